@@ -1,0 +1,44 @@
+// What an estimator answers. "Cannot tell" is an answer: a status other than ok, with its reason in plain words.
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace backlash_diagnosis {
+
+enum class Status {
+  ok,
+  below_range,        ///< the signal says less backlash than the method can resolve or the curve covers
+  above_range,        ///< more backlash than the curve covers
+  out_of_domain,      ///< the record was not taken under the conditions that the method or curve needs
+  insufficient_data,  ///< a channel, a curve or enough samples are missing
+  ambiguous,          ///< several backlash values explain the signal equally well
+};
+const char* to_string(Status status);
+Status status_from_string(const std::string& text);  ///< throws InvalidParameter
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Parts of the play between the two flanks, by estimators that can separate them. Angles at the motor_position axis.
+struct PlayComponents {
+  double gap = kNaN;         ///< rad, free play without elastic deflection
+  double compliance = kNaN;  ///< rad/(N m), elastic deflection per torque on one flank
+  double coulomb = kNaN;     ///< N m, half the width of the friction hysteresis
+  double at_torque = kNaN;   ///< N m, torque at which backlash_angle holds
+};
+
+/// An estimate of backlash. NaN where not known: `backlash` for a rig without base radius, all where status says so.
+struct Estimate {
+  std::string method;
+  Status status = Status::insufficient_data;
+  double backlash = kNaN;              ///< m, total free play along the line of action
+  double lower = kNaN, upper = kNaN;   ///< m, 95 % interval of backlash
+  double backlash_angle = kNaN;        ///< rad, the same as an angle on the axis of motor_position
+  double angle_lower = kNaN, angle_upper = kNaN;  ///< rad, 95 % interval of backlash_angle
+  double skewness = kNaN;              ///< of the class values of the APD, where the method uses it
+  std::optional<PlayComponents> components;
+  std::string message;                 ///< the reason of the status, or how the value came about
+};
+
+}  // namespace backlash_diagnosis

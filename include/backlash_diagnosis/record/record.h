@@ -1,0 +1,56 @@
+// What was measured: time series with a common time base, as columns. SI units, rotary (N m, rad) or, for a linear
+// axis, force and length (N, m).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace backlash_diagnosis {
+
+/// The channels a record may have. `motor_*` and `sensor_torque` are seen from the load side of the reduction
+/// (angle divided by the ratio, torque multiplied by it) unless the rig file says `motor_side: true`.
+enum class Channel {
+  motor_torque,        // N m, torque that the motor applies (a current in A is allowed where the rig file says so)
+  motor_position,      // rad
+  motor_velocity,      // rad/s
+  load_position,       // rad
+  load_velocity,       // rad/s
+  sensor_torque,       // N m, torque in the input coupling
+  reference_position,  // rad
+};
+constexpr std::size_t kChannelCount = 7;
+extern const std::array<Channel, kChannelCount> kChannels;
+
+/// Column name of a channel in a CSV, the same as its enumerator.
+const std::string& channel_name(Channel channel);
+
+/// Inverse of channel_name; throws InvalidParameter for a name that is no channel.
+Channel channel_from_name(const std::string& name);
+
+/// A record: `time` in seconds, strictly increasing, and one column of the same length per channel present.
+class Record {
+ public:
+  std::string name;                   ///< where it came from: file name or topic, for messages
+  std::vector<double> time;           ///< s
+  std::vector<std::string> warnings;  ///< what the reader saw and mended: repeated stamps dropped, gaps
+
+  std::size_t size() const { return time.size(); }
+  bool has(Channel channel) const { return !column(channel).empty(); }
+
+  /// Values of a channel; empty when the record does not have it.
+  const std::vector<double>& column(Channel channel) const { return columns_[static_cast<std::size_t>(channel)]; }
+  std::vector<double>& column(Channel channel) { return columns_[static_cast<std::size_t>(channel)]; }
+
+  /// Median distance between samples [s]; 0 with fewer than two samples.
+  double sampling_interval() const;
+
+  /// Samples with from <= time < to.
+  Record slice(double from, double to) const;
+
+ private:
+  std::array<std::vector<double>, kChannelCount> columns_;
+};
+
+}  // namespace backlash_diagnosis
