@@ -2,7 +2,7 @@
 
 #include <sstream>
 
-namespace backlash_diagnosis {
+namespace backlash {
 namespace {
 
 std::string to_text(double value) {
@@ -20,4 +20,4 @@ InvalidParameter::InvalidParameter(const std::string& name, const std::string& v
 InvalidParameter::InvalidParameter(const std::string& name, double value, const std::string& limit)
     : InvalidParameter(name, to_text(value), limit) {}
 
-}  // namespace backlash_diagnosis
+}  // namespace backlash

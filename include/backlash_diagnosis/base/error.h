@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace backlash_diagnosis {
+namespace backlash {
 
 /// Base of everything the core throws on purpose.
 class Error : public std::runtime_error {
@@ -57,4 +57,4 @@ class Cancelled : public Error {
   Cancelled() : Error("cancelled") {}
 };
 
-}  // namespace backlash_diagnosis
+}  // namespace backlash

@@ -5,10 +5,10 @@
 #include <functional>
 #include <string>
 
-namespace backlash_diagnosis {
+namespace backlash {
 
 /// Called now and then with the fraction done (0..1) and what is being worked on; returns false to cancel.
 /// May be called from worker threads, never from two at the same time.
 using Progress = std::function<bool(double fraction, const std::string& phase)>;
 
-}  // namespace backlash_diagnosis
+}  // namespace backlash

@@ -1,6 +1,8 @@
-// Strict reading of YAML configuration: every value is checked for presence, type and range, every key must be known.
-// Errors name the file, the line, the full key, the value and the limit, e.g.
+// Strict reading of YAML configuration: every value is checked for presence, type and range, every key must
+// be known. Errors name the file, the line, the full key, the value and the limit, e.g.
 //   rig.yaml:12: gear_train.motor.inertia = -1: must be > 0
+// Text in quotes is never a number or a boolean; a plain number may be read as text; a key without value
+// counts as present and is refused by every reader. Documents are bounded as base/yaml_tree.h says.
 #pragma once
 
 #include <memory>
@@ -8,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace backlash_diagnosis {
+namespace backlash {
 
 /// Valid range of a number; infinite where not given. Bounds belong to the range unless `open_*`.
 struct Range {
@@ -19,8 +21,8 @@ struct Range {
   static Range positive();      ///< > 0
   static Range not_negative();  ///< >= 0
   static Range between(double lower, double upper);
-  std::string text() const;  ///< "must be > 0"
-  bool contains(double value) const;
+  std::string text() const;           ///< "must be > 0"
+  bool contains(double value) const;  ///< false for NaN and infinities
 };
 
 /// One map of a YAML document. Copies refer to the same map and remember together which keys were read.
@@ -33,6 +35,7 @@ class YamlReader {
   YamlReader(const YamlReader&);
   YamlReader& operator=(const YamlReader&);
 
+  /// Whether the key is there; asking makes it known to finish().
   bool has(const std::string& key) const;
   bool is_text(const std::string& key) const;  ///< the value is a plain scalar, not a map or list
 
@@ -73,4 +76,4 @@ class YamlReader {
   std::shared_ptr<Impl> impl_;
 };
 
-}  // namespace backlash_diagnosis
+}  // namespace backlash

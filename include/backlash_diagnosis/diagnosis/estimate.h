@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace backlash_diagnosis {
+namespace backlash {
 
 enum class Status {
   ok,
@@ -41,4 +41,4 @@ struct Estimate {
   std::string message;                 ///< the reason of the status, or how the value came about
 };
 
-}  // namespace backlash_diagnosis
+}  // namespace backlash

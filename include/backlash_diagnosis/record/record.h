@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace backlash_diagnosis {
+namespace backlash {
 
 /// The channels a record may have. `motor_*` and `sensor_torque` are seen from the load side of the reduction
 /// (angle divided by the ratio, torque multiplied by it) unless the rig file says `motor_side: true`.
@@ -28,6 +28,9 @@ const std::string& channel_name(Channel channel);
 
 /// Inverse of channel_name; throws InvalidParameter for a name that is no channel.
 Channel channel_from_name(const std::string& name);
+
+/// One sample of all channels; NaN where there is none.
+using ChannelValues = std::array<double, kChannelCount>;
 
 /// A record: `time` in seconds, strictly increasing, and one column of the same length per channel present.
 class Record {
@@ -53,4 +56,4 @@ class Record {
   std::array<std::vector<double>, kChannelCount> columns_;
 };
 
-}  // namespace backlash_diagnosis
+}  // namespace backlash

@@ -1,0 +1,19 @@
+// Opening files for reading and writing them whole, with errors that name the file and the reason.
+#pragma once
+
+#include <fstream>
+#include <string>
+#include <string_view>
+
+namespace backlash {
+
+/// A binary input stream; throws MissingInput when the file does not exist, is a directory or cannot be
+/// opened.
+std::ifstream open_input(const std::string& path);
+
+/// Writes the file whole or not at all: into a temporary file beside it, then renamed, so that no reader ever
+/// sees half a file and an old one survives a full disk. A symbolic link stays and its target is replaced;
+/// devices and pipes are written directly. Throws CannotWrite and leaves nothing behind.
+void write_file(const std::string& path, std::string_view content);
+
+}  // namespace backlash

@@ -1,0 +1,8 @@
+#pragma once
+
+namespace backlash {
+
+/// Version of the package, as package.xml states it.
+const char* version();
+
+}  // namespace backlash

@@ -1,0 +1,51 @@
+// Backlash from the skewness of the APD, period by period, through a monitoring curve.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+#include "backlash_diagnosis/diagnosis/period_analyser.h"
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash {
+
+struct ApdSettings {
+  Channel signal = Channel::sensor_torque;
+  double period = 0;         // s; 0: found from the signal
+  int settling_periods = 0;  // windows discarded at the start of a record
+  ApdLayout layout;
+};
+
+/// The APDs of a record.
+struct ApdResult {
+  double period = 0;                   // s; 0 where none was found
+  std::vector<PeriodResult> periods;   // complete ones, after settling
+  int incomplete = 0;                  // windows left out because of gaps
+  double skewness = kNaN;              // mean over the periods
+  double noise = kNaN;                 // estimated from the signal; NaN with fewer than two periods
+  AmplitudeDistribution total{ApdLayout{2, 0, 1}};  // all periods together
+};
+
+/// Excitation period of a record [s]: of motor_torque where recorded, else of `signal`. 0 where there is none.
+double excitation_period(const Record& record, Channel signal);
+
+/// The whole excitation periods of a record after settling, by period and settling of `settings` (0 s: found from the
+/// signal). Nothing where there is no period, or not one whole period after settling.
+std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings);
+
+/// Throws InvalidParameter for a layout or period outside its range; a record without the signal gives no periods.
+ApdResult analyse_apd(const Record& record, const ApdSettings& settings);
+
+/// Why a record was not taken under the conditions of a curve; empty where it was. Compares sampling rate (2 %),
+/// excitation amplitude and shape (5 %, from motor_torque where recorded, else 25 % on the signal's own level),
+/// frequency (2 %), saturation, and whether the output moves although it should be locked.
+std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                          const MonitoringCurve& curve);
+
+/// The estimate, or a status with its reason. `curve` may be null: then insufficient_data says so.
+Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                               const MonitoringCurve* curve);
+
+}  // namespace backlash

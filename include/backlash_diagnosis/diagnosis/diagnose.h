@@ -1,0 +1,42 @@
+// All estimators on one record. The live node and the offline command call this and give the same numbers.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/apd_skewness.h"
+#include "backlash_diagnosis/diagnosis/lost_motion.h"
+#include "backlash_diagnosis/diagnosis/verdict.h"
+
+namespace backlash {
+
+/// What a rig file says under `diagnosis`. An absent part means that its estimator cannot be served.
+struct DiagnosisSettings {
+  std::optional<ApdSettings> apd;
+  std::optional<LostMotionSettings> lost_motion;
+  std::optional<Limits> limits;
+};
+
+DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml);
+
+struct Diagnosis {
+  std::vector<Estimate> estimates;  // one per method of diagnosis_methods(), in that order, or the one asked for
+  std::optional<ApdResult> apd;
+  Verdict verdict;
+};
+
+/// Names of all estimators.
+const std::vector<std::string>& diagnosis_methods();
+
+/// Runs the estimators (`method` empty: all) on the whole excitation periods of a record after settling, or on all of it
+/// where the rig declares no APD. Throws InvalidParameter for an unknown method; everything that the record lacks becomes
+/// a status with its reason.
+Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
+                   const std::optional<Baseline>& baseline = std::nullopt, const std::string& method = "");
+
+/// The same for a record that was cut already, as a SampleStream does; `settings` without settling.
+Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
+                           const std::optional<Baseline>& baseline = std::nullopt, const std::string& method = "");
+DiagnosisSettings without_settling(DiagnosisSettings settings);
+
+}  // namespace backlash

@@ -1,0 +1,32 @@
+// Statistics that few wrong values cannot spoil.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace backlash {
+
+/// Median; the mean of the two middle values for an even number. NaN for an empty list.
+double median(std::vector<double> values);
+
+/// Value below which `fraction` [0, 1] of the values lie (nearest rank). NaN for an empty list.
+double quantile(std::vector<double> values, double fraction);
+
+/// Location and scale of values of which a minority may be wrong.
+struct RobustScale {
+  double centre = 0;     ///< median
+  double deviation = 0;  ///< standard deviation about the median, residuals clipped at `clip`
+  double clip =
+      0;  ///< 3.5 times the median absolute deviation scaled to a normal standard deviation, plus floor
+  std::size_t outliers = 0;  ///< values farther than `clip` from the median
+};
+
+/// `floor` [unit of the values, >= 0] is the smallest difference that may count as one.
+RobustScale robust_scale(const std::vector<double>& values, double floor);
+
+/// 97.5 % quantile of Student's t with `degrees` >= 1 degrees of freedom: half width of a 95 % interval in
+/// standard errors. Tabulated to 4, beyond that the expansion of Fisher and Cornish (1960) to the third
+/// order, error < 0.3 %.
+double student_t_975(std::size_t degrees);
+
+}  // namespace backlash

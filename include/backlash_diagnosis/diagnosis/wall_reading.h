@@ -1,0 +1,49 @@
+// Where the motor comes to lie at the two walls of the play, excursion by excursion of the torque.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace backlash {
+
+/// Torque [N m] and motor position [rad] over time [s], same length, finite values only.
+struct LockedMotion {
+  std::vector<double> time, torque, position;
+};
+
+/// Samples [begin, end) in which side * torque exceeds a level.
+struct TorqueExcursion {
+  int side = 1;  ///< +1 or -1
+  std::size_t begin = 0, end = 0;
+};
+
+/// Standard deviation of the torque noise [N m], from the second differences of the samples (median of the
+/// absolute values, so that ramps, switches and slips do not count). 0 with fewer than three samples.
+double torque_noise(const std::vector<double>& torque);
+
+/// Excursions above `level` [N m, > 0], one per half cycle (half cycles end where torque passes -level/2 of
+/// the other side), without those that noise alone can make and without the last one if torque has not come
+/// back by then.
+std::vector<TorqueExcursion> find_excursions(const std::vector<double>& torque, double level);
+
+/// What one excursion tells about its wall. Positions in rad, not multiplied by side.
+struct WallReading {
+  int side = 1;
+  double time = 0;           ///< s, middle of the window
+  double torque = 0;         ///< N m, mean of side * torque over the window
+  double torque_change = 0;  ///< N m, size of the change of torque over the last third of the excursion
+  double position = 0;       ///< Hann-weighted mean over the window
+  double spread = 0;         ///< standard deviation over the window
+  double earlier_position = 0, earlier_spread = 0;  ///< the same, half a window earlier
+  double ringing =
+      0;  ///< rms about a straight line from the window's begin until torque falls below half the level
+};
+
+/// Reads the wall of one excursion. The window is the last third of the excursion, shortened so that torque
+/// changes by at most `torque_span` [N m, > 0] within it, never below four samples where the excursion has
+/// them. `level` is the one that the excursion was found with, `limit` the first sample of the next excursion
+/// (or the number of samples).
+WallReading read_wall(const LockedMotion& motion, const TorqueExcursion& excursion, double level,
+                      double torque_span, std::size_t limit);
+
+}  // namespace backlash

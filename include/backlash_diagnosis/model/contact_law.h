@@ -1,0 +1,47 @@
+// The force between two teeth that touch.
+//
+// A new law: one file in src/model/contact/ with its equation, and one line in contact_law.cpp.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/parameter.h"
+
+namespace backlash {
+
+/// Contact force along the common normal as a function of penetration d [m] and its rate d' [m/s], d > 0 where the
+/// flanks overlap, d' > 0 while they approach. Force > 0 pushes the flanks apart [N].
+/// A rig without base radius uses the same laws with angles: d [rad], d' [rad/s], force [N m].
+class ContactLaw {
+ public:
+  virtual ~ContactLaw() = default;
+
+  /// Force at penetration d > 0; callers handle d <= 0 (no contact, no force).
+  virtual double force(double penetration, double rate) const = 0;
+
+  /// Elastic energy at penetration d >= 0: the integral of the force at rest [J].
+  virtual double elastic_energy(double penetration) const = 0;
+
+  /// Penetration at rest under a force >= 0: the inverse of force(d, 0) [m].
+  virtual double static_penetration(double force) const = 0;
+};
+
+/// What the registry knows of a law.
+struct ContactLawType {
+  std::string name;
+  std::vector<ParameterSpec> parameters;
+  std::unique_ptr<ContactLaw> (*create)(const ParameterValues&);
+};
+
+/// All laws, by the name that a rig file uses.
+const std::vector<ContactLawType>& contact_laws();
+
+/// Reads `law: NAME` and that law's parameters.
+std::shared_ptr<const ContactLaw> read_contact_law(const YamlReader& yaml);
+
+/// Creates a law by name; throws InvalidParameter for an unknown name or a value outside its range.
+std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, const ParameterValues& values);
+
+}  // namespace backlash

@@ -1,0 +1,78 @@
+// Equations of motion of one gear train, in absolute angles at the load side of the reduction.
+//
+//   J_M a_M = tau_M - c_M w_M - T_I            T_I = k_I (q_M - q_P) + c_I (w_M - w_P)
+//   J_P a_P = T_I - r F                        x   = r (q_P - q_G), contact where |x| > backlash / 2
+//   J_G a_G = r F - T_O                        F   = contact law, sign of x
+//   J_L a_L = T_O - c_L w_L + terms            T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
+//
+// Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its neighbours one
+// body; a locked link has q_L = 0. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute
+// instead of relative coordinates.
+#pragma once
+
+#include <array>
+
+#include "backlash_diagnosis/model/rig.h"
+
+namespace backlash {
+
+/// What can be seen of a gear train at one moment, in the units of its records (see Rig::motor_side).
+struct Observation {
+  double motor_torque, motor_position, motor_velocity;
+  double sensor_torque;   // N m, spring torque of the input coupling (an ideal strain gauge); NaN if rigid
+  double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
+  double load_position, load_velocity;
+  double load_torque;     // N m, spring torque of the output coupling; NaN if rigid
+};
+
+class GearTrain {
+ public:
+  /// Throws InvalidParameter where the rig has no moving part or a massless one.
+  explicit GearTrain(const Rig& rig);
+
+  /// Degrees of freedom, 1 to 4. A state has 2 * dof numbers: first the angles [rad], then the speeds [rad/s].
+  int dof() const { return dof_; }
+  static constexpr int kMaxStates = 8;
+
+  /// dstate/dt at time t [s] for a motor torque in the units of the rig's records [N m].
+  void derivative(double t, const double* state, double motor_torque, double* rate) const;
+
+  Observation observe(const double* state, double motor_torque) const;
+
+  /// Kinetic plus elastic energy (couplings, contact) [J], without terms.
+  double energy(const double* state) const;
+
+  /// Power that the dampers of motor, couplings and link take out [W]; contact damping is not among them.
+  double damping_power(const double* state) const;
+
+  /// Twist between motor and link under a static torque in one contact, without the gap. Torque and angle in the
+  /// units of motor_torque and motor_position; odd in torque.
+  double elastic_deflection(double motor_torque) const;
+
+  /// Total free play [m] (angular mesh: [rad] at the load side), >= 0; takes effect at the next derivative().
+  void set_backlash(double backlash);
+  double backlash() const { return 2 * half_gap_; }
+
+ private:
+  enum Slot { kMotor, kPinion, kGear, kLink, kSlots };
+  struct Slots {
+    double q[kSlots], w[kSlots];
+  };
+
+  Slots unpack(const double* state) const;
+  double contact_force(const Slots& s) const;
+  void join(const Rig& rig);
+
+  double ratio_;  // load-side torque per torque of the records: Rig::motor_axis_ratio()
+  int dof_ = 0;
+  std::array<int, kSlots> node_{};        // which degree of freedom a part moves with; kFixed if none
+  std::array<double, kSlots> inertia_{};  // per degree of freedom, kg m^2
+  std::array<double, kSlots> damping_;  // per part, N m s/rad
+  Coupling input_, output_;  // referred to the load side
+  double half_gap_, lever_;
+  std::shared_ptr<const ContactLaw> contact_;
+  std::vector<std::shared_ptr<const Term>> terms_;
+  static constexpr int kFixed = -1;
+};
+
+}  // namespace backlash

@@ -1,0 +1,70 @@
+// What the machine is: the declared parameters of one gear train, as its rig file gives them.
+//
+//   motor - [input coupling = torque sensor] - pinion | mesh | gear - [output coupling] - link
+//
+// Couplings in brackets may be rigid, then their neighbours move as one. The link is free or locked.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/model/contact_law.h"
+#include "backlash_diagnosis/model/term.h"
+
+namespace backlash {
+
+/// A rotating part.
+struct Body {
+  double inertia = 0;          // kg m^2
+  double viscous_damping = 0;  // N m s/rad, against the frame
+};
+
+/// A flexible shaft or torque sensor; half of its inertia moves with either end.
+struct Coupling {
+  bool rigid = true;
+  double stiffness = 0;  // N m/rad
+  double damping = 0;    // N m s/rad
+  double inertia = 0;    // kg m^2
+};
+
+/// Tooth contact. `backlash` is the total free play along the line of action [m]; for a rig without base radius it is
+/// the angle at the load side [rad] and the contact law works with angles and torques.
+struct Mesh {
+  double backlash = 0;
+  double base_radius = std::numeric_limits<double>::quiet_NaN();  // m, of the load gear; NaN: angular mesh
+  std::shared_ptr<const ContactLaw> contact;
+
+  bool angular() const { return std::isnan(base_radius); }
+  double lever() const { return angular() ? 1 : base_radius; }  // m (or 1): torque per contact force
+};
+
+/// A validated rig. Motor, input coupling and pinion are given as seen from the load side of the reduction unless
+/// `motor_side` is true; then they, and motor_torque, motor_position and sensor_torque of its records, are those of
+/// the motor shaft.
+struct Rig {
+  std::string name;
+  std::string joint;           // prefix of its names in sensor_msgs/JointState
+  double reduction_ratio = 1;  // motor turns per load turn, > 0
+  bool motor_side = false;
+  Body motor, pinion, gear, link;
+  Coupling input_coupling, output_coupling;
+  bool link_locked = false;
+  Mesh mesh;
+  std::vector<std::shared_ptr<const Term>> terms;
+
+  /// Load-side angle (or torque, divided) to the axis of motor_position: reduction ratio or 1.
+  double motor_axis_ratio() const { return motor_side ? reduction_ratio : 1; }
+
+  /// Backlash along the line of action [m] (or load-side angle [rad] for an angular mesh) to the angle on the axis of
+  /// motor_position [rad].
+  double backlash_angle(double backlash) const { return backlash / mesh.lever() * motor_axis_ratio(); }
+};
+
+/// Reads the machine's part of a rig file (`name`, `joint`, `gear_train`, `terms`). Throws BadData naming file, line,
+/// key, value and limit.
+Rig read_rig(const YamlReader& yaml);
+
+}  // namespace backlash

@@ -1,0 +1,72 @@
+// The node `diagnoser`: joint_states in, distributions, estimates and answers out.
+#pragma once
+
+#include <actionlib/server/simple_action_server.h>
+#include <backlash_diagnosis/BuildCurveAction.h>
+#include <backlash_diagnosis/Diagnose.h>
+#include <backlash_diagnosis/GetCurve.h>
+#include <backlash_diagnosis/SetBaseline.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/ros/joint_monitor.h"
+
+namespace backlash {
+
+/// Parameters of the node, validated.
+struct DiagnoserSettings {
+  std::vector<MonitorSettings> joints;
+  int queue = 20000;      // messages waiting at most
+  double stale = 2;       // s of wall time without a message before /diagnostics says so
+};
+
+/// Throws InvalidParameter, BadData, MissingInput.
+DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle);
+
+/// Text for --help: parameters, topics, services.
+const char* diagnoser_help();
+
+class DiagnoserNode {
+ public:
+  DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle, DiagnoserSettings settings);
+  ~DiagnoserNode();
+
+  /// Serves until ROS shuts down.
+  void run();
+
+ private:
+  using CurveServer = actionlib::SimpleActionServer<backlash_diagnosis::BuildCurveAction>;
+
+  void on_joint_state(const sensor_msgs::JointState::ConstPtr& message);
+  void publish(const JointMonitor& monitor, const PeriodReport& report);
+  bool on_diagnose(backlash_diagnosis::Diagnose::Request& request, backlash_diagnosis::Diagnose::Response& response);
+  bool on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
+                       backlash_diagnosis::SetBaseline::Response& response);
+  bool on_get_curve(backlash_diagnosis::GetCurve::Request& request, backlash_diagnosis::GetCurve::Response& response);
+  void on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal);
+  void advertise();
+  void add_diagnostics();
+  void report_backlash(JointMonitor& monitor, diagnostic_updater::DiagnosticStatusWrapper& status) const;
+  void report_input(JointMonitor& monitor, diagnostic_updater::DiagnosticStatusWrapper& status) const;
+
+  /// The monitor of a joint; with an empty name the only one. Null with the reason in `why`.
+  JointMonitor* find(const std::string& joint, std::string& why);
+
+  ros::NodeHandle handle_, private_handle_;
+  double stale_;
+  std::vector<std::unique_ptr<JointMonitor>> monitors_;
+  std::string topic_;
+  ros::CallbackQueue sample_queue_;  // samples have a thread of their own, services never hold them up
+  ros::Subscriber subscriber_;
+  ros::Publisher distributions_, estimates_;
+  std::vector<ros::ServiceServer> services_;
+  std::unique_ptr<CurveServer> curve_server_;
+  diagnostic_updater::Updater updater_;
+};
+
+}  // namespace backlash

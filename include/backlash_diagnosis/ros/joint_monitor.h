@@ -1,0 +1,95 @@
+// One joint as the diagnoser sees it: its samples, its curve, its baseline, its latest diagnosis. Thread-safe: the
+// subscriber feeds it from one thread while services ask from others.
+#pragma once
+
+#include <sensor_msgs/JointState.h>
+
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "backlash_diagnosis/diagnosis/sample_stream.h"
+#include "backlash_diagnosis/ros/joint_state.h"
+#include "backlash_diagnosis/workflow/curve_builder.h"
+
+namespace backlash {
+
+struct MonitorSettings {
+  std::string joint;
+  RigFile rig;
+  std::optional<MonitoringCurve> curve;  // absent: built from the rig at the sampling rate of the messages
+  int window = 5;                        // periods that the running estimates look back
+  double keep = 60;                      // s of samples kept
+};
+
+/// What the outside hears of a completed period.
+struct PeriodReport {
+  std::optional<PeriodResult> period;  // absent for a rig without APD
+  Diagnosis diagnosis;                 // over the last `window` periods
+  double period_length = 0;            // s
+  ros::Time stamp;                     // of the last sample
+};
+
+struct MonitorState {
+  StreamCounters counters;
+  long bad_messages = 0;          // wrong array sizes, infinite values, names twice
+  std::string last_problem;
+  std::string curve_state;        // "loaded", "building, 40 %", "built", "none: ..."
+  double rate = 0;                // Hz, of the samples kept
+  double period = 0;              // s
+  long periods = 0;               // whole settled ones at hand
+  bool any_sample = false;
+  ros::WallTime last_arrival;
+  std::optional<Diagnosis> latest;
+};
+
+class JointMonitor {
+ public:
+  explicit JointMonitor(MonitorSettings settings);
+  ~JointMonitor();
+
+  const std::string& joint() const { return settings_.joint; }
+  const RigFile& rig() const { return settings_.rig; }
+
+  /// Takes a message that mentions the joint; a report when it completes a period. Never throws for bad content: that is
+  /// counted and told by state().
+  std::optional<PeriodReport> take(const sensor_msgs::JointState& message, const std::string& topic);
+
+  /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s] of wall time,
+  /// then diagnoses the latest `periods` (0: all kept).
+  Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
+
+  void set_baseline(const std::optional<Baseline>& baseline);
+  void set_curve(MonitoringCurve curve);
+  std::shared_ptr<const MonitoringCurve> curve() const;
+  MonitorState state() const;
+
+ private:
+  void start_building(double rate);
+  void build(double rate);
+  std::optional<PeriodReport> report(const PeriodResult* period);
+  long wanted_periods(long periods) const { return periods > 0 ? periods : 1; }
+
+  MonitorSettings settings_;
+  DiagnosisSettings diagnosis_settings_;  // without settling: the stream cuts
+  JointNames names_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  StampClock clock_;
+  SampleStream stream_;
+  long reported_periods_ = 0;
+  std::shared_ptr<const MonitoringCurve> curve_;
+  std::optional<Baseline> baseline_;
+  std::optional<Diagnosis> latest_;
+  std::string curve_state_, last_problem_;
+  long bad_messages_ = 0;
+  ros::WallTime last_arrival_;
+  bool building_ = false, build_tried_ = false, stop_ = false;
+  std::thread builder_;
+};
+
+}  // namespace backlash

@@ -1,0 +1,22 @@
+// Results of the core as messages. Core types live in namespace backlash, generated messages in backlash_diagnosis.
+#pragma once
+
+#include <backlash_diagnosis/AmplitudeDistribution.h>
+#include <backlash_diagnosis/BacklashEstimate.h>
+#include <backlash_diagnosis/MonitoringCurve.h>
+#include <backlash_diagnosis/Verdict.h>
+
+#include "backlash_diagnosis/diagnosis/diagnose.h"
+
+namespace backlash {
+
+/// One period.
+backlash_diagnosis::AmplitudeDistribution to_message(const PeriodResult& period, const ApdSettings& settings,
+                                                     double period_length);
+/// All periods of an analysis together; skewness is the mean over the periods.
+backlash_diagnosis::AmplitudeDistribution to_message(const ApdResult& apd, const ApdSettings& settings);
+backlash_diagnosis::BacklashEstimate to_message(const Estimate& estimate);
+backlash_diagnosis::Verdict to_message(const Verdict& verdict);
+backlash_diagnosis::MonitoringCurve to_message(const MonitoringCurve& curve);
+
+}  // namespace backlash

@@ -1,0 +1,29 @@
+// What the simulator node is told by its private parameters.
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <string>
+
+#include "backlash_diagnosis/workflow/rig_file.h"
+
+namespace backlash {
+
+struct SimulatorSettings {
+  RigFile file;             // with the parameters that override it applied to `rig` and `simulation`
+  std::string description;  // the rig file's text after a comment line: its source and what overrides it
+  double real_time_factor;  // simulated per wall time; 0: as fast as possible
+  long samples;             // to publish before the node ends; 0: endless
+  bool publish_clock;
+  bool wait_for_subscriber;
+  double diagnostic_period;  // s, wall time
+};
+
+/// Reads and checks all private parameters of the node; simulator_help() lists them. Throws InvalidParameter,
+/// MissingInput or BadData with a message that names the parameter.
+SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle);
+
+/// The node's parameters, topics and services for `--help`.
+const char* simulator_help();
+
+}  // namespace backlash

@@ -1,0 +1,65 @@
+// Motor torque as a function of time, smooth between switching times that are known exactly.
+//
+// Time is cut into segments 0, 1, 2, ... at the switching times. Inside a segment the torque is a smooth function; at a
+// switching time both neighbours are defined, so an integrator that stops there never sees the wrong side of a jump.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/yaml_reader.h"
+
+namespace backlash {
+
+class Excitation {
+ public:
+  virtual ~Excitation() = default;
+
+  /// Torque [N m] at time t [s] by the formula of a segment.
+  virtual double torque(double t, long segment) const = 0;
+
+  /// End of a segment [s]; infinite where the torque never jumps again.
+  virtual double segment_end(long segment) const = 0;
+
+  /// Repetition time [s]; 0 where the torque does not repeat.
+  virtual double period() const { return 0; }
+
+  /// Torque set from outside [N m], held until the next call. Refused (false) by all but the `topic` excitation.
+  virtual bool set_torque(double) { return false; }
+};
+
+/// One line of a multi-sine.
+struct SineLine {
+  double amplitude;  // N m
+  double frequency;  // Hz
+  double phase;      // rad
+};
+
+std::unique_ptr<Excitation> constant_excitation(double torque);
+/// +amplitude for the first half of each period, -amplitude for the second, plus bias.
+std::unique_ptr<Excitation> square_excitation(double amplitude, double frequency, double bias = 0);
+std::unique_ptr<Excitation> sine_excitation(double amplitude, double frequency, double bias = 0);
+/// Sine whose frequency rises linearly from `start` to `end` [Hz] within `duration` [s], then starts again.
+std::unique_ptr<Excitation> chirp_excitation(double amplitude, double start, double end, double duration,
+                                             double bias = 0);
+/// Sum of sines; its period is the inverse of the greatest common divisor of the frequencies (to 1 mHz).
+std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, double bias = 0);
+/// Zero until set_torque() is called.
+std::unique_ptr<Excitation> external_excitation();
+
+/// What a rig file says under `excitation`; a recipe, so that copies of it can run side by side.
+struct ExcitationSettings {
+  std::string type = "square";  // square, sine, chirp, multi_sine, constant, topic
+  double amplitude = 0;         // N m; the torque itself for `constant`
+  double frequency = 0;         // Hz, square and sine
+  double bias = 0;              // N m
+  double start_frequency = 0, end_frequency = 0, duration = 0;  // Hz, Hz, s: chirp
+  std::vector<SineLine> lines;                                  // multi_sine
+
+  std::unique_ptr<Excitation> create() const;
+};
+
+ExcitationSettings read_excitation(const YamlReader& yaml);
+
+}  // namespace backlash

@@ -1,0 +1,58 @@
+// Initial value problems by SUNDIALS, whose types stay inside the .cpp.
+//
+// Explicit Runge-Kutta (ARKODE) is the default: a geared joint with play is a sequence of short impacts, which an
+// explicit pair with error control follows with fewer evaluations than a multistep method, whose history each impact
+// makes worthless. Sarkar, Ellis and Moore (1997, Section 6.3) found BDF wrong for the contact and Verner's pair right.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/yaml_reader.h"
+
+namespace backlash {
+
+struct SolverSettings {
+  std::string method = "dormand_prince";  // one of integrator_methods()
+  double relative_tolerance = 1e-6;       // -
+  double position_tolerance = 1e-10;      // absolute, rad
+  double velocity_tolerance = 1e-7;       // absolute, rad/s
+};
+
+/// ARKODE explicit pairs: bogacki_shampine, cash_karp, dormand_prince, verner (6(5), the pair of DVERK), fehlberg;
+/// CVODE: bdf, adams.
+const std::vector<std::string>& integrator_methods();
+
+SolverSettings read_solver(const YamlReader& yaml);
+
+struct IntegratorStatistics {
+  long steps = 0, evaluations = 0, error_test_failures = 0;
+};
+
+class Integrator {
+ public:
+  using Derivative = std::function<void(double t, const double* state, double* rate)>;
+
+  /// `absolute_tolerances` has one entry per state. Throws InvalidParameter for an unknown method or a tolerance <= 0.
+  Integrator(Derivative derivative, std::vector<double> absolute_tolerances, const SolverSettings& settings);
+  ~Integrator();
+  Integrator(Integrator&&) noexcept;
+  Integrator& operator=(Integrator&&) noexcept;
+
+  /// Starts anew from `state` at `t`, forgetting step size and history. `stop` is a time beyond which the derivative
+  /// is not evaluated (infinite: none): the next jump of the right-hand side.
+  void restart(double t, const double* state, double stop);
+
+  /// State at `t`: not before the last returned time, not beyond the stop time. Throws IntegrationError.
+  void integrate_to(double t, double* state);
+
+  IntegratorStatistics statistics() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace backlash

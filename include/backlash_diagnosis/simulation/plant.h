@@ -1,0 +1,54 @@
+// A gear train in motion: excitation, equations of motion and integrator, without sensors.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/simulation/excitation.h"
+#include "backlash_diagnosis/simulation/integrator.h"
+
+namespace backlash {
+
+class Plant {
+ public:
+  using State = std::array<double, GearTrain::kMaxStates>;
+
+  Plant(const Rig& rig, const ExcitationSettings& excitation, const SolverSettings& solver);
+  Plant(const Plant&) = delete;  // the integrator refers to this object
+  Plant& operator=(const Plant&) = delete;
+
+  /// Back to time 0 at rest in the middle of the gap, no external torque.
+  void reset();
+
+  /// Integrates up to t [s], t >= time(). Stops and starts again at every switch of the excitation on the way.
+  /// Throws IntegrationError.
+  void advance_to(double t);
+
+  /// Changes that act from time() on; the integrator starts again there.
+  void set_backlash(double backlash);  // m (angular mesh: rad), total free play
+  bool set_torque(double torque);      // N m; false unless the excitation is `topic`
+  void set_state(const State& state);
+
+  double time() const { return time_; }
+  const State& state() const { return state_; }
+  const GearTrain& gear_train() const { return gear_train_; }
+  double excitation_period() const { return excitation_->period(); }
+  double motor_torque() const { return excitation_->torque(time_, segment_); }
+  Observation observe() const { return gear_train_.observe(state_.data(), motor_torque()); }
+  IntegratorStatistics statistics() const { return integrator_.statistics(); }
+
+ private:
+  void restart();
+
+  GearTrain gear_train_;
+  ExcitationSettings excitation_settings_;
+  std::unique_ptr<Excitation> excitation_;
+  Integrator integrator_;
+  State state_{};
+  double time_ = 0;
+  long segment_ = 0;
+  double initial_backlash_;
+};
+
+}  // namespace backlash

@@ -1,0 +1,55 @@
+// From exact to measured values: offset, noise, saturation, quantisation.
+//
+//   measured = round(clamp(exact + offset + noise, -limit, limit) / resolution) * resolution
+//
+// Each channel draws from a generator of its own, so that a sensor added or removed leaves the others' noise unchanged.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <random>
+
+#include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash {
+
+struct SensorSettings {
+  double noise = 0;       // standard deviation, white Gaussian, unit of the channel
+  double resolution = 0;  // width of a step; 0: none
+  double offset = 0;
+  double limit = std::numeric_limits<double>::infinity();  // saturation at +-limit
+};
+
+/// All sensors of a rig, and how they sample.
+struct SensorsSettings {
+  double sampling_rate = 1000;  // Hz
+  std::uint64_t seed = 1;
+  std::array<SensorSettings, kChannelCount> channels;  // indexed by Channel
+
+  const SensorSettings& of(Channel channel) const { return channels[static_cast<std::size_t>(channel)]; }
+  SensorSettings& of(Channel channel) { return channels[static_cast<std::size_t>(channel)]; }
+};
+
+SensorsSettings read_sensors(const YamlReader& yaml);
+
+class SensorModel {
+ public:
+  explicit SensorModel(const SensorsSettings& settings);
+
+  /// Starts the noise again from the seed.
+  void reset();
+
+  double measure(Channel channel, double exact);
+
+  /// Every value of an observation through its sensor; a NaN (no such sensor) stays NaN.
+  Observation measure(const Observation& exact);
+
+ private:
+  SensorsSettings settings_;
+  std::array<std::mt19937_64, kChannelCount> generators_;
+  std::array<std::normal_distribution<double>, kChannelCount> normal_;
+};
+
+}  // namespace backlash

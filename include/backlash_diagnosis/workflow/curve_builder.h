@@ -1,0 +1,27 @@
+// Builds a monitoring curve: simulates the rig over a grid of backlash values, with several sensor noise seeds and
+// sampling phases at each, and stores mean and scatter of the skewness.
+//
+// The motion is simulated once per backlash value, finer than the sampling; each seed then samples it at another phase
+// between two samples (a recorder does not know where between its samples the excitation switches) and adds its own
+// sensor noise. The same is done at several noise levels, so that a record can be compared with the curve at the noise that it has.
+#pragma once
+
+#include "backlash_diagnosis/base/progress.h"
+#include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+#include "backlash_diagnosis/workflow/rig_file.h"
+
+namespace backlash {
+
+struct CurveRequest {
+  int points = 41;             // >= 2
+  double max_backlash = 2e-4;  // m (angular mesh: rad), total free play, > 0
+  double sampling_rate = 0;    // Hz; 0: the rig file's
+  int periods = 10;            // per seed, after settling
+  int seeds = 8;
+};
+
+/// Throws InvalidParameter (also where the rig declares no APD or an excitation without period), IntegrationError,
+/// Cancelled. Uses all processors; the result does not depend on their number.
+MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, const Progress& progress = nullptr);
+
+}  // namespace backlash

@@ -1,0 +1,76 @@
+# Shell functions that the scripts share; to be sourced: source "$(dirname "$0")/common.sh"
+# Afterwards: REPO (this repository) and WS (the catkin workspace that the scripts build in).
+
+REPO=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
+# Hidden and below build: rosrun and roslaunch search the package's folder for executables, but not there.
+WS=${BACKLASH_DIAGNOSIS_WS:-${REPO}/build/.ws}
+PACKAGE=backlash_diagnosis
+
+# Debian's python3 sees the ROS modules; another one (pyenv, conda) does not.
+export PATH=/usr/bin:/bin:/usr/sbin:/sbin:${PATH}
+unset PYTHONPATH PYTHONHOME
+# Debian's ROS lives in /usr and needs no entry here; other workspaces of the caller must not leak in.
+unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH
+
+# fail MESSAGE: ends the script.
+fail() {
+  echo "$(basename "$0"): $1" >&2
+  exit 1
+}
+
+# quietly NAME COMMAND...: runs it with the output in ${WS}/log/NAME.log; shows its last lines if it fails.
+quietly() {
+  local log=${WS}/log/$1.log
+  shift
+  mkdir -p "${WS}/log"
+  "$@" >"${log}" 2>&1 </dev/null && return 0
+  tail -n 40 "${log}" >&2
+  echo "$(basename "$0"): failed: $* (all of it in ${log})" >&2
+  return 1
+}
+
+install_dependencies() {
+  bash "${REPO}/scripts/install_dependencies.sh"
+}
+
+# Creates the workspace ${WS} with this repository as its only package. The package is a folder of links, one per
+# entry of the repository, not a link to the repository: that may hold the workspace, and searches would go round.
+make_workspace() {
+  mkdir -p "${WS}/src" || fail "cannot create the workspace ${WS}"
+  WS=$(cd "${WS}" && pwd -P)
+  touch "${WS}/CATKIN_IGNORE"  # for a search that starts above the workspace
+  local folder=${WS}/src/${PACKAGE} entry
+  [[ ! -L ${folder} ]] || rm "${folder}"
+  mkdir -p "${folder}"
+  find -L "${folder}" -maxdepth 1 -type l -delete  # links to entries that are gone
+  for entry in "${REPO}"/*; do
+    case ${entry##*/} in build | devel | install) continue ;; esac
+    [[ ${folder}/${entry##*/} -ef ${entry} ]] || ln -sfn "${entry}" "${folder}/"
+  done
+  # CMake refuses a build folder that was made elsewhere (a copied or moved repository).
+  local cache=${WS}/build/CMakeCache.txt
+  if [[ -e ${cache} ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=${WS}/src" "${cache}"; then
+    rm -rf "${WS}/build" "${WS}/devel" "${WS}/install"
+  fi
+}
+
+# build [TARGET...]: catkin_make in the workspace, quiet unless it fails.
+build() {
+  make_workspace
+  (
+    flock 9  # demo.sh and test.sh may run at the same time
+    quietly "build${1:+_$1}" catkin_make --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 "-j$(nproc)" \
+      "$@" 9>&-
+  ) 9>"${WS}/lock"
+}
+
+# Makes rosrun, roslaunch and rostest find the package, and keeps everything on this machine.
+use_workspace() {
+  local nounset=$-
+  set +u  # the generated file reads unset variables
+  # shellcheck disable=SC1091
+  source "${WS}/devel/setup.bash"
+  [[ ${nounset} != *u* ]] || set -u
+  export ROS_HOSTNAME=localhost ROS_HOME=${WS}/ros_home ROS_MASTER_URI=${ROS_MASTER_URI:-http://localhost:11311}
+  unset ROS_IP
+}

@@ -1,0 +1,47 @@
+#!/bin/bash
+# Installs what the package needs from Debian 12 and is not there yet; without anything missing it only looks.
+# Debian packages ROS 1 itself, so no foreign archive is needed. Run as root or with sudo.
+set -euo pipefail
+
+# One line per purpose.
+packages=(
+  build-essential cmake                                           # compiler and build
+  catkin catkin-lint ros-core-dev                                 # ROS 1: build system, roscpp, rosbag, messages
+  libactionlib-dev libdiagnostic-updater-dev                      # ROS 1 libraries outside the core
+  rosbash python3-rostest librostest-dev                          # rosrun, rostest
+  python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
+  libboost-program-options-dev libeigen3-dev libyaml-cpp-dev nlohmann-json3-dev
+  libsundials-dev                                                 # has no rosdep key, hence not in package.xml
+  libgtest-dev
+  python3-matplotlib python3-numpy python3-yaml                   # plots
+)
+
+missing=()
+installed=" $(dpkg-query --show --showformat '${Package}=${db:Status-Status} ' "${packages[@]}" 2>/dev/null || true)"
+for package in "${packages[@]}"; do
+  [[ ${installed} == *" ${package}=installed "* ]] || missing+=("${package}")
+done
+((${#missing[@]})) || exit 0
+
+as_root=()
+if ((EUID != 0)); then
+  if ! command -v sudo >/dev/null; then
+    echo "install_dependencies: these packages are missing: ${missing[*]}" >&2
+    echo "install_dependencies: run this script as root, or install sudo" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+echo "Installing ${#missing[@]} Debian packages and what they need: ${missing[*]}"
+log=$(mktemp)
+trap 'rm -f "${log}"' EXIT
+apt() {
+  if ! "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -y "$@" </dev/null >"${log}" 2>&1; then
+    tail -n 40 "${log}" >&2
+    echo "install_dependencies: apt-get $1 failed (see above); needed are: ${missing[*]}" >&2
+    exit 1
+  fi
+}
+apt update
+apt install --no-install-recommends "${missing[@]}"

@@ -1,0 +1,7 @@
+#include "backlash_diagnosis/base/version.h"
+
+namespace backlash {
+
+const char* version() { return BACKLASH_DIAGNOSIS_VERSION; }
+
+}  // namespace backlash

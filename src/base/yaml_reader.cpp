@@ -1,0 +1,333 @@
+#include "backlash_diagnosis/base/yaml_reader.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/base/yaml_tree.h"
+
+namespace backlash {
+namespace {
+
+using Kind = YamlNode::Kind;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::string shown(const YamlNode& node) {
+  switch (node.kind) {
+    case Kind::null:
+      return "null";
+    case Kind::plain:
+      return printable(node.scalar);
+    case Kind::quoted:
+      return "'" + printable(node.scalar) + "'";
+    case Kind::list:
+      return "[...]";
+    case Kind::map:
+      return "{...}";
+  }
+  return "";
+}
+
+// Why the node is not the plain scalar that `expected` needs; empty where it is one.
+std::string scalar_problem(const YamlNode& node, const std::string& expected) {
+  switch (node.kind) {
+    case Kind::null:
+      return "has no value, expected " + expected;
+    case Kind::plain:
+      return "";
+    case Kind::quoted:
+      return "is text in quotes, expected " + expected;
+    case Kind::list:
+      return "is a list, expected " + expected;
+    case Kind::map:
+      return "is a map, expected " + expected;
+  }
+  return "";
+}
+
+std::string number_problem(const YamlNode& node, const Range& range, double& value) {
+  std::string problem = scalar_problem(node, "a number");
+  if (!problem.empty()) return problem;
+  const ParsedNumber number = parse_number(node.scalar);
+  if (number && range.contains(number.value)) {
+    value = number.value;
+    return "";
+  }
+  const bool bounded = range.lower > -kInfinity || range.upper < kInfinity;
+  if (number) return range.text();
+  return number.problem + (bounded ? ", " + range.text() : std::string());
+}
+
+std::string text_problem(const YamlNode& node) {
+  return node.kind == Kind::quoted ? "" : scalar_problem(node, "text");
+}
+
+}  // namespace
+
+Range Range::any() {
+  return {-kInfinity, kInfinity};
+}
+Range Range::positive() {
+  return {0, kInfinity, true};
+}
+Range Range::not_negative() {
+  return {0, kInfinity};
+}
+Range Range::between(double lower, double upper) {
+  return {lower, upper};
+}
+
+bool Range::contains(double value) const {
+  return std::isfinite(value) && (open_lower ? value > lower : value >= lower) && value <= upper;
+}
+
+std::string Range::text() const {
+  const std::string from = (open_lower ? "> " : ">= ") + to_text(lower), to = "<= " + to_text(upper);
+  if (lower == -kInfinity && upper == kInfinity) return "must be finite";
+  if (lower == -kInfinity) return "must be " + to;
+  if (upper == kInfinity) return "must be " + from;
+  return "must be " + from + " and " + to;
+}
+
+// A map of the document with what was asked of it. A map that an alias shows in two places has two of these.
+struct YamlReader::Impl {
+  std::shared_ptr<const YamlTree> tree;
+  const YamlNode* node = nullptr;
+  std::string path;  // "gear_train.motor", empty at the top
+  int line = 0;
+  std::set<std::string> asked;
+  std::map<std::pair<std::string, std::size_t>, std::shared_ptr<Impl>>
+      children;  // by key and index in a list
+
+  [[noreturn]] void fail_at(int where, const std::string& what) const {
+    throw BadData(tree->name + ":" + std::to_string(where), what);
+  }
+
+  std::string full(const std::string& key) const {
+    return path.empty() ? printable(key) : path + "." + printable(key);
+  }
+
+  // nullptr where the key is absent. The key counts as asked for.
+  const YamlEntry* find(const std::string& key) {
+    asked.insert(key);
+    const auto entry = node->entries.find(key);
+    return entry == node->entries.end() ? nullptr : &entry->second;
+  }
+
+  const YamlEntry& get(const std::string& key, const std::string& expected) {
+    const YamlEntry* const entry = find(key);
+    if (entry == nullptr) fail_at(line, full(key) + ": is missing, expected " + expected);
+    return *entry;
+  }
+
+  void require(const YamlEntry& entry, const std::string& key, const std::string& problem) const {
+    if (!problem.empty()) fail_at(entry.line, full(key) + " = " + shown(*entry.value) + ": " + problem);
+  }
+
+  const YamlNode& get_list(const std::string& key, const std::string& expected) {
+    const YamlEntry& entry = get(key, expected);
+    require(entry, key, entry.value->kind == Kind::list ? "" : "must be " + expected);
+    return *entry.value;
+  }
+
+  void require_item(const std::string& key, std::size_t index, const YamlNode& item,
+                    const std::string& problem) const {
+    if (!problem.empty()) fail_at(item.line, item_path(key, index) + " = " + shown(item) + ": " + problem);
+  }
+
+  std::string item_path(const std::string& key, std::size_t index) const {
+    return full(key) + "[" + std::to_string(index) + "]";
+  }
+
+  std::shared_ptr<Impl> child(const std::string& key, std::size_t index, const YamlNode& value,
+                              std::string child_path, int child_line) {
+    std::shared_ptr<Impl>& place = children[{key, index}];
+    if (!place) {
+      place = std::make_shared<Impl>();
+      place->tree = tree;
+      place->node = &value;
+      place->path = std::move(child_path);
+      place->line = child_line;
+    }
+    return place;
+  }
+
+  std::shared_ptr<Impl> map_child(const std::string& key, const YamlEntry& entry) {
+    require(entry, key, entry.value->kind == Kind::map ? "" : "must be a map");
+    return child(key, 0, *entry.value, full(key), entry.line);
+  }
+
+  void finish() const {
+    const std::pair<const std::string, YamlEntry>* unknown = nullptr;  // the first in the file
+    for (const auto& entry : node->entries) {
+      if (asked.count(entry.first) != 0) continue;
+      if (unknown == nullptr || entry.second.line < unknown->second.line) unknown = &entry;
+    }
+    if (unknown != nullptr) {
+      fail_at(unknown->second.line,
+              full(unknown->first) + " = " + shown(*unknown->second.value) +
+                  ": unknown key, known here: " + (asked.empty() ? "none" : joined(asked)));
+    }
+    for (const auto& [place, reader] : children) reader->finish();
+  }
+};
+
+YamlReader YamlReader::from_file(const std::string& path) {
+  std::ifstream in = open_input(path);
+  std::string text(kLargestYaml + 1,
+                   '\0');  // one more than allowed, so that the parser sees that it is too large
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (in.bad()) throw MissingInput(path + ": cannot be read");
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return from_text(text, path);
+}
+
+YamlReader YamlReader::from_text(const std::string& text, const std::string& name) {
+  auto impl = std::make_shared<Impl>();
+  impl->tree = std::make_shared<const YamlTree>(parse_yaml(text, name));
+  impl->node = impl->tree->root;
+  impl->line = impl->node->line;
+  return YamlReader(std::move(impl));
+}
+
+YamlReader::YamlReader(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+YamlReader::~YamlReader() = default;
+YamlReader::YamlReader(const YamlReader&) = default;
+YamlReader& YamlReader::operator=(const YamlReader&) = default;
+
+bool YamlReader::has(const std::string& key) const {
+  return impl_->find(key) != nullptr;
+}
+
+bool YamlReader::is_text(const std::string& key) const {
+  const YamlEntry* const entry = impl_->find(key);
+  return entry != nullptr && (entry->value->kind == Kind::plain || entry->value->kind == Kind::quoted);
+}
+
+double YamlReader::number(const std::string& key, const Range& range) const {
+  const YamlEntry& entry = impl_->get(key, "a number");
+  double value = 0;
+  impl_->require(entry, key, number_problem(*entry.value, range, value));
+  return value;
+}
+
+long YamlReader::integer(const std::string& key, long lower, long upper) const {
+  const YamlEntry& entry = impl_->get(key, "an integer");
+  impl_->require(entry, key, scalar_problem(*entry.value, "an integer"));
+  const std::string& text = entry.value->scalar;
+  const char* const end = text.data() + text.size();
+  const bool plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
+  long value = 0;
+  const auto result = std::from_chars(text.data() + (plus ? 1 : 0), end, value);
+  const bool is_integer = result.ec != std::errc::invalid_argument && result.ptr == end;
+  if (is_integer && result.ec == std::errc() && value >= lower && value <= upper) return value;
+  std::string limit = is_integer ? "must be " : "must be an integer ";
+  limit += ">= " + std::to_string(lower);
+  if (upper < std::numeric_limits<long>::max()) limit += " and <= " + std::to_string(upper);
+  impl_->require(entry, key, limit);
+  return value;
+}
+
+bool YamlReader::boolean(const std::string& key) const {
+  const YamlEntry& entry = impl_->get(key, "true or false");
+  impl_->require(entry, key, scalar_problem(*entry.value, "true or false"));
+  const bool value = entry.value->scalar == "true";
+  impl_->require(entry, key, value || entry.value->scalar == "false" ? "" : "must be true or false");
+  return value;
+}
+
+std::string YamlReader::text(const std::string& key) const {
+  const YamlEntry& entry = impl_->get(key, "text");
+  impl_->require(entry, key, text_problem(*entry.value));
+  return entry.value->scalar;
+}
+
+std::string YamlReader::choice(const std::string& key, const std::vector<std::string>& allowed) const {
+  const YamlEntry& entry = impl_->get(key, "one of " + joined(allowed));
+  const bool known = text_problem(*entry.value).empty() &&
+                     std::find(allowed.begin(), allowed.end(), entry.value->scalar) != allowed.end();
+  impl_->require(entry, key, known ? "" : "must be one of " + joined(allowed));
+  return entry.value->scalar;
+}
+
+std::vector<double> YamlReader::numbers(const std::string& key, const Range& range) const {
+  const YamlNode& list = impl_->get_list(key, "a list of numbers");
+  std::vector<double> values(list.items.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    impl_->require_item(key, i, *list.items[i], number_problem(*list.items[i], range, values[i]));
+  }
+  return values;
+}
+
+std::vector<std::string> YamlReader::texts(const std::string& key) const {
+  const YamlNode& list = impl_->get_list(key, "a list of texts");
+  std::vector<std::string> values;
+  for (std::size_t i = 0; i < list.items.size(); ++i) {
+    impl_->require_item(key, i, *list.items[i], text_problem(*list.items[i]));
+    values.push_back(list.items[i]->scalar);
+  }
+  return values;
+}
+
+double YamlReader::number_or(const std::string& key, double absent, const Range& range) const {
+  return has(key) ? number(key, range) : absent;
+}
+
+long YamlReader::integer_or(const std::string& key, long absent, long lower, long upper) const {
+  return has(key) ? integer(key, lower, upper) : absent;
+}
+
+bool YamlReader::boolean_or(const std::string& key, bool absent) const {
+  return has(key) ? boolean(key) : absent;
+}
+
+std::string YamlReader::text_or(const std::string& key, const std::string& absent) const {
+  return has(key) ? text(key) : absent;
+}
+
+YamlReader YamlReader::map(const std::string& key) const {
+  return YamlReader(impl_->map_child(key, impl_->get(key, "a map")));
+}
+
+std::optional<YamlReader> YamlReader::optional_map(const std::string& key) const {
+  if (!has(key)) return std::nullopt;
+  return map(key);
+}
+
+std::vector<YamlReader> YamlReader::maps(const std::string& key) const {
+  const YamlNode& list = impl_->get_list(key, "a list of maps");
+  std::vector<YamlReader> readers;
+  for (std::size_t i = 0; i < list.items.size(); ++i) {
+    const YamlNode& item = *list.items[i];
+    impl_->require_item(key, i, item, item.kind == Kind::map ? "" : "must be a map");
+    readers.push_back(YamlReader(impl_->child(key, i, item, impl_->item_path(key, i), item.line)));
+  }
+  return readers;
+}
+
+void YamlReader::ignore(const std::string& key) const {
+  impl_->asked.insert(key);
+}
+
+void YamlReader::finish() const {
+  impl_->finish();
+}
+
+void YamlReader::fail(const std::string& key, const std::string& reason) const {
+  const auto entry = impl_->node->entries.find(key);
+  if (entry == impl_->node->entries.end()) impl_->fail_at(impl_->line, impl_->full(key) + ": " + reason);
+  impl_->fail_at(entry->second.line, impl_->full(key) + " = " + shown(*entry->second.value) + ": " + reason);
+}
+
+const std::string& YamlReader::source() const {
+  return impl_->tree->name;
+}
+
+}  // namespace backlash

@@ -1,0 +1,82 @@
+#include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
+
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+
+ApdLayout read_apd_layout(const YamlReader& yaml) {
+  ApdLayout layout;
+  layout.classes = static_cast<int>(yaml.integer("classes", 2, 100'000));
+  layout.lower = yaml.number("lower", Range::any());
+  layout.upper = yaml.number("upper", Range::any());
+  if (!(layout.lower < layout.upper)) yaml.fail("upper", "must be greater than lower");
+  return layout;
+}
+
+AmplitudeDistribution::AmplitudeDistribution(const ApdLayout& layout)
+    : layout_(layout), per_width_(layout.classes / (layout.upper - layout.lower)) {
+  if (layout.classes < 2) throw InvalidParameter("apd.classes", layout.classes, "must be >= 2");
+  if (!(layout.lower < layout.upper)) throw InvalidParameter("apd.upper", layout.upper, "must be greater than lower");
+  counts_.assign(layout.classes, 0);
+}
+
+void AmplitudeDistribution::add(double value) {
+  ++samples_;
+  if (value < layout_.lower) {
+    ++below_;
+    return;
+  }
+  if (!(value < layout_.upper)) {
+    ++above_;
+    return;
+  }
+  const auto k = static_cast<std::size_t>((value - layout_.lower) * per_width_);
+  ++counts_[k < counts_.size() ? k : counts_.size() - 1];  // rounding just under the upper end
+}
+
+void AmplitudeDistribution::merge(const AmplitudeDistribution& other) {
+  if (!(layout_ == other.layout_)) throw InvalidParameter("apd", "another class layout", "must be equal to merge");
+  for (std::size_t k = 0; k < counts_.size(); ++k) counts_[k] += other.counts_[k];
+  samples_ += other.samples_;
+  below_ += other.below_;
+  above_ += other.above_;
+}
+
+void AmplitudeDistribution::clear() {
+  counts_.assign(counts_.size(), 0);
+  samples_ = below_ = above_ = 0;
+}
+
+double AmplitudeDistribution::centre(int k) const { return layout_.lower + (k + 0.5) / per_width_; }
+
+std::vector<double> AmplitudeDistribution::percentages() const {
+  std::vector<double> y(counts_.size(), 0);
+  if (samples_ == 0) return y;
+  for (std::size_t k = 0; k < y.size(); ++k) y[k] = 100.0 * counts_[k] / samples_;
+  return y;
+}
+
+double AmplitudeDistribution::standardised_moment(int order) const {
+  // Invariant under scaling, so the counts themselves will do.
+  const double mean = double(samples_ - below_ - above_) / counts_.size();
+  double variance = 0, moment = 0;
+  for (const std::size_t count : counts_) {
+    const double d = count - mean;
+    variance += d * d;
+    moment += order == 3 ? d * d * d : d * d * d * d;
+  }
+  variance /= counts_.size();
+  moment /= counts_.size();
+  if (!(variance > 0)) return std::numeric_limits<double>::quiet_NaN();
+  return moment / (order == 3 ? variance * std::sqrt(variance) : variance * variance);
+}
+
+double AmplitudeDistribution::skewness() const { return standardised_moment(3); }
+double AmplitudeDistribution::kurtosis() const { return standardised_moment(4); }
+
+double RunningMoments::standard_deviation() const { return count_ ? std::sqrt(squares_ / count_) : 0; }
+
+}  // namespace backlash

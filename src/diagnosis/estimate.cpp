@@ -1,0 +1,36 @@
+#include "backlash_diagnosis/diagnosis/estimate.h"
+
+#include <array>
+#include <utility>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+namespace {
+
+constexpr std::array<std::pair<Status, const char*>, 6> kNames = {
+    {{Status::ok, "ok"},
+     {Status::below_range, "below_range"},
+     {Status::above_range, "above_range"},
+     {Status::out_of_domain, "out_of_domain"},
+     {Status::insufficient_data, "insufficient_data"},
+     {Status::ambiguous, "ambiguous"}}};
+
+}  // namespace
+
+const char* to_string(Status status) {
+  for (const auto& [value, name] : kNames) {
+    if (value == status) return name;
+  }
+  throw InvalidParameter("status", static_cast<double>(status), "must be an enumerator of Status");
+}
+
+Status status_from_string(const std::string& text) {
+  for (const auto& [value, name] : kNames) {
+    if (text == name) return value;
+  }
+  throw InvalidParameter(
+      "status", text, "must be ok, below_range, above_range, out_of_domain, insufficient_data or ambiguous");
+}
+
+}  // namespace backlash

@@ -1,0 +1,298 @@
+#include "backlash_diagnosis/diagnosis/lost_motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/hysteresis_loop.h"
+#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/diagnosis/wall_reading.h"
+#include "backlash_diagnosis/diagnosis/wall_to_wall.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kReached = 0.95;         // torque counts as reached from this fraction of the stated level
+constexpr double kLevelFromRecord = 0.9;  // where no level is stated, of the torque typical of the record
+constexpr double kTorqueSpan = 0.1;       // change of torque within a reading, fraction of the stated level
+constexpr double kReadLevelFree =
+    0.5;  // where deflection is subtracted, any torque that keeps contact will do, and
+          // a longer window averages more ringing; fraction of the stated level
+constexpr double kUnsettled = 0.1;  // uncertainty by ringing and settling over travel from which on the motor
+                                    // is not at rest at the walls
+constexpr double kContactLoss =
+    0.5;  // rms ringing over elastic deflection from which on the flank is left again
+constexpr std::size_t kFewest = 2;  // excursions per side
+
+// A status with its reason, raised where the record turns out unfit.
+struct Refusal {
+  Status status;
+  std::string reason;
+};
+
+std::string text(double value) {
+  std::ostringstream stream;
+  stream.precision(4);
+  stream << value;
+  return stream.str();
+}
+
+void check(const LostMotionSettings& settings) {
+  const bool from_record = std::isnan(settings.torque) && settings.subtract_elastic_deflection;
+  if (!from_record && !(settings.torque > 0 && std::isfinite(settings.torque))) {
+    throw InvalidParameter("lost_motion.torque", settings.torque, "must be > 0");
+  }
+  if (settings.subtract_elastic_deflection && !settings.elastic_deflection) {
+    throw InvalidParameter("lost_motion.elastic_deflection", "empty",
+                           "needed to subtract the elastic deflection");
+  }
+  if (!(settings.elastic_uncertainty >= 0)) {
+    throw InvalidParameter("lost_motion.elastic_uncertainty", settings.elastic_uncertainty, "must be >= 0");
+  }
+  if (settings.base_radius <= 0) {
+    throw InvalidParameter("lost_motion.base_radius", settings.base_radius, "must be > 0");
+  }
+  if (settings.locked_tolerance <= 0) {
+    throw InvalidParameter("lost_motion.locked_tolerance", settings.locked_tolerance, "must be > 0");
+  }
+}
+
+double travel(const std::vector<double>& values) {
+  return quantile(values, 0.99) - quantile(values, 0.01);
+}
+
+LockedMotion collect(const Record& record, const LostMotionSettings& settings) {
+  const std::vector<double>& position = record.column(Channel::motor_position);
+  const bool motor = record.has(Channel::motor_torque);
+  const std::vector<double>& torque = record.column(motor ? Channel::motor_torque : Channel::sensor_torque);
+  if (position.empty()) throw Refusal{Status::insufficient_data, "the record has no motor_position"};
+  if (torque.empty())
+    throw Refusal{Status::insufficient_data, "the record has neither motor_torque nor sensor_torque"};
+  LockedMotion motion;
+  for (std::size_t i = 0; i < std::min({record.time.size(), position.size(), torque.size()}); ++i) {
+    if (!std::isfinite(record.time[i]) || !std::isfinite(position[i]) || !std::isfinite(torque[i])) continue;
+    motion.time.push_back(record.time[i]);
+    motion.torque.push_back(torque[i]);
+    motion.position.push_back(position[i]);
+  }
+  if (motion.time.empty()) throw Refusal{Status::insufficient_data, "the record has no finite samples"};
+
+  std::vector<double> load;
+  for (const double value : record.column(Channel::load_position)) {
+    if (std::isfinite(value)) load.push_back(value);
+  }
+  if (!load.empty()) {
+    const double moved = travel(load);
+    const double tolerance =
+        std::isnan(settings.locked_tolerance) ? 0.05 * travel(motion.position) : settings.locked_tolerance;
+    if (moved > tolerance) {
+      throw Refusal{Status::out_of_domain, "the output is not locked: load_position moves by " + text(moved) +
+                                               " rad, allowed " + text(tolerance) + " rad"};
+    }
+  }
+  return motion;
+}
+
+struct Walls {
+  double level = 0;  // N m, stated
+  bool switched = false;
+  std::vector<TorqueExcursion> excursions;
+  std::vector<WallReading> readings;
+};
+
+// Torque reached on the negative and on the positive side; the percentile leaves out peaks of noise.
+std::array<double, 2> reached_torque(const LockedMotion& motion, double fraction) {
+  return {-quantile(motion.torque, 1 - fraction), quantile(motion.torque, fraction)};
+}
+
+std::array<std::size_t, 2> count_sides(const std::vector<TorqueExcursion>& excursions) {
+  std::array<std::size_t, 2> count = {0, 0};
+  for (const TorqueExcursion& excursion : excursions) ++count[excursion.side > 0];
+  return count;
+}
+
+// `excursions` are those beyond kReached * level. Noise may hide short ones, a percentile may miss rare ones.
+void require_reached(const LockedMotion& motion, const std::vector<TorqueExcursion>& excursions,
+                     double level) {
+  const auto count = count_sides(excursions);
+  const auto reached = reached_torque(motion, 0.99);
+  for (const std::size_t side : {0, 1}) {
+    if (count[side] > 0 || reached[side] >= kReached * level) continue;
+    throw Refusal{Status::out_of_domain, "torque reaches " + text(reached[1]) + " N m and " +
+                                             text(-reached[0]) + " N m, needed are +-" + text(level) +
+                                             " N m"};
+  }
+}
+
+void require_count(const std::vector<TorqueExcursion>& excursions, double level) {
+  const auto count = count_sides(excursions);
+  if (std::min(count[0], count[1]) >= kFewest) return;
+  throw Refusal{Status::insufficient_data,
+                "torque goes clearly beyond " + text(level) + " N m and comes back " +
+                    std::to_string(count[1]) + " times, beyond " + text(-level) + " N m " +
+                    std::to_string(count[0]) + " times; needed are " + std::to_string(kFewest) + " each"};
+}
+
+Walls read_walls(const LockedMotion& motion, const LostMotionSettings& settings) {
+  Walls walls;
+  walls.level = settings.torque;
+  if (std::isnan(walls.level)) {
+    const auto typical = reached_torque(motion, 0.875);  // three quarters of each side's half of the time
+    walls.level = kLevelFromRecord * std::min(typical[0], typical[1]);
+    if (!(walls.level > 0)) throw Refusal{Status::out_of_domain, "torque does not go to both signs"};
+  }
+  walls.excursions = find_excursions(motion.torque, kReached * walls.level);
+  require_reached(motion, walls.excursions, walls.level);
+  double read_level = kReached * walls.level;
+  if (settings.subtract_elastic_deflection) {
+    read_level = kReadLevelFree * walls.level;
+    walls.excursions = find_excursions(motion.torque, read_level);
+  }
+  require_count(walls.excursions, read_level);
+  for (std::size_t i = 0; i < walls.excursions.size(); ++i) {
+    const bool last = i + 1 == walls.excursions.size();
+    const std::size_t limit = last ? motion.torque.size() : walls.excursions[i + 1].begin;
+    walls.readings.push_back(
+        read_wall(motion, walls.excursions[i], read_level, kTorqueSpan * walls.level, limit));
+  }
+  walls.switched = is_switched(walls.excursions, walls.readings);
+  return walls;
+}
+
+// Deflection to subtract per reading: all of it, or what a switched torque exceeds the stated level by, or
+// none.
+std::vector<double> deflections_of(const Walls& walls, const LostMotionSettings& settings, bool exceeds) {
+  std::vector<double> deflections(walls.readings.size(), 0.0);
+  if (!settings.subtract_elastic_deflection && !exceeds) return deflections;
+  const double stated = exceeds ? settings.elastic_deflection(walls.level) : 0;
+  for (std::size_t i = 0; i < deflections.size(); ++i) {
+    deflections[i] = settings.elastic_deflection(walls.readings[i].torque) - stated;
+  }
+  return deflections;
+}
+
+void require_rest(const WallToWall& play, double deflection) {
+  const bool settled = play.motion <= kUnsettled * std::abs(play.travel);
+  const bool touching = deflection == 0 || play.ringing <= kContactLoss * deflection;
+  if (settled && touching) return;
+  throw Refusal{Status::out_of_domain,
+                "the motor does not come to rest at the walls: its position varies by " + text(play.ringing) +
+                    " rad rms there (travel " + text(play.travel) + " rad); apply torque more slowly"};
+}
+
+struct Parts {
+  PlayComponents components;
+  double flank_friction = kNaN;  // N m
+  std::string missing;
+};
+
+Parts find_parts(LockedMotion motion, const Walls& walls, const LostMotionSettings& settings,
+                 const WallToWall& play) {
+  Parts parts;
+  if (walls.switched) {
+    parts.missing =
+        "torque is switched between two levels, so the record holds neither compliance nor friction";
+    if (settings.subtract_elastic_deflection) {
+      parts.components.gap = std::max(0.0, play.value);
+    } else if (settings.elastic_deflection) {
+      parts.components.gap = std::max(0.0, play.value - 2 * settings.elastic_deflection(walls.level));
+    } else {
+      parts.missing += ", and without elastic deflection no gap";
+    }
+    return parts;
+  }
+  const double drift = drift_rate(walls.readings);
+  for (std::size_t i = 0; i < motion.time.size(); ++i)
+    motion.position[i] -= drift * (motion.time[i] - motion.time[0]);
+  std::vector<double> positions[2];
+  for (const WallReading& reading : walls.readings) {
+    positions[reading.side > 0].push_back(reading.position - drift * (reading.time - motion.time[0]));
+  }
+  const double lower = median(positions[0]), upper = median(positions[1]);
+  HysteresisLoop loop = analyse_hysteresis(motion, walls.excursions, lower, upper);
+  parts.components = loop.components;
+  if (settings.subtract_elastic_deflection) parts.components.gap = std::max(0.0, play.value);
+  parts.flank_friction = loop.flank_friction;
+  parts.missing = loop.missing;
+  return parts;
+}
+
+std::string describe(const Walls& walls, const LostMotionSettings& settings, const WallToWall& play,
+                     const Parts& parts) {
+  std::string message = settings.subtract_elastic_deflection
+                            ? "free play without elastic deflection, read at " +
+                                  text(median_of(walls.readings, &WallReading::torque)) + " N m"
+                            : "play from wall to wall at +-" + text(walls.level) + " N m";
+  message += ", median of " + std::to_string(play.passages) + " passages";
+  if (play.outliers > 0) {
+    message += ", " + std::to_string(play.outliers) +
+               " of them far from the others (slips), the interval is wider for it";
+  }
+  if (!parts.missing.empty()) message += "; " + parts.missing;
+  return message;
+}
+
+void fill(const Record& record, const LostMotionSettings& settings, Estimate& estimate) {
+  const LockedMotion motion = collect(record, settings);
+  const Walls walls = read_walls(motion, settings);
+  const double torque = median_of(walls.readings, &WallReading::torque);
+  const bool exceeds = !settings.subtract_elastic_deflection && torque > (1 + kTorqueSpan) * walls.level;
+  if (exceeds && !settings.elastic_deflection) {
+    throw Refusal{Status::out_of_domain, "torque jumps past the stated " + text(walls.level) + " N m to " +
+                                             text(torque) +
+                                             " N m, and no elastic deflection is known to correct for it"};
+  }
+  const std::vector<double> deflections = deflections_of(walls, settings, exceeds);
+  const WallToWall play = measure_wall_to_wall(motion, walls.readings, deflections, walls.switched);
+  require_rest(play, std::abs(median(deflections)));
+  if (!(play.travel > 0)) {
+    throw Refusal{Status::out_of_domain,
+                  "positive torque moves the motor to smaller positions, or not at all"};
+  }
+  const Parts parts = find_parts(motion, walls, settings, play);
+  double elastic = 2 * settings.elastic_uncertainty * std::abs(median(deflections));
+  if (settings.subtract_elastic_deflection && parts.flank_friction > 0) {
+    // Friction carries part of the torque, so the flank may hold less than the motor gives.
+    const double carried = std::max(0.0, torque - parts.flank_friction);
+    elastic += 2 * (settings.elastic_deflection(torque) - settings.elastic_deflection(carried));
+  }
+  const double half = std::hypot(play.half_interval(), elastic);
+  if (play.value + half < 0) {
+    throw Refusal{Status::out_of_domain,
+                  "the travel of " + text(play.travel) +
+                      " rad is less than the elastic "
+                      "deflection that the rig declares: the rig is not this machine, or the motor "
+                      "did not reach both walls"};
+  }
+  estimate.status = Status::ok;
+  estimate.backlash_angle = std::max(0.0, play.value);
+  estimate.angle_lower = std::max(0.0, play.value - half);
+  estimate.angle_upper = play.value + half;
+  estimate.backlash = settings.base_radius * estimate.backlash_angle;
+  estimate.lower = settings.base_radius * estimate.angle_lower;
+  estimate.upper = settings.base_radius * estimate.angle_upper;
+  estimate.components = parts.components;
+  estimate.components->at_torque = settings.subtract_elastic_deflection ? torque : walls.level;
+  estimate.message = describe(walls, settings, play, parts);
+}
+
+}  // namespace
+
+Estimate estimate_lost_motion(const Record& record, const LostMotionSettings& settings) {
+  check(settings);
+  Estimate estimate;
+  estimate.method = "lost_motion";
+  try {
+    fill(record, settings, estimate);
+  } catch (const Refusal& refusal) {
+    estimate.status = refusal.status;
+    estimate.message = refusal.reason;
+  }
+  return estimate;
+}
+
+}  // namespace backlash

@@ -1,0 +1,163 @@
+#include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kNormal95 = 1.959964;  // two-sided 95 % quantile of the normal distribution
+constexpr int kRefinement = 20;         // inversion grid per curve interval
+
+double total(const SkewnessCell& cell, int periods) {
+  return std::sqrt(cell.between * cell.between + cell.within * cell.within / std::max(1, periods));
+}
+
+SkewnessCell mix(const SkewnessCell& a, const SkewnessCell& b, double share) {
+  const auto line = [share](double x, double y) { return x + share * (y - x); };
+  return {line(a.mean, b.mean), line(a.between, b.between), line(a.within, b.within)};
+}
+
+/// Index i and share s with values[i] (1 - s) + values[i + 1] s = x, clamped to the ends.
+template <typename Get>
+std::pair<std::size_t, double> locate(std::size_t count, Get value, double x) {
+  if (count < 2 || x <= value(0)) return {0, 0};
+  std::size_t i = 0;
+  while (i + 2 < count && value(i + 1) < x) ++i;
+  return {i, std::clamp((x - value(i)) / (value(i + 1) - value(i)), 0.0, 1.0)};
+}
+
+/// Scatter of the points about the straight line through their neighbours: structure finer than the grid.
+double roughness(const std::vector<CurvePoint>& points, std::size_t i, std::size_t level) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t k = i < 2 ? 1 : i - 1; k <= i + 1 && k + 1 < points.size(); ++k) {
+    const double bend = points[k].cells[level].mean -
+                        0.5 * (points[k - 1].cells[level].mean + points[k + 1].cells[level].mean);
+    sum += bend * bend / 1.5;  // variance of a point minus the mean of two others, all with variance 1, is 1.5
+    ++count;
+  }
+  return count ? std::sqrt(sum / count) : 0;
+}
+
+struct Accepted {
+  double best = kNaN, best_distance = 1e300;
+  double lower = kNaN, upper = kNaN;
+  bool touches_end = false, in_flagged_stretch = false;
+  int pieces = 0;
+};
+
+/// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's construction).
+Accepted accept(const MonitoringCurve& curve, double skewness, int periods, double noise) {
+  Accepted result;
+  bool inside = false;
+  const std::size_t intervals = curve.points.size() - 1;
+  for (std::size_t step = 0; step <= intervals * kRefinement; ++step) {
+    const std::size_t i = std::min(step / kRefinement, intervals - 1);
+    const double share = double(step - i * kRefinement) / kRefinement;
+    const double b = curve.points[i].backlash + share * (curve.points[i + 1].backlash - curve.points[i].backlash);
+    const SkewnessCell cell = curve.at(b, noise);
+    const double distance = std::fabs(skewness - cell.mean) / std::max(total(cell, periods), 1e-6);
+    const bool ok = distance <= kNormal95;
+    if (distance < result.best_distance) {
+      result.best_distance = distance;
+      result.best = b;
+    }
+    if (ok && !inside) ++result.pieces;
+    if (ok) {
+      if (std::isnan(result.lower)) result.lower = b;
+      result.upper = b;
+      result.touches_end = step == intervals * kRefinement;
+      if (!curve.points[i + 1].monotonic || !curve.points[i].monotonic) result.in_flagged_stretch = true;
+    }
+    inside = ok;
+  }
+  return result;
+}
+
+Estimate with_angle(Estimate estimate, const MonitoringCurve& curve) {
+  estimate.backlash_angle = estimate.backlash * curve.backlash_to_angle;
+  estimate.angle_lower = estimate.lower * curve.backlash_to_angle;
+  estimate.angle_upper = estimate.upper * curve.backlash_to_angle;
+  if (curve.conditions.angular) estimate.backlash = estimate.lower = estimate.upper = kNaN;  // no length known
+  return estimate;
+}
+
+}  // namespace
+
+SkewnessCell MonitoringCurve::at(double backlash, double noise) const {
+  const auto [p, along] = locate(points.size(), [this](std::size_t i) { return points[i].backlash; }, backlash);
+  const auto [n, across] = locate(noise_levels.size(), [this](std::size_t i) { return noise_levels[i]; }, noise);
+  const auto cell = [&](std::size_t i) {
+    const auto& cells = points[i].cells;
+    return n + 1 < cells.size() ? mix(cells[n], cells[n + 1], across) : cells[n];
+  };
+  return p + 1 < points.size() ? mix(cell(p), cell(p + 1), along) : cell(p);
+}
+
+const SkewnessCell& MonitoringCurve::nominal(const CurvePoint& point) const {
+  const auto level = std::lower_bound(noise_levels.begin(), noise_levels.end(), conditions.noise);
+  return point.cells[level == noise_levels.end() ? noise_levels.size() - 1 : level - noise_levels.begin()];
+}
+
+void MonitoringCurve::finish() {
+  std::vector<std::vector<double>> rough(points.size(), std::vector<double>(noise_levels.size(), 0));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::size_t level = 0; level < noise_levels.size(); ++level) rough[i][level] = roughness(points, i, level);
+  double lowest = 1e300;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const SkewnessCell& cell = nominal(points[i]);
+    const double error = total(cell, conditions.periods * conditions.seeds);
+    points[i].monotonic = cell.mean <= lowest + 2 * error;
+    lowest = std::min(lowest, cell.mean);
+  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::size_t level = 0; level < noise_levels.size(); ++level) {
+      double& between = points[i].cells[level].between;
+      between = std::hypot(between, rough[i][level]);
+    }
+}
+
+Estimate MonitoringCurve::invert(double skewness, int periods, double noise) const {
+  Estimate estimate;
+  estimate.method = "apd_skewness";
+  estimate.skewness = skewness;
+  const Accepted found = accept(*this, skewness, periods, noise);
+  std::ostringstream text;
+  text.precision(4);
+  text << "skewness " << skewness << " over " << periods << " period(s)";
+  if (found.pieces == 0) {
+    const bool above_start = skewness > at(points.front().backlash, noise).mean;
+    estimate.status = above_start ? Status::below_range : Status::above_range;
+    text << (above_start ? " is higher than the curve at its smallest backlash (" : " is lower than the curve anywhere (");
+    text << at(above_start ? points.front().backlash : points.back().backlash, noise).mean << ")";
+    if (!above_start) estimate.lower = points.back().backlash;
+    estimate.message = text.str();
+    return with_angle(estimate, *this);
+  }
+  const double span = points.back().backlash - points.front().backlash;
+  const bool wide = found.upper - found.lower > 0.5 * span;
+  estimate.lower = found.lower;
+  estimate.upper = found.upper;
+  if (found.touches_end && found.best >= points.back().backlash - 1e-3 * span) {
+    estimate.status = Status::above_range;
+    text << " is at the end of the curve; backlash may be larger than it covers";
+  } else if (wide) {
+    estimate.status = Status::ambiguous;
+    text << " fits more than half of the curve";
+  } else {
+    estimate.status = Status::ok;
+    estimate.backlash = found.best;
+    text << " on the curve of " << conditions.rig;
+    if (found.pieces > 1 || found.in_flagged_stretch)
+      text << "; the curve is not monotonic here, the interval covers all branches";
+    if (found.touches_end) text << "; the interval reaches the end of the curve";
+  }
+  estimate.message = text.str();
+  return with_angle(estimate, *this);
+}
+
+}  // namespace backlash

@@ -1,0 +1,147 @@
+// Monitoring curves as files.
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+
+namespace backlash {
+namespace {
+
+constexpr long kSchema = 1;
+
+void emit_conditions(YAML::Emitter& out, const CurveConditions& c) {
+  out << YAML::Key << "conditions" << YAML::Value << YAML::BeginMap;
+  const auto text = [&out](const char* key, const std::string& value) {
+    out << YAML::Key << key << YAML::Value << YAML::DoubleQuoted << value;
+  };
+  const auto number = [&out](const char* key, double value, const char* unit) {
+    out << YAML::Key << key << YAML::Value << to_text(value) << YAML::Comment(unit);
+  };
+  text("rig", c.rig);
+  text("rig_digest", c.rig_digest);
+  text("version", c.version);
+  text("signal", c.signal);
+  text("excitation", c.excitation);
+  number("amplitude", c.amplitude, "N m");
+  number("excitation_level", c.excitation_level, "N m, median magnitude");
+  number("frequency", c.frequency, "Hz");
+  number("sampling_rate", c.sampling_rate, "Hz");
+  out << YAML::Key << "apd" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "classes" << YAML::Value
+      << c.apd.classes << YAML::Key << "lower" << YAML::Value << to_text(c.apd.lower) << YAML::Key << "upper"
+      << YAML::Value << to_text(c.apd.upper) << YAML::EndMap;
+  number("periods", c.periods, "per seed");
+  number("settling_periods", c.settling_periods, "discarded");
+  number("seeds", c.seeds, "runs with other noise and sampling phase");
+  number("noise", c.noise, "declared standard deviation, unit of the signal");
+  number("motor_travel", c.motor_travel, "rad, largest on the curve");
+  out << YAML::Key << "output_locked" << YAML::Value << c.output_locked;
+  out << YAML::Key << "angular" << YAML::Value << c.angular << YAML::EndMap;
+}
+
+void emit_row(YAML::Emitter& out, const char* key, const std::vector<double>& values) {
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (double v : values) out << to_text(v);
+  out << YAML::EndSeq;
+}
+
+void emit_point(YAML::Emitter& out, const MonitoringCurve& curve, const CurvePoint& point) {
+  std::vector<double> mean, between, within;
+  for (const SkewnessCell& cell : point.cells) {
+    mean.push_back(cell.mean);
+    between.push_back(cell.between);
+    within.push_back(cell.within);
+  }
+  const SkewnessCell& nominal = curve.nominal(point);
+  out << YAML::BeginMap;
+  out << YAML::Key << "backlash" << YAML::Value << to_text(point.backlash);
+  out << YAML::Key << "half_gap" << YAML::Value << to_text(point.backlash / 2);
+  out << YAML::Key << "skewness" << YAML::Value << to_text(nominal.mean);
+  out << YAML::Key << "scatter" << YAML::Value << to_text(std::hypot(nominal.between, nominal.within));
+  out << YAML::Key << "monotonic" << YAML::Value << point.monotonic;
+  out << YAML::Key << "signal_level" << YAML::Value << to_text(point.signal_level);
+  emit_row(out, "mean", mean);
+  emit_row(out, "between", between);
+  emit_row(out, "within", within);
+  out << YAML::EndMap;
+}
+
+CurveConditions read_conditions(const YamlReader& yaml) {
+  CurveConditions c;
+  c.rig = yaml.text("rig");
+  c.rig_digest = yaml.text("rig_digest");
+  c.version = yaml.text("version");
+  c.signal = yaml.text("signal");
+  c.excitation = yaml.text("excitation");
+  c.amplitude = yaml.number("amplitude", Range::not_negative());
+  c.excitation_level = yaml.number("excitation_level", Range::not_negative());
+  c.frequency = yaml.number("frequency", Range::not_negative());
+  c.sampling_rate = yaml.number("sampling_rate", Range::positive());
+  c.apd = read_apd_layout(yaml.map("apd"));
+  c.periods = static_cast<int>(yaml.integer("periods", 1, 1'000'000));
+  c.settling_periods = static_cast<int>(yaml.integer("settling_periods", 0, 1'000'000));
+  c.seeds = static_cast<int>(yaml.integer("seeds", 1, 1'000'000));
+  c.noise = yaml.number("noise", Range::not_negative());
+  c.motor_travel = yaml.number("motor_travel", Range::not_negative());
+  c.output_locked = yaml.boolean("output_locked");
+  c.angular = yaml.boolean("angular");
+  return c;
+}
+
+CurvePoint read_point(const YamlReader& yaml, std::size_t levels) {
+  CurvePoint point;
+  point.backlash = yaml.number("backlash", Range::not_negative());
+  for (const char* derived : {"half_gap", "skewness", "scatter"}) yaml.ignore(derived);  // repeated for readers
+  point.monotonic = yaml.boolean("monotonic");
+  point.signal_level = yaml.number("signal_level", Range::not_negative());
+  const auto mean = yaml.numbers("mean", Range::any());
+  const auto between = yaml.numbers("between", Range::not_negative());
+  const auto within = yaml.numbers("within", Range::not_negative());
+  if (mean.size() != levels || between.size() != levels || within.size() != levels)
+    yaml.fail("mean", "mean, between and within need one value per noise level");
+  for (std::size_t i = 0; i < levels; ++i) point.cells.push_back({mean[i], between[i], within[i]});
+  return point;
+}
+
+}  // namespace
+
+std::string MonitoringCurve::to_yaml() const {
+  YAML::Emitter out;
+  out << YAML::Comment("Monitoring curve: skewness of the class values of the APD against backlash.") << YAML::Newline;
+  out << YAML::Comment("backlash: total free play along the line of action [m]; half_gap is half of it.");
+  out << YAML::BeginMap << YAML::Key << "schema_version" << YAML::Value << kSchema;
+  emit_conditions(out, conditions);
+  out << YAML::Key << "backlash_to_angle" << YAML::Value << to_text(backlash_to_angle)
+      << YAML::Comment("rad at the axis of motor_position per unit of backlash");
+  emit_row(out, "noise_levels", noise_levels);
+  out << YAML::Key << "points" << YAML::Value << YAML::BeginSeq;
+  for (const CurvePoint& point : points) emit_point(out, *this, point);
+  out << YAML::EndSeq << YAML::EndMap << YAML::Newline;
+  return out.c_str();
+}
+
+MonitoringCurve MonitoringCurve::from_yaml(const YamlReader& yaml) {
+  MonitoringCurve curve;
+  yaml.integer("schema_version", kSchema, kSchema);
+  curve.conditions = read_conditions(yaml.map("conditions"));
+  curve.backlash_to_angle = yaml.number("backlash_to_angle", Range::positive());
+  curve.noise_levels = yaml.numbers("noise_levels", Range::not_negative());
+  if (curve.noise_levels.empty()) yaml.fail("noise_levels", "needs at least one level");
+  for (std::size_t i = 1; i < curve.noise_levels.size(); ++i)
+    if (!(curve.noise_levels[i] > curve.noise_levels[i - 1])) yaml.fail("noise_levels", "must increase");
+  for (const YamlReader& point : yaml.maps("points"))
+    curve.points.push_back(read_point(point, curve.noise_levels.size()));
+  if (curve.points.size() < 2) yaml.fail("points", "a curve needs at least two points");
+  for (std::size_t i = 1; i < curve.points.size(); ++i)
+    if (!(curve.points[i].backlash > curve.points[i - 1].backlash)) yaml.fail("points", "backlash must increase");
+  yaml.finish();
+  return curve;
+}
+
+MonitoringCurve read_curve(const std::string& path) { return MonitoringCurve::from_yaml(YamlReader::from_file(path)); }
+
+void write_curve(const MonitoringCurve& curve, const std::string& path) { write_file(path, curve.to_yaml()); }
+
+}  // namespace backlash

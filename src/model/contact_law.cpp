@@ -1,0 +1,45 @@
+#include "backlash_diagnosis/model/contact_law.h"
+
+#include "backlash_diagnosis/base/error.h"
+#include "contact/laws.h"
+
+namespace backlash {
+namespace {
+
+const ContactLawType* find(const std::string& name) {
+  for (const ContactLawType& type : contact_laws())
+    if (type.name == name) return &type;
+  return nullptr;
+}
+
+std::vector<std::string> names() {
+  std::vector<std::string> all;
+  for (const ContactLawType& type : contact_laws()) all.push_back(type.name);
+  return all;
+}
+
+}  // namespace
+
+const std::vector<ContactLawType>& contact_laws() {
+  static const std::vector<ContactLawType> laws = {linear_contact(), power_law_contact(), hunt_crossley_contact()};
+  return laws;
+}
+
+std::shared_ptr<const ContactLaw> read_contact_law(const YamlReader& yaml) {
+  const ContactLawType& type = *find(yaml.choice("law", names()));
+  return type.create(read_parameters(yaml, type.parameters));
+}
+
+std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, const ParameterValues& values) {
+  const ContactLawType* type = find(name);
+  if (!type) throw InvalidParameter("contact.law", name, "is not a known contact law");
+  for (const ParameterSpec& spec : type->parameters) {
+    const auto value = values.find(spec.name);
+    if (value == values.end()) throw InvalidParameter("contact." + spec.name, "absent", "is required by " + name);
+    if (!spec.range.contains(value->second))
+      throw InvalidParameter("contact." + spec.name, value->second, spec.range.text() + " " + spec.unit);
+  }
+  return type->create(values);
+}
+
+}  // namespace backlash

@@ -1,0 +1,157 @@
+#include "backlash_diagnosis/model/gear_train.h"
+
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+namespace {
+
+Coupling referred(Coupling coupling, double factor) {
+  coupling.stiffness *= factor;
+  coupling.damping *= factor;
+  coupling.inertia *= factor;
+  return coupling;
+}
+
+double spring(const Coupling& c, double twist) { return c.stiffness * twist; }
+
+}  // namespace
+
+GearTrain::GearTrain(const Rig& rig)
+    : ratio_(rig.motor_axis_ratio()),
+      damping_{rig.motor.viscous_damping * ratio_ * ratio_, rig.pinion.viscous_damping * ratio_ * ratio_,
+               rig.gear.viscous_damping, rig.link.viscous_damping},
+      input_(referred(rig.input_coupling, ratio_ * ratio_)),
+      output_(rig.output_coupling),
+      lever_(rig.mesh.lever()),
+      contact_(rig.mesh.contact),
+      terms_(rig.terms) {
+  set_backlash(rig.mesh.backlash);
+  join(rig);
+}
+
+/// Gives each part its degree of freedom and sums the inertia that moves with it.
+void GearTrain::join(const Rig& rig) {
+  const double square = ratio_ * ratio_;
+  node_[kMotor] = dof_++;
+  node_[kPinion] = input_.rigid ? node_[kMotor] : dof_++;
+  const bool gear_fixed = rig.link_locked && output_.rigid;
+  node_[kGear] = gear_fixed ? kFixed : dof_++;
+  node_[kLink] = rig.link_locked ? kFixed : output_.rigid ? node_[kGear] : dof_++;
+  const double part[kSlots] = {rig.motor.inertia * square + 0.5 * input_.inertia,
+                               rig.pinion.inertia * square + 0.5 * input_.inertia,
+                               rig.gear.inertia + 0.5 * output_.inertia, rig.link.inertia + 0.5 * output_.inertia};
+  for (int slot = 0; slot < kSlots; ++slot)
+    if (node_[slot] != kFixed) inertia_[node_[slot]] += part[slot];
+  for (int node = 0; node < dof_; ++node)
+    if (!(inertia_[node] > 0)) throw InvalidParameter("inertia", inertia_[node], "every moving part needs inertia");
+}
+
+void GearTrain::set_backlash(double backlash) {
+  if (!(backlash >= 0) || !std::isfinite(backlash))
+    throw InvalidParameter("backlash", backlash, "must be >= 0 and finite");
+  half_gap_ = 0.5 * backlash;
+}
+
+GearTrain::Slots GearTrain::unpack(const double* state) const {
+  Slots s;
+  for (int slot = 0; slot < kSlots; ++slot) {
+    const int node = node_[slot];
+    s.q[slot] = node == kFixed ? 0 : state[node];
+    s.w[slot] = node == kFixed ? 0 : state[dof_ + node];
+  }
+  return s;
+}
+
+double GearTrain::contact_force(const Slots& s) const {
+  const double x = lever_ * (s.q[kPinion] - s.q[kGear]);
+  const double penetration = std::fabs(x) - half_gap_;
+  if (penetration <= 0) return 0;
+  const double side = x > 0 ? 1 : -1;
+  const double rate = side * lever_ * (s.w[kPinion] - s.w[kGear]);
+  return side * contact_->force(penetration, rate);
+}
+
+void GearTrain::derivative(double t, const double* state, double motor_torque, double* rate) const {
+  const Slots s = unpack(state);
+  double torque[kSlots];
+  for (int slot = 0; slot < kSlots; ++slot) torque[slot] = -damping_[slot] * s.w[slot];
+  torque[kMotor] += motor_torque * ratio_;
+  if (!input_.rigid) {
+    const double through =
+        spring(input_, s.q[kMotor] - s.q[kPinion]) + input_.damping * (s.w[kMotor] - s.w[kPinion]);
+    torque[kMotor] -= through;
+    torque[kPinion] += through;
+  }
+  if (!output_.rigid) {
+    const double through =
+        spring(output_, s.q[kGear] - s.q[kLink]) + output_.damping * (s.w[kGear] - s.w[kLink]);
+    torque[kGear] -= through;
+    torque[kLink] += through;
+  }
+  const double mesh_torque = lever_ * contact_force(s);
+  torque[kPinion] -= mesh_torque;
+  torque[kGear] += mesh_torque;
+  if (!terms_.empty()) {
+    const Motion motion{t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink]};
+    EndTorques ends;
+    for (const auto& term : terms_) term->add(motion, ends);
+    torque[kMotor] += ends.motor;
+    torque[kLink] += ends.load;
+  }
+  double sum[kSlots] = {};
+  for (int slot = 0; slot < kSlots; ++slot)
+    if (node_[slot] != kFixed) sum[node_[slot]] += torque[slot];
+  for (int node = 0; node < dof_; ++node) {
+    rate[node] = state[dof_ + node];
+    rate[dof_ + node] = sum[node] / inertia_[node];
+  }
+}
+
+Observation GearTrain::observe(const double* state, double motor_torque) const {
+  const Slots s = unpack(state);
+  const double none = std::nan("");
+  Observation o;
+  o.motor_torque = motor_torque;
+  o.motor_position = s.q[kMotor] * ratio_;
+  o.motor_velocity = s.w[kMotor] * ratio_;
+  const double twist = s.q[kMotor] - s.q[kPinion];
+  o.sensor_torque = input_.rigid ? none : spring(input_, twist) / ratio_;
+  o.sensor_twist = input_.rigid ? none : twist * ratio_;
+  o.sensor_twist_rate = input_.rigid ? none : (s.w[kMotor] - s.w[kPinion]) * ratio_;
+  o.load_position = s.q[kLink];
+  o.load_velocity = s.w[kLink];
+  o.load_torque = output_.rigid ? none : spring(output_, s.q[kGear] - s.q[kLink]);
+  return o;
+}
+
+double GearTrain::energy(const double* state) const {
+  const Slots s = unpack(state);
+  double energy = 0;
+  for (int node = 0; node < dof_; ++node) energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
+  if (!input_.rigid) energy += 0.5 * input_.stiffness * std::pow(s.q[kMotor] - s.q[kPinion], 2);
+  if (!output_.rigid) energy += 0.5 * output_.stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
+  const double penetration = std::fabs(lever_ * (s.q[kPinion] - s.q[kGear])) - half_gap_;
+  if (penetration > 0) energy += contact_->elastic_energy(penetration);
+  return energy;
+}
+
+double GearTrain::damping_power(const double* state) const {
+  const Slots s = unpack(state);
+  double power = 0;
+  for (int slot = 0; slot < kSlots; ++slot) power += damping_[slot] * s.w[slot] * s.w[slot];
+  if (!input_.rigid) power += input_.damping * std::pow(s.w[kMotor] - s.w[kPinion], 2);
+  if (!output_.rigid) power += output_.damping * std::pow(s.w[kGear] - s.w[kLink], 2);
+  return power;
+}
+
+double GearTrain::elastic_deflection(double motor_torque) const {
+  const double torque = std::fabs(motor_torque) * ratio_;
+  double angle = contact_->static_penetration(torque / lever_) / lever_;
+  if (!input_.rigid) angle += torque / input_.stiffness;
+  if (!output_.rigid) angle += torque / output_.stiffness;
+  return std::copysign(angle * ratio_, motor_torque);
+}
+
+}  // namespace backlash

@@ -1,0 +1,21 @@
+#include "backlash_diagnosis/model/term.h"
+
+#include "terms/terms.h"
+
+namespace backlash {
+
+const std::vector<TermType>& term_types() {
+  static const std::vector<TermType> types = {gravity_term()};
+  return types;
+}
+
+std::shared_ptr<const Term> read_term(const YamlReader& yaml) {
+  std::vector<std::string> ids;
+  for (const TermType& type : term_types()) ids.push_back(type.id);
+  const std::string id = yaml.choice("id", ids);
+  for (const TermType& type : term_types())
+    if (type.id == id) return type.create(read_parameters(yaml, type.parameters));
+  yaml.fail("id", "is not a known term");  // choice() has refused it already
+}
+
+}  // namespace backlash

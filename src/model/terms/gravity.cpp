@@ -1,0 +1,32 @@
+// Gravity on a link whose centre of mass lies off the axis:
+//   load torque = -A sin(q + p)        A = m g d [N m], p [rad], q = load position, q + p = 0 hanging down
+// Sarkar, Ellis and Moore (1997), Table 1 (m_L d_L sin(theta_L) g).
+#include <cmath>
+
+#include "terms.h"
+
+namespace backlash {
+namespace {
+
+class Gravity : public Term {
+ public:
+  Gravity(double amplitude, double phase) : amplitude_(amplitude), phase_(phase) {}
+  void add(const Motion& motion, EndTorques& torques) const override {
+    torques.load -= amplitude_ * std::sin(motion.load_position + phase_);
+  }
+
+ private:
+  double amplitude_, phase_;
+};
+
+}  // namespace
+
+TermType gravity_term() {
+  return {"gravity",
+          {{"amplitude", "N m", Range::not_negative(), "A"}, {"phase", "rad", Range::any(), "p"}},
+          [](const ParameterValues& p) -> std::unique_ptr<Term> {
+            return std::make_unique<Gravity>(p.at("amplitude"), p.at("phase"));
+          }};
+}
+
+}  // namespace backlash

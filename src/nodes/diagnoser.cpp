@@ -1,0 +1,12 @@
+// The diagnoser node; `--help` lists its parameters, topics and services.
+#include "backlash_diagnosis/ros/diagnoser_node.h"
+#include "backlash_diagnosis/ros/node_main.h"
+
+int main(int argc, char** argv) {
+  using namespace backlash;
+  return node_main(argc, argv, "diagnoser", diagnoser_help(), [] {
+    const ros::NodeHandle handle, private_handle("~");
+    DiagnoserNode(handle, private_handle, load_diagnoser_settings(private_handle)).run();
+    return 0;
+  });
+}

@@ -1,0 +1,60 @@
+#include "backlash_diagnosis/record/record.h"
+
+#include <algorithm>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/record/time_base.h"
+
+namespace backlash {
+namespace {
+
+// In the order of the enumerators.
+const std::array<std::string, kChannelCount>& channel_names() {
+  static const std::array<std::string, kChannelCount> names = {
+      "motor_torque",  "motor_position", "motor_velocity",    "load_position",
+      "load_velocity", "sensor_torque",  "reference_position"};
+  return names;
+}
+
+}  // namespace
+
+const std::array<Channel, kChannelCount> kChannels = {
+    Channel::motor_torque,  Channel::motor_position, Channel::motor_velocity,    Channel::load_position,
+    Channel::load_velocity, Channel::sensor_torque,  Channel::reference_position};
+
+const std::string& channel_name(Channel channel) {
+  return channel_names()[static_cast<std::size_t>(channel)];
+}
+
+Channel channel_from_name(const std::string& name) {
+  for (const Channel channel : kChannels) {
+    if (channel_name(channel) == name) return channel;
+  }
+  throw InvalidParameter("channel", printable(name), "must be one of " + joined(channel_names()));
+}
+
+double Record::sampling_interval() const {
+  return median_interval(time);
+}
+
+Record Record::slice(double from, double to) const {
+  const auto first = std::lower_bound(time.begin(), time.end(), from) - time.begin();
+  const auto last = std::max(first, std::lower_bound(time.begin(), time.end(), to) - time.begin());
+  Record part;
+  part.name = name;
+  part.warnings = warnings;
+  part.time.assign(time.begin() + first, time.begin() + last);
+  for (const Channel channel : kChannels) {
+    const std::vector<double>& all = column(channel);
+    if (all.empty()) continue;
+    if (all.size() != time.size()) {
+      throw BadData(name, channel_name(channel) + " has " + std::to_string(all.size()) +
+                              " values, time has " + std::to_string(time.size()));
+    }
+    part.column(channel).assign(all.begin() + first, all.begin() + last);
+  }
+  return part;
+}
+
+}  // namespace backlash

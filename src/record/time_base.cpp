@@ -1,0 +1,104 @@
+#include "backlash_diagnosis/record/time_base.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+namespace {
+
+std::string short_text(double value, int digits = 6) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
+  return buffer;
+}
+
+std::string seconds(double time) {
+  return time_text(time) + " s";
+}
+
+std::string counted(std::size_t count, const std::string& noun) {
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+}  // namespace
+
+std::string time_text(double time) {
+  char buffer[400];  // the largest double has 309 digits before the point
+  const auto result = std::to_chars(buffer, buffer + sizeof buffer, time, std::chars_format::fixed, 9);
+  std::string text(buffer, result.ptr);
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text == "-0" ? "0" : text;
+}
+
+StampVerdict StampChecker::next(double stamp) {
+  if (!std::isfinite(stamp)) throw InvalidParameter("time", stamp, "must be finite");
+  if (accepted_ > 0 && stamp < last_) return StampVerdict::backwards;
+  if (accepted_ > 0 && stamp == last_) {
+    if (repeated_++ == 0) first_repeated_ = stamp;
+    return StampVerdict::repeated;
+  }
+  last_ = stamp;
+  ++accepted_;
+  return StampVerdict::accept;
+}
+
+std::string StampChecker::describe(const std::string& where) const {
+  if (repeated_ == 0) return "";
+  return counted(repeated_, "repeated time stamp") + ": the later sample dropped; first at " +
+         (where.empty() ? "" : where + ", ") + "time = " + seconds(first_repeated_);
+}
+
+double median_interval(const std::vector<double>& time) {
+  if (time.size() < 2) return 0;
+  std::vector<double> intervals(time.size() - 1);
+  for (std::size_t i = 0; i < intervals.size(); ++i) intervals[i] = time[i + 1] - time[i];
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  if (intervals.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(intervals.begin(), middle));
+}
+
+std::vector<std::string> describe_time_base(const std::vector<double>& time) {
+  if (time.size() < 3) return {};
+  const double median = median_interval(time);
+  std::size_t gaps = 0, uneven = 0, longest_gap = 0, most_uneven = 0, regular = 0;
+  double longest = 0, largest_deviation = 0, sum = 0, sum_of_squares = 0;  // of the deviation from the median
+  for (std::size_t i = 0; i + 1 < time.size(); ++i) {
+    const double interval = time[i + 1] - time[i];
+    if (interval > kGapFactor * median) {
+      ++gaps;
+      if (interval > longest) longest = interval, longest_gap = i;
+      continue;
+    }
+    const double deviation = interval - median;
+    ++regular;
+    sum += deviation;
+    sum_of_squares += deviation * deviation;
+    if (std::abs(deviation) > kJitterFraction * median) ++uneven;
+    if (std::abs(deviation) > largest_deviation) largest_deviation = std::abs(deviation), most_uneven = i;
+  }
+  std::vector<std::string> warnings;
+  const std::string against = "median interval " + short_text(median) + " s";
+  if (gaps > 0) {
+    warnings.push_back(counted(gaps, "time gap") + ": the longest " + short_text(longest) +
+                       " s after time = " + seconds(time[longest_gap]) + " (" + against + ")");
+  }
+  const double mean = sum / static_cast<double>(regular);  // at least half of the intervals are no gap
+  const double deviation =
+      std::sqrt(std::max(0.0, sum_of_squares / static_cast<double>(regular) - mean * mean));
+  if (deviation > kJitterFraction * median) {
+    warnings.push_back("time jitter: standard deviation of the interval " +
+                       short_text(100 * deviation / median, 3) + " % of the " + against + ", " +
+                       counted(uneven, "interval") + " off by more than " +
+                       short_text(100 * kJitterFraction) + " %, the largest by " +
+                       short_text(largest_deviation) + " s after time = " + seconds(time[most_uneven]));
+  }
+  return warnings;
+}
+
+}  // namespace backlash

@@ -1,0 +1,159 @@
+// The writing half of bag_record.h.
+#include <fcntl.h>
+#include <rosbag/bag.h>
+#include <std_msgs/String.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/ros/bag_record.h"
+#include "backlash_diagnosis/ros/joint_state.h"
+
+namespace backlash {
+namespace {
+
+const std::string kInfoTopic = "/record_info";
+const std::string kJointTopic = "/joint_states";
+
+/// A file beside the target that vanishes unless it is kept.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& path) : path_(path), target_(path) {
+    struct stat existing {};
+    if (::stat(path.c_str(), &existing) == 0) {
+      if (!S_ISREG(existing.st_mode)) fail(S_ISDIR(existing.st_mode) ? "is a directory" : "is not a regular file");
+      std::error_code ignored;
+      const auto real = std::filesystem::canonical(path, ignored);  // a symbolic link stays
+      if (!ignored) target_ = real.string();
+    }
+    name_ = target_ + ".tmp-" + std::to_string(::getpid());
+    const int descriptor = ::open(name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor < 0) fail(std::strerror(errno));
+    ::close(descriptor);
+  }
+  ~TemporaryFile() {
+    if (!kept_) ::unlink(name_.c_str());
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  const std::string& name() const { return name_; }
+
+  void keep() {
+    const int descriptor = ::open(name_.c_str(), O_RDONLY | O_CLOEXEC);
+    int error = descriptor < 0 || ::fsync(descriptor) != 0 ? errno : 0;
+    if (descriptor >= 0) ::close(descriptor);
+    if (error == 0 && ::rename(name_.c_str(), target_.c_str()) != 0) error = errno;
+    if (error != 0) fail(std::strerror(error));
+    kept_ = true;
+  }
+
+  [[noreturn]] void fail(const std::string& reason) const { throw CannotWrite(path_ + ": cannot be written: " + reason); }
+
+ private:
+  const std::string path_;
+  std::string target_, name_;
+  bool kept_ = false;
+};
+
+void check_writable(const Record& record) {
+  const auto fail = [&record](const std::string& reason) { throw BadData(record.name, reason); };
+  if (record.time.empty()) fail("a record without samples cannot be written");
+  if (!record.has(Channel::motor_torque) && !record.has(Channel::sensor_torque) &&
+      !record.has(Channel::motor_position) && !record.has(Channel::load_position))
+    fail("a record needs a torque or position to be written");
+  for (const Channel channel : kChannels) {
+    const std::vector<double>& column = record.column(channel);
+    if (column.empty()) continue;
+    if (column.size() != record.size())
+      fail(channel_name(channel) + " has " + std::to_string(column.size()) + " values, time has " +
+           std::to_string(record.size()));
+    for (std::size_t i = 0; i < column.size(); ++i)
+      if (!std::isfinite(column[i]))
+        fail(channel_name(channel) + " in sample " + std::to_string(i) + " is not a finite number");
+  }
+}
+
+/// Stamps to the nanosecond, increasing and within what ROS can hold.
+std::vector<ros::Time> stamps_of(const Record& record, const ros::Time& origin) {
+  std::vector<ros::Time> stamps;
+  stamps.reserve(record.size());
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const auto fail = [&](const char* reason) {
+      throw BadData(record.name, "time = " + to_text(record.time[i]) + " s in sample " + std::to_string(i) + ": " + reason);
+    };
+    if (!(std::abs(record.time[i]) < 4294967295.0)) fail("a ROS stamp cannot hold it");
+    const double whole = std::floor(record.time[i]);
+    const std::int64_t total = static_cast<std::int64_t>(origin.toNSec()) +
+                               static_cast<std::int64_t>(whole) * 1'000'000'000 +
+                               std::llround((record.time[i] - whole) * 1e9);
+    if (total <= 0 || total / 1'000'000'000 > std::numeric_limits<std::uint32_t>::max())
+      fail("a ROS stamp cannot hold it");
+    ros::Time stamp;
+    stamp.fromNSec(static_cast<std::uint64_t>(total));
+    if (!stamps.empty() && !(stamp > stamps.back())) fail("does not increase by at least 1 ns");
+    stamps.push_back(stamp);
+  }
+  return stamps;
+}
+
+std_msgs::String info_message(const Record& record, const ros::Time& origin) {
+  std::string name;
+  for (const char c : printable(record.name, 4096)) {
+    if (c == '"' || c == '\\') name += '\\';
+    name += c;
+  }
+  std_msgs::String message;
+  message.data = "{name: \"" + name + "\", time_origin: {secs: " + std::to_string(origin.sec) +
+                 ", nsecs: " + std::to_string(origin.nsec) + "}}";
+  return message;
+}
+
+void write_messages(rosbag::Bag& bag, const Record& record, const std::vector<ros::Time>& stamps,
+                    const JointNames& names, const ros::Time& origin) {
+  using Info = ros::message_traits::DataType<std_msgs::String>;
+  const auto latched = boost::make_shared<ros::M_string>();
+  (*latched)["type"] = Info::value();
+  (*latched)["md5sum"] = ros::message_traits::MD5Sum<std_msgs::String>::value();
+  (*latched)["message_definition"] = ros::message_traits::Definition<std_msgs::String>::value();
+  (*latched)["latching"] = "1";
+  (*latched)["callerid"] = "/convert_record";
+  bag.write(kInfoTopic, stamps.front(), info_message(record, origin), latched);
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    sensor_msgs::JointState message = make_joint_state(record, i, names);
+    message.header.seq = static_cast<std::uint32_t>(i);
+    message.header.stamp = stamps[i];
+    bag.write(kJointTopic, stamps[i], message);
+  }
+}
+
+}  // namespace
+
+void write_bag(const Record& record, const std::string& path, const std::string& joint, const ros::Time& origin) {
+  if (joint.empty()) throw InvalidParameter("joint", "''", "must not be empty");
+  check_writable(record);
+  const std::vector<ros::Time> stamps = stamps_of(record, origin);
+  TemporaryFile file(path);
+  auto bag = std::make_unique<rosbag::Bag>();
+  try {
+    bag->open(file.name(), rosbag::bagmode::Write);
+    bag->setCompression(rosbag::compression::LZ4);
+    write_messages(*bag, record, stamps, JointNames(joint), origin);
+    bag->close();
+  } catch (const std::exception& e) {
+    // Its destructor would try to write the rest and end the program when that fails too; so it is not called.
+    (void)bag.release();
+    file.fail(std::string("rosbag: ") + e.what());
+  }
+  file.keep();
+}
+
+}  // namespace backlash

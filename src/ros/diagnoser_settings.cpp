@@ -1,0 +1,68 @@
+// Parameters of the node `diagnoser`.
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/ros/diagnoser_node.h"
+#include "backlash_diagnosis/ros/parameters.h"
+
+namespace backlash {
+namespace {
+
+RigFile rig_from(const std::string& path) { return path.empty() ? default_rig_file() : load_rig_file(path); }
+
+}  // namespace
+
+const char* diagnoser_help() {
+  return R"(diagnoser: tells the backlash of geared joints from joint torque and position
+
+usage: rosrun backlash_diagnosis diagnoser [_PARAMETER:=VALUE ...] [NAME:=REMAPPED ...]
+
+parameters (private)
+  rig       path of the rig file; default: the built-in rig of Sarkar et al. (1997)
+  curve     path of a monitoring curve; default: built from the rig at the rate of the messages
+  joints    list of joint names; default: the joint of the rig file
+  JOINT/rig, JOINT/curve   the same for one of several joints
+  window    whole periods that the published estimates look back; default 5
+  keep      s of samples kept for the service; default 60
+  queue     messages waiting at most; default 20000
+  stale     s of wall time without a message before /diagnostics says so; default 2
+
+subscribes
+  joint_states             sensor_msgs/JointState: JOINT_motor, JOINT_sensor, JOINT_load
+publishes
+  amplitude_distribution   backlash_diagnosis/AmplitudeDistribution, each whole period
+  backlash_estimate        backlash_diagnosis/BacklashEstimate, one per method each period
+  /diagnostics             diagnostic_msgs/DiagnosticArray
+services
+  ~diagnose  ~set_baseline  ~get_curve
+action
+  ~build_curve
+)";
+}
+
+DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle) {
+  Parameters parameters(private_handle);
+  DiagnoserSettings settings;
+  const std::string rig = parameters.text("rig", "");
+  const std::string curve = parameters.text("curve", "");
+  const RigFile common = rig_from(rig);
+  MonitorSettings defaults;
+  defaults.window = static_cast<int>(parameters.integer("window", 5, 1, 1'000'000));
+  defaults.keep = parameters.number("keep", 60, Range::positive());
+  settings.queue = static_cast<int>(parameters.integer("queue", 20000, 1, 10'000'000));
+  settings.stale = parameters.number("stale", 2, Range::positive());
+  parameters.allow("diagnostic_period");  // of diagnostic_updater
+  for (const std::string& joint : parameters.texts("joints", {common.rig.joint})) {
+    for (const MonitorSettings& other : settings.joints)
+      if (other.joint == joint) throw InvalidParameter("~joints", joint, "is named twice");
+    MonitorSettings monitor = defaults;
+    monitor.joint = joint;
+    const std::string own_rig = parameters.text(joint + "/rig", "");
+    const std::string own_curve = parameters.text(joint + "/curve", curve);
+    monitor.rig = own_rig.empty() ? common : load_rig_file(own_rig);
+    if (!own_curve.empty()) monitor.curve = read_curve(own_curve);
+    settings.joints.push_back(std::move(monitor));
+  }
+  parameters.finish();
+  return settings;
+}
+
+}  // namespace backlash

@@ -1,0 +1,172 @@
+#include "backlash_diagnosis/ros/joint_monitor.h"
+
+#include <ros/console.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+namespace {
+
+StreamSettings stream_settings(const MonitorSettings& settings) {
+  StreamSettings stream;
+  stream.apd = settings.rig.diagnosis.apd;
+  stream.keep = settings.keep;
+  return stream;
+}
+
+}  // namespace
+
+JointMonitor::JointMonitor(MonitorSettings settings)
+    : settings_(std::move(settings)),
+      diagnosis_settings_(without_settling(settings_.rig.diagnosis)),
+      names_(settings_.joint),
+      stream_(stream_settings(settings_)) {
+  if (settings_.curve) {
+    curve_ = std::make_shared<MonitoringCurve>(*settings_.curve);
+    curve_state_ = "loaded";
+  } else if (!settings_.rig.diagnosis.apd) {
+    curve_state_ = "none: the rig file declares no diagnosis.apd";
+  } else {
+    curve_state_ = "waiting for samples to know their rate";
+  }
+}
+
+JointMonitor::~JointMonitor() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+    changed_.notify_all();
+  }
+  if (builder_.joinable()) builder_.join();
+}
+
+std::optional<PeriodReport> JointMonitor::take(const sensor_msgs::JointState& message, const std::string& topic) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_arrival_ = ros::WallTime::now();
+  ChannelValues values;
+  try {
+    if (message.header.stamp.isZero()) throw BadData(topic, "the header stamp is zero");
+    values = read_joint_state(message, names_, topic);
+  } catch (const BadData& error) {
+    ++bad_messages_;
+    last_problem_ = error.what();
+    return std::nullopt;
+  }
+  const long restarts = stream_.counters().restarts;
+  const PeriodResult* period = stream_.add(clock_.seconds(message.header.stamp), values);
+  if (stream_.counters().restarts != restarts) reported_periods_ = 0;
+  if (!stream_.counters().last_problem.empty()) last_problem_ = topic + ": " + stream_.counters().last_problem;
+  const long periods = stream_.periods();
+  const bool complete = settings_.rig.diagnosis.apd ? period != nullptr : periods > reported_periods_;
+  if (!complete) return std::nullopt;
+  reported_periods_ = periods;
+  const double interval = stream_.kept().sampling_interval();
+  if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd && interval > 0) start_building(1 / interval);
+  auto result = report(period);
+  changed_.notify_all();
+  return result;
+}
+
+/// Called with the lock held.
+std::optional<PeriodReport> JointMonitor::report(const PeriodResult* period) {
+  PeriodReport report;
+  if (period) report.period = *period;
+  report.period_length = stream_.period();
+  const Record window = stream_.latest(settings_.window);
+  if (window.time.empty()) return std::nullopt;
+  report.stamp = clock_.stamp(window.time.back());
+  report.diagnosis = diagnose_settled(window, diagnosis_settings_, curve_.get(), baseline_);
+  latest_ = report.diagnosis;
+  return report;
+}
+
+Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note, ros::Time& stamp) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const auto ready = [&] { return stop_ || (stream_.periods() >= wanted_periods(periods) && !building_); };
+  changed_.wait_for(lock, std::chrono::duration<double>(timeout), ready);
+  const long available = stream_.periods();
+  if (available < wanted_periods(periods))
+    note = "only " + std::to_string(available) + " of " + std::to_string(wanted_periods(periods)) +
+           " whole periods arrived" + (last_problem_.empty() ? "" : "; last problem: " + last_problem_);
+  const Record record = stream_.latest(periods);
+  const auto curve = curve_;
+  const auto baseline = baseline_;
+  const std::string curve_state = curve_state_;
+  stamp = record.time.empty() ? ros::Time() : clock_.stamp(record.time.back());
+  lock.unlock();  // the subscriber goes on while this computes
+  Diagnosis diagnosis = diagnose_settled(record, diagnosis_settings_, curve.get(), baseline);
+  for (Estimate& estimate : diagnosis.estimates)
+    if (estimate.method == "apd_skewness" && !curve) estimate.message += " (" + curve_state + ")";
+  return diagnosis;
+}
+
+void JointMonitor::start_building(double rate) {
+  building_ = build_tried_ = true;
+  curve_state_ = "building";
+  if (builder_.joinable()) builder_.join();
+  builder_ = std::thread(&JointMonitor::build, this, rate);
+}
+
+void JointMonitor::build(double rate) {
+  CurveRequest request;
+  request.sampling_rate = rate;
+  std::string failure;
+  try {
+    MonitoringCurve built = build_curve(settings_.rig, request, [this](double fraction, const std::string&) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      curve_state_ = "building, " + std::to_string(std::lround(100 * fraction)) + " %";
+      return !stop_;
+    });
+    ROS_INFO("%s: built the monitoring curve for %g Hz from %s", settings_.joint.c_str(),
+             built.conditions.sampling_rate, settings_.rig.source.c_str());
+    set_curve(std::move(built));
+  } catch (const Cancelled&) {
+    return;
+  } catch (const std::exception& error) {
+    failure = error.what();
+    ROS_ERROR("%s: the monitoring curve cannot be built: %s", settings_.joint.c_str(), error.what());
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  building_ = false;
+  if (!failure.empty()) curve_state_ = "none: " + failure;
+  changed_.notify_all();
+}
+
+void JointMonitor::set_baseline(const std::optional<Baseline>& baseline) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  baseline_ = baseline;
+}
+
+void JointMonitor::set_curve(MonitoringCurve curve) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  curve_ = std::make_shared<MonitoringCurve>(std::move(curve));
+  curve_state_ = "built";
+  changed_.notify_all();
+}
+
+std::shared_ptr<const MonitoringCurve> JointMonitor::curve() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return curve_;
+}
+
+MonitorState JointMonitor::state() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  MonitorState state;
+  state.counters = stream_.counters();
+  state.bad_messages = bad_messages_;
+  state.last_problem = last_problem_;
+  state.curve_state = curve_state_;
+  const double interval = stream_.kept().sampling_interval();
+  state.rate = interval > 0 ? 1 / interval : 0;
+  state.period = stream_.period();
+  state.periods = stream_.periods();
+  state.any_sample = stream_.counters().accepted > 0;
+  state.last_arrival = last_arrival_;
+  state.latest = latest_;
+  return state;
+}
+
+}  // namespace backlash

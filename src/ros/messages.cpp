@@ -1,0 +1,122 @@
+#include "backlash_diagnosis/ros/messages.h"
+
+#include <cmath>
+
+namespace backlash {
+namespace {
+
+using EstimateMessage = backlash_diagnosis::BacklashEstimate;
+
+backlash_diagnosis::AmplitudeDistribution distribution(const AmplitudeDistribution& apd, const ApdSettings& settings) {
+  backlash_diagnosis::AmplitudeDistribution m;
+  m.signal = channel_name(settings.signal);
+  m.lower = apd.layout().lower;
+  m.upper = apd.layout().upper;
+  m.percentage = apd.percentages();
+  m.samples = static_cast<std::uint32_t>(apd.samples());
+  m.below = static_cast<std::uint32_t>(apd.below());
+  m.above = static_cast<std::uint32_t>(apd.above());
+  m.skewness = apd.skewness();
+  m.kurtosis = apd.kurtosis();
+  return m;
+}
+
+std::uint8_t code(Status status) {
+  switch (status) {
+    case Status::ok: return EstimateMessage::OK;
+    case Status::below_range: return EstimateMessage::BELOW_RANGE;
+    case Status::above_range: return EstimateMessage::ABOVE_RANGE;
+    case Status::out_of_domain: return EstimateMessage::OUT_OF_DOMAIN;
+    case Status::insufficient_data: return EstimateMessage::INSUFFICIENT_DATA;
+    case Status::ambiguous: break;
+  }
+  return EstimateMessage::AMBIGUOUS;
+}
+
+}  // namespace
+
+backlash_diagnosis::AmplitudeDistribution to_message(const PeriodResult& period, const ApdSettings& settings,
+                                                     double period_length) {
+  auto m = distribution(period.apd, settings);
+  m.mean = period.signal.mean();
+  m.standard_deviation = period.signal.standard_deviation();
+  m.period = period_length;
+  m.periods = 1;
+  return m;
+}
+
+backlash_diagnosis::AmplitudeDistribution to_message(const ApdResult& apd, const ApdSettings& settings) {
+  auto m = distribution(apd.total, settings);
+  m.skewness = apd.skewness;
+  m.period = apd.period;
+  m.periods = static_cast<std::uint32_t>(apd.periods.size());
+  double sum = 0, squares = 0;  // of equally long periods
+  for (const PeriodResult& period : apd.periods) {
+    sum += period.signal.mean();
+    squares += std::pow(period.signal.mean(), 2) + std::pow(period.signal.standard_deviation(), 2);
+  }
+  const double n = apd.periods.empty() ? kNaN : apd.periods.size();
+  m.mean = sum / n;
+  m.standard_deviation = std::sqrt(std::max(0.0, squares / n - m.mean * m.mean));
+  return m;
+}
+
+backlash_diagnosis::BacklashEstimate to_message(const Estimate& e) {
+  EstimateMessage m;
+  m.method = e.method;
+  m.status = code(e.status);
+  m.status_name = to_string(e.status);
+  m.backlash = e.backlash;
+  m.lower = e.lower;
+  m.upper = e.upper;
+  m.backlash_angle = e.backlash_angle;
+  m.angle_lower = e.angle_lower;
+  m.angle_upper = e.angle_upper;
+  m.skewness = e.skewness;
+  const PlayComponents parts = e.components.value_or(PlayComponents{});
+  m.gap = parts.gap;
+  m.compliance = parts.compliance;
+  m.coulomb = parts.coulomb;
+  m.at_torque = parts.at_torque;
+  m.message = e.message;
+  return m;
+}
+
+backlash_diagnosis::Verdict to_message(const Verdict& verdict) {
+  backlash_diagnosis::Verdict m;
+  m.grade = to_string(verdict.grade);
+  m.estimate = verdict.estimate;
+  m.agreement = verdict.agreement;
+  m.growth = verdict.growth;
+  m.message = verdict.message;
+  return m;
+}
+
+backlash_diagnosis::MonitoringCurve to_message(const MonitoringCurve& curve) {
+  const CurveConditions& c = curve.conditions;
+  backlash_diagnosis::MonitoringCurve m;
+  m.rig = c.rig;
+  m.version = c.version;
+  m.signal = c.signal;
+  m.excitation = c.excitation;
+  m.amplitude = c.amplitude;
+  m.frequency = c.frequency;
+  m.sampling_rate = c.sampling_rate;
+  m.classes = static_cast<std::uint32_t>(c.apd.classes);
+  m.lower = c.apd.lower;
+  m.upper = c.apd.upper;
+  m.periods = static_cast<std::uint32_t>(c.periods);
+  m.seeds = static_cast<std::uint32_t>(c.seeds);
+  m.noise = c.noise;
+  for (const CurvePoint& point : curve.points) {
+    backlash_diagnosis::MonitoringCurvePoint p;
+    p.backlash = point.backlash;
+    p.skewness = curve.nominal(point).mean;
+    p.scatter = std::hypot(curve.nominal(point).between, curve.nominal(point).within);
+    p.monotonic = point.monotonic;
+    m.points.push_back(p);
+  }
+  return m;
+}
+
+}  // namespace backlash

@@ -1,0 +1,146 @@
+#include "backlash_diagnosis/simulation/excitation.h"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+class Constant : public Excitation {
+ public:
+  explicit Constant(double torque) : torque_(torque) {}
+  double torque(double, long) const override { return torque_; }
+  double segment_end(long) const override { return kNever; }
+
+ private:
+  double torque_;
+};
+
+class External : public Excitation {
+ public:
+  double torque(double, long) const override { return torque_; }
+  double segment_end(long) const override { return kNever; }
+  bool set_torque(double torque) override {
+    torque_ = torque;
+    return true;
+  }
+
+ private:
+  double torque_ = 0;
+};
+
+class Square : public Excitation {
+ public:
+  Square(double amplitude, double frequency, double bias)
+      : amplitude_(amplitude), frequency_(frequency), bias_(bias) {}
+  double torque(double, long segment) const override {
+    return bias_ + (segment % 2 == 0 ? amplitude_ : -amplitude_);
+  }
+  double segment_end(long segment) const override { return (segment + 1) / (2 * frequency_); }
+  double period() const override { return 1 / frequency_; }
+
+ private:
+  double amplitude_, frequency_, bias_;
+};
+
+class MultiSine : public Excitation {
+ public:
+  MultiSine(std::vector<SineLine> lines, double bias) : lines_(std::move(lines)), bias_(bias) {}
+  double torque(double t, long) const override {
+    double sum = bias_;
+    for (const SineLine& line : lines_) sum += line.amplitude * std::sin(2 * M_PI * line.frequency * t + line.phase);
+    return sum;
+  }
+  double segment_end(long) const override { return kNever; }
+  double period() const override {
+    if (lines_.size() == 1) return 1 / lines_.front().frequency;
+    long common = 0;  // in mHz
+    for (const SineLine& line : lines_) common = std::gcd(common, std::lround(line.frequency * 1000));
+    return common > 0 ? 1000.0 / common : 0;
+  }
+
+ private:
+  std::vector<SineLine> lines_;
+  double bias_;
+};
+
+class Chirp : public Excitation {
+ public:
+  Chirp(double amplitude, double start, double end, double duration, double bias)
+      : amplitude_(amplitude), start_(start), rate_((end - start) / duration), duration_(duration), bias_(bias) {}
+  double torque(double t, long segment) const override {
+    const double s = t - segment * duration_;
+    return bias_ + amplitude_ * std::sin(2 * M_PI * (start_ + 0.5 * rate_ * s) * s);
+  }
+  double segment_end(long segment) const override { return (segment + 1) * duration_; }
+  double period() const override { return duration_; }
+
+ private:
+  double amplitude_, start_, rate_, duration_, bias_;
+};
+
+}  // namespace
+
+std::unique_ptr<Excitation> constant_excitation(double torque) { return std::make_unique<Constant>(torque); }
+
+std::unique_ptr<Excitation> square_excitation(double amplitude, double frequency, double bias) {
+  return std::make_unique<Square>(amplitude, frequency, bias);
+}
+
+std::unique_ptr<Excitation> sine_excitation(double amplitude, double frequency, double bias) {
+  return multi_sine_excitation({{amplitude, frequency, 0}}, bias);
+}
+
+std::unique_ptr<Excitation> chirp_excitation(double amplitude, double start, double end, double duration,
+                                             double bias) {
+  return std::make_unique<Chirp>(amplitude, start, end, duration, bias);
+}
+
+std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, double bias) {
+  return std::make_unique<MultiSine>(std::move(lines), bias);
+}
+
+std::unique_ptr<Excitation> external_excitation() { return std::make_unique<External>(); }
+
+std::unique_ptr<Excitation> ExcitationSettings::create() const {
+  if (type == "square") return square_excitation(amplitude, frequency, bias);
+  if (type == "sine") return sine_excitation(amplitude, frequency, bias);
+  if (type == "chirp") return chirp_excitation(amplitude, start_frequency, end_frequency, duration, bias);
+  if (type == "multi_sine") return multi_sine_excitation(lines, bias);
+  if (type == "constant") return constant_excitation(amplitude);
+  if (type == "topic") return external_excitation();
+  throw InvalidParameter("excitation.type", type, "must be square, sine, chirp, multi_sine, constant or topic");
+}
+
+ExcitationSettings read_excitation(const YamlReader& yaml) {
+  ExcitationSettings settings;
+  settings.type = yaml.choice("type", {"square", "sine", "chirp", "multi_sine", "constant", "topic"});
+  const std::string& type = settings.type;
+  if (type == "constant") settings.amplitude = yaml.number("torque", Range::any());
+  if (type == "square" || type == "sine" || type == "chirp") {
+    settings.amplitude = yaml.number("amplitude", Range::not_negative());
+    settings.bias = yaml.number_or("bias", 0, Range::any());
+  }
+  if (type == "square" || type == "sine") settings.frequency = yaml.number("frequency", Range::positive());
+  if (type == "chirp") {
+    settings.start_frequency = yaml.number("start_frequency", Range::positive());
+    settings.end_frequency = yaml.number("end_frequency", Range::positive());
+    settings.duration = yaml.number("duration", Range::positive());
+  }
+  if (type == "multi_sine") {
+    settings.bias = yaml.number_or("bias", 0, Range::any());
+    for (const YamlReader& line : yaml.maps("lines"))
+      settings.lines.push_back({line.number("amplitude", Range::not_negative()),
+                                line.number("frequency", Range::positive()),
+                                line.number_or("phase", 0, Range::any())});
+    if (settings.lines.empty()) yaml.fail("lines", "needs at least one line");
+  }
+  return settings;
+}
+
+}  // namespace backlash

@@ -1,0 +1,61 @@
+#include "backlash_diagnosis/simulation/sensor_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace backlash {
+namespace {
+
+SensorSettings read_sensor(const YamlReader& yaml) {
+  SensorSettings sensor;
+  sensor.noise = yaml.number_or("noise", 0, Range::not_negative());
+  sensor.resolution = yaml.number_or("resolution", 0, Range::not_negative());
+  sensor.offset = yaml.number_or("offset", 0, Range::any());
+  if (yaml.has("limit")) sensor.limit = yaml.number("limit", Range::positive());
+  return sensor;
+}
+
+}  // namespace
+
+SensorsSettings read_sensors(const YamlReader& yaml) {
+  SensorsSettings settings;
+  settings.sampling_rate = yaml.number("sampling_rate", Range::positive());
+  settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
+  for (Channel channel : kChannels)
+    if (const auto sensor = yaml.optional_map(channel_name(channel))) settings.of(channel) = read_sensor(*sensor);
+  return settings;
+}
+
+SensorModel::SensorModel(const SensorsSettings& settings) : settings_(settings) { reset(); }
+
+void SensorModel::reset() {
+  for (std::size_t i = 0; i < kChannelCount; ++i) {
+    std::seed_seq sequence{static_cast<std::uint32_t>(settings_.seed), static_cast<std::uint32_t>(settings_.seed >> 32),
+                           static_cast<std::uint32_t>(i)};
+    generators_[i].seed(sequence);
+    normal_[i].reset();
+  }
+}
+
+double SensorModel::measure(Channel channel, double exact) {
+  const std::size_t i = static_cast<std::size_t>(channel);
+  const SensorSettings& sensor = settings_.channels[i];
+  double value = exact + sensor.offset;
+  if (sensor.noise > 0) value += sensor.noise * normal_[i](generators_[i]);
+  value = std::clamp(value, -sensor.limit, sensor.limit);
+  if (sensor.resolution > 0) value = std::round(value / sensor.resolution) * sensor.resolution;
+  return std::isnan(exact) ? exact : value;
+}
+
+Observation SensorModel::measure(const Observation& exact) {
+  Observation measured = exact;  // the twist and the load torque have no sensor of their own
+  measured.motor_torque = measure(Channel::motor_torque, exact.motor_torque);
+  measured.motor_position = measure(Channel::motor_position, exact.motor_position);
+  measured.motor_velocity = measure(Channel::motor_velocity, exact.motor_velocity);
+  measured.sensor_torque = measure(Channel::sensor_torque, exact.sensor_torque);
+  measured.load_position = measure(Channel::load_position, exact.load_position);
+  measured.load_velocity = measure(Channel::load_velocity, exact.load_velocity);
+  return measured;
+}
+
+}  // namespace backlash

@@ -1,0 +1,58 @@
+#include "backlash_diagnosis/simulation/simulation.h"
+
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+
+SimulationSettings read_simulation_settings(const YamlReader& yaml) {
+  SimulationSettings settings;
+  settings.excitation = read_excitation(yaml.map("excitation"));
+  settings.sensors = read_sensors(yaml.map("sensors"));
+  if (const auto solver = yaml.optional_map("solver")) settings.solver = read_solver(*solver);
+  return settings;
+}
+
+Simulation::Simulation(const Rig& rig, const SimulationSettings& settings)
+    : plant_(rig, settings.excitation, settings.solver),
+      sensors_(settings.sensors),
+      rate_(settings.sensors.sampling_rate) {}
+
+Observation Simulation::step() {
+  plant_.advance_to(index_ / rate_);
+  ++index_;
+  return sensors_.measure(plant_.observe());
+}
+
+void Simulation::reset() {
+  plant_.reset();
+  sensors_.reset();
+  index_ = 0;
+}
+
+Record simulate_record(const Rig& rig, const SimulationSettings& settings, double duration, const Progress& progress) {
+  if (!(duration > 0) || !std::isfinite(duration)) throw InvalidParameter("duration", duration, "must be > 0 s");
+  Simulation simulation(rig, settings);
+  const long samples = std::lround(duration * simulation.sampling_rate());
+  if (samples < 1 || samples > 1'000'000'000L)
+    throw InvalidParameter("duration", duration, "gives no sample or more than 1e9 at this sampling rate");
+  Record record;
+  record.name = rig.name;
+  record.time.reserve(samples);
+  for (long k = 0; k < samples; ++k) {
+    if (progress && k % 1024 == 0 && !progress(double(k) / samples, "simulating")) throw Cancelled();
+    record.time.push_back(k / simulation.sampling_rate());
+    const Observation o = simulation.step();
+    record.column(Channel::motor_torque).push_back(o.motor_torque);
+    record.column(Channel::motor_position).push_back(o.motor_position);
+    record.column(Channel::motor_velocity).push_back(o.motor_velocity);
+    record.column(Channel::load_position).push_back(o.load_position);
+    record.column(Channel::load_velocity).push_back(o.load_velocity);
+    if (!std::isnan(o.sensor_torque)) record.column(Channel::sensor_torque).push_back(o.sensor_torque);
+  }
+  if (progress) progress(1, "simulating");
+  return record;
+}
+
+}  // namespace backlash

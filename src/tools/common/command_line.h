@@ -1,0 +1,61 @@
+// Command lines of the tools: one description gives the parser, the help text and the messages.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/yaml_reader.h"
+
+namespace backlash::tools {
+
+/// A command line that cannot be understood; ends the program with kUsage.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// "--name VALUE", with a help text that states unit and default.
+struct Option {
+  std::string name, value, help;
+  bool required = false;
+};
+
+struct Command {
+  std::string name;
+  std::string summary;                   ///< one sentence
+  std::vector<std::string> positional;   ///< "RIG.yaml", all required
+  std::vector<Option> options;
+  std::string notes;                     ///< paragraphs after the options
+  std::vector<std::string> examples;     ///< without "rosrun backlash_diagnosis"
+  std::string exit_codes;                ///< lines "  0  done"; those of all commands are added
+};
+
+/// What the user wrote. The readers throw UsageError naming option, value and limit.
+class Arguments {
+ public:
+  Arguments(std::vector<std::string> positional, std::map<std::string, std::string> options)
+      : positional_(std::move(positional)), options_(std::move(options)) {}
+
+  const std::string& positional(std::size_t i) const { return positional_.at(i); }
+  bool has(const std::string& option) const { return options_.count(option) > 0; }
+  std::string text(const std::string& option) const;  ///< empty where absent, never where given
+  double number(const std::string& option, double absent, const Range& range) const;
+  std::uint64_t integer(const std::string& option, std::uint64_t absent, std::uint64_t lower, std::uint64_t upper) const;
+
+ private:
+  std::vector<std::string> positional_;
+  std::map<std::string, std::string> options_;
+};
+
+/// Throws UsageError. --help and --version are the business of run_command.
+Arguments parse_arguments(const Command& command, const std::vector<std::string>& words);
+
+std::string help_text(const Command& command);
+
+/// A main(): parses, answers --help and --version, calls `body` and turns exceptions into messages and exit codes.
+int run_command(const Command& command, int argc, char** argv, int (*body)(const Arguments&));
+
+}  // namespace backlash::tools

@@ -1,0 +1,30 @@
+// What diagnose_record tells: as JSON for programs and as text for people.
+#pragma once
+
+#include <iosfwd>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "backlash_diagnosis/diagnosis/diagnose.h"
+
+namespace backlash::tools {
+
+/// A diagnosis and what it rests on.
+struct DiagnosisReport {
+  const Record* record = nullptr;
+  std::vector<std::string> warnings;           ///< of the record and of the curve
+  std::optional<ApdSettings> apd_settings;
+  std::string rig;                             ///< name; empty: none
+  const MonitoringCurve* curve = nullptr;      ///< may be null
+  std::string curve_source;                    ///< path, or "built for this record"
+  Diagnosis diagnosis;
+};
+
+/// Keys in the order of the documentation; NaN is null.
+nlohmann::ordered_json to_json(const DiagnosisReport& report);
+
+/// Lengths in m, angles in rad and deg.
+void print_summary(const DiagnosisReport& report, std::ostream& out);
+
+}  // namespace backlash::tools

@@ -1,0 +1,55 @@
+#include "tools/common/plot.h"
+
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+
+namespace backlash::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kPython = "/usr/bin/python3";  // Debian's, which has matplotlib and the ROS modules
+
+/// Exit code of a program; throws Error where it does not even start.
+int run(std::vector<std::string> words) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  pid_t child = 0;
+  const int problem = ::posix_spawn(&child, words[0].c_str(), nullptr, nullptr, arguments.data(), environ);
+  if (problem != 0) throw Error("cannot start " + words[0] + ": " + std::strerror(problem));
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) throw Error("cannot wait for " + words[0] + ": " + std::strerror(errno));
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+}  // namespace
+
+void check_plot_path(const std::string& path) {
+  const std::string extension = fs::path(path).extension();
+  if (extension != ".png" && extension != ".svg" && extension != ".pdf")
+    throw UsageError("'" + printable(path, 4096) + "': a plot must end in .png, .svg or .pdf");
+}
+
+void plot_curve(const std::string& curve_path, const std::string& picture_path) {
+  std::error_code error;
+  const fs::path script = fs::read_symlink("/proc/self/exe", error).parent_path() / "plot_curve.py";
+  if (error || !fs::exists(script)) throw Error("cannot plot: " + script.string() + " is missing");
+  const int code = run({kPython, script.string(), "--out", picture_path, "--", curve_path});
+  if (code == kCannotWrite) throw CannotWrite(picture_path + ": cannot be written; the curve itself is in " + curve_path);
+  if (code != kHealthy)
+    throw Error("plot_curve.py failed (exit code " + std::to_string(code) + "); the curve itself is in " + curve_path);
+}
+
+}  // namespace backlash::tools

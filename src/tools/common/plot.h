@@ -1,0 +1,15 @@
+// Plots are drawn by the package's Python scripts (matplotlib), found beside the executable.
+#pragma once
+
+#include <string>
+
+namespace backlash::tools {
+
+/// Throws UsageError for a picture that does not end in .png, .svg or .pdf.
+void check_plot_path(const std::string& path);
+
+/// Draws a curve file. Throws CannotWrite where the picture cannot be written, Error where the script or Python is
+/// missing or fails.
+void plot_curve(const std::string& curve_path, const std::string& picture_path);
+
+}  // namespace backlash::tools

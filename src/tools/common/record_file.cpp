@@ -1,0 +1,85 @@
+#include "tools/common/record_file.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/ros/bag_record.h"
+#include "tools/common/command_line.h"
+
+namespace backlash::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_bag(const std::string& path) {
+  check_record_path(path);
+  return fs::path(path).extension() == ".bag";
+}
+
+/// Puts off Ctrl-C and its like while a file is written.
+class SignalsBlocked {
+ public:
+  SignalsBlocked() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, signal);
+    pthread_sigmask(SIG_BLOCK, &signals, &before_);
+  }
+  ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsBlocked(const SignalsBlocked&) = delete;
+  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+}  // namespace
+
+const std::string kDefaultJoint = "joint";
+
+void check_record_path(const std::string& path) {
+  const std::string extension = fs::path(path).extension();
+  if (extension != ".csv" && extension != ".bag")
+    throw UsageError("'" + printable(path, 4096) + "': a record must end in .csv or .bag");
+}
+
+Record read_record(const std::string& path, const BagPlace& place) {
+  return is_bag(path) ? read_bag(path, place.joint, place.topic) : read_csv(path);
+}
+
+void write_record(const Record& record, const std::string& path, const std::string& joint) {
+  const SignalsBlocked blocked;
+  if (is_bag(path))
+    write_bag(record, path, joint);
+  else
+    write_csv(record, path);
+}
+
+void write_text(const std::string& path, const std::string& text) {
+  const SignalsBlocked blocked;
+  write_file(path, text);
+}
+
+void check_output(const std::string& path, const std::vector<std::string>& inputs) {
+  std::error_code error;
+  for (const std::string& input : inputs)
+    if (fs::equivalent(path, input, error))
+      throw UsageError("'" + printable(path, 4096) + "' would overwrite the input '" + printable(input, 4096) + "'");
+  const auto fail = [&path](const std::string& reason) {
+    throw CannotWrite(printable(path, 4096) + ": cannot be written: " + reason);
+  };
+  if (fs::is_directory(path, error)) fail("is a directory");
+  const fs::path folder = fs::path(path).parent_path();
+  if (!folder.empty() && !fs::is_directory(folder, error)) fail("there is no folder " + printable(folder.string(), 4096));
+  if (!fs::exists(path, error) && ::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0) fail(std::strerror(errno));
+}
+
+}  // namespace backlash::tools

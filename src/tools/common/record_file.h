@@ -1,0 +1,35 @@
+// Records as files whose extension tells the format, and what is checked about files before long work begins.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash::tools {
+
+extern const std::string kDefaultJoint;  ///< "joint"
+
+/// Where in a bag the record is; means nothing for a CSV.
+struct BagPlace {
+  std::string joint;  ///< empty: the only one there is
+  std::string topic = "joint_states";
+};
+
+/// Throws UsageError for a path that ends in neither .csv nor .bag.
+void check_record_path(const std::string& path);
+
+/// Throws UsageError as above and what read_csv and read_bag throw.
+Record read_record(const std::string& path, const BagPlace& place = {});
+
+/// Not interrupted by Ctrl-C: the file is written whole or not at all. Throws as write_csv and write_bag.
+void write_record(const Record& record, const std::string& path, const std::string& joint);
+
+/// The same for any text file.
+void write_text(const std::string& path, const std::string& text);
+
+/// Throws UsageError where the output would overwrite one of the inputs, CannotWrite where its folder does not exist or
+/// it is a folder itself.
+void check_output(const std::string& path, const std::vector<std::string>& inputs);
+
+}  // namespace backlash::tools

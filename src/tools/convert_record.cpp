@@ -1,0 +1,55 @@
+// CSV to bag and back.
+#include <iostream>
+
+#include "backlash_diagnosis/workflow/rig_file.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+Command command() {
+  Command c;
+  c.name = "convert_record";
+  c.summary = "Converts a record between CSV and bag (sensor_msgs/JointState on /joint_states); times and values survive "
+              "the way there and back.";
+  c.positional = {"IN.{csv,bag}", "OUT.{csv,bag}"};
+  c.options = {
+      {"rig", "RIG.yaml", "rig file whose joint the bag has"},
+      {"joint", "NAME", "joint in the bag, its names are NAME_motor, NAME_sensor and NAME_load; default: the rig's, "
+                        "else the only one (reading) or 'joint' (writing)"},
+      {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
+  };
+  c.notes = "Only header stamps count. Time 0 of a CSV becomes the stamp 1000000000 s, as ROS refuses 0; the topic "
+            "/record_info in the bag says so. A recorded bag without it begins at time 0.";
+  c.examples = {"convert_record run.csv run.bag --joint elbow", "convert_record run.bag run.csv"};
+  c.exit_codes = "  0   done\n";
+  return c;
+}
+
+int convert(const Arguments& arguments) {
+  const std::string in = arguments.positional(0), out = arguments.positional(1);
+  check_record_path(in);
+  check_record_path(out);
+  BagPlace place;
+  if (arguments.has("rig")) place.joint = load_rig_file(arguments.text("rig")).rig.joint;
+  if (arguments.has("joint")) place.joint = arguments.text("joint");
+  if (arguments.has("topic")) place.topic = arguments.text("topic");
+  std::vector<std::string> inputs = {in};
+  if (arguments.has("rig")) inputs.push_back(arguments.text("rig"));
+  const Record record = read_record(in, place);
+  check_output(out, inputs);
+  for (const std::string& warning : record.warnings) std::cerr << "convert_record: " << in << ": " << warning << '\n';
+  write_record(record, out, place.joint.empty() ? kDefaultJoint : place.joint);
+  std::cout << out << ": " << record.size() << " samples\n";
+  return kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, convert);
+}

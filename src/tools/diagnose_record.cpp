@@ -1,0 +1,191 @@
+// All estimators on one record, without ROS.
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/workflow/curve_builder.h"
+#include "tools/common/command_line.h"
+#include "tools/common/diagnosis_report.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/progress_bar.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+const std::string kApd = "apd_skewness";
+const std::string kStandardOutput = "-";
+
+Command command() {
+  Command c;
+  c.name = "diagnose_record";
+  c.summary = "Estimates the backlash in a record by all methods that it can serve and grades it.";
+  c.positional = {"RECORD.{csv,bag}"};
+  c.options = {
+      {"json", "OUT.json", "report to write; '-' writes it to standard output instead of the summary", true},
+      {"rig", "RIG.yaml", "rig file: what to look for and which limits hold; without it only what the curve allows"},
+      {"curve", "CURVE.yaml", "monitoring curve (see build_curve); without it one is built from the rig file at the "
+                              "record's sampling rate"},
+      {"method", "NAME", "only this method: " + joined(diagnosis_methods())},
+      {"joint", "NAME", "joint in a bag; default: the rig file's, else the only one"},
+      {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
+      {"periods", "N", "use only the last N excitation periods (and those before them that settling discards)"},
+  };
+  c.notes = "backlash is the total free play along the line of action [m], backlash_angle the same as an angle on the axis "
+            "of motor_position [rad]; intervals hold with 95 %.";
+  c.examples = {"diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json",
+                "diagnose_record run.bag --joint elbow --curve curve.yaml --json -"};
+  c.exit_codes =
+      "  0   healthy\n"
+      "  1   watch\n"
+      "  2   fault found: service or stop\n"
+      "  3   inconclusive: the estimates cannot tell\n";
+  return c;
+}
+
+int exit_code(Grade grade) {
+  switch (grade) {
+    case Grade::good: return kHealthy;
+    case Grade::watch: return kWatch;
+    case Grade::service:
+    case Grade::stop: return kFault;
+    case Grade::cannot_tell: break;
+  }
+  return kInconclusive;
+}
+
+/// What the command was given, read.
+struct Inputs {
+  std::string method;
+  std::optional<RigFile> rig;
+  std::optional<MonitoringCurve> curve;
+  std::string curve_source;
+  std::string no_curve;  // why the rig file gives none
+  Record record;
+  DiagnosisSettings settings;
+};
+
+ApdSettings settings_of(const MonitoringCurve& curve) {
+  ApdSettings settings;
+  settings.signal = channel_from_name(curve.conditions.signal);
+  settings.layout = curve.conditions.apd;
+  settings.period = curve.conditions.frequency > 0 ? 1 / curve.conditions.frequency : 0;
+  settings.settling_periods = curve.conditions.settling_periods;
+  return settings;
+}
+
+/// The last `count` whole periods, with as many before them as settling discards.
+void keep_last_periods(Inputs& in, std::uint64_t count) {
+  Record& record = in.record;
+  const auto& apd = in.settings.apd;
+  double period = apd ? apd->period : 0;
+  if (!(period > 0)) period = excitation_period(record, apd ? apd->signal : Channel::motor_torque);
+  if (!(period > 0)) throw BadData(record.name, "--periods needs an excitation that repeats, none was found");
+  const double interval = record.sampling_interval();
+  const double wanted = (static_cast<double>(count) + (apd ? apd->settling_periods : 0)) * period;
+  const double end = record.time.back() + 0.5 * interval;  // each sample stands for half an interval to both sides
+  if (record.time.front() - 0.5 * interval > end - wanted + 1e-6 * period) {
+    record.warnings.push_back("the record is shorter than the " + std::to_string(count) +
+                              " period(s) asked for: all of it is used");
+    return;
+  }
+  record = record.slice(end - wanted, record.time.back() + interval);
+}
+
+/// A curve for this very record, where the rig file tells how.
+void build_own_curve(Inputs& in) {
+  const double interval = in.record.sampling_interval();
+  if (!in.settings.apd || (!in.method.empty() && in.method != kApd)) return;
+  if (!in.record.has(in.settings.apd->signal) || !(interval > 0)) return;
+  CurveRequest request;
+  request.sampling_rate = 1 / interval;
+  std::cerr << "diagnose_record: no --curve given, building one from " << in.rig->source << " at "
+            << to_text(std::round(1e3 / interval) / 1e3) << " Hz (build_curve keeps one)" << std::endl;
+  try {
+    ProgressBar bar;
+    in.curve = build_curve(*in.rig, request, bar.progress());
+    in.curve_source = "built for this record";
+  } catch (const InvalidParameter& e) {  // the other methods need no curve
+    in.no_curve = e.what();
+  }
+}
+
+Inputs read_inputs(const Arguments& arguments) {
+  Inputs in;
+  in.method = arguments.text("method");
+  const auto& methods = diagnosis_methods();
+  if (arguments.has("method") && std::find(methods.begin(), methods.end(), in.method) == methods.end())
+    throw UsageError("--method = '" + printable(in.method) + "': must be one of " + joined(methods));
+  const std::uint64_t periods = arguments.integer("periods", 0, 1, 1'000'000'000);
+  check_record_path(arguments.positional(0));
+  BagPlace place;
+  if (arguments.has("topic")) place.topic = arguments.text("topic");
+  if (arguments.has("rig")) {
+    in.rig = load_rig_file(arguments.text("rig"));
+    in.settings = in.rig->diagnosis;
+    place.joint = in.rig->rig.joint;
+  }
+  if (arguments.has("joint")) place.joint = arguments.text("joint");
+  if (arguments.has("curve")) {
+    in.curve_source = arguments.text("curve");
+    in.curve = read_curve(in.curve_source);
+    if (!in.rig) in.settings.apd = settings_of(*in.curve);
+  }
+  in.record = read_record(arguments.positional(0), place);
+  if (arguments.has("periods")) keep_last_periods(in, periods);
+  return in;
+}
+
+/// Says what is missing in the words of this command.
+void explain(Diagnosis& diagnosis, const Inputs& in) {
+  for (Estimate& e : diagnosis.estimates) {
+    if (e.status != Status::insufficient_data) continue;
+    if (!in.rig && e.method == kApd && !in.curve) e.message = "needs --rig or --curve";
+    if (!in.rig && e.method != kApd) e.message = "needs --rig";
+    if (e.method == kApd && !in.no_curve.empty()) e.message = "no monitoring curve: " + in.no_curve;
+  }
+  diagnosis.verdict = combine(diagnosis.estimates, in.settings.limits, std::nullopt);
+}
+
+int diagnose_record(const Arguments& arguments) {
+  Inputs in = read_inputs(arguments);
+  const std::string out = arguments.text("json");
+  if (out != kStandardOutput) {
+    std::vector<std::string> inputs = {arguments.positional(0)};
+    for (const char* option : {"rig", "curve"})
+      if (arguments.has(option)) inputs.push_back(arguments.text(option));
+    check_output(out, inputs);
+  }
+  if (in.rig && !in.curve) build_own_curve(in);
+  DiagnosisReport report;
+  report.record = &in.record;
+  report.warnings = in.record.warnings;
+  report.apd_settings = in.settings.apd;
+  if (in.rig) report.rig = in.rig->rig.name;
+  if (in.curve) {
+    report.curve = &*in.curve;
+    report.curve_source = in.curve_source;
+    if (in.rig && in.curve->conditions.rig_digest != in.rig->digest)
+      report.warnings.push_back("the curve was made from another version of the rig file; build it again");
+  }
+  report.diagnosis = diagnose(in.record, in.settings, report.curve, std::nullopt, in.method);
+  explain(report.diagnosis, in);
+  const std::string json = to_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  if (out == kStandardOutput) {
+    std::cout << json;
+  } else {
+    write_text(out, json);
+    print_summary(report, std::cout);
+  }
+  return exit_code(report.diagnosis.verdict.grade);
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, diagnose_record);
+}

@@ -1,0 +1,77 @@
+// Runs a rig without ROS and writes what its sensors measure.
+#include <cmath>
+#include <iostream>
+#include <limits>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/workflow/rig_file.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/progress_bar.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+constexpr double kMostSamples = 1e9;
+
+Command command() {
+  Command c;
+  c.name = "simulate";
+  c.summary = "Simulates the rig that a file describes, from rest, and writes the record of its sensors.";
+  c.positional = {"RIG.yaml"};
+  c.options = {
+      {"duration", "S", "length of the record [s]", true},
+      {"out", "RECORD.{csv,bag}", "record to write; a bag has the joint of the rig file on /joint_states", true},
+      {"backlash", "M", "total free play along the line of action [m] (a rig without base radius: angle at the load "
+                        "[rad]) instead of the rig file's"},
+      {"half-gap", "M", "half of that, instead of --backlash"},
+      {"seed", "N", "of all sensor noise, instead of the rig file's; the same seed gives the same record"},
+      {"sample-rate", "HZ", "instead of the rig file's"},
+  };
+  c.examples = {"simulate config/sarkar_1997.yaml --duration 2 --backlash 60e-6 --out run.csv"};
+  c.exit_codes = "  0   done\n";
+  return c;
+}
+
+void apply(const Arguments& arguments, RigFile& file) {
+  if (arguments.has("backlash") && arguments.has("half-gap"))
+    throw UsageError("--backlash and --half-gap say the same thing, give one of them");
+  double& backlash = file.rig.mesh.backlash;
+  backlash = arguments.number("backlash", backlash, Range::not_negative());
+  if (arguments.has("half-gap")) backlash = 2 * arguments.number("half-gap", 0, Range::not_negative());
+  SensorsSettings& sensors = file.simulation.sensors;
+  sensors.seed = arguments.integer("seed", sensors.seed, 0, std::numeric_limits<std::uint64_t>::max());
+  sensors.sampling_rate = arguments.number("sample-rate", sensors.sampling_rate, Range::positive());
+}
+
+int simulate(const Arguments& arguments) {
+  const std::string out = arguments.text("out");
+  check_record_path(out);
+  const double duration = arguments.number("duration", 0, Range::positive());
+  RigFile file = load_rig_file(arguments.positional(0));
+  apply(arguments, file);
+  const double samples = std::round(duration * file.simulation.sensors.sampling_rate);
+  if (samples < 1 || samples > kMostSamples)
+    throw UsageError("--duration = " + to_text(duration) + " s at " + to_text(file.simulation.sensors.sampling_rate) +
+                     " Hz: must give from 1 to 1e9 samples");
+  check_output(out, {arguments.positional(0)});
+  Record record;
+  {
+    ProgressBar bar;
+    record = simulate_record(file.rig, file.simulation, duration, bar.progress());
+  }
+  write_record(record, out, file.rig.joint);
+  std::cout << out << ": " << record.size() << " samples at " << to_text(file.simulation.sensors.sampling_rate)
+            << " Hz of " << file.rig.name << " with backlash " << to_text(file.rig.mesh.backlash)
+            << (file.rig.mesh.angular() ? " rad" : " m") << '\n';
+  return kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, simulate);
+}

@@ -1,0 +1,8 @@
+// The text of config/sarkar_1997.yaml, put into the library by CMake.
+#pragma once
+
+namespace backlash {
+
+extern const char* const kDefaultRig;
+
+}  // namespace backlash
