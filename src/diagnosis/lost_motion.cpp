@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -147,17 +148,17 @@ Walls read_walls(const LockedMotion& motion, const LostMotionSettings& settings)
   }
   walls.excursions = find_excursions(motion.torque, kReached * walls.level);
   require_reached(motion, walls.excursions, walls.level);
-  double read_level = kReached * walls.level;
+  double read_level = kReached * walls.level, torque_span = kTorqueSpan * walls.level;
   if (settings.subtract_elastic_deflection) {
     read_level = kReadLevelFree * walls.level;
+    torque_span = std::numeric_limits<double>::infinity();
     walls.excursions = find_excursions(motion.torque, read_level);
   }
   require_count(walls.excursions, read_level);
   for (std::size_t i = 0; i < walls.excursions.size(); ++i) {
     const bool last = i + 1 == walls.excursions.size();
     const std::size_t limit = last ? motion.torque.size() : walls.excursions[i + 1].begin;
-    walls.readings.push_back(
-        read_wall(motion, walls.excursions[i], read_level, kTorqueSpan * walls.level, limit));
+    walls.readings.push_back(read_wall(motion, walls.excursions[i], read_level, torque_span, limit));
   }
   walls.switched = is_switched(walls.excursions, walls.readings);
   return walls;

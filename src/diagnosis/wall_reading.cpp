@@ -34,7 +34,8 @@ struct Moments {
   double mean = 0, deviation = 0;
 };
 
-// Hann weights suppress ringing whose phase at the ends of the window is arbitrary.
+// Hann weights suppress ringing whose phase at the ends of the window is arbitrary, and torque noise at the
+// end of the excursion, which the noise itself has picked.
 Moments hann_moments(const std::vector<double>& values, std::size_t begin, std::size_t end) {
   const double pi = std::acos(-1.0), n = static_cast<double>(end - begin);
   double weight_sum = 0, weighted = 0, sum = 0, squares = 0;
@@ -119,7 +120,7 @@ WallReading read_wall(const LockedMotion& motion, const TorqueExcursion& excursi
   reading.side = excursion.side;
   const std::size_t begin = end - window;
   reading.time = 0.5 * (motion.time[begin] + motion.time[end - 1]);
-  reading.torque = excursion.side * fit_line(motion.torque, begin, end).mean;
+  reading.torque = excursion.side * hann_moments(motion.torque, begin, end).mean;
   const Moments last = hann_moments(motion.position, begin, end);
   const std::size_t shift = std::min(window / 2, begin - excursion.begin);
   const Moments earlier = hann_moments(motion.position, begin - shift, end - shift);

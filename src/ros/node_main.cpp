@@ -2,6 +2,7 @@
 
 #include <ros/console.h>
 #include <ros/init.h>
+#include <ros/node_handle.h>
 
 #include <iostream>
 
@@ -18,18 +19,8 @@ int fatal(const std::exception& e, int code) {
   return code;
 }
 
-}  // namespace
-
-int node_main(int argc, char** argv, const std::string& name, const char* help,
-              const std::function<int()>& run) {
-  for (int i = 1; i < argc; ++i)
-    if (argv[i] == std::string("--help") || argv[i] == std::string("-h")) {
-      std::cout << help;
-      return 0;
-    }
+int guarded(const std::function<int()>& run) {
   try {
-    ros::init(argc, argv, name);
-    if (argc > 1) throw InvalidParameter("argument", argv[1], "is not understood; see --help");
     return run();
   } catch (const InvalidParameter& e) {
     return fatal(e, kUsage);
@@ -40,6 +31,26 @@ int node_main(int argc, char** argv, const std::string& name, const char* help,
   } catch (const std::exception& e) {
     return fatal(e, kInternal);
   }
+}
+
+}  // namespace
+
+int node_main(int argc, char** argv, const std::string& name, const char* help,
+              const std::function<int()>& run) {
+  for (int i = 1; i < argc; ++i)
+    if (argv[i] == std::string("--help") || argv[i] == std::string("-h")) {
+      std::cout << help;
+      return 0;
+    }
+  const int refused = guarded([&] {
+    ros::init(argc, argv, name);
+    if (argc > 1) throw InvalidParameter("argument", argv[1], "is not understood; see --help");
+    return 0;
+  });
+  if (refused) return refused;
+  // The log closes with the last handle; the reason for an early end must still get into it.
+  const ros::NodeHandle alive;
+  return guarded(run);
 }
 
 }  // namespace backlash

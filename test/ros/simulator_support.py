@@ -1,4 +1,5 @@
 """What the tests of the simulator node share: waiting for messages, starting the node, rig files."""
+import bisect
 import os
 import subprocess
 import tempfile
@@ -43,14 +44,15 @@ class Inbox:
     def wait_for_count(self, count):
         return self.wait_for(lambda m: m[:count] if len(m) >= count else None, "%d messages" % count)
 
-    def after(self, stamp, count):
-        """The first `count` messages with stamps [ns] beyond `stamp`."""
-        def found(messages):
-            if not messages or nanoseconds(messages[-1]) < stamp:
+    def since(self, stamp, count=1, later_than=None):
+        """All messages with stamps [ns] beyond `stamp`, once `count` of them are beyond `later_than`, too."""
+        limit = stamp if later_than is None else later_than
+
+        def found(messages):  # asked for every message: look at one only until there are enough
+            if len(messages) < count or nanoseconds(messages[-count]) <= limit:
                 return None
-            late = [m for m in messages if nanoseconds(m) > stamp]
-            return late[:count] if len(late) >= count else None
-        return self.wait_for(found, "%d messages after %d ns" % (count, stamp))
+            return messages[bisect.bisect_right([nanoseconds(m) for m in messages], stamp):]
+        return self.wait_for(found, "%d messages after %d ns" % (count, limit))
 
     def close(self):
         self._subscriber.unregister()
@@ -87,7 +89,6 @@ def default_rig():
 def write_rig(folder, rig):
     path = os.path.join(folder, "rig.yaml")
     with open(path, "w") as file:
-        # Plain scalars: YAML 1.2 takes 1e-07 for a number, which PyYAML writes for small ones.
         yaml.safe_dump(rig, file, default_flow_style=False)
     return path
 

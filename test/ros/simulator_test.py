@@ -26,6 +26,11 @@ def travel_between_walls(messages):
     return upper[-1] - lower[-1]
 
 
+def rests(messages):
+    """Where the rig starts: nothing else is exactly 0."""
+    return [i for i, m in enumerate(messages) if m.position[MOTOR] == 0 and m.velocity[MOTOR] == 0]
+
+
 class SimulatorTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -37,12 +42,15 @@ class SimulatorTest(unittest.TestCase):
     def setUp(self):
         self.assertTrue(self.reset().success)
 
-    def now(self):
-        """Stamp of the newest sample [ns]."""
-        return nanoseconds(self.joint_states.wait_for(lambda m: m[-1:], "sample")[0])
-
     def next_samples(self, count):
-        return self.joint_states.after(self.now(), count)
+        """Samples of after this call: at real time no stamp is ahead of ROS time."""
+        return self.joint_states.since(rospy.Time.now().to_nsec(), count)
+
+    def samples_around_reset(self, count):
+        """What is published from before a reset until `count` samples after it."""
+        before = nanoseconds(self.next_samples(1)[0])
+        self.assertTrue(self.reset().success)
+        return self.joint_states.since(before, count, rospy.Time.now().to_nsec())
 
     def test_joint_states_name_the_joints_and_fill_the_arrays(self):
         for message in self.next_samples(10):
@@ -63,12 +71,12 @@ class SimulatorTest(unittest.TestCase):
         self.assertEqual(yaml.safe_load(text), default_rig())
 
     def test_set_backlash_widens_the_travel_by_the_backlash_over_the_base_radius(self):
-        period = 500  # samples at 2 Hz
-        before = travel_between_walls(self.next_samples(2 * period)[period:])
+        settled, needed = 500, 1600  # samples; the period is 500
+        before = travel_between_walls(self.next_samples(needed)[settled:])
         backlash = 1e-4  # m
         self.assertTrue(self.set_backlash(backlash).success)
         self.assertEqual(latched("true_backlash", Float64).data, backlash)
-        after = travel_between_walls(self.next_samples(3 * period)[period:])
+        after = travel_between_walls(self.next_samples(needed)[settled:])
         base_radius = default_rig()["gear_train"]["mesh"]["base_radius"]
         # At rest at a wall all springs carry the same torque with and without play, so the travel grows by the play
         # alone. 1e-4 of it covers what is left of the motion after 250 ms: the motor's damper takes it down with a
@@ -77,30 +85,16 @@ class SimulatorTest(unittest.TestCase):
 
     def test_reset_starts_again_at_rest_while_the_stamps_go_on(self):
         self.assertTrue(self.set_backlash(5e-5).success)
-        stamp = nanoseconds(self.next_samples(100)[-1])
-        self.assertTrue(self.reset().success)
+        samples = self.samples_around_reset(50)
         self.assertEqual(latched("true_backlash", Float64).data, 0)  # of the rig file
-
-        def restart(messages):  # the only sample at exactly 0: the rig at rest
-            late = [m for m in messages if nanoseconds(m) > stamp]
-            found = [i for i, m in enumerate(late) if m.position[MOTOR] == 0 and m.velocity[MOTOR] == 0]
-            return late if found and len(late) > found[0] + 10 else None
-
-        late = self.joint_states.wait_for(restart, "sample at rest")
-        self.assertEqual(set(steps(late)), {INTERVAL})
+        self.assertEqual(set(steps(samples)), {INTERVAL})
+        self.assertEqual(len(rests(samples)), 1)
 
     def test_two_resets_give_the_same_motion(self):
         def motion():
-            stamp = self.now()
-            self.assertTrue(self.reset().success)
-            late = self.joint_states.after(stamp, 400)
-            at_rest = [i for i, m in enumerate(late) if m.position[MOTOR] == 0 and m.velocity[MOTOR] == 0]
-            # Without load, few samples lie between reading the stamp and the answer; with load, wait for more.
-            while not at_rest or len(late) < at_rest[-1] + 300:
-                late = self.joint_states.after(stamp, len(late) + 300)
-                at_rest = [i for i, m in enumerate(late) if m.position[MOTOR] == 0 and m.velocity[MOTOR] == 0]
-            run = late[at_rest[-1]:at_rest[-1] + 300]
-            return [(m.position, m.velocity, m.effort) for m in run]
+            samples = self.samples_around_reset(300)
+            start = rests(samples)[-1]
+            return [(m.position, m.velocity, m.effort) for m in samples[start:start + 300]]
         self.assertEqual(motion(), motion())
 
     def test_impossible_backlash_is_refused_with_a_reason(self):

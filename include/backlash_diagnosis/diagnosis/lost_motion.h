@@ -1,35 +1,32 @@
-// Play from torque against motor position with the output locked (hysteresis curve of a gear unit).
+// Play from torque against motor position with the output locked: the hysteresis curve of a gear unit.
 //
-// Lost motion: with the output locked, torque is led slowly (or switched) between the two signs; the angle
-// between the positions at +T and -T is the play from wall to wall at T (hysteresis curve and lost motion as
-// gear makers state it, e.g. at +-3 % of the rated torque: Sumitomo, "Fine Cyclo" catalogue, section
-// "Stiffness and lost motion"; Harmonic Drive, engineering data, "Hysteresis loss, lost motion, torsional
-// stiffness"). Conventions used here:
+// Lost motion is the angle between the positions at +T and -T when torque is led slowly (or switched)
+// between the two signs, as gear makers state it (e.g. at +-3 % of the rated torque: catalogues of Sumitomo
+// Fine Cyclo, "lost motion", and Harmonic Drive, "hysteresis loss"). Here, with u torque and x position:
 //
-//   excursion       contiguous stretch in which side * torque exceeds a level: the stretch with the largest
-//   sum of
-//                   (side * torque - level) within one half cycle (Kadane), so that torque noise does not cut
-//                   it
-//   wall position   Hann-weighted mean over the last third of an excursion, that is on the unloading branch
-//   for a ramp
-//                   and at the end of the half period for a square wave; shortened to 0.1 T where torque
-//                   changes
-//   play            median over neighbouring walls of x(+) - x(-), common linear drift taken out before
-//   settling        where torque is switched, the mean still approaches its limit while ringing dies out.
-//   With the mean m
-//                   and standard deviation S over the window (2) and over one half a window earlier (1), rho
-//                   = S2/S1: x = m2 + (m2 - m1) rho/(1 - rho), geometric extrapolation, rho <= 0.7
-//   interval        95 %, root of the squares of: Student t (n - 3 degrees of freedom, n walls) times 1.25 s
-//   sqrt(2/n);
-//                   ringing (where torque is switched once its rms at one wall, else four times); the
-//                   settling extrapolation in full; one step of the position's resolution; the elastic
-//                   deflection's uncertainty; the deflection that friction on the flanks may carry, where
-//                   deflection is subtracted from a ramp (shares of ringing and settling: bounds of the error
-//                   in simulations of a ringing rig, 0 to 150 um half gap, square waves of 7 to 20 Hz, sine
-//                   and triangle of 1 to 10 Hz)
+// Excursion: the stretch of one half cycle with the largest sum of (side * u - level), which torque noise
+// does not cut. The level is 0.95 T, or T/2 where elastic deflection is subtracted (any torque will do then).
 //
-// Positive torque must move towards positive position. Motion must be slow or come to rest before torque
-// returns. Torque: motor_torque where present, else sensor_torque (equal where the motion is quasi-static).
+// Wall position: Hann-weighted mean over the last third of an excursion: the unloading branch of a ramp, the
+// end of the half period of a square wave. At level 0.95 T the window is shortened to a torque change of 0.1 T.
+//
+// Play: median over neighbouring walls of x(+) - x(-), after a common linear drift is taken out.
+//
+// Settling: where torque is switched, the mean m still approaches its limit while ringing dies out. With mean
+// and standard deviation S over the window (2) and half a window earlier (1), rho = S2/S1 <= 0.7:
+//   x = m2 + (m2 - m1) rho / (1 - rho).
+//
+// Interval, 95 %, root of the sum of squares of
+// - scatter: Student t (n - 3 degrees of freedom, n walls) times 1.25 s sqrt(2/n),
+// - ringing: its rms at one wall where torque is switched, four times that where it is ramped,
+// - settling: the extrapolation in full,
+// - resolution: one step of the position,
+// - elastic deflection, where subtracted: its uncertainty, and for ramps what friction on the flanks carries.
+// The shares of ringing and settling bound the error in simulations of a ringing rig (half gap 0 to 150 um,
+// square wave 7 to 15 Hz, sine and triangle 1 to 10 Hz).
+//
+// Positive torque must move towards positive position, and the motor must come to rest before torque returns.
+// Torque is motor_torque where present, else sensor_torque (equal where the motion is quasi-static).
 #pragma once
 
 #include <functional>

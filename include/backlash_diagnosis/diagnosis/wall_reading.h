@@ -30,7 +30,7 @@ std::vector<TorqueExcursion> find_excursions(const std::vector<double>& torque, 
 struct WallReading {
   int side = 1;
   double time = 0;           ///< s, middle of the window
-  double torque = 0;         ///< N m, mean of side * torque over the window
+  double torque = 0;         ///< N m, Hann-weighted mean of side * torque over the window
   double torque_change = 0;  ///< N m, size of the change of torque over the last third of the excursion
   double position = 0;       ///< Hann-weighted mean over the window
   double spread = 0;         ///< standard deviation over the window

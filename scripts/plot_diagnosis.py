@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+"""Draws one diagnosis: torque over two periods, its APD, and the monitoring curve with the estimate marked.
+
+usage: plot_diagnosis.py --record RECORD.csv --diagnosis OUT.json --curve CURVE.yaml --out PICTURE [--true METRES]
+"""
+import argparse
+import csv
+import json
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import yaml
+
+
+def read_columns(path, names):
+    with open(path, newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    return [[float(row[name]) for row in rows] if name in rows[0] else [] for name in names]
+
+
+def draw_torque(axes, record, apd):
+    signal = apd["signal"]
+    time, torque, motor = read_columns(record, ["time", signal, "motor_torque"])
+    end = time[-1]
+    start = end - 2 * apd["period"]
+    shown = [i for i, t in enumerate(time) if t >= start]
+    ms = [1e3 * (time[i] - start) for i in shown]
+    if motor:
+        axes.plot(ms, [motor[i] for i in shown], color="0.6", lw=1, label="motor_torque (excitation)")
+    axes.plot(ms, [torque[i] for i in shown], color="tab:blue", lw=0.8, label=signal)
+    axes.set_xlabel("time [ms]")
+    axes.set_ylabel("torque [N m]")
+    axes.set_title("Torque over two periods")
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def draw_apd(axes, apd):
+    width = (apd["upper"] - apd["lower"]) / apd["classes"]
+    centres = [apd["lower"] + (k + 0.5) * width for k in range(apd["classes"])]
+    axes.bar(centres, apd["percentages"], width=width, color="tab:blue", edgecolor="white", lw=0.3)
+    used = [c for c, p in zip(centres, apd["percentages"]) if p > 0]
+    margin = 4 * width
+    axes.set_xlim(min(used) - margin, max(used) + margin)
+    axes.set_xlabel("amplitude [N m]")
+    axes.set_ylabel("share of time [%]")
+    axes.set_title("APD of %d periods, skewness %.3f" % (apd["periods"], apd["skewness"]))
+
+
+def draw_curve(axes, curve, estimates, true):
+    points = curve["points"]
+    x = [1e6 * float(p["backlash"]) for p in points]
+    y = [float(p["skewness"]) for p in points]
+    scatter = [float(p["scatter"]) for p in points]
+    axes.fill_between(x, [a - 2 * s for a, s in zip(y, scatter)], [a + 2 * s for a, s in zip(y, scatter)],
+                      color="tab:blue", alpha=0.15, lw=0, label="curve, 2 standard deviations")
+    axes.plot(x, y, color="tab:blue", lw=1)
+    if true is not None:
+        axes.axvline(1e6 * true, color="k", ls=":", label="true %.1f um" % (1e6 * true))
+    # Every estimate is drawn at the height of the measured skewness; only apd_skewness itself comes from the curve.
+    height = next((e["skewness"] for e in estimates if e["skewness"] is not None), y[len(y) // 2])
+    for shift, (e, colour) in enumerate(zip(estimates, ("tab:orange", "tab:green", "tab:red", "tab:purple"))):
+        if e["status"] != "ok" or not e["interval"]:
+            axes.plot([], [], color=colour, label="%s: %s" % (e["method"], e["status"]))
+            continue
+        low, high = (1e6 * v for v in e["interval"])
+        value, level = 1e6 * e["backlash"], height + 0.06 * shift
+        axes.errorbar([value], [level], xerr=[[value - low], [high - value]], fmt="o", color=colour, capsize=4, ms=5,
+                      label="%s: %.1f um [%.1f, %.1f]" % (e["method"], value, low, high))
+    axes.set_xlabel("backlash, total free play along the line of action [um]")
+    axes.set_ylabel("skewness of the class values [-]")
+    axes.set_title("Monitoring curve (%s, %s Hz)" % (curve["conditions"]["rig"], curve["conditions"]["sampling_rate"]))
+    axes.legend(fontsize=8)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--record", required=True, help="CSV record")
+    parser.add_argument("--diagnosis", required=True, help="JSON of diagnose_record")
+    parser.add_argument("--curve", required=True, help="YAML of build_curve")
+    parser.add_argument("--out", required=True, help="picture to write: .png, .svg or .pdf")
+    parser.add_argument("--true", type=float, help="true backlash [m], where it is known")
+    arguments = parser.parse_args()
+    with open(arguments.diagnosis) as stream:
+        diagnosis = json.load(stream)
+    with open(arguments.curve) as stream:
+        curve = yaml.safe_load(stream)
+    if not diagnosis.get("apd"):
+        sys.exit("plot_diagnosis.py: %s holds no APD" % arguments.diagnosis)
+    figure, axes = plt.subplots(1, 3, figsize=(16, 4.8), constrained_layout=True)
+    draw_torque(axes[0], arguments.record, diagnosis["apd"])
+    draw_apd(axes[1], diagnosis["apd"])
+    draw_curve(axes[2], curve, diagnosis["estimates"], arguments.true)
+    for a in axes:
+        a.grid(True, alpha=0.3)
+    figure.suptitle(diagnosis["verdict"]["message"], fontsize=10)
+    figure.savefig(arguments.out, dpi=110)
+
+
+if __name__ == "__main__":
+    main()
