@@ -20,13 +20,13 @@ namespace {
 constexpr double kReached = 0.95;         // torque counts as reached from this fraction of the stated level
 constexpr double kLevelFromRecord = 0.9;  // where no level is stated, of the torque typical of the record
 constexpr double kTorqueSpan = 0.1;       // change of torque within a reading, fraction of the stated level
-constexpr double kReadLevelFree =
-    0.5;  // where deflection is subtracted, any torque that keeps contact will do, and
-          // a longer window averages more ringing; fraction of the stated level
-constexpr double kUnsettled = 0.1;  // uncertainty by ringing and settling over travel from which on the motor
-                                    // is not at rest at the walls
-constexpr double kContactLoss =
-    0.5;  // rms ringing over elastic deflection from which on the flank is left again
+// Where deflection is subtracted, any torque that keeps contact will do and a longer window averages more
+// ringing; fraction of the stated level.
+constexpr double kReadLevelFree = 0.5;
+// The motor is not at rest at the walls if ringing and settling make this share of the travel uncertain, ...
+constexpr double kUnsettled = 0.1;
+// ... or if rms ringing is this share of the elastic deflection, so that the flank is left again.
+constexpr double kContactLoss = 0.5;
 constexpr std::size_t kFewest = 2;  // excursions per side
 
 // A status with its reason, raised where the record turns out unfit.
@@ -164,8 +164,8 @@ Walls read_walls(const LockedMotion& motion, const LostMotionSettings& settings)
   return walls;
 }
 
-// Deflection to subtract per reading: all of it, or what a switched torque exceeds the stated level by, or
-// none.
+// To subtract per reading: all deflection, or that of torque beyond the stated level where torque is switched
+// past it, or none.
 std::vector<double> deflections_of(const Walls& walls, const LostMotionSettings& settings, bool exceeds) {
   std::vector<double> deflections(walls.readings.size(), 0.0);
   if (!settings.subtract_elastic_deflection && !exceeds) return deflections;
@@ -207,13 +207,18 @@ Parts find_parts(LockedMotion motion, const Walls& walls, const LostMotionSettin
     return parts;
   }
   const double drift = drift_rate(walls.readings);
-  for (std::size_t i = 0; i < motion.time.size(); ++i)
+  for (std::size_t i = 0; i < motion.time.size(); ++i) {
     motion.position[i] -= drift * (motion.time[i] - motion.time[0]);
+  }
   std::vector<double> positions[2];
   for (const WallReading& reading : walls.readings) {
     positions[reading.side > 0].push_back(reading.position - drift * (reading.time - motion.time[0]));
   }
   const double lower = median(positions[0]), upper = median(positions[1]);
+  if (!(lower < upper)) {
+    parts.missing = "the walls scatter more than they are apart, so the hysteresis loop has no parts";
+    return parts;
+  }
   HysteresisLoop loop = analyse_hysteresis(motion, walls.excursions, lower, upper);
   parts.components = loop.components;
   if (settings.subtract_elastic_deflection) parts.components.gap = std::max(0.0, play.value);
@@ -249,7 +254,7 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
   }
   const std::vector<double> deflections = deflections_of(walls, settings, exceeds);
   const WallToWall play = measure_wall_to_wall(motion, walls.readings, deflections, walls.switched);
-  require_rest(play, std::abs(median(deflections)));
+  require_rest(play, settings.subtract_elastic_deflection ? median(deflections) : 0);
   if (!(play.travel > 0)) {
     throw Refusal{Status::out_of_domain,
                   "positive torque moves the motor to smaller positions, or not at all"};
@@ -265,9 +270,8 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
   if (play.value + half < 0) {
     throw Refusal{Status::out_of_domain,
                   "the travel of " + text(play.travel) +
-                      " rad is less than the elastic "
-                      "deflection that the rig declares: the rig is not this machine, or the motor "
-                      "did not reach both walls"};
+                      " rad is less than the elastic deflection that the rig declares: the rig is "
+                      "not this machine, or the motor did not reach both walls"};
   }
   estimate.status = Status::ok;
   estimate.backlash_angle = std::max(0.0, play.value);

@@ -11,11 +11,12 @@ namespace {
 
 constexpr double kSwitchTime = 0.1;    // passage between the sides over length of an excursion
 constexpr double kSwitchChange = 0.2;  // change of torque in the last third of an excursion over torque
-constexpr double kLargestDecay =
-    0.7;  // of the spread over half a window that still is taken for dying ringing
-constexpr double kSwitchedRinging = 1.0;  // ringing's share in the interval, in rms at one wall: what the
-                                          // settling extrapolation leaves
-constexpr double kRampedRinging = 4.0;  // without extrapolation, twice the rms at each of the two walls
+// Largest ratio of spreads half a window apart that is still taken for dying ringing.
+constexpr double kLargestDecay = 0.7;
+// Share of ringing in the interval, in rms at one wall: what the settling extrapolation leaves, or without
+// extrapolation twice the rms at each of the two walls.
+constexpr double kSwitchedRinging = 1.0;
+constexpr double kRampedRinging = 4.0;
 
 // The smallest change between two samples [rad].
 double resolution(const std::vector<double>& position) {

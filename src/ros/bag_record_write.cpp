@@ -125,7 +125,7 @@ void write_messages(rosbag::Bag& bag, const Record& record, const std::vector<ro
   (*latched)["md5sum"] = ros::message_traits::MD5Sum<std_msgs::String>::value();
   (*latched)["message_definition"] = ros::message_traits::Definition<std_msgs::String>::value();
   (*latched)["latching"] = "1";
-  (*latched)["callerid"] = "/convert_record";
+  (*latched)["callerid"] = "/backlash_diagnosis";
   bag.write(kInfoTopic, stamps.front(), info_message(record, origin), latched);
   for (std::size_t i = 0; i < record.size(); ++i) {
     sensor_msgs::JointState message = make_joint_state(record, i, names);

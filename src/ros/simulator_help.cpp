@@ -7,38 +7,38 @@ const char* simulator_help() {
 
 Usage: rosrun backlash_diagnosis simulator [_PARAMETER:=VALUE ...] [NAME:=NEW_NAME ...]
 
-Private parameters (unknown ones are refused; the default of those in brackets is the rig file's value)
+Private parameters; unknown ones are refused. In brackets: units of values that override the rig file
   rig                   path of a rig file; without it the built-in rig of Sarkar et al. (1997)
   joint                 [text] prefix of the names in joint_states: JOINT_motor, JOINT_sensor, JOINT_load
-  backlash              [m] total free play along the line of action, >= 0 (rig without base radius: rad at the load)
+  backlash              [m] total free play along the line of action, >= 0 (rig without base radius: rad)
   half_gap              [m] half of it; give one of the two
-  sampling_rate         [Hz] 0.001 .. 1e6
+  sampling_rate         [Hz] 0.001 to 1e6
   seed                  [-] of the sensor noise, >= 0
   excitation_amplitude  [N m] >= 0, square and sine only
   excitation_frequency  [Hz] > 0, square and sine only
-  real_time_factor      1; 2 is twice as fast as wall time, 0 as fast as possible (slow subscribers then lose messages)
+  real_time_factor      1; 2: twice as fast as wall time, 0: as fast as possible (slow subscribers lose some)
   duration              0 s; simulated time after which the node ends, 0 is endless
-  publish_clock         true if real_time_factor is not 1, else false; set use_sim_time for the nodes that shall follow
-  wait_for_subscriber   false; true: the simulation starts when joint_states has its first subscriber
+  publish_clock         true if real_time_factor is not 1, else false; others follow with /use_sim_time true
+  wait_for_subscriber   false; true: the simulation starts when joint_states has a subscriber
   diagnostic_period     1 s; wall time between two messages on /diagnostics
 
 Publishes
-  joint_states          sensor_msgs/JointState, every sample; stamps 1/sampling_rate apart, also after falling behind
-  rig_description       std_msgs/String, latched: the rig file's text; a comment in its first line names the source
-  true_backlash         std_msgs/Float64, latched: m (rig without base radius: rad at the load)
-  /clock                rosgraph_msgs/Clock if publish_clock, from the wall time at start; 1 to 10 ms simulated apart
+  joint_states          sensor_msgs/JointState, every sample; stamps exactly 1/sampling_rate apart, always
+  rig_description       std_msgs/String, latched: the rig file; a comment in its first line names the source
+  true_backlash         std_msgs/Float64, latched: m (rig without base radius: rad)
+  /clock                rosgraph_msgs/Clock if publish_clock: 1 to 10 ms apart, from wall time on
   /diagnostics          diagnostic_msgs/DiagnosticArray: lag, samples, real time factor, integrator
 
 Subscribes
-  torque_command        std_msgs/Float64, N m, held until the next; for rigs with `excitation: {type: topic}`
+  torque_command        std_msgs/Float64, N m, held until the next; for rigs with excitation type topic
 
 Services
   ~set_backlash         backlash_diagnosis/SetBacklash; acts from the last sample on
-  ~reset                std_srvs/Trigger; at rest in the middle of the gap with the backlash of the start, stamps go on
+  ~reset                std_srvs/Trigger; at rest in the middle of the gap, backlash as at start; stamps go on
 
-Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the simulation
-follows that clock; otherwise it follows wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a wrong rig
-file, 66 for a missing one, 70 if the integration fails.
+Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the
+simulation follows that clock, otherwise wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a wrong
+rig file, 66 for a missing one, 70 where the integration fails.
 )";
 }
 

@@ -100,9 +100,10 @@ void build_own_curve(Inputs& in) {
   if (!in.settings.apd || (!in.method.empty() && in.method != kApd)) return;
   if (!in.record.has(in.settings.apd->signal) || !(interval > 0)) return;
   CurveRequest request;
-  request.sampling_rate = 1 / interval;
+  request.sampling_rate = std::round(1e3 / interval) / 1e3;  // without the last digits of the stamps
+  if (!(request.sampling_rate > 0)) request.sampling_rate = 1 / interval;
   std::cerr << "diagnose_record: no --curve given, building one from " << in.rig->source << " at "
-            << to_text(std::round(1e3 / interval) / 1e3) << " Hz (build_curve keeps one)" << std::endl;
+            << to_text(request.sampling_rate) << " Hz (build_curve keeps one)" << std::endl;
   try {
     ProgressBar bar;
     in.curve = build_curve(*in.rig, request, bar.progress());

@@ -17,8 +17,8 @@ class SimulatorClockTest(unittest.TestCase):
         last = nanoseconds(samples[-1])
         ticks = clock.wait_for(lambda m: list(m) if m and m[-1].clock.to_nsec() >= last else None, "clock")
         times = [m.clock.to_nsec() for m in ticks]
-        # Every 5 ms simulated, that is every millisecond of wall time; a slow subscriber may miss some, but each one
-        # is the stamp of a sample.
+        # Every 5 ms simulated, that is every millisecond of wall time. A slow subscriber may miss some, but
+        # each one is the stamp of a sample.
         for earlier, later in zip(times, times[1:]):
             self.assertGreater(later, earlier)
             self.assertEqual((later - earlier) % 5000000, 0)
@@ -30,7 +30,7 @@ class SimulatorClockTest(unittest.TestCase):
         stamp = nanoseconds(joint_states.wait_for_count(1)[0])
         later = stamp + 1000000000  # ns
         joint_states.wait_for(lambda m: nanoseconds(m[-1]) > later, "sample one simulated second later")
-        # A sample comes at most one tick (5 ms) after its /clock message, which travels on a connection of its own.
+        # A sample is at most one tick (5 ms) ahead of /clock, which travels on a connection of its own.
         joint_states.wait_for(lambda m: rospy.get_rostime().to_nsec() >= later - 5000000, "ROS time")
 
 

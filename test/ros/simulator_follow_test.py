@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The simulator node with a /clock from elsewhere, here from the test: it simulates up to that time and no further."""
+"""The simulator node with a /clock from elsewhere, here the test: it simulates that far and no further."""
 import unittest
 
 import rospy
@@ -17,13 +17,13 @@ class SimulatorFollowTest(unittest.TestCase):
         clock = rospy.Publisher("/clock", Clock, latch=True, queue_size=10)
 
         def tick(milliseconds):
-            clock.publish(rospy.Time(0, 0) + rospy.Duration(milliseconds // 1000, milliseconds % 1000 * MILLISECOND))
+            clock.publish(rospy.Time(milliseconds // 1000, milliseconds % 1000 * MILLISECOND))
 
         tick(START)
         joint_states = Inbox("joint_states", JointState)
         joint_states.wait_for_count(1)
-        # 570 ms: 0.57 * 1000 rounds to less than 570. Then the clock goes back, as when a bag starts again: no stamp
-        # may follow it. At last a jump ahead: no sample may be left out.
+        # 570 ms: 0.57 * 1000 rounds to less than 570. Then the clock goes back, as when a bag starts again:
+        # no stamp may follow it. At last a jump ahead: no sample may be left out.
         for milliseconds, stand in ((570, 570), (100, 570), (2000, 2000)):
             tick(START + milliseconds)
             stamp = (START + stand) * MILLISECOND

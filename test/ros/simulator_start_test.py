@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Simulators started with parameters of their own: what is refused, what is followed, runs that can be repeated."""
+"""Simulators started with parameters of their own: what is refused, followed and repeatable."""
 import math
 import re
 import shutil
@@ -80,22 +80,24 @@ class SimulatorStartTest(unittest.TestCase):
             self.assertRegex(output, r"(?m)^  %s " % name)
 
     def test_parameters_override_the_rig_file(self):
-        with Simulator({"joint": "elbow", "half_gap": 3e-5, "sampling_rate": 400, "excitation_amplitude": 0.02}) as s:
+        with Simulator({"joint": "elbow", "half_gap": 3e-5, "sampling_rate": 400,
+                        "excitation_amplitude": 0.02}) as s:
             message, following = Inbox(s.topic("joint_states"), JointState).wait_for_count(2)
             self.assertEqual(message.name, ["elbow_motor", "elbow_sensor", "elbow_load"])
             self.assertEqual(steps([message, following]), [2500000])  # ns, 1 / 400 Hz
             self.assertEqual(abs(message.effort[MOTOR]), 0.02)
             self.assertEqual(latched(s.topic("true_backlash"), Float64).data, 6e-5)
             first = latched(s.topic("rig_description"), String).data.splitlines()[0]
-            for text in ("joint = elbow", "half_gap = 3e-05", "sampling_rate = 400", "excitation_amplitude = 0.02"):
+            for text in ("joint = elbow", "half_gap = 3e-05", "sampling_rate = 400",
+                         "excitation_amplitude = 0.02"):
                 self.assertIn(text, first)
             code, output = s.interrupt()
         self.assertEqual(code, 0, output)
 
     def run_of_500(self, seed):
         path = self.rig(sensors={"motor_position": {"noise": 1e-4}})
-        with Simulator({"rig": path, "seed": seed, "duration": 0.5, "real_time_factor": 0, "publish_clock": False,
-                        "wait_for_subscriber": True}) as simulator:
+        with Simulator({"rig": path, "seed": seed, "duration": 0.5, "real_time_factor": 0,
+                        "publish_clock": False, "wait_for_subscriber": True}) as simulator:
             inbox = Inbox(simulator.topic("joint_states"), JointState)
             code, output = simulator.wait()
             self.assertEqual(code, 0, output)

@@ -109,7 +109,8 @@ class Simulator:
                    "true_backlash:=" + self.topic("true_backlash"),
                    "rig_description:=" + self.topic("rig_description"),
                    "torque_command:=" + self.topic("torque_command")]
-        self._process = subprocess.Popen(command + list(arguments), stdout=self._log, stderr=subprocess.STDOUT)
+        self._process = subprocess.Popen(command + list(arguments), stdout=self._log,
+                                         stderr=subprocess.STDOUT)
 
     def topic(self, name):
         return "%s/%s" % (self.name, name)

@@ -8,7 +8,7 @@
 // does not cut. The level is 0.95 T, or T/2 where elastic deflection is subtracted (any torque will do then).
 //
 // Wall position: Hann-weighted mean over the last third of an excursion: the unloading branch of a ramp, the
-// end of the half period of a square wave. At level 0.95 T the window is shortened to a torque change of 0.1 T.
+// end of the half period of a square wave. At level 0.95 T, torque may change by 0.1 T within the window.
 //
 // Play: median over neighbouring walls of x(+) - x(-), after a common linear drift is taken out.
 //
@@ -38,7 +38,7 @@ namespace backlash {
 
 struct LostMotionSettings {
   /// N m, > 0: torque at which play is stated. With subtract_elastic_deflection NaN is allowed and means 0.9
-  /// times the torque that the record reaches on both sides.
+  /// times the torque that is exceeded on each side for an eighth of the record.
   double torque = kNaN;
 
   /// False: backlash_angle is the play from wall to wall at +-torque, elastic deflection included.

@@ -35,8 +35,8 @@ struct WallReading {
   double position = 0;       ///< Hann-weighted mean over the window
   double spread = 0;         ///< standard deviation over the window
   double earlier_position = 0, earlier_spread = 0;  ///< the same, half a window earlier
-  double ringing =
-      0;  ///< rms about a straight line from the window's begin until torque falls below half the level
+  /// rms about a straight line, from the window's begin until torque falls below half the level
+  double ringing = 0;
 };
 
 /// Reads the wall of one excursion. The window is the last third of the excursion, shortened so that torque

@@ -1,0 +1,468 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "../support/data.h"
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/lost_motion.h"
+#include "backlash_diagnosis/record/csv.h"
+
+namespace backlash {
+namespace {
+
+const double kPi = std::acos(-1.0);
+
+// Motor behind a locked output, quasi-static: gap g, compliance c on the flanks, Coulomb friction Fc at the
+// motor. It rests while abs(u - f(x)) <= Fc and else follows u -+ Fc along the flank characteristic.
+struct Machine {
+  double gap = 0.02, compliance = 1e-3, coulomb = 0.5;
+  double position = 0;
+
+  double held(double x) const {
+    return std::abs(x) <= gap / 2 ? 0 : (x - std::copysign(gap / 2, x)) / compliance;
+  }
+  double step(double torque) {
+    if (torque - coulomb > held(position)) position = flank(torque - coulomb);
+    if (torque + coulomb < held(position)) position = flank(torque + coulomb);
+    return position;
+  }
+  double flank(double torque) const {
+    return torque == 0 ? position : std::copysign(gap / 2, torque) + compliance * torque;
+  }
+  // Closed form of the play at +-torque on the unloading branch after a peak: friction holds the motor there
+  // until torque has fallen by 2 Fc.
+  double play(double torque, double peak) const {
+    return gap + 2 * compliance * std::min(peak - coulomb, torque + coulomb);
+  }
+};
+
+enum class Wave { triangle, sine, square };
+
+double wave(Wave shape, double phase) {
+  phase -= std::floor(phase);
+  if (shape == Wave::sine) return std::sin(2 * kPi * phase);
+  if (shape == Wave::square) return phase < 0.5 ? 1 : -1;
+  return phase < 0.25 ? 4 * phase : phase < 0.75 ? 2 - 4 * phase : 4 * phase - 4;
+}
+
+struct Experiment {
+  Wave shape = Wave::triangle;
+  double amplitude = 4, frequency = 0.25, duration = 20, rate = 400;
+  double torque_noise = 0, position_noise = 0, offset = 0, drift = 0;
+  std::vector<std::pair<double, double>> slips;  // s, rad: from this half period on until the next
+  unsigned seed = 1;
+};
+
+Record run(Machine machine, const Experiment& e) {
+  Record record;
+  std::mt19937 generator(e.seed);
+  std::normal_distribution<double> normal;
+  const auto samples = static_cast<std::size_t>(e.duration * e.rate);
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double time = static_cast<double>(i) / e.rate;
+    const double torque = e.amplitude * wave(e.shape, time * e.frequency);
+    double position = machine.step(torque) + e.offset + e.drift * time + e.position_noise * normal(generator);
+    for (const auto& [from, size] : e.slips) {
+      if (time >= from && time < from + 0.5 / e.frequency) position += size;
+    }
+    record.time.push_back(time);
+    record.column(Channel::motor_torque).push_back(torque + e.torque_noise * normal(generator));
+    record.column(Channel::motor_position).push_back(position);
+  }
+  return record;
+}
+
+LostMotionSettings at(double torque) {
+  LostMotionSettings settings;
+  settings.torque = torque;
+  return settings;
+}
+
+LostMotionSettings without_deflection(double torque, double compliance) {
+  LostMotionSettings settings = at(torque);
+  settings.subtract_elastic_deflection = true;
+  settings.elastic_deflection = [compliance](double u) { return compliance * u; };
+  return settings;
+}
+
+void expect_contains(const Estimate& estimate, double truth) {
+  EXPECT_EQ(estimate.status, Status::ok) << estimate.message;
+  EXPECT_LE(estimate.angle_lower, truth);
+  EXPECT_GE(estimate.angle_upper, truth);
+}
+
+void expect_refusal(const Estimate& estimate, Status status, const std::string& words) {
+  EXPECT_EQ(estimate.status, status) << estimate.message;
+  EXPECT_NE(estimate.message.find(words), std::string::npos) << estimate.message;
+  EXPECT_TRUE(std::isnan(estimate.backlash_angle));
+  EXPECT_TRUE(std::isnan(estimate.angle_lower));
+  EXPECT_FALSE(estimate.components);
+}
+
+TEST(LostMotionRamp, PlayAtTheStatedTorqueIsTheClosedForm) {
+  for (const double coulomb : {0.1, 0.5, 1.5}) {
+    Machine machine;
+    machine.coulomb = coulomb;
+    const Estimate estimate = estimate_lost_motion(run(machine, {}), at(2.5));
+    // The window holds 0.95 T to 1.05 T; its mean torque is within 2 % of T, so position within c * 0.05 N m
+    // a side.
+    EXPECT_NEAR(estimate.backlash_angle, machine.play(2.5, 4), 2 * 1e-3 * 0.05) << coulomb;
+    EXPECT_EQ(estimate.method, "lost_motion");
+  }
+}
+
+TEST(LostMotionRamp, GapComplianceAndFrictionAreSeparated) {
+  const Machine machine;
+  const Estimate estimate = estimate_lost_motion(run(machine, {}), at(3));
+  ASSERT_TRUE(estimate.components) << estimate.message;
+  // One sample is 0.01 N m of torque; averaging over a fiftieth of a passage rounds the branches by that
+  // order.
+  EXPECT_NEAR(estimate.components->coulomb, machine.coulomb, 0.05);
+  EXPECT_NEAR(estimate.components->compliance, machine.compliance, 0.05 * machine.compliance);
+  // Extrapolation over the flank (3.5 N m long) with the same relative error.
+  EXPECT_NEAR(estimate.components->gap, machine.gap, 2 * 0.05 * machine.compliance * 3.5);
+  EXPECT_EQ(estimate.components->at_torque, 3);
+  EXPECT_TRUE(std::isnan(estimate.backlash));  // no base radius
+}
+
+TEST(LostMotionRamp, TorqueNoiseQuantisedPositionOffsetAndDriftDoNotMatter) {
+  const Machine machine;
+  Experiment experiment;
+  experiment.torque_noise = 0.35;
+  experiment.position_noise = 5e-5;
+  experiment.offset = -0.2;
+  experiment.drift = 2e-4;  // 4e-3 rad over the record, a sixth of the play
+  Record record = run(machine, experiment);
+  for (double& value : record.column(Channel::motor_position)) value = std::round(value / 1e-4) * 1e-4;
+  const Estimate estimate = estimate_lost_motion(record, at(3.5));
+  expect_contains(estimate, machine.play(3.5, 4));
+  // One step of the position.
+  EXPECT_NEAR(estimate.backlash_angle, machine.play(3.5, 4), 1e-4);
+  EXPECT_NEAR(estimate.components->coulomb, machine.coulomb, 0.1);
+}
+
+TEST(LostMotionRamp, OneSlippedRampIsCountedAndWidensTheInterval) {
+  const Machine machine;
+  Experiment experiment;
+  experiment.position_noise = 5e-5;
+  const Estimate clean = estimate_lost_motion(run(machine, experiment), at(3));
+  experiment.slips = {{8.0, 0.0175}};  // a degree, through the third positive half period
+  const Estimate slipped = estimate_lost_motion(run(machine, experiment), at(3));
+  expect_contains(slipped, machine.play(3, 4));
+  // The median moves within the scatter of the readings: position noise averaged over at least 10 samples,
+  // three times.
+  EXPECT_NEAR(slipped.backlash_angle, machine.play(3, 4), 2 * machine.compliance * 0.06 + 5e-5);
+  EXPECT_GT(slipped.angle_upper - slipped.angle_lower, clean.angle_upper - clean.angle_lower);
+  EXPECT_EQ(clean.message.find("far from"), std::string::npos) << clean.message;
+  EXPECT_NE(slipped.message.find("2 of them far from"), std::string::npos)
+      << slipped.message;  // into and out of it
+}
+
+TEST(LostMotionRamp, IntervalContainsTheTruthAsOftenAsItSays) {
+  int inside = 0;
+  const int records = 200;
+  for (int k = 0; k < records; ++k) {
+    const Machine machine;
+    Experiment experiment;
+    experiment.rate = 100;
+    experiment.seed = static_cast<unsigned>(k);
+    std::mt19937 generator(1000 + experiment.seed);
+    std::normal_distribution<double> scatter(0, 1e-3);
+    for (int half = 0; half < 10; ++half) experiment.slips.push_back({2.0 * half, scatter(generator)});
+    const Estimate estimate = estimate_lost_motion(run(machine, experiment), at(3.4));
+    const double truth = machine.play(3.4, 4);
+    inside += estimate.angle_lower <= truth && truth <= estimate.angle_upper;
+  }
+  // 95 % of 200 with a binomial standard deviation of 3.1: below 180 in one of a million runs.
+  EXPECT_GE(inside, 180);
+}
+
+TEST(LostMotionRamp, TorqueFarBeyondTheStatedLevelIsNoSwitch) {
+  const Machine machine;
+  Experiment experiment;
+  experiment.amplitude = 40;
+  experiment.rate = 2000;
+  const Estimate estimate = estimate_lost_motion(run(machine, experiment), at(3));
+  // Mean torque in the window within 2 % of T.
+  EXPECT_NEAR(estimate.backlash_angle, machine.play(3, 40), 2 * machine.compliance * 0.06);
+  EXPECT_GT(estimate.components->coulomb, 0.4);
+}
+
+TEST(LostMotionFree, FreePlayComesOutForEveryShapeAmplitudeAndRate) {
+  Machine machine;
+  machine.coulomb = 0;
+  machine.compliance = 0.04;
+  machine.gap = 0.008;
+  for (const Wave shape : {Wave::triangle, Wave::sine, Wave::square}) {
+    for (const double amplitude : {0.05, 0.08}) {
+      for (const double rate : {500.0, 1000.0, 10000.0}) {
+        Experiment experiment;
+        experiment.shape = shape;
+        experiment.amplitude = amplitude;
+        experiment.frequency = 10;
+        experiment.duration = 0.3;  // three periods
+        experiment.rate = rate;
+        experiment.offset = 0.3;
+        const Estimate estimate =
+            estimate_lost_motion(run(machine, experiment), without_deflection(0.05, machine.compliance));
+        expect_contains(estimate, machine.gap);
+        // A window of 4 samples at 500 Hz lies off the torque's mean by at most a sample: 4 A f / rate of
+        // torque.
+        EXPECT_NEAR(estimate.backlash_angle, machine.gap,
+                    2 * machine.compliance * 40 * amplitude / rate + 1e-9)
+            << static_cast<int>(shape) << " " << amplitude << " " << rate;
+      }
+    }
+  }
+}
+
+TEST(LostMotionFree, LevelMayBeTakenFromTheRecordAndBaseRadiusGivesLength) {
+  Machine machine;
+  machine.coulomb = 0;
+  LostMotionSettings settings = without_deflection(kNaN, machine.compliance);
+  settings.base_radius = 0.015;
+  Experiment experiment;
+  experiment.shape = Wave::square;
+  const Estimate estimate = estimate_lost_motion(run(machine, experiment), settings);
+  expect_contains(estimate, machine.gap);
+  EXPECT_NEAR(estimate.backlash, 0.015 * machine.gap, 1e-9);  // exact but for rounding of sums
+  EXPECT_DOUBLE_EQ(estimate.lower, 0.015 * estimate.angle_lower);
+  EXPECT_DOUBLE_EQ(estimate.upper, 0.015 * estimate.angle_upper);
+  EXPECT_NEAR(estimate.components->gap, machine.gap, 1e-9);
+  EXPECT_TRUE(std::isnan(estimate.components->compliance));
+  EXPECT_TRUE(std::isnan(estimate.components->coulomb));
+  EXPECT_NE(estimate.message.find("neither compliance nor friction"), std::string::npos) << estimate.message;
+}
+
+TEST(LostMotionFree, UncertainDeflectionWidensTheInterval) {
+  Machine machine;
+  machine.coulomb = 0;
+  Experiment experiment;
+  experiment.shape = Wave::square;
+  LostMotionSettings settings = without_deflection(3, machine.compliance);
+  for (const double uncertainty : {0.0, 0.1}) {
+    settings.elastic_uncertainty = uncertainty;
+    const Estimate estimate = estimate_lost_motion(run(machine, experiment), settings);
+    // Both sides deflect by c * 4 N m; nothing else is uncertain in this record but rounding and one position
+    // step, which is the whole play here because the position takes two values only.
+    const double step = machine.play(4, 4) - 0, half = (estimate.angle_upper - estimate.angle_lower) / 2;
+    EXPECT_LE(half, std::hypot(step, uncertainty * 8e-3) * 1.01);
+    EXPECT_GE(estimate.angle_upper - estimate.backlash_angle, uncertainty * 8e-3 * 0.99);
+  }
+}
+
+// Square wave whose motion approaches the wall as W - B exp(-t/tau) + A exp(-t/tau) cos(omega t).
+Record settling_record(double wall, double creep, double ring, double tau) {
+  Record record;
+  for (int i = 0; i < 2000; ++i) {
+    const double time = i * 1e-3, since = (i % 50) * 1e-3, side = (i / 50) % 2 == 0 ? 1 : -1;
+    const double decay = std::exp(-since / tau);
+    record.time.push_back(time);
+    record.column(Channel::motor_torque).push_back(side);
+    record.column(Channel::motor_position)
+        .push_back(side * (wall - creep * decay + ring * decay * std::cos(2 * kPi * 150 * since)));
+  }
+  return record;
+}
+
+TEST(LostMotionFree, RingingIsAveragedAndInTheInterval) {
+  const double wall = 5e-3;
+  const Estimate estimate =
+      estimate_lost_motion(settling_record(wall, 0, 2e-3, 0.012), without_deflection(1, 1e-3));
+  expect_contains(estimate, 2 * wall - 2e-3);
+  // At the window's begin (33 ms) the ring is 2e-3 exp(-33/12) = 1.3e-4; Hann over 2.4 of its periods leaves
+  // a tenth.
+  EXPECT_NEAR(estimate.backlash_angle, 2 * wall - 2e-3, 2 * 1.3e-5);
+  // rms of the ring over the window, 1.4e-3 exp(-33/12) sqrt(0.34) = 5.1e-5 rad, less a fifth for whole
+  // samples.
+  EXPECT_GT((estimate.angle_upper - estimate.angle_lower) / 2, 4e-5);
+}
+
+TEST(LostMotionRamp, RippleOfThePositionIsInTheInterval) {
+  const double ripple = 2e-4;
+  Record record = run({}, {});
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    record.column(Channel::motor_position)[i] += ripple * std::sin(2 * kPi * 30 * record.time[i]);
+  }
+  const Estimate estimate = estimate_lost_motion(record, at(3));
+  expect_contains(estimate, Machine().play(3, 4));
+  // Four times the rms of a sine, ripple / sqrt(2), less a tenth for a window of broken periods.
+  EXPECT_GT((estimate.angle_upper - estimate.angle_lower) / 2, 0.9 * 4 * ripple / std::sqrt(2.0));
+}
+
+TEST(LostMotionFree, CreepIsExtrapolated) {
+  const double wall = 5e-3, creep = 1e-3, tau = 0.010;
+  const Estimate estimate =
+      estimate_lost_motion(settling_record(wall, creep, 0, tau), without_deflection(1, 1e-3));
+  const double truth = 2 * wall - 2e-3;
+  expect_contains(estimate, truth);
+  // Geometric extrapolation is exact for one exponential; rounding of the window to samples remains.
+  // Unextrapolated, 2 creep exp(-42/10) = 3e-5 rad would be missing.
+  EXPECT_NEAR(estimate.backlash_angle, truth, 2e-7);
+}
+
+TEST(LostMotionFree, FrictionOnTheFlanksOfARampIsInTheInterval) {
+  Machine machine;
+  machine.coulomb = 0.3;
+  const Estimate estimate = estimate_lost_motion(run(machine, {}), without_deflection(3, machine.compliance));
+  expect_contains(estimate, machine.gap);
+  // Friction holds the motor up to 2 c Fc farther on either side; the interval knows that order of size.
+  EXPECT_GT(estimate.angle_upper - estimate.angle_lower, 2 * machine.compliance * machine.coulomb);
+}
+
+TEST(LostMotionStated, SwitchedTorqueBeyondTheLevelIsCorrectedWhereDeflectionIsKnown) {
+  Machine machine;
+  machine.coulomb = 0;
+  Experiment experiment;
+  experiment.shape = Wave::square;  // +-4 N m, stated 3 N m
+  LostMotionSettings settings = at(3);
+  expect_refusal(estimate_lost_motion(run(machine, experiment), settings), Status::out_of_domain,
+                 "jumps past");
+  settings.elastic_deflection = [&](double torque) { return machine.compliance * torque; };
+  const Estimate estimate = estimate_lost_motion(run(machine, experiment), settings);
+  EXPECT_NEAR(estimate.backlash_angle, machine.gap + 2 * machine.compliance * 3, 1e-9);  // rounding of sums
+  EXPECT_NEAR(estimate.components->gap, machine.gap, 1e-9);
+}
+
+TEST(LostMotionStatus, NamesTheMissingChannel) {
+  Record record = run({}, {});
+  record.column(Channel::motor_position).clear();
+  expect_refusal(estimate_lost_motion(record, at(3)), Status::insufficient_data, "motor_position");
+  record = run({}, {});
+  record.column(Channel::motor_torque).clear();
+  expect_refusal(estimate_lost_motion(record, at(3)), Status::insufficient_data, "sensor_torque");
+  expect_refusal(estimate_lost_motion(Record(), at(3)), Status::insufficient_data, "motor_position");
+}
+
+TEST(LostMotionStatus, SensorTorqueServesWhereMotorTorqueIsAbsent) {
+  Record record = run({}, {});
+  const double expected = estimate_lost_motion(record, at(3)).backlash_angle;
+  record.column(Channel::motor_torque).swap(record.column(Channel::sensor_torque));
+  EXPECT_DOUBLE_EQ(estimate_lost_motion(record, at(3)).backlash_angle, expected);
+}
+
+TEST(LostMotionStatus, TorqueBelowTheLevelIsOutOfDomainWithWhatWasReached) {
+  Experiment experiment;
+  experiment.amplitude = 2;
+  expect_refusal(estimate_lost_motion(run({}, experiment), at(3)), Status::out_of_domain,
+                 "needed are +-3 N m");
+  expect_refusal(estimate_lost_motion(run({}, experiment), without_deflection(3, 1e-3)),
+                 Status::out_of_domain, "1.9");
+  Record one_sided = run({}, {});
+  for (double& torque : one_sided.column(Channel::motor_torque)) torque = std::max(torque, -1.0);
+  expect_refusal(estimate_lost_motion(one_sided, at(3)), Status::out_of_domain, "-1 N m");
+}
+
+TEST(LostMotionStatus, OneExcursionPerSideIsTooFewAndTwoGiveAWideInterval) {
+  Experiment experiment;
+  experiment.duration = 4;
+  expect_refusal(estimate_lost_motion(run({}, experiment), at(3)), Status::insufficient_data,
+                 "needed are 2 each");
+  experiment.duration = 8.1;
+  experiment.position_noise = 5e-5;
+  const Estimate few = estimate_lost_motion(run({}, experiment), at(3));
+  experiment.duration = 40.1;
+  const Estimate many = estimate_lost_motion(run({}, experiment), at(3));
+  ASSERT_EQ(few.status, Status::ok) << few.message;
+  EXPECT_GT(few.angle_upper - few.angle_lower, many.angle_upper - many.angle_lower);
+}
+
+TEST(LostMotionStatus, MovingOutputIsOutOfDomain) {
+  Record record = run({}, {});
+  record.column(Channel::load_position).assign(record.size(), 0.7);
+  EXPECT_EQ(estimate_lost_motion(record, at(3)).status, Status::ok);
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    record.column(Channel::load_position)[i] = 0.2 * record.column(Channel::motor_position)[i];
+  }
+  expect_refusal(estimate_lost_motion(record, at(3)), Status::out_of_domain, "not locked");
+  LostMotionSettings settings = at(3);
+  settings.locked_tolerance = 0.1;  // rad, more than it moves
+  EXPECT_EQ(estimate_lost_motion(record, settings).status, Status::ok);
+}
+
+TEST(LostMotionStatus, MotionThatDoesNotSettleOrGoesTheWrongWayIsOutOfDomain) {
+  expect_refusal(estimate_lost_motion(settling_record(5e-3, 0, 5e-3, 1.0), without_deflection(1, 1e-3)),
+                 Status::out_of_domain, "come to rest");
+  Record reversed = run({}, {});
+  for (double& position : reversed.column(Channel::motor_position)) position = -position;
+  expect_refusal(estimate_lost_motion(reversed, at(3)), Status::out_of_domain, "smaller positions");
+  expect_refusal(estimate_lost_motion(run({}, {}), without_deflection(3, 1.0)), Status::out_of_domain,
+                 "not this machine");
+}
+
+TEST(LostMotionStatus, SamplesThatAreNotFiniteAreSkipped) {
+  Record record = run({}, {});
+  const double expected = estimate_lost_motion(record, at(3)).backlash_angle;
+  for (std::size_t i = 50; i < record.size(); i += 400) record.column(Channel::motor_position)[i] = kNaN;
+  // A missing sample shifts a window by less than a sample, 0.01 N m of torque on each side.
+  EXPECT_NEAR(estimate_lost_motion(record, at(3)).backlash_angle, expected, 2 * 1e-3 * 0.01);
+}
+
+TEST(LostMotionStatus, SettingsOutOfRangeThrow) {
+  const Record record = run({}, {});
+  for (const double torque : {0.0, -1.0, kNaN})
+    EXPECT_THROW(estimate_lost_motion(record, at(torque)), InvalidParameter);
+  LostMotionSettings settings = at(3);
+  settings.subtract_elastic_deflection = true;
+  EXPECT_THROW(estimate_lost_motion(record, settings), InvalidParameter);
+  settings = at(3);
+  settings.base_radius = 0;
+  EXPECT_THROW(estimate_lost_motion(record, settings), InvalidParameter);
+  settings = at(3);
+  settings.elastic_uncertainty = -0.1;
+  EXPECT_THROW(estimate_lost_motion(record, settings), InvalidParameter);
+  settings = at(3);
+  settings.locked_tolerance = 0;
+  EXPECT_THROW(estimate_lost_motion(record, settings), InvalidParameter);
+}
+
+TEST(LostMotionMeasured, CycloidalGearboxKeepsOrderAndReference) {
+  // Play at +-3.5 N m [deg] as read off the plots of these records.
+  const std::vector<std::pair<std::string, double>> reference = {
+      {"split_preload3", 0.28}, {"split_preload1", 1.10}, {"split_reassembled", 1.74}};
+  double previous = 0;
+  for (const auto& [name, degrees] : reference) {
+    const auto path = test::find_data("measured/cycloidal_" + name + "_play.csv");
+    if (!path) GTEST_SKIP() << "measured record of " << name << " is absent";
+    const Estimate estimate = estimate_lost_motion(read_csv(*path), at(3.5));
+    // Reading precision of the plots and the slips of a degree in single ramps: 0.05 deg.
+    EXPECT_NEAR(estimate.backlash_angle * 180 / kPi, degrees, 0.05) << name << ": " << estimate.message;
+    expect_contains(estimate, degrees * kPi / 180);
+    EXPECT_GT(estimate.angle_lower, previous) << name;
+    previous = estimate.angle_upper;
+    ASSERT_TRUE(estimate.components);
+    // Half the width of the loop lies between 1 and 3 N m in every one of these plots.
+    EXPECT_GT(estimate.components->coulomb, 1) << name;
+    EXPECT_LT(estimate.components->coulomb, 3) << name;
+    EXPECT_LT(estimate.components->gap, estimate.backlash_angle) << name;
+  }
+}
+
+TEST(LostMotionMeasured, RigWithKnownHalfGapWithinThreeMicrometres) {
+  // Series of input sensor, Hertzian contact and output coupling of the rig that made the records.
+  const double radius = 0.014917;
+  LostMotionSettings settings = at(0.05);
+  settings.subtract_elastic_deflection = true;
+  settings.base_radius = radius;
+  settings.elastic_deflection = [radius](double torque) {
+    return torque / 28.71 + std::pow(torque / radius / 2.28e8, 2.0 / 3) / radius + torque / 6310;
+  };
+  for (const int half_gap : {0, 30, 55, 80}) {
+    const auto path = test::find_data("rig/rig_halfgap_" + std::to_string(half_gap) + "um.csv");
+    if (!path) GTEST_SKIP() << "rig record with half gap " << half_gap << " um is absent";
+    const Estimate estimate = estimate_lost_motion(read_csv(*path), settings);
+    const double truth = 2e-6 * half_gap;
+    EXPECT_NEAR(estimate.backlash, truth, 3e-6) << estimate.message;  // demanded of the method
+    EXPECT_LE(estimate.lower, truth);
+    EXPECT_GE(estimate.upper, truth);
+    EXPECT_LT(estimate.upper - estimate.lower, 1e-5);  // an interval that still tells 25 um steps apart
+  }
+}
+
+}  // namespace
+}  // namespace backlash

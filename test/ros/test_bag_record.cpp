@@ -1,0 +1,357 @@
+#include "backlash_diagnosis/ros/bag_record.h"
+
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/JointState.h>
+#include <std_msgs/String.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+namespace {
+
+namespace fs = std::filesystem;
+
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// Message text of an exception of a certain type; fails the test where there is none.
+template <typename Exception, typename Action>
+std::string message_of(const Action& action) {
+  try {
+    action();
+  } catch (const Exception& e) {
+    return e.what();
+  } catch (const std::exception& e) {
+    ADD_FAILURE() << "other exception: " << e.what();
+    return "";
+  }
+  ADD_FAILURE() << "no exception";
+  return "";
+}
+
+void expect_contains(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << text << "\nlacks: " << part;
+}
+
+class BagRecord : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::path(testing::TempDir()) / "bag_record_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+
+  std::string write_bytes(const std::string& name, const std::string& bytes) const {
+    std::ofstream(file(name), std::ios::binary) << bytes;
+    return file(name);
+  }
+
+  static std::string bytes_of(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  }
+
+  std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+
+  fs::path folder_;
+};
+
+/// A bag as a recorder writes it, message by message.
+class Recording {
+ public:
+  explicit Recording(const std::string& path) { bag_.open(path, rosbag::bagmode::Write); }
+  ~Recording() { bag_.close(); }
+
+  static sensor_msgs::JointState motor(double stamp, double position = 1, double velocity = 2, double effort = 3,
+                                       const std::string& joint = "joint") {
+    sensor_msgs::JointState m;
+    m.header.stamp.fromSec(stamp);
+    m.name = {joint + "_motor"};
+    m.position = {position};
+    m.velocity = {velocity};
+    m.effort = {effort};
+    return m;
+  }
+
+  /// Received one second after the message before, whatever its stamp says.
+  Recording& add(const sensor_msgs::JointState& m, const std::string& topic = "/joint_states") {
+    bag_.write(topic, ros::Time(received_++, 0), m);
+    return *this;
+  }
+
+  Recording& add_text(const std::string& topic, const std::string& text) {
+    std_msgs::String m;
+    m.data = text;
+    bag_.write(topic, ros::Time(received_++, 0), m);
+    return *this;
+  }
+
+ private:
+  rosbag::Bag bag_;
+  std::uint32_t received_ = 100;
+};
+
+Record sample_record(std::vector<double> time = {0, 0.001, 0.0020000005, 0.003, 17}) {
+  Record record;
+  record.name = "run \"a\".csv";
+  record.time = std::move(time);
+  double value = 0.1;
+  for (const Channel channel : kChannels)
+    for (std::size_t i = 0; i < record.size(); ++i) record.column(channel).push_back(value = -1.7 * value + 1.0 / 3);
+  record.column(Channel::motor_torque)[1] = -0.0;
+  record.column(Channel::sensor_torque)[1] = std::numeric_limits<double>::denorm_min();
+  record.column(Channel::load_position)[1] = std::numeric_limits<double>::max();
+  return record;
+}
+
+void expect_same_columns(const Record& a, const Record& b) {
+  for (const Channel channel : kChannels) EXPECT_EQ(a.column(channel), b.column(channel)) << channel_name(channel);
+}
+
+TEST_F(BagRecord, AllChannelsAndTimesSurviveExactly) {
+  const Record record = sample_record();
+  write_bag(record, file("a.bag"), "elbow");
+  const Record read = read_bag(file("a.bag"));
+  // 0.0020000005 is between two nanoseconds; the stamp is the nearest one.
+  EXPECT_EQ(read.time, (std::vector<double>{0, 0.001, 0.002000001, 0.003, 17}));
+  expect_same_columns(read, record);
+  EXPECT_TRUE(std::signbit(read.column(Channel::motor_torque)[1]));
+  EXPECT_EQ(read.name, file("a.bag"));
+  EXPECT_EQ(files(), 1u);  // no temporary file stays
+}
+
+TEST_F(BagRecord, TimesThatDoNotStartAtZeroSurvive) {
+  // The last: a decimal of more than 2^53 nanoseconds, whose double is coarser than a nanosecond.
+  for (const std::vector<double>& time : {std::vector<double>{1234.567891234, 1234.567892, 1235.1},
+                                          std::vector<double>{-2.5, -0.25, 3.125},
+                                          std::vector<double>{1700000000.25, 1700000000.251, 1700000001}}) {
+    const Record record = sample_record(time);
+    write_bag(record, file("a.bag"), "joint");
+    EXPECT_EQ(read_bag(file("a.bag")).time, time);
+  }
+}
+
+TEST_F(BagRecord, EveryMillisecondOfAnHourIsTheDoubleOfItsDecimal) {
+  std::vector<double> time;
+  for (int i = 0; i < 3600; ++i) time.push_back(std::stod(std::to_string(i) + "." + std::to_string(100 + i % 900)));
+  write_bag(sample_record(time), file("a.bag"), "joint");
+  EXPECT_EQ(read_bag(file("a.bag")).time, time);
+}
+
+TEST_F(BagRecord, StampsAreTheOriginPlusTime) {
+  write_bag(sample_record({0, 0.5}), file("a.bag"), "joint", ros::Time(5, 250000000));
+  rosbag::Bag bag(file("a.bag"));
+  rosbag::View view(bag, rosbag::TopicQuery("/joint_states"));
+  ASSERT_EQ(view.size(), 2u);
+  const auto last = (++view.begin())->instantiate<sensor_msgs::JointState>();
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->header.stamp, ros::Time(5, 750000000));
+  EXPECT_EQ((++view.begin())->getTime(), ros::Time(5, 750000000));
+  rosbag::View info(bag, rosbag::TopicQuery("/record_info"));
+  ASSERT_EQ(info.size(), 1u);
+  EXPECT_TRUE(info.begin()->isLatching());
+}
+
+TEST_F(BagRecord, RecordedBagBeginsAtZeroAndOnlyHeaderStampsCount) {
+  Recording(file("a.bag")).add(Recording::motor(50.25, 1)).add(Recording::motor(50.5, 2)).add(Recording::motor(51, 3));
+  const Record record = read_bag(file("a.bag"));
+  EXPECT_EQ(record.time, (std::vector<double>{0, 0.25, 0.75}));
+  EXPECT_EQ(record.column(Channel::motor_position), (std::vector<double>{1, 2, 3}));
+  EXPECT_FALSE(record.has(Channel::sensor_torque));
+}
+
+TEST_F(BagRecord, ChannelThatIsNanThroughoutIsAbsent) {
+  Recording(file("a.bag")).add(Recording::motor(1, 1, kNan)).add(Recording::motor(2, 2, kNan));
+  const Record record = read_bag(file("a.bag"));
+  EXPECT_FALSE(record.has(Channel::motor_velocity));
+  EXPECT_TRUE(record.has(Channel::motor_torque));
+}
+
+TEST_F(BagRecord, ChannelThatIsNanAtTimesIsRefused) {
+  Recording(file("a.bag")).add(Recording::motor(1)).add(Recording::motor(2.5, 1, kNan));
+  const std::string message = message_of<BadData>([&] { read_bag(file("a.bag")); });
+  for (const std::string part : {file("a.bag"), std::string("/joint_states message 1"), std::string("motor_velocity"),
+                                 std::string("2.500000000")})
+    expect_contains(message, part);
+}
+
+TEST_F(BagRecord, StampThatGoesBackIsRefused) {
+  Recording(file("a.bag")).add(Recording::motor(1)).add(Recording::motor(2)).add(Recording::motor(1.5));
+  const std::string message = message_of<BadData>([&] { read_bag(file("a.bag")); });
+  for (const char* part : {"/joint_states message 2", "1.500000000", "2.000000000", "looped"}) expect_contains(message, part);
+}
+
+TEST_F(BagRecord, RepeatedStampLosesTheLaterMessageWithAWarning) {
+  Recording(file("a.bag")).add(Recording::motor(1, 1)).add(Recording::motor(2, 2)).add(Recording::motor(2, 9));
+  const Record record = read_bag(file("a.bag"));
+  EXPECT_EQ(record.column(Channel::motor_position), (std::vector<double>{1, 2}));
+  ASSERT_FALSE(record.warnings.empty());
+  expect_contains(record.warnings.front(), "repeated time stamp");
+}
+
+TEST_F(BagRecord, ZeroStampIsRefused) {
+  Recording(file("a.bag")).add(Recording::motor(0));
+  expect_contains(message_of<BadData>([&] { read_bag(file("a.bag")); }), "header.stamp = 0");
+}
+
+TEST_F(BagRecord, WrongSizesAndInfinitiesAreRefused) {
+  sensor_msgs::JointState wrong = Recording::motor(2);
+  wrong.effort = {1, 2};
+  Recording(file("a.bag")).add(Recording::motor(1)).add(wrong);
+  const std::string message = message_of<BadData>([&] { read_bag(file("a.bag")); });
+  expect_contains(message, "message 1");
+  expect_contains(message, "effort");
+  Recording(file("b.bag")).add(Recording::motor(1, std::numeric_limits<double>::infinity()));
+  expect_contains(message_of<BadData>([&] { read_bag(file("b.bag")); }), "infinite");
+}
+
+TEST_F(BagRecord, JointIsChosenOrAskedFor) {
+  Recording(file("a.bag"))
+      .add(Recording::motor(1, 1, 1, 1, "elbow"))
+      .add(Recording::motor(1, 5, 5, 5, "wrist"))
+      .add(Recording::motor(2, 2, 2, 2, "elbow"))
+      .add(Recording::motor(2, 6, 6, 6, "wrist"));
+  EXPECT_EQ(read_bag(file("a.bag"), "wrist").column(Channel::motor_position), (std::vector<double>{5, 6}));
+  const std::string several = message_of<BadData>([&] { read_bag(file("a.bag")); });
+  for (const char* part : {"--joint", "elbow", "wrist"}) expect_contains(several, part);
+  const std::string absent = message_of<BadData>([&] { read_bag(file("a.bag"), "knee"); });
+  for (const char* part : {"knee", "elbow", "wrist"}) expect_contains(absent, part);
+}
+
+TEST_F(BagRecord, TopicIsFoundByItsLastPart) {
+  Recording(file("a.bag")).add_text("/other", "x").add(Recording::motor(1), "/robot/joint_states");
+  EXPECT_EQ(read_bag(file("a.bag")).size(), 1u);
+  EXPECT_EQ(read_bag(file("a.bag"), "", "/robot/joint_states").size(), 1u);
+  const std::string absent = message_of<BadData>([&] { read_bag(file("a.bag"), "", "states"); });
+  for (const char* part : {"/other", "/robot/joint_states", "std_msgs/String"}) expect_contains(absent, part);
+  expect_contains(message_of<BadData>([&] { read_bag(file("a.bag"), "", "other"); }), "std_msgs/String");
+}
+
+TEST_F(BagRecord, JointOnSeveralTopicsIsAskedFor) {
+  Recording(file("a.bag")).add(Recording::motor(1), "/a/joint_states").add(Recording::motor(2), "/b/joint_states");
+  expect_contains(message_of<BadData>([&] { read_bag(file("a.bag")); }), "--topic");
+  EXPECT_EQ(read_bag(file("a.bag"), "", "/b/joint_states").size(), 1u);
+}
+
+TEST_F(BagRecord, BagWithoutMessagesIsRefused) {
+  { Recording recording(file("a.bag")); }
+  expect_contains(message_of<BadData>([&] { read_bag(file("a.bag")); }), "there are: none");
+}
+
+TEST_F(BagRecord, RecordInfoOfSomebodyElseIsIgnoredWhenItIsNoText) {
+  Recording(file("a.bag")).add(Recording::motor(7), "/record_info").add(Recording::motor(8)).add(Recording::motor(9));
+  EXPECT_EQ(read_bag(file("a.bag")).time, (std::vector<double>{0, 1}));
+  Recording(file("b.bag")).add_text("/record_info", "{name: x}").add(Recording::motor(8));
+  expect_contains(message_of<BadData>([&] { read_bag(file("b.bag")); }), "time_origin");
+}
+
+TEST_F(BagRecord, FilesThatAreNoBagAreRefused) {
+  expect_contains(message_of<MissingInput>([&] { read_bag(file("none.bag")); }), "none.bag");
+  expect_contains(message_of<MissingInput>([&] { read_bag(folder_.string()); }), "directory");
+  for (const std::string& bytes : {std::string(), std::string("time,motor_torque\n0,1\n"), std::string("#ROSBAG"),
+                                   std::string("#ROSBAG V1.2\n")}) {
+    const std::string path = write_bytes("a.bag", bytes);
+    expect_contains(message_of<BadData>([&] { read_bag(path); }), path);
+  }
+}
+
+TEST_F(BagRecord, TruncatedBagIsRefusedWhereverItIsCut) {
+  write_bag(sample_record(), file("a.bag"), "joint");
+  const std::string whole = bytes_of(file("a.bag"));
+  for (std::size_t length = 0; length < whole.size(); length += 97) {
+    const std::string path = write_bytes("cut.bag", whole.substr(0, length));
+    expect_contains(message_of<BadData>([&] { read_bag(path); }), path);
+  }
+}
+
+TEST_F(BagRecord, UnindexedBagPointsToReindex) {
+  write_bag(sample_record(), file("a.bag"), "joint");
+  std::string bytes = bytes_of(file("a.bag"));
+  const std::string key = "index_pos=";
+  const auto place = bytes.find(key) + key.size();  // what a recorder leaves that is killed: no index, no place of it
+  std::uint64_t index = 0;
+  std::memcpy(&index, bytes.data() + place, sizeof index);
+  bytes.resize(index);
+  bytes.replace(place, sizeof index, sizeof index, '\0');
+  expect_contains(message_of<BadData>([&] { read_bag(write_bytes("cut.bag", bytes)); }), "rosbag reindex");
+}
+
+// An unpacked chunk has no checksum, so a flipped bit may become another value, but never a crash or an endless loop.
+TEST_F(BagRecord, FlippedBitsAreRefusedOrHarmless) {
+  const Record record = sample_record({0, 0.001, 0.002});
+  write_bag(record, file("packed.bag"), "joint");
+  Recording(file("plain.bag")).add(Recording::motor(1)).add(Recording::motor(2));
+  for (const char* name : {"packed.bag", "plain.bag"}) {
+    const bool packed = std::string(name) == "packed.bag";
+    const std::string whole = bytes_of(file(name));
+    int refused = 0;
+    for (std::size_t i = 0; i < whole.size(); i += i < 4096 ? 13 : 1) {  // the head is mostly padding
+      std::string bytes = whole;
+      bytes[i] = static_cast<char>(bytes[i] ^ (1 << (i % 8)));
+      const std::string path = write_bytes("flipped.bag", bytes);
+      try {
+        const Record read = read_bag(path);
+        if (packed) {  // lz4 has a checksum
+          EXPECT_EQ(read.time, record.time) << "byte " << i;
+          expect_same_columns(read, record);
+        }
+      } catch (const BadData& e) {
+        ++refused;
+        expect_contains(e.what(), path);
+      }
+    }
+    EXPECT_GT(refused, 100) << name;
+  }
+}
+
+TEST_F(BagRecord, WritingFailsWithoutLeavingAnything) {
+  const Record record = sample_record();
+  expect_contains(message_of<CannotWrite>([&] { write_bag(record, file("no/a.bag"), "joint"); }), "no/a.bag");
+  fs::create_directory(folder_ / "d.bag");
+  message_of<CannotWrite>([&] { write_bag(record, file("d.bag"), "joint"); });
+  message_of<InvalidParameter>([&] { write_bag(record, file("a.bag"), ""); });
+  EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(BagRecord, RecordThatCannotBeReadBackLeavesTheOldFile) {
+  const std::string path = write_bytes("a.bag", "old");
+  const auto refused = [&](Record record) {
+    message_of<BadData>([&] { write_bag(record, path, "joint"); });
+    EXPECT_EQ(bytes_of(path), "old");
+  };
+  Record record = sample_record();
+  record.column(Channel::motor_torque)[2] = kNan;
+  refused(record);
+  record = sample_record();
+  record.column(Channel::motor_torque).pop_back();
+  refused(record);
+  refused(sample_record({0, 1e-10}));
+  refused(sample_record({0, 5e9}));
+  refused(sample_record({-1e9, 0}));  // stamp 0
+  refused(Record());
+  write_bag(sample_record(), path, "joint");
+  EXPECT_EQ(read_bag(path).size(), 5u);
+}
+
+TEST_F(BagRecord, SymbolicLinkStaysALink) {
+  fs::create_symlink(file("target.bag"), file("link.bag"));
+  write_bytes("target.bag", "old");
+  write_bag(sample_record(), file("link.bag"), "joint");
+  EXPECT_TRUE(fs::is_symlink(file("link.bag")));
+  EXPECT_EQ(read_bag(file("target.bag")).size(), 5u);
+}
+
+}  // namespace
+}  // namespace backlash
