@@ -2,6 +2,8 @@
 
 namespace backlash {
 
-const char* version() { return BACKLASH_DIAGNOSIS_VERSION; }
+const char* version() {
+  return BACKLASH_DIAGNOSIS_VERSION;
+}
 
 }  // namespace backlash

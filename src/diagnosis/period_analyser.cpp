@@ -4,8 +4,25 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/time_base.h"
 
 namespace backlash {
+
+long WindowGrid::index(double time) const {
+  auto k = static_cast<long>(std::floor((time - origin) / period));
+  while (time >= start(k + 1)) ++k;  // the quotient may be one unit in the last place off
+  while (time < start(k)) --k;
+  return k;
+}
+
+std::optional<WindowGrid> window_grid(const std::vector<double>& time, double period) {
+  if (time.size() < kLeadingSamples) return std::nullopt;
+  WindowGrid grid;
+  grid.period = period;
+  grid.interval = median_interval({time.begin(), time.begin() + kLeadingSamples});
+  grid.origin = time.front() - 0.5 * grid.interval;
+  return grid;
+}
 
 PeriodAnalyser::PeriodAnalyser(double period, const ApdLayout& layout)
     : period_(period), current_(layout), finished_(layout) {
@@ -13,56 +30,61 @@ PeriodAnalyser::PeriodAnalyser(double period, const ApdLayout& layout)
 }
 
 void PeriodAnalyser::reset() {
-  seen_ = 0;
+  leading_.clear();
   last_index_ = -1;
-  open_ = false;
+  known_ = open_ = false;
+}
+
+const PeriodResult* PeriodAnalyser::add(double time, double value) {
+  if (known_) return take(time, value);
+  leading_.emplace_back(time, value);
+  if (leading_.size() < kLeadingSamples) return nullptr;
+  std::vector<double> stamps;
+  for (const auto& sample : leading_) stamps.push_back(sample.first);
+  grid_ = *window_grid(stamps, period_);
+  known_ = true;
+  const PeriodResult* finished = nullptr;
+  for (const auto& sample : leading_) finished = take(sample.first, sample.second);
+  return finished;
+}
+
+const PeriodResult* PeriodAnalyser::take(double time, double value) {
+  const PeriodResult* finished = nullptr;
+  const long index = grid_.index(time);
+  if (open_ && index > current_.index) finished = close();
+  if (!open_ && index > last_index_) open(index, time);
+  if (open_) {  // else: a late sample of a window that was closed already
+    current_.apd.add(value);
+    current_.signal.add(value);
+    if (current_.signal.count() > 1) current_.largest_gap = std::max(current_.largest_gap, time - last_time_);
+  }
+  last_time_ = time;
+  // Closed as soon as the next sample, one interval later, would lie beyond: no waiting for a stream that ends here.
+  if (open_ && !finished && grid_.completed(time) > current_.index) finished = close();
+  return finished;
+}
+
+const PeriodResult* PeriodAnalyser::finish() {
+  return open_ && last_time_ + 1.5 * grid_.interval >= current_.end ? close() : nullptr;
 }
 
 void PeriodAnalyser::open(long index, double time) {
   current_.index = index;
   current_.start = time;
-  current_.end = end_of(index);
+  current_.end = grid_.start(index + 1);
   current_.apd.clear();
   current_.signal = RunningMoments();
-  current_.largest_gap = std::max(0.0, time - (end_of(index) - period_) - 0.5 * interval_);
+  current_.largest_gap = std::max(0.0, time - grid_.start(index) - 0.5 * grid_.interval);
   last_index_ = index;
   open_ = true;
 }
 
-const PeriodResult* PeriodAnalyser::close(double last_time) {
+const PeriodResult* PeriodAnalyser::close() {
   open_ = false;
-  current_.largest_gap = std::max(current_.largest_gap, current_.end - last_time - 0.5 * interval_);
-  current_.complete = current_.largest_gap <= std::max(0.05 * period_, 1.5 * interval_);
+  current_.largest_gap = std::max(current_.largest_gap, current_.end - last_time_ - 0.5 * grid_.interval);
+  current_.complete = current_.largest_gap <= std::max(0.05 * period_, 1.5 * grid_.interval);
   std::swap(current_, finished_);
   return &finished_;
-}
-
-const PeriodResult* PeriodAnalyser::add(double time, double value) {
-  if (++seen_ == 1) {  // the origin needs the distance to the second sample
-    first_time_ = last_time_ = time;
-    first_value_ = value;
-    return nullptr;
-  }
-  if (seen_ == 2) {
-    interval_ = time - first_time_;
-    origin_ = first_time_ - 0.5 * interval_;
-    open(0, first_time_);
-    current_.apd.add(first_value_);
-    current_.signal.add(first_value_);
-  }
-  const PeriodResult* finished = nullptr;
-  const long index = static_cast<long>(std::floor((time - origin_) / period_));
-  if (open_ && index > current_.index) finished = close(last_time_);
-  if (!open_ && index > last_index_) open(index, time);
-  if (open_) {  // else: a late sample of a window that was closed already
-    current_.apd.add(value);
-    current_.signal.add(value);
-    current_.largest_gap = std::max(current_.largest_gap, time - std::max(last_time_, current_.start));
-    // Closed as soon as the next sample, one interval later, would lie beyond: no waiting for a stream that ends here.
-    if (!finished && time + interval_ >= current_.end) finished = close(time);
-  }
-  last_time_ = time;
-  return finished;
 }
 
 }  // namespace backlash

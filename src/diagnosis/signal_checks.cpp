@@ -1,15 +1,20 @@
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 
 #include <algorithm>
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <numeric>
 #include <unsupported/Eigen/FFT>
+
+#include "backlash_diagnosis/record/time_base.h"
 
 namespace backlash {
 namespace {
 
-constexpr std::size_t kMaxSamples = 1 << 16;  // enough to find a period; more would only cost time
+constexpr std::size_t kMaxSamples = 1 << 16;  // per search; a longer record is searched in growing stretches
+constexpr std::size_t kBlock = 10;            // samples over which noise is judged
 
 /// Values at `count` equidistant times from the first stamp on, linear in between.
 std::vector<double> resample(const std::vector<double>& time, const std::vector<double>& signal, double interval,
@@ -25,19 +30,9 @@ std::vector<double> resample(const std::vector<double>& time, const std::vector<
   return even;
 }
 
-double median_of_differences(const std::vector<double>& time) {
-  std::vector<double> differences(time.size() - 1);
-  for (std::size_t i = 0; i + 1 < time.size(); ++i) differences[i] = time[i + 1] - time[i];
-  std::nth_element(differences.begin(), differences.begin() + differences.size() / 2, differences.end());
-  return differences[differences.size() / 2];
-}
-
-/// Autocorrelation at lags 0 .. n/2, unbiased (each lag divided by its number of pairs), 1 at lag 0.
-std::vector<double> autocorrelation(std::vector<double> x) {
+/// Autocorrelation at lags 0 .. `lags`, unbiased (each lag divided by its number of pairs), 1 at lag 0.
+std::vector<double> autocorrelation(std::vector<double> x, std::size_t lags) {
   const std::size_t n = x.size();
-  double mean = 0;
-  for (double v : x) mean += v / n;
-  for (double& v : x) v -= mean;
   std::size_t padded = 1;
   while (padded < 2 * n) padded *= 2;
   x.resize(padded, 0.0);
@@ -47,62 +42,131 @@ std::vector<double> autocorrelation(std::vector<double> x) {
   for (auto& line : spectrum) line = std::norm(line);
   std::vector<double> product;
   fft.inv(product, spectrum);
-  std::vector<double> r(n / 2 + 1, 0.0);
+  std::vector<double> r(lags + 1, 0.0);
   const double power = product[0] / n;
   if (!(power > 0)) return r;
-  for (std::size_t lag = 0; lag < r.size(); ++lag) r[lag] = product[lag] / (n - lag) / power;
+  for (std::size_t lag = 0; lag <= lags; ++lag) r[lag] = product[lag] / (n - lag) / power;
   return r;
+}
+
+/// Ringing that dies out repeats too, but is no excitation.
+bool dies_out(const std::vector<double>& x) {
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  const double early = std::inner_product(x.begin(), middle, x.begin(), 0.0);
+  const double late = std::inner_product(middle, x.end(), middle, 0.0);
+  return late < 0.1 * early;
+}
+
+/// Lag of the first maximum of the autocorrelation that is nearly as high as the highest; 0 where there is none.
+std::size_t repetition_lag(std::vector<double> x) {
+  const std::size_t n = x.size();
+  if (n < 8) return 0;
+  const double mean = std::accumulate(x.begin(), x.end(), 0.0) / n;
+  for (double& v : x) v -= mean;
+  if (dies_out(x)) return 0;
+  const std::size_t longest = n / 2 + 1;  // of a lag: two periods, the last sample of which may be missing
+  // A little beyond, so that a hill at the longest lag is told from one that still rises there.
+  const std::vector<double> r = autocorrelation(std::move(x), std::min(n - 1, longest + n / 16 + 2));
+  std::size_t first = 1;
+  while (first <= longest && r[first] > 0) ++first;  // past the first zero: the lobe around lag 0
+  if (first > longest) return 0;
+  const double highest = *std::max_element(r.begin() + first, r.begin() + longest + 1);
+  if (!(highest >= 0.5)) return 0;
+  std::size_t rise = first;
+  while (r[rise] < 0.9 * highest) ++rise;
+  // The top of this first hill; noise may put smaller ones on its slope.
+  const auto end = r.begin() + std::min(r.size(), rise + rise / 4 + 2);
+  const std::size_t lag = std::max_element(r.begin() + rise, end) - r.begin();
+  return lag <= longest ? lag : 0;
 }
 
 }  // namespace
 
 std::optional<double> detect_period(const std::vector<double>& time, const std::vector<double>& signal) {
   if (time.size() < 8 || signal.size() != time.size()) return std::nullopt;
+  for (const double v : signal)
+    if (!std::isfinite(v)) return std::nullopt;
   const auto [low, high] = std::minmax_element(signal.begin(), signal.end());
   if (!(*high - *low > 1e-9 * (std::fabs(*high) + std::fabs(*low)))) return std::nullopt;  // constant
-  const double span = time.back() - time.front();
-  double interval = median_of_differences(time);
-  if (!(interval > 0) || !(span > 0)) return std::nullopt;
-  const double wanted = span / interval + 1;
-  const double step = wanted > kMaxSamples ? span / (kMaxSamples - 1) : interval;
-  const std::size_t count = std::min<std::size_t>(kMaxSamples, static_cast<std::size_t>(std::lround(wanted)));
-  const std::vector<double> r = autocorrelation(resample(time, signal, step, count));
-  std::size_t first = 1;
-  while (first < r.size() && r[first] > 0) ++first;  // past the first zero: the lobe around lag 0
-  if (first >= r.size()) return std::nullopt;
-  const double highest = *std::max_element(r.begin() + first, r.end());
-  if (highest < 0.5) return std::nullopt;
-  std::size_t rise = first;
-  while (r[rise] < 0.9 * highest) ++rise;
-  // The top of this first hill; noise may put smaller ones on its slope.
-  const auto end = r.begin() + std::min(r.size(), rise + rise / 4 + 2);
-  const std::size_t lag = std::max_element(r.begin() + rise, end) - r.begin();
-  if (lag + 1 >= r.size()) return std::nullopt;  // still rising: less than two periods
-  return std::max(1.0, std::round(lag * step / interval)) * interval;
+  const double interval = median_interval(time), span = time.back() - time.front();
+  if (!(interval > 0)) return std::nullopt;
+  const double samples = span / interval + 1;
+  // A long record is first searched in its beginning, at full resolution, then in stretches of twice the length at
+  // half the resolution: what is found then has a lag of thousands of steps.
+  for (double stride = 1;; stride *= 2) {
+    const bool all = samples <= stride * kMaxSamples;
+    const auto count = all ? static_cast<std::size_t>(std::lround(samples / stride)) : kMaxSamples;
+    const std::size_t lag = repetition_lag(resample(time, signal, stride * interval, count));
+    // Unless the excitation began late: then the end of the record shows it at full resolution.
+    if (lag > 0 && stride > 1 && lag * stride < 0.25 * kMaxSamples) {
+      const auto tail = static_cast<std::ptrdiff_t>(std::min(time.size(), kMaxSamples / 2));
+      if (const auto fine = detect_period({time.end() - tail, time.end()}, {signal.end() - tail, signal.end()}))
+        return fine;
+    }
+    if (lag > 0) return lag * stride * interval;
+    if (all) return std::nullopt;
+  }
 }
 
 double median_magnitude(std::vector<double> signal) {
+  signal.erase(std::remove_if(signal.begin(), signal.end(), [](double v) { return std::isnan(v); }), signal.end());
   if (signal.empty()) return 0;
   for (double& v : signal) v = std::fabs(v);
   std::nth_element(signal.begin(), signal.begin() + signal.size() / 2, signal.end());
   return signal[signal.size() / 2];
 }
 
+namespace {
+
+/// A stretch of the differences between a signal and itself one period later.
+struct Stretch {
+  double sum = 0;  // of squares
+  std::size_t begin = 0;
+};
+
+/// Share of the power of the differences that is white: smallest over mean eigenvalue of the covariance of five
+/// successive ones. A few oscillations leave the smallest eigenvalue to the white part (Pisarenko 1973).
+double white_share(const std::vector<double>& differences, const std::vector<Stretch>& calm) {
+  constexpr int kOrder = 5;
+  Eigen::Matrix<double, kOrder, kOrder> covariance = Eigen::Matrix<double, kOrder, kOrder>::Zero();
+  for (const Stretch& stretch : calm)
+    for (std::size_t i = stretch.begin; i + kOrder <= stretch.begin + kBlock; ++i) {
+      const Eigen::Map<const Eigen::Matrix<double, kOrder, 1>> successive(&differences[i]);
+      covariance += successive * successive.transpose();
+    }
+  const double mean = covariance.trace() / kOrder;
+  if (!(mean > 0)) return 1;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kOrder, kOrder>> solver(covariance,
+                                                                                   Eigen::EigenvaluesOnly);
+  return std::max(0.0, solver.eigenvalues()[0]) / mean;
+}
+
+}  // namespace
+
 std::optional<double> estimate_noise(const std::vector<double>& signal, double samples_per_period) {
-  constexpr std::size_t kBlock = 10;
   constexpr double kQuantile = 0.2;
-  constexpr double kChiSquare = 6.179;  // 20 % quantile of chi-square with 10 degrees of freedom
+  constexpr double kChiSquare = 6.179;       // 20 % quantile of chi-square with 10 degrees of freedom
+  constexpr std::size_t kEnoughCalm = 20;    // stretches; with fewer, chance alone makes eigenvalues unequal
+  constexpr double kClearlyNotWhite = 0.5;   // with so many, the share is above 0.6 for white noise
+  if (!(samples_per_period >= kBlock && samples_per_period <= 0.5 * signal.size())) return std::nullopt;
   const auto lag = static_cast<std::size_t>(std::lround(samples_per_period));
-  if (lag < kBlock || signal.size() < 2 * lag) return std::nullopt;
-  std::vector<double> sums;
-  for (std::size_t i = 0; i + kBlock + lag <= signal.size(); i += kBlock) {
+  std::vector<double> differences;
+  for (std::size_t i = 0; i + lag < signal.size(); ++i) differences.push_back(signal[i + lag] - signal[i]);
+  std::vector<Stretch> stretches;
+  for (std::size_t i = 0; i + kBlock <= differences.size(); i += kBlock) {
     double sum = 0;
-    for (std::size_t j = i; j < i + kBlock; ++j) sum += (signal[j + lag] - signal[j]) * (signal[j + lag] - signal[j]);
-    sums.push_back(sum);
+    for (std::size_t j = i; j < i + kBlock; ++j) sum += differences[j] * differences[j];
+    if (std::isfinite(sum)) stretches.push_back({sum, i});
   }
-  const auto at = static_cast<std::ptrdiff_t>(kQuantile * sums.size());
-  std::nth_element(sums.begin(), sums.begin() + at, sums.end());
-  return std::sqrt(sums[at] / kChiSquare / 2);  // a difference of two samples has twice the variance
+  if (stretches.empty()) return std::nullopt;
+  const auto at = stretches.begin() + static_cast<std::ptrdiff_t>(kQuantile * stretches.size());
+  std::nth_element(stretches.begin(), at, stretches.end(),
+                   [](const Stretch& a, const Stretch& b) { return a.sum < b.sum; });
+  const double variance = at->sum / kChiSquare / 2;  // a difference of two samples has twice the variance
+  stretches.erase(at, stretches.end());
+  if (stretches.size() < kEnoughCalm) return std::sqrt(variance);
+  const double white = white_share(differences, stretches);
+  return std::sqrt(variance * (white < kClearlyNotWhite ? white : 1));
 }
 
 bool looks_saturated(const std::vector<double>& signal) {

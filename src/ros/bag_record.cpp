@@ -25,7 +25,9 @@ namespace {
 const std::string kInfoTopic = "/record_info";
 constexpr double kNanosecond = 1e-9;
 
-std::string type_of(const rosbag::ConnectionInfo& c) { return printable(c.datatype); }
+std::string type_of(const rosbag::ConnectionInfo& c) {
+  return printable(c.datatype);
+}
 
 template <typename Message>
 bool is_type(const rosbag::ConnectionInfo& c) {
@@ -35,21 +37,25 @@ bool is_type(const rosbag::ConnectionInfo& c) {
 
 std::string stamp_text(const ros::Time& stamp) {
   std::string nanoseconds = std::to_string(stamp.nsec);
-  return std::to_string(stamp.sec) + "." + std::string(9 - std::min<std::size_t>(9, nanoseconds.size()), '0') +
-         nanoseconds;
+  return std::to_string(stamp.sec) + "." +
+         std::string(9 - std::min<std::size_t>(9, nanoseconds.size()), '0') + nanoseconds;
 }
 
 /// "joint_states" stands for "/joint_states" and "/robot/joint_states".
 bool topic_matches(const std::string& topic, const std::string& wanted) {
-  const auto bare = [](const std::string& name) { return name.substr(std::min(name.find_first_not_of('/'), name.size())); };
+  const auto bare = [](const std::string& name) {
+    return name.substr(std::min(name.find_first_not_of('/'), name.size()));
+  };
   const std::string a = bare(topic), b = bare(wanted);
-  return a == b || (a.size() > b.size() && a.compare(a.size() - b.size() - 1, std::string::npos, "/" + b) == 0);
+  return a == b ||
+         (a.size() > b.size() && a.compare(a.size() - b.size() - 1, std::string::npos, "/" + b) == 0);
 }
 
 /// The prefix of a name that belongs to a geared joint.
 std::optional<std::string> joint_of(const std::string& name) {
   for (const std::string suffix : {"_motor", "_sensor", "_load"})
-    if (name.size() > suffix.size() && name.compare(name.size() - suffix.size(), std::string::npos, suffix) == 0)
+    if (name.size() > suffix.size() &&
+        name.compare(name.size() - suffix.size(), std::string::npos, suffix) == 0)
       return name.substr(0, name.size() - suffix.size());
   return std::nullopt;
 }
@@ -96,12 +102,14 @@ class Reader {
     } catch (const Error&) {
       throw;
     } catch (const std::exception& e) {
-      throw BadData(path_, std::string("damaged bag: ") + e.what() + "; 'rosbag reindex' may save a part of it");
+      throw BadData(path_,
+                    std::string("damaged bag: ") + e.what() + "; 'rosbag reindex' may save a part of it");
     }
     drop_absent_channels();
     const std::string repeated = stamps_.describe("topic " + topic_);
     if (!repeated.empty()) record_.warnings.push_back(repeated);
-    for (std::string& warning : describe_time_base(record_.time)) record_.warnings.push_back(std::move(warning));
+    for (std::string& warning : describe_time_base(record_.time))
+      record_.warnings.push_back(std::move(warning));
     return std::move(record_);
   }
 
@@ -139,11 +147,13 @@ class Reader {
       present.insert(printable(c->topic) + " (" + type_of(*c) + ")");
       if (!topic_matches(c->topic, wanted_topic_)) continue;
       if (!is_type<sensor_msgs::JointState>(*c))
-        fail("topic " + printable(c->topic) + " is of type " + type_of(*c) + ", expected sensor_msgs/JointState");
+        fail("topic " + printable(c->topic) + " is of type " + type_of(*c) +
+             ", expected sensor_msgs/JointState");
       topics.insert(c->topic);
     }
     if (topics.empty())
-      fail("no topic " + printable(wanted_topic_) + "; there are: " + (present.empty() ? "none" : joined(present)));
+      fail("no topic " + printable(wanted_topic_) +
+           "; there are: " + (present.empty() ? "none" : joined(present)));
     return {topics.begin(), topics.end()};
   }
 
@@ -161,14 +171,17 @@ class Reader {
     std::vector<std::string> joints;
     for (const auto& [joint, topics] : topics_of_joint) joints.push_back(printable(joint));
     if (joints.empty())
-      fail("no joint on " + joined(candidates) + ": expected names like 'joint_motor', 'joint_sensor' or 'joint_load'");
-    if (joint_.empty() && joints.size() > 1) fail("several joints, choose one with --joint: " + joined(joints));
+      fail("no joint on " + joined(candidates) +
+           ": expected names like 'joint_motor', 'joint_sensor' or 'joint_load'");
+    if (joint_.empty() && joints.size() > 1)
+      fail("several joints, choose one with --joint: " + joined(joints));
     if (joint_.empty()) joint_ = topics_of_joint.begin()->first;
     const auto found = topics_of_joint.find(joint_);
     if (found == topics_of_joint.end())
       fail("no joint '" + printable(joint_) + "'; there are (--joint): " + joined(joints));
     if (found->second.size() > 1)
-      fail("joint '" + printable(joint_) + "' is on several topics, choose one with --topic: " + joined(found->second));
+      fail("joint '" + printable(joint_) +
+           "' is on several topics, choose one with --topic: " + joined(found->second));
     topic_ = *found->second.begin();
   }
 
@@ -183,8 +196,9 @@ class Reader {
     const YamlReader yaml = YamlReader::from_text(message->data, path_ + ": " + kInfoTopic);
     yaml.text("name");
     const YamlReader stamp = yaml.map("time_origin");
-    origin_ = ros::Time(static_cast<std::uint32_t>(stamp.integer("secs", 0, std::numeric_limits<std::uint32_t>::max())),
-                        static_cast<std::uint32_t>(stamp.integer("nsecs", 0, 999'999'999)));
+    origin_ = ros::Time(
+        static_cast<std::uint32_t>(stamp.integer("secs", 0, std::numeric_limits<std::uint32_t>::max())),
+        static_cast<std::uint32_t>(stamp.integer("nsecs", 0, 999'999'999)));
     yaml.finish();
   }
 
@@ -195,7 +209,8 @@ class Reader {
       const std::string place = path_ + ": " + printable(topic_) + " message " + std::to_string(index);
       const ChannelValues values = read_joint_state(m, names, place);
       if (!accept_stamp(m.header.stamp, index)) return;
-      for (const Channel channel : kChannels) add(channel, values[static_cast<std::size_t>(channel)], m, index);
+      for (const Channel channel : kChannels)
+        add(channel, values[static_cast<std::size_t>(channel)], m, index);
     });
     if (record_.time.empty()) fail("no message of joint '" + printable(joint_) + "' on " + printable(topic_));
   }
@@ -207,8 +222,10 @@ class Reader {
       clock_.seconds(origin_.value_or(stamp));  // time 0
     }
     switch (stamps_.next(since_first(stamp))) {
-      case StampVerdict::accept: break;
-      case StampVerdict::repeated: return false;
+      case StampVerdict::accept:
+        break;
+      case StampVerdict::repeated:
+        return false;
       case StampVerdict::backwards:
         fail_at(index, "header.stamp = " + stamp_text(stamp) + " s is before " + stamp_text(last_stamp_) +
                            " s of the message before: a looped or merged recording, or a clock that jumped");
@@ -224,7 +241,8 @@ class Reader {
     return clock.seconds(stamp);
   }
 
-  /// The double that a CSV with nine decimals would give, so that times survive the way through a bag bit by bit.
+  /// The double that a CSV with nine decimals would give, so that times survive the way through a bag bit by
+  /// bit.
   static double nearest_nanosecond(double seconds) {
     constexpr double kExactIntegers = 9007199254740992.0;  // 2^53
     const double count = std::nearbyint(seconds / kNanosecond);
@@ -236,7 +254,8 @@ class Reader {
     std::vector<double>& column = record_.column(channel);
     if (!column.empty() && std::isnan(column.front()) != std::isnan(value))
       fail_at(index, channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
-                         stamp_text(m.header.stamp) + " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
+                         stamp_text(m.header.stamp) + " s is " +
+                         (std::isnan(value) ? "missing or NaN" : "there") +
                          ", unlike in the messages before");
     column.push_back(value);
   }

@@ -29,7 +29,8 @@ class TemporaryFile {
   explicit TemporaryFile(const std::string& path) : path_(path), target_(path) {
     struct stat existing {};
     if (::stat(path.c_str(), &existing) == 0) {
-      if (!S_ISREG(existing.st_mode)) fail(S_ISDIR(existing.st_mode) ? "is a directory" : "is not a regular file");
+      if (!S_ISREG(existing.st_mode))
+        fail(S_ISDIR(existing.st_mode) ? "is a directory" : "is not a regular file");
       std::error_code ignored;
       const auto real = std::filesystem::canonical(path, ignored);  // a symbolic link stays
       if (!ignored) target_ = real.string();
@@ -56,7 +57,9 @@ class TemporaryFile {
     kept_ = true;
   }
 
-  [[noreturn]] void fail(const std::string& reason) const { throw CannotWrite(path_ + ": cannot be written: " + reason); }
+  [[noreturn]] void fail(const std::string& reason) const {
+    throw CannotWrite(path_ + ": cannot be written: " + reason);
+  }
 
  private:
   const std::string path_;
@@ -88,7 +91,8 @@ std::vector<ros::Time> stamps_of(const Record& record, const ros::Time& origin) 
   stamps.reserve(record.size());
   for (std::size_t i = 0; i < record.size(); ++i) {
     const auto fail = [&](const char* reason) {
-      throw BadData(record.name, "time = " + to_text(record.time[i]) + " s in sample " + std::to_string(i) + ": " + reason);
+      throw BadData(record.name, "time = " + to_text(record.time[i]) + " s in sample " + std::to_string(i) +
+                                     ": " + reason);
     };
     if (!(std::abs(record.time[i]) < 4294967295.0)) fail("a ROS stamp cannot hold it");
     const double whole = std::floor(record.time[i]);
@@ -137,7 +141,8 @@ void write_messages(rosbag::Bag& bag, const Record& record, const std::vector<ro
 
 }  // namespace
 
-void write_bag(const Record& record, const std::string& path, const std::string& joint, const ros::Time& origin) {
+void write_bag(const Record& record, const std::string& path, const std::string& joint,
+               const ros::Time& origin) {
   if (joint.empty()) throw InvalidParameter("joint", "''", "must not be empty");
   check_writable(record);
   const std::vector<ros::Time> stamps = stamps_of(record, origin);
@@ -149,7 +154,8 @@ void write_bag(const Record& record, const std::string& path, const std::string&
     write_messages(*bag, record, stamps, JointNames(joint), origin);
     bag->close();
   } catch (const std::exception& e) {
-    // Its destructor would try to write the rest and end the program when that fails too; so it is not called.
+    // Its destructor would try to write the rest and end the program when that fails too; so it is not
+    // called.
     (void)bag.release();
     file.fail(std::string("rosbag: ") + e.what());
   }

@@ -21,10 +21,12 @@ namespace {
 
 const std::string kMagic = "#ROSBAG V";
 const std::string kVersionLine = "#ROSBAG V2.0\n";
-constexpr std::uint32_t kLargestPart = std::uint32_t{1} << 30;  // bytes of a header, of data, of an unpacked chunk
+constexpr std::uint32_t kLargestPart = std::uint32_t{1}
+                                       << 30;  // bytes of a header, of data, of an unpacked chunk
 enum Operation { kMessage = 2, kBagHeader = 3, kIndex = 4, kChunk = 5, kChunkInfo = 6, kConnection = 7 };
 
-std::uint32_t number_at(const char* bytes) {  // the format and all machines that ROS runs on are little-endian
+std::uint32_t number_at(
+    const char* bytes) {  // the format and all machines that ROS runs on are little-endian
   std::uint32_t value;
   std::memcpy(&value, bytes, sizeof value);
   return value;
@@ -69,7 +71,8 @@ class Checker {
     }
     if (!seen_header_) fail("there is no bag header");
     if (index_place_ == 0) fail("not indexed (the recording was cut off): try 'rosbag reindex'");
-    if (index_place_ != size_ && record_starts_.count(index_place_) == 0) damaged("its index is not where it says");
+    if (index_place_ != size_ && record_starts_.count(index_place_) == 0)
+      damaged("its index is not where it says");
     for (const std::uint64_t chunk : stated_chunks_)
       if (chunk_starts_.count(chunk) == 0) damaged("a chunk is not where the index says");
   }
@@ -83,7 +86,8 @@ class Checker {
   }
 
   std::string take(std::uint64_t count, const char* what) {
-    if (count > size_ - place_) damaged(std::string(what) + " ends after the end of the file, it was cut off");
+    if (count > size_ - place_)
+      damaged(std::string(what) + " ends after the end of the file, it was cut off");
     std::string bytes(count, '\0');
     if (!in_.read(bytes.data(), static_cast<std::streamsize>(count))) fail("cannot be read further");
     place_ += count;
@@ -100,19 +104,22 @@ class Checker {
     in_.seekg(0);
     if (size_ == 0) fail("not a bag: the file is empty");
     const std::string start = take(std::min<std::uint64_t>(size_, kVersionLine.size()), "version");
-    if (start.compare(0, kMagic.size(), kMagic) != 0) fail("not a bag: it starts with '" + printable(start) + "'");
+    if (start.compare(0, kMagic.size(), kMagic) != 0)
+      fail("not a bag: it starts with '" + printable(start) + "'");
     if (start != kVersionLine) fail("a bag of another format than 2.0 ('" + printable(start) + "')");
   }
 
   std::uint32_t field(const char* name) const {
     const auto found = fields_.find(name);
-    if (found == fields_.end() || found->second.size() < 4) damaged(std::string("no ") + name + " in a record");
+    if (found == fields_.end() || found->second.size() < 4)
+      damaged(std::string("no ") + name + " in a record");
     return number_at(found->second.data());
   }
 
   std::uint64_t long_field(const char* name) const {
     const auto found = fields_.find(name);
-    if (found == fields_.end() || found->second.size() != 8) damaged(std::string("no ") + name + " in a record");
+    if (found == fields_.end() || found->second.size() != 8)
+      damaged(std::string("no ") + name + " in a record");
     std::uint64_t value;
     std::memcpy(&value, found->second.data(), sizeof value);
     return value;
@@ -140,13 +147,18 @@ class Checker {
         chunk_starts_.insert(record_start_);
         chunk_ = read_chunk(data);
         break;
-      case kIndex: check_index(data); break;
+      case kIndex:
+        check_index(data);
+        break;
       case kChunkInfo:
         if (data.size() != std::uint64_t{8} * field("count")) damaged("a chunk summary has the wrong length");
         stated_chunks_.push_back(long_field("chunk_pos"));
         break;
-      case kConnection: check_connection(data); break;
-      default: damaged("a record of an unknown kind");
+      case kConnection:
+        check_connection(data);
+        break;
+      default:
+        damaged("a record of an unknown kind");
     }
   }
 
@@ -165,7 +177,8 @@ class Checker {
       return walk_chunk(packed);
     }
     if (compression != "lz4" && compression != "bz2") damaged("a chunk has an unknown compression");
-    return walk_chunk(unpacked(packed, size, compression == "lz4" ? rosbag::compression::LZ4 : rosbag::compression::BZ2));
+    return walk_chunk(
+        unpacked(packed, size, compression == "lz4" ? rosbag::compression::LZ4 : rosbag::compression::BZ2));
   }
 
   std::string unpacked(const std::string& packed, std::uint32_t size, rosbag::CompressionType type) {
@@ -232,6 +245,8 @@ class Checker {
 
 }  // namespace
 
-void check_bag_structure(const std::string& path) { Checker(path).check(); }
+void check_bag_structure(const std::string& path) {
+  Checker(path).check();
+}
 
 }  // namespace backlash

@@ -64,7 +64,7 @@ std::optional<PeriodReport> JointMonitor::take(const sensor_msgs::JointState& me
   if (!complete) return std::nullopt;
   reported_periods_ = periods;
   const double interval = stream_.kept().sampling_interval();
-  if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd && interval > 0) start_building(1 / interval);
+  if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd && interval > 0) start_building(nominal_sampling_rate(interval));
   auto result = report(period);
   changed_.notify_all();
   return result;

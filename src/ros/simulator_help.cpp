@@ -37,8 +37,8 @@ Services
   ~reset                std_srvs/Trigger; at rest in the middle of the gap, backlash as at start; stamps go on
 
 Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the
-simulation follows that clock, otherwise wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a wrong
-rig file, 66 for a missing one, 70 where the integration fails.
+simulation follows that clock, otherwise wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a
+wrong rig file, 66 for a missing one, 70 where the integration fails.
 )";
 }
 

@@ -1,10 +1,9 @@
 // Builds a monitoring curve and, where asked, its plot.
-#include "backlash_diagnosis/workflow/curve_builder.h"
-
 #include <iostream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/workflow/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/plot.h"
@@ -21,17 +20,22 @@ Command command() {
   const auto fallback = [](double value) { return "; default: " + to_text(value); };
   Command c;
   c.name = "build_curve";
-  c.summary = "Simulates a rig over a grid of backlash values and writes the monitoring curve: skewness of the amplitude "
-              "probability distribution against backlash, with its scatter and all conditions it holds for.";
+  c.summary =
+      "Simulates a rig over a grid of backlash values and writes the monitoring curve: skewness of the "
+      "amplitude "
+      "probability distribution against backlash, with its scatter and all conditions it holds for.";
   c.positional = {"RIG.yaml"};
   c.options = {
       {"out", "CURVE.yaml", "curve to write", true},
       {"points", "N", "backlash values, from 0 to the largest" + fallback(defaults.points)},
-      {"max-backlash", "M", "largest total free play along the line of action [m] (a rig without base radius: angle at "
-                            "the load [rad])" + fallback(defaults.max_backlash)},
+      {"max-backlash", "M",
+       "largest total free play along the line of action [m] (a rig without base radius: angle at "
+       "the load [rad])" +
+           fallback(defaults.max_backlash)},
       {"sample-rate", "HZ", "of the records that the curve is for; default: the rig file's"},
       {"periods", "N", "excitation periods per run, after settling" + fallback(defaults.periods)},
-      {"seeds", "N", "runs per backlash value, each with its own noise and sampling phase" + fallback(defaults.seeds)},
+      {"seeds", "N",
+       "runs per backlash value, each with its own noise and sampling phase" + fallback(defaults.seeds)},
       {"plot", "CURVE.png", "also draw the curve with its scatter"},
   };
   c.examples = {"build_curve config/sarkar_1997.yaml --out curve.yaml --plot curve.png"};
@@ -52,15 +56,16 @@ CurveRequest read_request(const Arguments& arguments) {
 void tell(const MonitoringCurve& curve, const std::string& out) {
   const char* unit = curve.conditions.angular ? " rad" : " m";
   const CurvePoint &first = curve.points.front(), &last = curve.points.back();
-  std::cout << out << ": skewness " << to_text(curve.nominal(first).mean) << " at backlash " << to_text(first.backlash)
-            << unit << " to " << to_text(curve.nominal(last).mean) << " at " << to_text(last.backlash) << unit << ", "
-            << curve.points.size() << " points, " << to_text(curve.conditions.sampling_rate) << " Hz\n";
+  std::cout << out << ": skewness " << to_text(curve.nominal(first).mean) << " at backlash "
+            << to_text(first.backlash) << unit << " to " << to_text(curve.nominal(last).mean) << " at "
+            << to_text(last.backlash) << unit << ", " << curve.points.size() << " points, "
+            << to_text(curve.conditions.sampling_rate) << " Hz\n";
   std::vector<std::string> rising;
   for (const CurvePoint& point : curve.points)
     if (!point.monotonic) rising.push_back(to_text(point.backlash));
   if (!rising.empty())
-    std::cerr << "build_curve: not monotonic, flagged in the curve, at backlash [" << (unit + 1) << "]: " << joined(rising)
-              << '\n';
+    std::cerr << "build_curve: not monotonic, flagged in the curve, at backlash [" << (unit + 1)
+              << "]: " << joined(rising) << '\n';
 }
 
 int build(const Arguments& arguments) {

@@ -12,17 +12,21 @@ namespace {
 Command command() {
   Command c;
   c.name = "convert_record";
-  c.summary = "Converts a record between CSV and bag (sensor_msgs/JointState on /joint_states); times and values survive "
-              "the way there and back.";
+  c.summary =
+      "Converts a record between CSV and bag (sensor_msgs/JointState on /joint_states); times and values "
+      "survive "
+      "the way there and back.";
   c.positional = {"IN.{csv,bag}", "OUT.{csv,bag}"};
   c.options = {
       {"rig", "RIG.yaml", "rig file whose joint the bag has"},
-      {"joint", "NAME", "joint in the bag, its names are NAME_motor, NAME_sensor and NAME_load; default: the rig's, "
-                        "else the only one (reading) or 'joint' (writing)"},
+      {"joint", "NAME",
+       "joint in the bag, its names are NAME_motor, NAME_sensor and NAME_load; default: the rig's, "
+       "else the only one (reading) or 'joint' (writing)"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
   };
-  c.notes = "Only header stamps count. Time 0 of a CSV becomes the stamp 1000000000 s, as ROS refuses 0; the topic "
-            "/record_info in the bag says so. A recorded bag without it begins at time 0.";
+  c.notes =
+      "Only header stamps count. Time 0 of a CSV becomes the stamp 1000000000 s, as ROS refuses 0; the topic "
+      "/record_info in the bag says so. A recorded bag without it begins at time 0.";
   c.examples = {"convert_record run.csv run.bag --joint elbow", "convert_record run.bag run.csv"};
   c.exit_codes = "  0   done\n";
   return c;
@@ -40,7 +44,8 @@ int convert(const Arguments& arguments) {
   if (arguments.has("rig")) inputs.push_back(arguments.text("rig"));
   const Record record = read_record(in, place);
   check_output(out, inputs);
-  for (const std::string& warning : record.warnings) std::cerr << "convert_record: " << in << ": " << warning << '\n';
+  for (const std::string& warning : record.warnings)
+    std::cerr << "convert_record: " << in << ": " << warning << '\n';
   write_record(record, out, place.joint.empty() ? kDefaultJoint : place.joint);
   std::cout << out << ": " << record.size() << " samples\n";
   return kHealthy;

@@ -25,16 +25,21 @@ Command command() {
   c.positional = {"RECORD.{csv,bag}"};
   c.options = {
       {"json", "OUT.json", "report to write; '-' writes it to standard output instead of the summary", true},
-      {"rig", "RIG.yaml", "rig file: what to look for and which limits hold; without it only what the curve allows"},
-      {"curve", "CURVE.yaml", "monitoring curve (see build_curve); without it one is built from the rig file at the "
-                              "record's sampling rate"},
+      {"rig", "RIG.yaml",
+       "rig file: what to look for and which limits hold; without it only what the curve allows"},
+      {"curve", "CURVE.yaml",
+       "monitoring curve (see build_curve); without it one is built from the rig file at the "
+       "record's sampling rate"},
       {"method", "NAME", "only this method: " + joined(diagnosis_methods())},
       {"joint", "NAME", "joint in a bag; default: the rig file's, else the only one"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
-      {"periods", "N", "use only the last N excitation periods (and those before them that settling discards)"},
+      {"periods", "N",
+       "use only the last N excitation periods (and those before them that settling discards)"},
   };
-  c.notes = "backlash is the total free play along the line of action [m], backlash_angle the same as an angle on the axis "
-            "of motor_position [rad]; intervals hold with 95 %.";
+  c.notes =
+      "backlash is the total free play along the line of action [m], backlash_angle the same as an angle on "
+      "the axis "
+      "of motor_position [rad]; intervals hold with 95 %.";
   c.examples = {"diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json",
                 "diagnose_record run.bag --joint elbow --curve curve.yaml --json -"};
   c.exit_codes =
@@ -47,11 +52,15 @@ Command command() {
 
 int exit_code(Grade grade) {
   switch (grade) {
-    case Grade::good: return kHealthy;
-    case Grade::watch: return kWatch;
+    case Grade::good:
+      return kHealthy;
+    case Grade::watch:
+      return kWatch;
     case Grade::service:
-    case Grade::stop: return kFault;
-    case Grade::cannot_tell: break;
+    case Grade::stop:
+      return kFault;
+    case Grade::cannot_tell:
+      break;
   }
   return kInconclusive;
 }
@@ -85,7 +94,8 @@ void keep_last_periods(Inputs& in, std::uint64_t count) {
   if (!(period > 0)) throw BadData(record.name, "--periods needs an excitation that repeats, none was found");
   const double interval = record.sampling_interval();
   const double wanted = (static_cast<double>(count) + (apd ? apd->settling_periods : 0)) * period;
-  const double end = record.time.back() + 0.5 * interval;  // each sample stands for half an interval to both sides
+  const double end =
+      record.time.back() + 0.5 * interval;  // each sample stands for half an interval to both sides
   if (record.time.front() - 0.5 * interval > end - wanted + 1e-6 * period) {
     record.warnings.push_back("the record is shorter than the " + std::to_string(count) +
                               " period(s) asked for: all of it is used");
@@ -100,8 +110,7 @@ void build_own_curve(Inputs& in) {
   if (!in.settings.apd || (!in.method.empty() && in.method != kApd)) return;
   if (!in.record.has(in.settings.apd->signal) || !(interval > 0)) return;
   CurveRequest request;
-  request.sampling_rate = std::round(1e3 / interval) / 1e3;  // without the last digits of the stamps
-  if (!(request.sampling_rate > 0)) request.sampling_rate = 1 / interval;
+  request.sampling_rate = nominal_sampling_rate(interval);
   std::cerr << "diagnose_record: no --curve given, building one from " << in.rig->source << " at "
             << to_text(request.sampling_rate) << " Hz (build_curve keeps one)" << std::endl;
   try {
@@ -173,7 +182,8 @@ int diagnose_record(const Arguments& arguments) {
   }
   report.diagnosis = diagnose(in.record, in.settings, report.curve, std::nullopt, in.method);
   explain(report.diagnosis, in);
-  const std::string json = to_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  const std::string json =
+      to_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   if (out == kStandardOutput) {
     std::cout << json;
   } else {

@@ -22,9 +22,11 @@ Command command() {
   c.positional = {"RIG.yaml"};
   c.options = {
       {"duration", "S", "length of the record [s]", true},
-      {"out", "RECORD.{csv,bag}", "record to write; a bag has the joint of the rig file on /joint_states", true},
-      {"backlash", "M", "total free play along the line of action [m] (a rig without base radius: angle at the load "
-                        "[rad]) instead of the rig file's"},
+      {"out", "RECORD.{csv,bag}", "record to write; a bag has the joint of the rig file on /joint_states",
+       true},
+      {"backlash", "M",
+       "total free play along the line of action [m] (a rig without base radius: angle at the load "
+       "[rad]) instead of the rig file's"},
       {"half-gap", "M", "half of that, instead of --backlash"},
       {"seed", "N", "of all sensor noise, instead of the rig file's; the same seed gives the same record"},
       {"sample-rate", "HZ", "instead of the rig file's"},
@@ -53,8 +55,8 @@ int simulate(const Arguments& arguments) {
   apply(arguments, file);
   const double samples = std::round(duration * file.simulation.sensors.sampling_rate);
   if (samples < 1 || samples > kMostSamples)
-    throw UsageError("--duration = " + to_text(duration) + " s at " + to_text(file.simulation.sensors.sampling_rate) +
-                     " Hz: must give from 1 to 1e9 samples");
+    throw UsageError("--duration = " + to_text(duration) + " s at " +
+                     to_text(file.simulation.sensors.sampling_rate) + " Hz: must give from 1 to 1e9 samples");
   check_output(out, {arguments.positional(0)});
   Record record;
   {
@@ -62,8 +64,9 @@ int simulate(const Arguments& arguments) {
     record = simulate_record(file.rig, file.simulation, duration, bar.progress());
   }
   write_record(record, out, file.rig.joint);
-  std::cout << out << ": " << record.size() << " samples at " << to_text(file.simulation.sensors.sampling_rate)
-            << " Hz of " << file.rig.name << " with backlash " << to_text(file.rig.mesh.backlash)
+  std::cout << out << ": " << record.size() << " samples at "
+            << to_text(file.simulation.sensors.sampling_rate) << " Hz of " << file.rig.name
+            << " with backlash " << to_text(file.rig.mesh.backlash)
             << (file.rig.mesh.angular() ? " rad" : " m") << '\n';
   return kHealthy;
 }

@@ -186,6 +186,12 @@ std::vector<Cell> make_cells(const Plan& plan, const Progress& progress) {
 
 }  // namespace
 
+double nominal_sampling_rate(double interval) {
+  if (!(interval > 0)) throw InvalidParameter("sampling interval", interval, "must be > 0 s");
+  const double scale = std::pow(10, 3 - std::floor(std::log10(1 / interval)));
+  return std::round(scale / interval) / scale;
+}
+
 MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, const Progress& progress) {
   const Plan plan = make_plan(file, request);
   MonitoringCurve curve;

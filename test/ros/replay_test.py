@@ -13,6 +13,7 @@ import rospy
 import rostest
 from diagnoser_support import Diagnoser, build_curve, rig_path, run_tool
 from simulator_support import TIMEOUT, Simulator, package_folder
+from std_srvs.srv import SetBool
 
 sys.path.append(os.path.join(package_folder(), "test", "support"))
 from skip import skip  # noqa: E402
@@ -79,6 +80,23 @@ class ReplayTest(unittest.TestCase):
         for answer in answers[1:]:
             self.assertEqual(numbers(answer), numbers(answers[0]))
         self.assert_like_offline(answers[0], offline(SMALL_BAG, self.folder, "--rig", rig_path(), "--curve", self.curve))
+
+    def test_pause_changes_nothing(self):
+        with Diagnoser({"curve": self.curve}).ready() as diagnoser:
+            player = subprocess.Popen(["rosbag", "play", "--clock", "--quiet", "--pause", SMALL_BAG, "__name:=player"],
+                                      stdin=subprocess.DEVNULL)
+            self.addCleanup(player.kill)
+            rospy.wait_for_service("/player/pause_playback", TIMEOUT)
+            pause = rospy.ServiceProxy("/player/pause_playback", SetBool)
+            pause(False)
+            diagnoser.diagnose(periods=1, timeout=TIMEOUT)  # in the middle of the run
+            pause(True)
+            early = diagnoser.diagnose(periods=SMALL_BAG_PERIODS, timeout=0.5)
+            pause(False)
+            self.assertEqual(player.wait(TIMEOUT), 0)
+            answer = diagnoser.diagnose(periods=SMALL_BAG_PERIODS, timeout=TIMEOUT)
+        self.assertFalse(early.success)
+        self.assertEqual(numbers(answer), numbers(self.replayed(SMALL_BAG, SMALL_BAG_PERIODS)))
 
     def test_second_pass_of_a_loop_gives_the_same_as_the_first(self):
         with Diagnoser({"curve": self.curve}).ready() as diagnoser:

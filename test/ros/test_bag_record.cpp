@@ -1,7 +1,6 @@
-#include "backlash_diagnosis/ros/bag_record.h"
-
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
+#include <rosbag/view.h>
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/String.h>
 
@@ -13,6 +12,7 @@
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/ros/bag_record.h"
 
 namespace backlash {
 namespace {
@@ -74,8 +74,8 @@ class Recording {
   explicit Recording(const std::string& path) { bag_.open(path, rosbag::bagmode::Write); }
   ~Recording() { bag_.close(); }
 
-  static sensor_msgs::JointState motor(double stamp, double position = 1, double velocity = 2, double effort = 3,
-                                       const std::string& joint = "joint") {
+  static sensor_msgs::JointState motor(double stamp, double position = 1, double velocity = 2,
+                                       double effort = 3, const std::string& joint = "joint") {
     sensor_msgs::JointState m;
     m.header.stamp.fromSec(stamp);
     m.name = {joint + "_motor"};
@@ -109,7 +109,8 @@ Record sample_record(std::vector<double> time = {0, 0.001, 0.0020000005, 0.003, 
   record.time = std::move(time);
   double value = 0.1;
   for (const Channel channel : kChannels)
-    for (std::size_t i = 0; i < record.size(); ++i) record.column(channel).push_back(value = -1.7 * value + 1.0 / 3);
+    for (std::size_t i = 0; i < record.size(); ++i)
+      record.column(channel).push_back(value = -1.7 * value + 1.0 / 3);
   record.column(Channel::motor_torque)[1] = -0.0;
   record.column(Channel::sensor_torque)[1] = std::numeric_limits<double>::denorm_min();
   record.column(Channel::load_position)[1] = std::numeric_limits<double>::max();
@@ -117,7 +118,8 @@ Record sample_record(std::vector<double> time = {0, 0.001, 0.0020000005, 0.003, 
 }
 
 void expect_same_columns(const Record& a, const Record& b) {
-  for (const Channel channel : kChannels) EXPECT_EQ(a.column(channel), b.column(channel)) << channel_name(channel);
+  for (const Channel channel : kChannels)
+    EXPECT_EQ(a.column(channel), b.column(channel)) << channel_name(channel);
 }
 
 TEST_F(BagRecord, AllChannelsAndTimesSurviveExactly) {
@@ -134,9 +136,9 @@ TEST_F(BagRecord, AllChannelsAndTimesSurviveExactly) {
 
 TEST_F(BagRecord, TimesThatDoNotStartAtZeroSurvive) {
   // The last: a decimal of more than 2^53 nanoseconds, whose double is coarser than a nanosecond.
-  for (const std::vector<double>& time : {std::vector<double>{1234.567891234, 1234.567892, 1235.1},
-                                          std::vector<double>{-2.5, -0.25, 3.125},
-                                          std::vector<double>{1700000000.25, 1700000000.251, 1700000001}}) {
+  for (const std::vector<double>& time :
+       {std::vector<double>{1234.567891234, 1234.567892, 1235.1}, std::vector<double>{-2.5, -0.25, 3.125},
+        std::vector<double>{1700000000.25, 1700000000.251, 1700000001}}) {
     const Record record = sample_record(time);
     write_bag(record, file("a.bag"), "joint");
     EXPECT_EQ(read_bag(file("a.bag")).time, time);
@@ -145,7 +147,8 @@ TEST_F(BagRecord, TimesThatDoNotStartAtZeroSurvive) {
 
 TEST_F(BagRecord, EveryMillisecondOfAnHourIsTheDoubleOfItsDecimal) {
   std::vector<double> time;
-  for (int i = 0; i < 3600; ++i) time.push_back(std::stod(std::to_string(i) + "." + std::to_string(100 + i % 900)));
+  for (int i = 0; i < 3600; ++i)
+    time.push_back(std::stod(std::to_string(i) + "." + std::to_string(100 + i % 900)));
   write_bag(sample_record(time), file("a.bag"), "joint");
   EXPECT_EQ(read_bag(file("a.bag")).time, time);
 }
@@ -165,7 +168,10 @@ TEST_F(BagRecord, StampsAreTheOriginPlusTime) {
 }
 
 TEST_F(BagRecord, RecordedBagBeginsAtZeroAndOnlyHeaderStampsCount) {
-  Recording(file("a.bag")).add(Recording::motor(50.25, 1)).add(Recording::motor(50.5, 2)).add(Recording::motor(51, 3));
+  Recording(file("a.bag"))
+      .add(Recording::motor(50.25, 1))
+      .add(Recording::motor(50.5, 2))
+      .add(Recording::motor(51, 3));
   const Record record = read_bag(file("a.bag"));
   EXPECT_EQ(record.time, (std::vector<double>{0, 0.25, 0.75}));
   EXPECT_EQ(record.column(Channel::motor_position), (std::vector<double>{1, 2, 3}));
@@ -182,19 +188,23 @@ TEST_F(BagRecord, ChannelThatIsNanThroughoutIsAbsent) {
 TEST_F(BagRecord, ChannelThatIsNanAtTimesIsRefused) {
   Recording(file("a.bag")).add(Recording::motor(1)).add(Recording::motor(2.5, 1, kNan));
   const std::string message = message_of<BadData>([&] { read_bag(file("a.bag")); });
-  for (const std::string part : {file("a.bag"), std::string("/joint_states message 1"), std::string("motor_velocity"),
-                                 std::string("2.500000000")})
+  expect_contains(message, file("a.bag"));
+  for (const char* part : {"/joint_states message 1", "motor_velocity", "2.500000000"})
     expect_contains(message, part);
 }
 
 TEST_F(BagRecord, StampThatGoesBackIsRefused) {
   Recording(file("a.bag")).add(Recording::motor(1)).add(Recording::motor(2)).add(Recording::motor(1.5));
   const std::string message = message_of<BadData>([&] { read_bag(file("a.bag")); });
-  for (const char* part : {"/joint_states message 2", "1.500000000", "2.000000000", "looped"}) expect_contains(message, part);
+  for (const char* part : {"/joint_states message 2", "1.500000000", "2.000000000", "looped"})
+    expect_contains(message, part);
 }
 
 TEST_F(BagRecord, RepeatedStampLosesTheLaterMessageWithAWarning) {
-  Recording(file("a.bag")).add(Recording::motor(1, 1)).add(Recording::motor(2, 2)).add(Recording::motor(2, 9));
+  Recording(file("a.bag"))
+      .add(Recording::motor(1, 1))
+      .add(Recording::motor(2, 2))
+      .add(Recording::motor(2, 9));
   const Record record = read_bag(file("a.bag"));
   EXPECT_EQ(record.column(Channel::motor_position), (std::vector<double>{1, 2}));
   ASSERT_FALSE(record.warnings.empty());
@@ -240,7 +250,9 @@ TEST_F(BagRecord, TopicIsFoundByItsLastPart) {
 }
 
 TEST_F(BagRecord, JointOnSeveralTopicsIsAskedFor) {
-  Recording(file("a.bag")).add(Recording::motor(1), "/a/joint_states").add(Recording::motor(2), "/b/joint_states");
+  Recording(file("a.bag"))
+      .add(Recording::motor(1), "/a/joint_states")
+      .add(Recording::motor(2), "/b/joint_states");
   expect_contains(message_of<BadData>([&] { read_bag(file("a.bag")); }), "--topic");
   EXPECT_EQ(read_bag(file("a.bag"), "", "/b/joint_states").size(), 1u);
 }
@@ -251,7 +263,10 @@ TEST_F(BagRecord, BagWithoutMessagesIsRefused) {
 }
 
 TEST_F(BagRecord, RecordInfoOfSomebodyElseIsIgnoredWhenItIsNoText) {
-  Recording(file("a.bag")).add(Recording::motor(7), "/record_info").add(Recording::motor(8)).add(Recording::motor(9));
+  Recording(file("a.bag"))
+      .add(Recording::motor(7), "/record_info")
+      .add(Recording::motor(8))
+      .add(Recording::motor(9));
   EXPECT_EQ(read_bag(file("a.bag")).time, (std::vector<double>{0, 1}));
   Recording(file("b.bag")).add_text("/record_info", "{name: x}").add(Recording::motor(8));
   expect_contains(message_of<BadData>([&] { read_bag(file("b.bag")); }), "time_origin");
@@ -260,8 +275,8 @@ TEST_F(BagRecord, RecordInfoOfSomebodyElseIsIgnoredWhenItIsNoText) {
 TEST_F(BagRecord, FilesThatAreNoBagAreRefused) {
   expect_contains(message_of<MissingInput>([&] { read_bag(file("none.bag")); }), "none.bag");
   expect_contains(message_of<MissingInput>([&] { read_bag(folder_.string()); }), "directory");
-  for (const std::string& bytes : {std::string(), std::string("time,motor_torque\n0,1\n"), std::string("#ROSBAG"),
-                                   std::string("#ROSBAG V1.2\n")}) {
+  for (const std::string& bytes : {std::string(), std::string("time,motor_torque\n0,1\n"),
+                                   std::string("#ROSBAG"), std::string("#ROSBAG V1.2\n")}) {
     const std::string path = write_bytes("a.bag", bytes);
     expect_contains(message_of<BadData>([&] { read_bag(path); }), path);
   }
@@ -280,7 +295,8 @@ TEST_F(BagRecord, UnindexedBagPointsToReindex) {
   write_bag(sample_record(), file("a.bag"), "joint");
   std::string bytes = bytes_of(file("a.bag"));
   const std::string key = "index_pos=";
-  const auto place = bytes.find(key) + key.size();  // what a recorder leaves that is killed: no index, no place of it
+  const auto place =
+      bytes.find(key) + key.size();  // what a recorder leaves that is killed: no index, no place of it
   std::uint64_t index = 0;
   std::memcpy(&index, bytes.data() + place, sizeof index);
   bytes.resize(index);
@@ -288,7 +304,8 @@ TEST_F(BagRecord, UnindexedBagPointsToReindex) {
   expect_contains(message_of<BadData>([&] { read_bag(write_bytes("cut.bag", bytes)); }), "rosbag reindex");
 }
 
-// An unpacked chunk has no checksum, so a flipped bit may become another value, but never a crash or an endless loop.
+// An unpacked chunk has no checksum, so a flipped bit may become another value, but never a crash or an
+// endless loop.
 TEST_F(BagRecord, FlippedBitsAreRefusedOrHarmless) {
   const Record record = sample_record({0, 0.001, 0.002});
   write_bag(record, file("packed.bag"), "joint");

@@ -27,11 +27,11 @@ class CommandTest : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  /// `line` is a command of the package with its arguments, as in a shell; `before` is put in front of it. No argument
-  /// may hold a quote.
+  /// `line` is a command of the package with its arguments, as in a shell; `before` is put in front of it. No
+  /// argument may hold a quote.
   Outcome run(const std::string& line, const std::string& before = "") const {
-    const std::string shell = "cd '" + path("") + "' && " + before + " '" BACKLASH_DIAGNOSIS_BIN_DIR "'/" + line +
-                              " >../out 2>../err </dev/null";
+    const std::string shell = "cd '" + path("") + "' && " + before + " '" BACKLASH_DIAGNOSIS_BIN_DIR "'/" +
+                              line + " >../out 2>../err </dev/null";
     const int status = std::system(shell.c_str());
     Outcome outcome;
     if (WIFEXITED(status)) outcome.code = WEXITSTATUS(status);

@@ -17,7 +17,9 @@ Command command() {
   return c;
 }
 
-Arguments parse(const std::vector<std::string>& words) { return parse_arguments(command(), words); }
+Arguments parse(const std::vector<std::string>& words) {
+  return parse_arguments(command(), words);
+}
 
 std::string complaint(const std::vector<std::string>& words) {
   try {
@@ -67,15 +69,17 @@ TEST(CommandLine, ComplaintsNameOptionValueAndLimit) {
   };
   for (const auto& [words, parts] : cases) {
     const std::string text = complaint(words);
-    for (const std::string& part : parts) EXPECT_NE(text.find(part), std::string::npos) << text << " lacks " << part;
+    for (const std::string& part : parts)
+      EXPECT_NE(text.find(part), std::string::npos) << text << " lacks " << part;
     EXPECT_FALSE(text.empty());
   }
 }
 
 TEST(CommandLine, HelpNamesEverythingWithinThePage) {
   const std::string help = help_text(command());
-  for (const char* part : {"Usage: saw WOOD --length M [--count N]", "Saws.", "length [m]", "default: 1", "--help",
-                           "--version", "saw oak --length 2", "0   done", "64", "65", "66", "70", "73"})
+  for (const char* part :
+       {"Usage: saw WOOD --length M [--count N]", "Saws.", "length [m]", "default: 1", "--help", "--version",
+        "saw oak --length 2", "0   done", "64", "65", "66", "70", "73"})
     EXPECT_NE(help.find(part), std::string::npos) << help << " lacks " << part;
 }
 

@@ -1,7 +1,6 @@
 // The commands as their users run them: exit codes, files, messages.
-#include <nlohmann/json.hpp>
-
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "support/data.h"
@@ -14,7 +13,8 @@ using Json = nlohmann::ordered_json;
 
 const std::string kRig = package_file("config/sarkar_1997.yaml");
 
-/// The rig with noise on its torque sensor, and with 50 instead of 10 Hz: five times as many periods per second.
+/// The rig with noise on its torque sensor, and with 50 instead of 10 Hz: five times as many periods per
+/// second.
 std::string rig_variant(bool noise, bool fast) {
   std::string text;
   {
@@ -22,7 +22,8 @@ std::string rig_variant(bool noise, bool fast) {
     text.assign(std::istreambuf_iterator<char>(in), {});
   }
   const auto replace = [&text](const std::string& pattern, const std::string& by) {
-    const std::string changed = std::regex_replace(text, std::regex(pattern), by, std::regex_constants::format_first_only);
+    const std::string changed =
+        std::regex_replace(text, std::regex(pattern), by, std::regex_constants::format_first_only);
     EXPECT_NE(changed, text) << pattern;
     text = changed;
   };
@@ -48,10 +49,11 @@ class Commands : public CommandTest {
 };
 
 TEST_F(Commands, HelpAndVersion) {
-  for (const std::string command : {"simulate", "build_curve", "diagnose_record", "convert_record"}) {
+  for (const std::string& command :
+       std::vector<std::string>{"simulate", "build_curve", "diagnose_record", "convert_record"}) {
     const std::string help = done(command + " --help").out;
-    for (const std::string& part : {"Usage: " + command, std::string("Options:"), std::string("rosrun"), std::string("Exit codes")})
-      expect_contains(help, part);
+    expect_contains(help, "Usage: " + command);
+    for (const char* part : {"Options:", "rosrun", "Exit codes"}) expect_contains(help, part);
     EXPECT_EQ(done(command + " --whatever --help").out, help);
     EXPECT_TRUE(std::regex_search(done(command + " --version").out, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+")));
   }
@@ -106,8 +108,9 @@ TEST_F(Commands, MissingInputEndsWith66) {
   for (const std::string& line : std::vector<std::string>{
            "simulate none.yaml --duration 1 --out x.csv", "build_curve none.yaml --out x.yaml",
            "diagnose_record none.csv --json x.json", "diagnose_record none.bag --json x.json",
-           "diagnose_record a.csv --rig none.yaml --json x.json", "diagnose_record a.csv --curve none.yaml --json x.json",
-           "convert_record none.csv x.bag", "convert_record none.bag x.csv", "convert_record a.csv x.bag --rig none.yaml"}) {
+           "diagnose_record a.csv --rig none.yaml --json x.json",
+           "diagnose_record a.csv --curve none.yaml --json x.json", "convert_record none.csv x.bag",
+           "convert_record none.bag x.csv", "convert_record a.csv x.bag --rig none.yaml"}) {
     const Outcome outcome = run(line);
     EXPECT_EQ(outcome.code, 66) << line;
     expect_contains(outcome.err, "none.");
@@ -128,9 +131,11 @@ TEST_F(Commands, BadDataEndsWith65AndNamesTheFile) {
   ASSERT_NE(chunk, std::string::npos);
   bytes[chunk + 40] ^= 0x10;
   write("flipped.bag", bytes);
-  for (const std::string name : {"bad.csv", "text.bag", "empty.bag", "truncated.bag", "flipped.bag"}) {
+  for (const std::string& name :
+       std::vector<std::string>{"bad.csv", "text.bag", "empty.bag", "truncated.bag", "flipped.bag"}) {
     const std::string out = name.find(".csv") == std::string::npos ? "x.csv" : "x.bag";
-    for (const std::string& line : {"convert_record " + name + " " + out, "diagnose_record " + name + " --json x.json"}) {
+    for (const std::string& line :
+         {"convert_record " + name + " " + out, "diagnose_record " + name + " --json x.json"}) {
       const Outcome outcome = run(line);
       EXPECT_EQ(outcome.code, 65) << line;
       expect_contains(outcome.err, name);
@@ -146,10 +151,13 @@ TEST_F(Commands, UnwritableOutputEndsWith73) {
   write("a.csv", "time,motor_torque\n0,1\n1,2\n");
   std::filesystem::create_directory(path("folder.csv"));
   for (const std::string& line : std::vector<std::string>{
-           "simulate rig.yaml --duration 0.1 --out none/x.csv", "simulate rig.yaml --duration 0.1 --out folder.csv",
-           "simulate rig.yaml --duration 0.1 --out none/x.bag", "build_curve rig.yaml --points 2 --out none/x.yaml",
-           "build_curve rig.yaml --points 2 --out x.yaml --plot none/x.png", "diagnose_record a.csv --json none/x.json",
-           "convert_record a.csv none/x.bag", "convert_record a.csv none/x.csv", "diagnose_record a.csv --json /dev/full"}) {
+           "simulate rig.yaml --duration 0.1 --out none/x.csv",
+           "simulate rig.yaml --duration 0.1 --out folder.csv",
+           "simulate rig.yaml --duration 0.1 --out none/x.bag",
+           "build_curve rig.yaml --points 2 --out none/x.yaml",
+           "build_curve rig.yaml --points 2 --out x.yaml --plot none/x.png",
+           "diagnose_record a.csv --json none/x.json", "convert_record a.csv none/x.bag",
+           "convert_record a.csv none/x.csv", "diagnose_record a.csv --json /dev/full"}) {
     const Outcome outcome = run(line);
     EXPECT_EQ(outcome.code, 73) << line << "\n" << outcome.err;
     expect_contains(outcome.err, "cannot be written");
@@ -160,8 +168,9 @@ TEST_F(Commands, UnwritableOutputEndsWith73) {
 // A limit on the size of files stands for a disk that is full halfway.
 TEST_F(Commands, DiskThatFillsUpLeavesNothing) {
   done("simulate rig.yaml --duration 2 --out a.csv");
-  for (const std::string& line : std::vector<std::string>{"convert_record a.csv x.bag", "convert_record a.csv x.csv",
-                                                          "simulate rig.yaml --duration 2 --out x.bag"})
+  for (const std::string& line :
+       std::vector<std::string>{"convert_record a.csv x.bag", "convert_record a.csv x.csv",
+                                "simulate rig.yaml --duration 2 --out x.bag"})
     EXPECT_EQ(run(line, "trap '' XFSZ; ulimit -f 20;").code, 73) << line;
   EXPECT_EQ(files(), 2u);
 }
@@ -176,7 +185,8 @@ TEST_F(Commands, SimulateIsDeterministicForASeed) {
   EXPECT_NE(read("a.csv"), read("c.csv"));
   done("simulate rig.yaml --duration 0.2 --backlash 6e-5 --seed 5 --out d.csv");
   done("simulate rig.yaml --duration 0.2 --half-gap 3e-5 --seed 6 --out e.csv");
-  EXPECT_EQ(read("d.csv"), read("e.csv"));  // no noise, so no seed; half a gap of 30 um is a backlash of 60 um
+  EXPECT_EQ(read("d.csv"),
+            read("e.csv"));  // no noise, so no seed; half a gap of 30 um is a backlash of 60 um
   EXPECT_NE(read("a.csv"), read("d.csv"));
 }
 
@@ -223,8 +233,8 @@ TEST_F(Commands, ReportHasTheDocumentedShape) {
   const Json json = report("a.csv --rig rig.yaml --curve c.yaml", 0);
   std::vector<std::string> keys;
   for (const auto& item : json.items()) keys.push_back(item.key());
-  EXPECT_EQ(keys, (std::vector<std::string>{"schema_version", "record", "estimates", "verdict", "apd", "warnings", "rig",
-                                            "curve", "version"}));
+  EXPECT_EQ(keys, (std::vector<std::string>{"schema_version", "record", "estimates", "verdict", "apd",
+                                            "warnings", "rig", "curve", "version"}));
   EXPECT_EQ(json["schema_version"], 1);
   EXPECT_EQ(json["estimates"][0]["method"], "apd_skewness");
   const Json& lost_motion = json["estimates"][1];
@@ -235,7 +245,8 @@ TEST_F(Commands, ReportHasTheDocumentedShape) {
   EXPECT_LE(lost_motion["interval"][0].get<double>(), 6e-5);
   EXPECT_GE(lost_motion["interval"][1].get<double>(), 6e-5);
   // Angle at the pinion = backlash / base radius (0.014917 m in the rig file), and the reduction ratio is 1.
-  EXPECT_NEAR(lost_motion["backlash_angle"].get<double>(), lost_motion["backlash"].get<double>() / 0.014917, 1e-9);
+  EXPECT_NEAR(lost_motion["backlash_angle"].get<double>(), lost_motion["backlash"].get<double>() / 0.014917,
+              1e-9);
   EXPECT_TRUE(lost_motion["skewness"].is_null());
   EXPECT_TRUE(lost_motion["components"].contains("at_torque"));
   EXPECT_EQ(json["verdict"]["estimate"], 1);
@@ -251,7 +262,8 @@ TEST_F(Commands, ReportHasTheDocumentedShape) {
 
 TEST_F(Commands, ExitCodeFollowsTheGrade) {
   // Limits of the rig file: watch from 100 um, service from 150 um, stop from 200 um.
-  const std::vector<std::pair<std::string, int>> cases = {{"60e-6", 0}, {"120e-6", 1}, {"170e-6", 2}, {"230e-6", 2}};
+  const std::vector<std::pair<std::string, int>> cases = {
+      {"60e-6", 0}, {"120e-6", 1}, {"170e-6", 2}, {"230e-6", 2}};
   for (const auto& [backlash, code] : cases) {
     done("simulate rig.yaml --duration 1 --backlash " + backlash + " --out a.csv");
     const Outcome outcome = run("diagnose_record a.csv --rig rig.yaml --method lost_motion --json a.json");
@@ -278,7 +290,8 @@ TEST_F(Commands, WithoutARigOnlyWhatTheCurveAllows) {
   EXPECT_TRUE(json["apd"].is_null());
   EXPECT_TRUE(json["curve"].is_null());
   const Outcome with_curve = run("diagnose_record a.csv --curve c.yaml --method apd_skewness --json -");
-  const Outcome with_both = run("diagnose_record a.csv --rig rig.yaml --curve c.yaml --method apd_skewness --json -");
+  const Outcome with_both =
+      run("diagnose_record a.csv --rig rig.yaml --curve c.yaml --method apd_skewness --json -");
   EXPECT_EQ(Json::parse(with_curve.out)["estimates"], Json::parse(with_both.out)["estimates"]);
   EXPECT_FALSE(Json::parse(with_curve.out)["estimates"][0]["skewness"].is_null());
 }
@@ -308,7 +321,8 @@ TEST_F(Commands, PeriodsKeepsTheLastOnes) {
   done("simulate rig.yaml --duration 2 --backlash 6e-5 --out a.csv");
   done("build_curve rig.yaml --points 2 --seeds 1 --periods 1 --out c.yaml");
   const std::string rest = "a.csv --rig rig.yaml --curve c.yaml ";
-  const Json all = report(rest, 0), last = report(rest + "--periods 4", 0), more = report(rest + "--periods 40", 0);
+  const Json all = report(rest, 0), last = report(rest + "--periods 4", 0),
+             more = report(rest + "--periods 40", 0);
   EXPECT_EQ(all["apd"]["periods"], 18);
   EXPECT_EQ(last["apd"]["periods"], 4);
   const auto& periods = all["apd"]["skewness_of_periods"];
@@ -330,16 +344,19 @@ TEST_F(Commands, CurveIsDrawnWhole) {
   EXPECT_EQ(files(), 3u);
   std::filesystem::remove(path("c.yaml"));
   std::filesystem::remove(path("c.png"));
-  const Outcome outcome = run(start, "trap '' XFSZ; ulimit -f 16;");  // room for the curve, not for the picture
+  const Outcome outcome =
+      run(start, "trap '' XFSZ; ulimit -f 16;");  // room for the curve, not for the picture
   EXPECT_EQ(outcome.code, 73) << outcome.err;
   EXPECT_TRUE(exists("c.yaml"));
   EXPECT_EQ(files(), 2u);
 }
 
-// Records of a separate program with known half gap (data/README.md): a check against somebody else's simulation.
+// Records of a separate program with known half gap (data/README.md): a check against somebody else's
+// simulation.
 TEST_F(Commands, KnownGapsLieInTheIntervals) {
   if (!find_data("rig/rig_halfgap_0um.csv")) GTEST_SKIP() << "no measured records (BACKLASH_DIAGNOSIS_DATA)";
-  const std::vector<std::pair<int, int>> cases = {{0, 0}, {30, 0}, {55, 1}, {80, 2}};  // half gap in um, exit code
+  const std::vector<std::pair<int, int>> cases = {
+      {0, 0}, {30, 0}, {55, 1}, {80, 2}};  // half gap in um, exit code
   done("build_curve rig.yaml --points 21 --seeds 4 --periods 4 --out c.yaml");
   for (const auto& [half_gap, code] : cases) {
     const std::string record = *find_data("rig/rig_halfgap_" + std::to_string(half_gap) + "um.csv");

@@ -5,8 +5,9 @@
 //   skewness = 1/M sum ((y_k - mean) / s)^3          s with divisor M = classes (population standard deviation)
 //   kurtosis = 1/M sum ((y_k - mean) / s)^4
 //
-// The moments are those of the class values y_k, not of the signal. They depend on the number of classes and on the
-// range, which are therefore part of every curve's conditions. Sarkar, Ellis and Moore (1997), Eq. 14 and Section 9.
+// The moments are those of the class values y_k, not of the signal. They depend on the number of classes and
+// on the range, which are therefore part of every curve's conditions. Sarkar, Ellis and Moore (1997), Eq. 14
+// and Section 9.
 #pragma once
 
 #include <cstddef>

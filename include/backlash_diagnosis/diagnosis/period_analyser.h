@@ -1,13 +1,34 @@
 // Cuts a signal into whole excitation periods by its stamps and computes the APD of each, sample by sample.
 //
 // Window k holds the samples with origin + k T <= t < origin + (k+1) T, where the origin lies half a sample before the
-// first one, so that stamps that jitter by less than half a sample never change windows. Only stamps count, never the
-// time of arrival: live, replayed and offline give the same numbers.
+// first one, so that stamps that jitter by less than a quarter of a sample never change windows (T a whole number of
+// samples). Only stamps count, never the time of arrival: live, replayed and offline give the same numbers.
 #pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 
 namespace backlash {
+
+/// Samples from which the sampling interval of a run is known: the median of the first eight distances, which a lost
+/// sample or jitter at the start cannot spoil.
+constexpr std::size_t kLeadingSamples = 9;
+
+/// The borders of a run's windows. All that cut a run ask here, so that they agree to the last bit.
+struct WindowGrid {
+  double origin = 0, period = 0, interval = 0;  // s
+
+  double start(long k) const { return origin + static_cast<double>(k) * period; }
+  long index(double time) const;  // window that holds a stamp, with start(k) <= time < start(k + 1)
+  /// Windows 0 .. completed - 1 end before the sample that follows a stamp is due.
+  long completed(double last) const { return std::max(0L, index(last + interval)); }
+};
+
+/// Grid of a run from its first stamps (increasing); nothing with fewer than kLeadingSamples of them.
+std::optional<WindowGrid> window_grid(const std::vector<double>& time, double period);
 
 /// One whole period.
 struct PeriodResult {
@@ -22,12 +43,15 @@ struct PeriodResult {
 
 class PeriodAnalyser {
  public:
-  /// Period [s] > 0. Throws InvalidParameter.
+  /// Period [s] > 0; it should span many more than kLeadingSamples samples. Throws InvalidParameter.
   PeriodAnalyser(double period, const ApdLayout& layout);
 
   /// Adds a sample; stamps must increase (the caller sees to that). Returns a window when this sample completes it, else
-  /// null; valid until the next call.
+  /// null; valid until the next call. Windows that end within the first kLeadingSamples samples are not returned.
   const PeriodResult* add(double time, double value);
+
+  /// No more samples will come: returns the open window if all but a fraction of a sample of it was seen, else null.
+  const PeriodResult* finish();
 
   /// Forgets all samples; the next one starts window 0.
   void reset();
@@ -35,15 +59,17 @@ class PeriodAnalyser {
   double period() const { return period_; }
 
  private:
+  const PeriodResult* take(double time, double value);
   void open(long index, double time);
-  const PeriodResult* close(double last_time);
-  double end_of(long index) const { return origin_ + (index + 1) * period_; }
+  const PeriodResult* close();
 
   double period_;
+  std::vector<std::pair<double, double>> leading_;  // time and value, until the grid is known
+  WindowGrid grid_;
   PeriodResult current_, finished_;
-  long seen_ = 0, last_index_ = -1;
-  bool open_ = false;
-  double first_time_ = 0, first_value_ = 0, origin_ = 0, interval_ = 0, last_time_ = 0;
+  long last_index_ = -1;
+  bool known_ = false, open_ = false;
+  double last_time_ = 0;
 };
 
 }  // namespace backlash

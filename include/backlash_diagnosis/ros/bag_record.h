@@ -1,7 +1,7 @@
 // Records in bags: sensor_msgs/JointState messages, no roscore needed.
 //
-// Only header stamps count, never the time at which a message was received. A bag written here says by a latched
-// std_msgs/String message on the topic `record_info` which stamp is time 0 of its record, as YAML:
+// Only header stamps count, never the time at which a message was received. A bag written here says by a
+// latched std_msgs/String message on the topic `record_info` which stamp is time 0 of its record, as YAML:
 //   {name: "run.csv", time_origin: {secs: 1000000000, nsecs: 0}}
 // so that CSV -> bag -> CSV gives the same times. Without it (any recorded bag) time 0 is the first stamp.
 #pragma once
@@ -21,19 +21,21 @@ extern const ros::Time kBagTimeOrigin;  ///< 1e9 s: stamp of time 0 in written b
 /// `joint`: prefix of its names (see joint_state.h); empty: the only one that the bag has.
 /// `topic`: a topic that is this one, or whose last part is it ("/robot/joint_states"), is read.
 ///
-/// Messages are taken in the order of the bag. A repeated stamp loses the later message; that, gaps and jitter are
-/// told in Record::warnings. A channel that is NaN in all messages is absent. Record::name is the path as given.
+/// Messages are taken in the order of the bag. A repeated stamp loses the later message; that, gaps and
+/// jitter are told in Record::warnings. A channel that is NaN in all messages is absent. Record::name is the
+/// path as given.
 ///
-/// Throws MissingInput when the file cannot be opened. Throws BadData, naming the path and where it applies topic,
-/// message (from 0) and stamp, when it is no bag, is damaged or not indexed; has no such topic or joint or more than
-/// one; when stamps are 0 or go back (looped or merged recordings), a channel is NaN in some messages only, an array
-/// has the wrong size or a value is infinite.
-Record read_bag(const std::string& path, const std::string& joint = "", const std::string& topic = "joint_states");
+/// Throws MissingInput when the file cannot be opened. Throws BadData, naming the path and where it applies
+/// topic, message (from 0) and stamp, when it is no bag, is damaged or not indexed; has no such topic or
+/// joint or more than one; when stamps are 0 or go back (looped or merged recordings), a channel is NaN in
+/// some messages only, an array has the wrong size or a value is infinite.
+Record read_bag(const std::string& path, const std::string& joint = "",
+                const std::string& topic = "joint_states");
 
-/// Writes a record as messages of `joint` on /joint_states, stamped `origin` + time (rounded to 1 ns), whole or not at
-/// all. Throws CannotWrite when the file cannot be written, BadData when read_bag would not read it back: no
-/// samples or channels, columns of unequal length, values that are not finite, times that do not increase by a
-/// nanosecond or whose stamp ROS cannot hold.
+/// Writes a record as messages of `joint` on /joint_states, stamped `origin` + time (rounded to 1 ns), whole
+/// or not at all. Throws CannotWrite when the file cannot be written, BadData when read_bag would not read it
+/// back: no samples or channels, columns of unequal length, values that are not finite, times that do not
+/// increase by a nanosecond or whose stamp ROS cannot hold.
 void write_bag(const Record& record, const std::string& path, const std::string& joint,
                const ros::Time& origin = kBagTimeOrigin);
 

@@ -20,6 +20,10 @@ struct CurveRequest {
   int seeds = 8;
 };
 
+/// Sampling rate [Hz] of a recorder whose samples are `interval` [s] apart, to four significant digits: the rate it was
+/// set to, without the jitter of its stamps. Curves for records are built at this rate.
+double nominal_sampling_rate(double interval);
+
 /// Throws InvalidParameter (also where the rig declares no APD or an excitation without period), IntegrationError,
 /// Cancelled. Uses all processors; the result does not depend on their number.
 MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, const Progress& progress = nullptr);

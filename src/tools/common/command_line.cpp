@@ -25,7 +25,8 @@ const std::string kCommonExitCodes =
     "  70  internal error\n"
     "  73  cannot write\n";
 
-[[noreturn]] void fail_option(const std::string& option, const std::string& value, const std::string& reason) {
+[[noreturn]] void fail_option(const std::string& option, const std::string& value,
+                              const std::string& reason) {
   throw UsageError("--" + option + " = '" + printable(value) + "': " + reason);
 }
 
@@ -55,7 +56,8 @@ void append_wrapped(std::string& text, const std::string& words, std::size_t ind
 void append_option(std::string& text, const std::string& head, const std::string& help) {
   constexpr std::size_t kIndent = 26;
   text += "  " + head;
-  text += head.size() + 3 > kIndent ? "\n" + std::string(kIndent, ' ') : std::string(kIndent - head.size() - 2, ' ');
+  text += head.size() + 3 > kIndent ? "\n" + std::string(kIndent, ' ')
+                                    : std::string(kIndent - head.size() - 2, ' ');
   append_wrapped(text, help, kIndent);
 }
 
@@ -114,8 +116,10 @@ std::uint64_t Arguments::integer(const std::string& option, std::uint64_t absent
   const std::string value = text(option);
   std::uint64_t number = 0;
   const auto result = std::from_chars(value.data(), value.data() + value.size(), number);
-  if (result.ec != std::errc() || result.ptr != value.data() + value.size() || number < lower || number > upper)
-    fail_option(option, value, "must be a whole number from " + std::to_string(lower) + " to " + std::to_string(upper));
+  if (result.ec != std::errc() || result.ptr != value.data() + value.size() || number < lower ||
+      number > upper)
+    fail_option(option, value,
+                "must be a whole number from " + std::to_string(lower) + " to " + std::to_string(upper));
   return number;
 }
 

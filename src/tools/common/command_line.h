@@ -25,12 +25,12 @@ struct Option {
 
 struct Command {
   std::string name;
-  std::string summary;                   ///< one sentence
-  std::vector<std::string> positional;   ///< "RIG.yaml", all required
+  std::string summary;                  ///< one sentence
+  std::vector<std::string> positional;  ///< "RIG.yaml", all required
   std::vector<Option> options;
-  std::string notes;                     ///< paragraphs after the options
-  std::vector<std::string> examples;     ///< without "rosrun backlash_diagnosis"
-  std::string exit_codes;                ///< lines "  0  done"; those of all commands are added
+  std::string notes;                  ///< paragraphs after the options
+  std::vector<std::string> examples;  ///< without "rosrun backlash_diagnosis"
+  std::string exit_codes;             ///< lines "  0  done"; those of all commands are added
 };
 
 /// What the user wrote. The readers throw UsageError naming option, value and limit.
@@ -43,7 +43,8 @@ class Arguments {
   bool has(const std::string& option) const { return options_.count(option) > 0; }
   std::string text(const std::string& option) const;  ///< empty where absent, never where given
   double number(const std::string& option, double absent, const Range& range) const;
-  std::uint64_t integer(const std::string& option, std::uint64_t absent, std::uint64_t lower, std::uint64_t upper) const;
+  std::uint64_t integer(const std::string& option, std::uint64_t absent, std::uint64_t lower,
+                        std::uint64_t upper) const;
 
  private:
   std::vector<std::string> positional_;
@@ -55,7 +56,8 @@ Arguments parse_arguments(const Command& command, const std::vector<std::string>
 
 std::string help_text(const Command& command);
 
-/// A main(): parses, answers --help and --version, calls `body` and turns exceptions into messages and exit codes.
+/// A main(): parses, answers --help and --version, calls `body` and turns exceptions into messages and exit
+/// codes.
 int run_command(const Command& command, int argc, char** argv, int (*body)(const Arguments&));
 
 }  // namespace backlash::tools

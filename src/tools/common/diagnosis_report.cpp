@@ -15,7 +15,9 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
 
 /// Null where neither end is known; one null end is an open one.
 Json interval(double lower, double upper) {
@@ -114,13 +116,14 @@ void print_estimate(const Estimate& e, std::ostream& out) {
   if (std::isfinite(e.backlash) || std::isfinite(e.lower))
     out << "  backlash        " << with_interval(e.backlash, e.lower, e.upper, 1) << " m\n";
   if (std::isfinite(e.backlash_angle) || std::isfinite(e.angle_lower))
-    out << "  backlash angle  " << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, 1) << " rad = "
-        << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, kDegree) << " deg\n";
+    out << "  backlash angle  " << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, 1)
+        << " rad = " << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, kDegree) << " deg\n";
   if (std::isfinite(e.skewness)) out << "  skewness        " << text_of(e.skewness) << '\n';
   if (e.components)
     out << "  gap " << text_of(e.components->gap) << " rad = " << text_of(e.components->gap / kDegree)
         << " deg, compliance " << text_of(e.components->compliance) << " rad/(N m), Coulomb friction "
-        << text_of(e.components->coulomb) << " N m, at torque " << text_of(e.components->at_torque) << " N m\n";
+        << text_of(e.components->coulomb) << " N m, at torque " << text_of(e.components->at_torque)
+        << " N m\n";
   if (!e.message.empty()) out << "  " << e.message << '\n';
 }
 
@@ -145,7 +148,8 @@ Json to_json(const DiagnosisReport& report) {
 void print_summary(const DiagnosisReport& report, std::ostream& out) {
   const Record& record = *report.record;
   const double interval = record.sampling_interval();
-  out << record.name << ": " << record.size() << " samples, " << text_of(record.time.back() - record.time.front()) << " s";
+  out << record.name << ": " << record.size() << " samples, "
+      << text_of(record.time.back() - record.time.front()) << " s";
   if (interval > 0) out << ", " << text_of(1 / interval) << " Hz";
   out << '\n';
   for (const std::string& warning : report.warnings) out << "warning: " << warning << '\n';

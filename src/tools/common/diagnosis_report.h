@@ -13,11 +13,11 @@ namespace backlash::tools {
 /// A diagnosis and what it rests on.
 struct DiagnosisReport {
   const Record* record = nullptr;
-  std::vector<std::string> warnings;           ///< of the record and of the curve
+  std::vector<std::string> warnings;  ///< of the record and of the curve
   std::optional<ApdSettings> apd_settings;
-  std::string rig;                             ///< name; empty: none
-  const MonitoringCurve* curve = nullptr;      ///< may be null
-  std::string curve_source;                    ///< path, or "built for this record"
+  std::string rig;                         ///< name; empty: none
+  const MonitoringCurve* curve = nullptr;  ///< may be null
+  std::string curve_source;                ///< path, or "built for this record"
   Diagnosis diagnosis;
 };
 

@@ -47,9 +47,11 @@ void plot_curve(const std::string& curve_path, const std::string& picture_path) 
   const fs::path script = fs::read_symlink("/proc/self/exe", error).parent_path() / "plot_curve.py";
   if (error || !fs::exists(script)) throw Error("cannot plot: " + script.string() + " is missing");
   const int code = run({kPython, script.string(), "--out", picture_path, "--", curve_path});
-  if (code == kCannotWrite) throw CannotWrite(picture_path + ": cannot be written; the curve itself is in " + curve_path);
+  if (code == kCannotWrite)
+    throw CannotWrite(picture_path + ": cannot be written; the curve itself is in " + curve_path);
   if (code != kHealthy)
-    throw Error("plot_curve.py failed (exit code " + std::to_string(code) + "); the curve itself is in " + curve_path);
+    throw Error("plot_curve.py failed (exit code " + std::to_string(code) + "); the curve itself is in " +
+                curve_path);
 }
 
 }  // namespace backlash::tools

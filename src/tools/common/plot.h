@@ -8,8 +8,8 @@ namespace backlash::tools {
 /// Throws UsageError for a picture that does not end in .png, .svg or .pdf.
 void check_plot_path(const std::string& path);
 
-/// Draws a curve file. Throws CannotWrite where the picture cannot be written, Error where the script or Python is
-/// missing or fails.
+/// Draws a curve file. Throws CannotWrite where the picture cannot be written, Error where the script or
+/// Python is missing or fails.
 void plot_curve(const std::string& curve_path, const std::string& picture_path);
 
 }  // namespace backlash::tools

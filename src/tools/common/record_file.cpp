@@ -72,14 +72,17 @@ void check_output(const std::string& path, const std::vector<std::string>& input
   std::error_code error;
   for (const std::string& input : inputs)
     if (fs::equivalent(path, input, error))
-      throw UsageError("'" + printable(path, 4096) + "' would overwrite the input '" + printable(input, 4096) + "'");
+      throw UsageError("'" + printable(path, 4096) + "' would overwrite the input '" +
+                       printable(input, 4096) + "'");
   const auto fail = [&path](const std::string& reason) {
     throw CannotWrite(printable(path, 4096) + ": cannot be written: " + reason);
   };
   if (fs::is_directory(path, error)) fail("is a directory");
   const fs::path folder = fs::path(path).parent_path();
-  if (!folder.empty() && !fs::is_directory(folder, error)) fail("there is no folder " + printable(folder.string(), 4096));
-  if (!fs::exists(path, error) && ::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0) fail(std::strerror(errno));
+  if (!folder.empty() && !fs::is_directory(folder, error))
+    fail("there is no folder " + printable(folder.string(), 4096));
+  if (!fs::exists(path, error) && ::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+    fail(std::strerror(errno));
 }
 
 }  // namespace backlash::tools

@@ -28,8 +28,8 @@ void write_record(const Record& record, const std::string& path, const std::stri
 /// The same for any text file.
 void write_text(const std::string& path, const std::string& text);
 
-/// Throws UsageError where the output would overwrite one of the inputs, CannotWrite where its folder does not exist or
-/// it is a folder itself.
+/// Throws UsageError where the output would overwrite one of the inputs, CannotWrite where its folder does
+/// not exist or it is a folder itself.
 void check_output(const std::string& path, const std::vector<std::string>& inputs);
 
 }  // namespace backlash::tools
