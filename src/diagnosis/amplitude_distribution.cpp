@@ -1,5 +1,6 @@
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -17,9 +18,11 @@ ApdLayout read_apd_layout(const YamlReader& yaml) {
 }
 
 AmplitudeDistribution::AmplitudeDistribution(const ApdLayout& layout)
-    : layout_(layout), per_width_(layout.classes / (layout.upper - layout.lower)) {
+    : layout_(layout), width_((layout.upper - layout.lower) / layout.classes) {
   if (layout.classes < 2) throw InvalidParameter("apd.classes", layout.classes, "must be >= 2");
   if (!(layout.lower < layout.upper)) throw InvalidParameter("apd.upper", layout.upper, "must be greater than lower");
+  if (!std::isfinite(layout.lower)) throw InvalidParameter("apd.lower", layout.lower, "must be finite");
+  if (!std::isfinite(width_)) throw InvalidParameter("apd.upper", layout.upper, "must be finite");
   counts_.assign(layout.classes, 0);
 }
 
@@ -33,8 +36,10 @@ void AmplitudeDistribution::add(double value) {
     ++above_;
     return;
   }
-  const auto k = static_cast<std::size_t>((value - layout_.lower) * per_width_);
-  ++counts_[k < counts_.size() ? k : counts_.size() - 1];  // rounding just under the upper end
+  auto k = std::min(static_cast<std::size_t>((value - layout_.lower) / width_), counts_.size() - 1);
+  if (k > 0 && value < border(k)) --k;  // the quotient may be rounded over a border
+  if (k + 1 < counts_.size() && value >= border(k + 1)) ++k;
+  ++counts_[k];
 }
 
 void AmplitudeDistribution::merge(const AmplitudeDistribution& other) {
@@ -50,7 +55,7 @@ void AmplitudeDistribution::clear() {
   samples_ = below_ = above_ = 0;
 }
 
-double AmplitudeDistribution::centre(int k) const { return layout_.lower + (k + 0.5) / per_width_; }
+double AmplitudeDistribution::centre(int k) const { return layout_.lower + (k + 0.5) * width_; }
 
 std::vector<double> AmplitudeDistribution::percentages() const {
   std::vector<double> y(counts_.size(), 0);

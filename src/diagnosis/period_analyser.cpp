@@ -21,6 +21,7 @@ std::optional<WindowGrid> window_grid(const std::vector<double>& time, double pe
   grid.period = period;
   grid.interval = median_interval({time.begin(), time.begin() + kLeadingSamples});
   grid.origin = time.front() - 0.5 * grid.interval;
+  if (!(period >= grid.interval)) return std::nullopt;
   return grid;
 }
 
@@ -41,7 +42,12 @@ const PeriodResult* PeriodAnalyser::add(double time, double value) {
   if (leading_.size() < kLeadingSamples) return nullptr;
   std::vector<double> stamps;
   for (const auto& sample : leading_) stamps.push_back(sample.first);
-  grid_ = *window_grid(stamps, period_);
+  const auto grid = window_grid(stamps, period_);
+  if (!grid) {  // a period shorter than the sampling interval has no windows
+    leading_.pop_back();
+    return nullptr;
+  }
+  grid_ = *grid;
   known_ = true;
   const PeriodResult* finished = nullptr;
   for (const auto& sample : leading_) finished = take(sample.first, sample.second);

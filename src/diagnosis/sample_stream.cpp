@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kFirstSearch = 0.25;  // s of samples before the first search for a period, then twice as long each time
+constexpr double kFirstSearch = kFirstPeriodSearch;
+constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says
 
 double get(const ChannelValues& values, Channel channel) { return values[static_cast<std::size_t>(channel)]; }
 
@@ -26,113 +28,133 @@ void SampleStream::restart() {
   record_ = Record();
   channels_.clear();
   analyser_.reset();
+  grid_.reset();
+  dropped_.reset();
   period_ = settings_.apd ? settings_.apd->period : 0;
-  interval_ = origin_ = 0;
   next_search_ = kFirstSearch;
 }
 
 double SampleStream::jump_limit() const { return std::max(1.0, 3 * period_); }
 
-/// The first sample of a run tells which channels there are; every later one must have them.
-bool SampleStream::acceptable(const ChannelValues& values) {
+/// A run has the channels of its first sample: every later one must have them, and one that has more begins a new run.
+SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
   const Channel needed = settings_.apd ? settings_.apd->signal : Channel::motor_torque;
-  if (channels_.empty()) {
-    if (std::isnan(get(values, needed))) {
-      counters_.last_problem = channel_name(needed) + " is absent or not a number";
-      return false;
-    }
-    for (Channel channel : kChannels)
-      if (!std::isnan(get(values, channel))) channels_.push_back(channel);
-    return true;
+  if (channels_.empty() && !std::isfinite(get(values, needed))) {
+    counters_.last_problem = channel_name(needed) + " is absent or not a number";
+    return Fit::drop;
   }
-  for (Channel channel : channels_)
-    if (std::isnan(get(values, channel))) {
+  for (const Channel channel : channels_)
+    if (!std::isfinite(get(values, channel))) {
       counters_.last_problem = channel_name(channel) + " is not a number";
-      return false;
+      return Fit::drop;
     }
-  return true;
+  if (channels_.empty()) return Fit::begin;
+  for (const Channel channel : kChannels)
+    if (std::isfinite(get(values, channel)) && std::find(channels_.begin(), channels_.end(), channel) == channels_.end()) {
+      counters_.last_problem = channel_name(channel) + " appeared";
+      return Fit::restart;
+    }
+  return Fit::take;
+}
+
+/// Whether a stamp continues the run; if not, says why.
+SampleStream::Fit SampleStream::fit(double time) {
+  const StampVerdict verdict = stamps_.next(time);
+  if (verdict == StampVerdict::repeated) {
+    counters_.last_problem = "repeated stamp";
+    return Fit::drop;
+  }
+  if (record_.time.empty()) return Fit::begin;
+  const double last = record_.time.back();
+  if (verdict == StampVerdict::backwards)
+    counters_.last_problem = "stamps went back from " + time_text(last) + " s to " + time_text(time) + " s";
+  else if (time - last > jump_limit())
+    counters_.last_problem = "stamps jumped forward by " + time_text(time - last) + " s";
+  else
+    return Fit::take;
+  return Fit::restart;
 }
 
 const PeriodResult* SampleStream::add(double time, const ChannelValues& values) {
-  if (!acceptable(values)) {
+  const Fit channels = fit(values);
+  if (channels == Fit::drop) {
     ++counters_.not_a_number;
     return nullptr;
   }
-  StampVerdict verdict = stamps_.next(time);
-  if (verdict == StampVerdict::repeated) {
+  const Fit stamp = fit(time);
+  if (stamp == Fit::drop) {
     ++counters_.repeated;
-    counters_.last_problem = "repeated stamp";
     return nullptr;
   }
-  const bool jumped = !record_.time.empty() && time - record_.time.back() > jump_limit();
-  if (verdict == StampVerdict::backwards || jumped) {
-    counters_.last_problem = jumped ? "stamps jumped forward by " + time_text(time - record_.time.back()) + " s"
-                                    : "stamps went back from " + time_text(record_.time.back()) + " s to " +
-                                          time_text(time) + " s";
+  if (stamp == Fit::restart || channels == Fit::restart) {
     restart();
-    acceptable(values);
     stamps_.next(time);
+  }
+  if (record_.time.empty()) {
+    start_ = time;
+    for (const Channel channel : kChannels)
+      if (std::isfinite(get(values, channel))) channels_.push_back(channel);
   }
   ++counters_.accepted;
   record_.time.push_back(time);
-  for (Channel channel : channels_) record_.column(channel).push_back(get(values, channel));
-  if (record_.size() == 2) {
-    interval_ = record_.time[1] - record_.time[0];
-    origin_ = record_.time[0] - 0.5 * interval_;
-    if (period_ > 0) start_windows();
-    return nullptr;
-  }
-  if (!(period_ > 0)) {
-    find_period();
-    return nullptr;
-  }
+  for (const Channel channel : channels_) record_.column(channel).push_back(get(values, channel));
+  if (!(period_ > 0)) find_period();
+  const PeriodResult* finished = nullptr;
+  if (!grid_)
+    finished = start_windows();
+  else if (analyser_)
+    finished = analyser_->add(time, get(values, settings_.apd->signal));
   trim();
-  if (!analyser_) return nullptr;
-  const PeriodResult* period = analyser_->add(time, get(values, settings_.apd->signal));
-  return period && period->index >= settings_.apd->settling_periods ? period : nullptr;
+  return finished && finished->index >= settings_.apd->settling_periods ? finished : nullptr;
 }
 
 /// Searched at fixed lengths of the run, so that the outcome does not depend on how the samples arrive.
 void SampleStream::find_period() {
-  if (record_.time.back() - record_.time.front() < next_search_) return;
-  next_search_ *= 2;
+  if (record_.time.back() - start_ < next_search_) return;
+  next_search_ += std::min(next_search_, next_search_ < settings_.keep ? next_search_ : 0.25 * settings_.keep);
   period_ = excitation_period(record_, settings_.apd ? settings_.apd->signal : Channel::motor_torque);
-  if (period_ > 0) start_windows();
-  trim();
 }
 
-void SampleStream::start_windows() {
-  if (!settings_.apd) return;
+const PeriodResult* SampleStream::start_windows() {
+  if (!(period_ > 0)) return nullptr;
+  grid_ = window_grid(record_.time, period_);
+  dropped_.reset();  // windows count from the first sample kept
+  const PeriodResult* finished = nullptr;
+  if (!grid_ || !settings_.apd) return finished;
   analyser_.emplace(period_, settings_.apd->layout);
   const auto& signal = record_.column(settings_.apd->signal);
-  for (std::size_t i = 0; i < record_.size(); ++i) analyser_->add(record_.time[i], signal[i]);
+  for (std::size_t i = 0; i < record_.size(); ++i) finished = analyser_->add(record_.time[i], signal[i]);
+  return finished;
 }
 
 void SampleStream::trim() {
   // In large steps, so that the cost per sample stays constant.
-  if (record_.time.back() - record_.time.front() < 1.25 * settings_.keep) return;
-  record_ = record_.slice(record_.time.back() - settings_.keep, record_.time.back() + interval_);
+  const double keep = std::max(settings_.keep, kKeepPeriods * period_), last = record_.time.back();
+  if (last - record_.time.front() < 1.25 * keep) return;
+  const auto first = std::lower_bound(record_.time.begin(), record_.time.end(), last - keep);
+  dropped_ = *(first - 1);
+  record_ = record_.slice(*first, std::numeric_limits<double>::infinity());
 }
 
-long SampleStream::completed_windows() const {
-  if (!(period_ > 0) || record_.size() < 2) return 0;
-  return static_cast<long>(std::floor((record_.time.back() + interval_ - origin_) / period_));
-}
-
-long SampleStream::periods() const {
-  if (!(period_ > 0) || record_.size() < 2) return 0;
+SampleStream::Windows SampleStream::windows() const {
+  if (!grid_) return {0, 0};
   const long settling = settings_.apd ? settings_.apd->settling_periods : 0;
-  const auto first_kept = static_cast<long>(std::ceil((record_.time.front() - 0.75 * interval_ - origin_) / period_));
-  return std::max(0L, completed_windows() - std::max(settling, first_kept));
+  const long untrimmed = dropped_ ? grid_->index(*dropped_) + 1 : 0;
+  const long end = grid_->completed(record_.time.back());
+  return {std::min(end, std::max(settling, untrimmed)), end};
 }
+
+long SampleStream::periods() const { return windows().end - windows().begin; }
 
 Record SampleStream::latest(long count) const {
-  const bool uncut = !settings_.apd && count == 0;  // nothing that needs whole periods
-  if (uncut || !(period_ > 0) || record_.size() < 2) return record_;
-  const long available = periods();
-  const long wanted = count > 0 ? std::min(count, available) : available;
-  const double end = origin_ + completed_windows() * period_;
-  return record_.slice(end - wanted * period_, end);
+  if (!settings_.apd && (count == 0 || !grid_)) return record_;  // nothing that needs whole periods
+  if (!grid_) {
+    if (!(run_period(record_, *settings_.apd) > 0)) return record_;
+    return whole_periods(record_, *settings_.apd).value_or(Record());  // found sooner than at the next search
+  }
+  Windows cut = windows();
+  if (count > 0) cut.begin = std::max(cut.begin, cut.end - count);
+  return record_.slice(grid_->start(cut.begin), grid_->start(cut.end));
 }
 
 }  // namespace backlash

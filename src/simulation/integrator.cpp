@@ -10,8 +10,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <limits>
 #include <map>
+#include <memory>
 #include <sstream>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 
@@ -26,6 +30,37 @@ const std::map<std::string, ARKODE_ERKTableID>& explicit_tables() {
       {"dormand_prince", ARKODE_DORMAND_PRINCE_7_4_5},     {"verner", ARKODE_VERNER_8_5_6},
       {"fehlberg", ARKODE_FEHLBERG_6_4_5}};
   return tables;
+}
+
+// Verner's 6(5) pair with its solution appended as a ninth stage. SUNDIALS before 6.6.2 takes every table whose last
+// stage lies at the end of the step for "first same as last", and would start each step with the derivative at that
+// stage instead of at the solution: order 3 instead of 6. With the ninth stage the assumption holds, at no more
+// evaluations per step.
+ARKodeButcherTable verner_first_same_as_last() {
+  ARKodeButcherTable pair = ARKodeButcherTable_LoadERK(ARKODE_VERNER_8_5_6);
+  if (!pair) return nullptr;
+  const int n = pair->stages, m = n + 1;
+  std::vector<double> a(m * m), b(m), c(m), embedded(m);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < i; ++j) a[i * m + j] = pair->A[i][j];
+    a[n * m + i] = b[i] = pair->b[i];
+    c[i] = pair->c[i];
+    embedded[i] = pair->d[i];
+  }
+  c[n] = 1;
+  ARKodeButcherTable table =
+      ARKodeButcherTable_Create(m, pair->q, pair->p, c.data(), a.data(), b.data(), embedded.data());
+  ARKodeButcherTable_Free(pair);
+  return table;
+}
+
+/// Times closer to t than this are the same: the solvers refuse so short a way, and no state changes within it.
+double rounding(double t) {
+  return 8 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+}
+
+IntegratorStatistics operator+(const IntegratorStatistics& a, const IntegratorStatistics& b) {
+  return {a.steps + b.steps, a.evaluations + b.evaluations, a.error_test_failures + b.error_test_failures};
 }
 
 // Errors are reported through return codes; the library's own printing to stderr would only repeat them.
@@ -60,9 +95,14 @@ struct Integrator::Impl {
 
   void create_explicit(double t);
   void create_multistep(double t);
-  void collect();
+  void restart(double t);
+  void evolve(double t);
+  void refuse_unreachable(double t) const;
+  void require_finite() const;
+  IntegratorStatistics since_restart() const;
   /// Negative return codes are errors; positive ones tell why the solver returned.
-  int check(int code, const char* function) const;
+  void check(int code, const char* function) const;
+  [[noreturn]] void fail(const std::string& what) const;
 
   Derivative derivative;
   SolverSettings settings;
@@ -73,32 +113,38 @@ struct Integrator::Impl {
   SUNLinearSolver linear_solver = nullptr;
   SUNNonlinearSolver nonlinear_solver = nullptr;
   void* memory = nullptr;
-  double time = 0;
+  double time = 0, stop = 0;
+  std::exception_ptr thrown;            // by the derivative: it must not pass through the solver's C frames
   IntegratorStatistics before_restart;  // the solvers' counters start again at each reset
+
+  static int evaluate(realtype t, N_Vector y, N_Vector ydot, void* user);
 };
 
-namespace {
-
-int evaluate(realtype t, N_Vector y, N_Vector ydot, void* user) {
-  const auto& derivative = *static_cast<const Integrator::Derivative*>(user);
-  derivative(t, N_VGetArrayPointer(y), N_VGetArrayPointer(ydot));
-  return 0;
+int Integrator::Impl::evaluate(realtype t, N_Vector y, N_Vector ydot, void* user) {
+  Impl& self = *static_cast<Impl*>(user);
+  try {
+    self.derivative(t, N_VGetArrayPointer(y), N_VGetArrayPointer(ydot));
+    return 0;
+  } catch (...) {
+    self.thrown = std::current_exception();
+    return -1;
+  }
 }
-
-}  // namespace
 
 Integrator::Impl::Impl(Derivative f, std::vector<double> absolute, const SolverSettings& s)
     : derivative(std::move(f)), settings(s), multistep(s.method == "bdf" || s.method == "adams") {
   if (!multistep && !explicit_tables().count(s.method))
     throw InvalidParameter("solver.method", s.method, "is not a known method");
-  if (!(s.relative_tolerance > 0)) throw InvalidParameter("solver.relative_tolerance", s.relative_tolerance, "must be > 0");
-  for (double tolerance : absolute)
-    if (!(tolerance > 0)) throw InvalidParameter("solver absolute tolerance", tolerance, "must be > 0");
+  const auto require_tolerance = [](const char* name, double value) {
+    if (!Range::positive().contains(value)) throw InvalidParameter(name, value, "must be > 0 and finite");
+  };
+  require_tolerance("solver.relative_tolerance", s.relative_tolerance);
+  for (double tolerance : absolute) require_tolerance("solver absolute tolerance", tolerance);
   check(SUNContext_Create(nullptr, &context), "SUNContext_Create");
   state = N_VNew_Serial(static_cast<sunindextype>(absolute.size()), context);
   tolerances = N_VNew_Serial(static_cast<sunindextype>(absolute.size()), context);
   if (!state || !tolerances) throw IntegrationError("N_VNew_Serial: out of memory");
-  N_VEnableFusedOps_Serial(state, SUNTRUE);
+  check(N_VEnableFusedOps_Serial(state, SUNTRUE), "N_VEnableFusedOps_Serial");
   std::copy(absolute.begin(), absolute.end(), N_VGetArrayPointer(tolerances));
 }
 
@@ -112,23 +158,36 @@ Integrator::Impl::~Impl() {
   if (context) SUNContext_Free(&context);
 }
 
-int Integrator::Impl::check(int code, const char* function) const {
-  if (code >= 0) return code;
-  char* name = multistep ? CVodeGetReturnFlagName(code) : ERKStepGetReturnFlagName(code);
+void Integrator::Impl::fail(const std::string& what) const {
+  double reached = time;  // where the solver is now; of no interest whether it can tell
+  if (memory) multistep ? CVodeGetCurrentTime(memory, &reached) : ERKStepGetCurrentTime(memory, &reached);
   std::ostringstream text;
-  text << settings.method << ": " << function << " returned " << (name ? name : "?") << " (" << code << ") at t = " << time
-       << " s";
-  free(name);
+  text.precision(12);
+  text << settings.method << ": " << what << " at t = " << reached << " s";
   throw IntegrationError(text.str());
+}
+
+void Integrator::Impl::check(int code, const char* function) const {
+  if (code >= 0) return;
+  char* name = multistep ? CVodeGetReturnFlagName(code) : ERKStepGetReturnFlagName(code);
+  const std::string word = name ? name : "?";
+  free(name);
+  fail(std::string(function) + " returned " + word + " (" + std::to_string(code) + ")");
 }
 
 void Integrator::Impl::create_explicit(double t) {
   memory = ERKStepCreate(evaluate, t, state, context);
   if (!memory) throw IntegrationError("ERKStepCreate failed");
   check(ERKStepSetErrHandlerFn(memory, silence, nullptr), "ERKStepSetErrHandlerFn");
-  check(ERKStepSetTableNum(memory, explicit_tables().at(settings.method)), "ERKStepSetTableNum");
+  if (settings.method == "verner") {
+    const std::unique_ptr<ARKodeButcherTableMem, void (*)(ARKodeButcherTable)> table(verner_first_same_as_last(),
+                                                                                     ARKodeButcherTable_Free);
+    check(ERKStepSetTable(memory, table.get()), "ERKStepSetTable");
+  } else {
+    check(ERKStepSetTableNum(memory, explicit_tables().at(settings.method)), "ERKStepSetTableNum");
+  }
   check(ERKStepSVtolerances(memory, settings.relative_tolerance, tolerances), "ERKStepSVtolerances");
-  check(ERKStepSetUserData(memory, &derivative), "ERKStepSetUserData");
+  check(ERKStepSetUserData(memory, this), "ERKStepSetUserData");
   check(ERKStepSetMaxNumSteps(memory, kMaxStepsPerCall), "ERKStepSetMaxNumSteps");
 }
 
@@ -139,7 +198,7 @@ void Integrator::Impl::create_multistep(double t) {
   check(CVodeSetErrHandlerFn(memory, silence, nullptr), "CVodeSetErrHandlerFn");
   check(CVodeInit(memory, evaluate, t, state), "CVodeInit");
   check(CVodeSVtolerances(memory, settings.relative_tolerance, tolerances), "CVodeSVtolerances");
-  check(CVodeSetUserData(memory, &derivative), "CVodeSetUserData");
+  check(CVodeSetUserData(memory, this), "CVodeSetUserData");
   check(CVodeSetMaxNumSteps(memory, kMaxStepsPerCall), "CVodeSetMaxNumSteps");
   if (stiff) {  // Newton with a dense difference-quotient Jacobian
     const sunindextype n = N_VGetLength(state);
@@ -152,22 +211,69 @@ void Integrator::Impl::create_multistep(double t) {
   }
 }
 
-void Integrator::Impl::collect() {
-  long steps = 0, evaluations = 0, failures = 0;
+IntegratorStatistics Integrator::Impl::since_restart() const {
+  IntegratorStatistics count;
   if (multistep) {
-    CVodeGetNumSteps(memory, &steps);
-    CVodeGetNumRhsEvals(memory, &evaluations);
-    CVodeGetNumErrTestFails(memory, &failures);
+    check(CVodeGetNumSteps(memory, &count.steps), "CVodeGetNumSteps");
+    check(CVodeGetNumRhsEvals(memory, &count.evaluations), "CVodeGetNumRhsEvals");
+    check(CVodeGetNumErrTestFails(memory, &count.error_test_failures), "CVodeGetNumErrTestFails");
+    if (linear_solver) {
+      long for_jacobian = 0;
+      check(CVodeGetNumLinRhsEvals(memory, &for_jacobian), "CVodeGetNumLinRhsEvals");
+      count.evaluations += for_jacobian;
+    }
   } else {
-    ERKStepGetNumSteps(memory, &steps);
-    ERKStepGetNumRhsEvals(memory, &evaluations);
-    ERKStepGetNumErrTestFails(memory, &failures);
+    check(ERKStepGetNumSteps(memory, &count.steps), "ERKStepGetNumSteps");
+    check(ERKStepGetNumRhsEvals(memory, &count.evaluations), "ERKStepGetNumRhsEvals");
+    check(ERKStepGetNumErrTestFails(memory, &count.error_test_failures), "ERKStepGetNumErrTestFails");
   }
-  before_restart.steps += steps;
-  before_restart.evaluations += evaluations;
-  before_restart.error_test_failures += failures;
+  return count;
 }
 
+void Integrator::Impl::restart(double t) {
+  if (!memory) {
+    multistep ? create_multistep(t) : create_explicit(t);
+  } else {
+    before_restart = before_restart + since_restart();
+    if (multistep)
+      check(CVodeReInit(memory, t, state), "CVodeReInit");
+    else  // a reset keeps the error controller's memory of the last segment; a new initial step must be found
+      check(ERKStepReInit(memory, evaluate, t, state), "ERKStepReInit");
+  }
+  // Set after each restart: ERKStep forgets the stop time, CVODE keeps the old one.
+  const double last = std::isfinite(stop) ? stop : 1e300;
+  if (multistep)
+    check(CVodeSetStopTime(memory, last), "CVodeSetStopTime");
+  else
+    check(ERKStepSetStopTime(memory, last), "ERKStepSetStopTime");
+}
+
+void Integrator::Impl::refuse_unreachable(double t) const {
+  std::ostringstream asked;
+  asked.precision(17);
+  asked << "cannot integrate to t = " << t << " s: ";
+  if (!memory) fail(asked.str() + "restart() comes first; now");
+  if (!std::isfinite(t)) fail(asked.str() + "must be finite; now");
+  if (t < time - rounding(time)) fail(asked.str() + "lies before the last returned time; now");
+  if (t > stop + rounding(stop)) fail(asked.str() + "lies beyond the stop time; now");
+}
+
+void Integrator::Impl::evolve(double t) {
+  if (t - time <= rounding(t)) return;
+  double reached = time;
+  thrown = nullptr;
+  const int code = multistep ? CVode(memory, std::min(t, stop), state, &reached, CV_NORMAL)
+                             : ERKStepEvolve(memory, std::min(t, stop), state, &reached, ARK_NORMAL);
+  if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
+  check(code, multistep ? "CVode" : "ERKStepEvolve");
+  time = reached;
+}
+
+void Integrator::Impl::require_finite() const {
+  const double* values = N_VGetArrayPointer(state);
+  for (sunindextype i = 0; i < N_VGetLength(state); ++i)
+    if (!std::isfinite(values[i])) fail("state " + std::to_string(i) + " is not finite");
+}
 Integrator::Integrator(Derivative derivative, std::vector<double> absolute_tolerances, const SolverSettings& settings)
     : impl_(std::make_unique<Impl>(std::move(derivative), std::move(absolute_tolerances), settings)) {}
 Integrator::~Integrator() = default;
@@ -178,50 +284,21 @@ void Integrator::restart(double t, const double* state, double stop) {
   Impl& s = *impl_;
   std::copy(state, state + N_VGetLength(s.state), N_VGetArrayPointer(s.state));
   s.time = t;
-  if (!s.memory) {
-    s.multistep ? s.create_multistep(t) : s.create_explicit(t);
-  } else {
-    s.collect();
-    if (s.multistep)
-      s.check(CVodeReInit(s.memory, t, s.state), "CVodeReInit");
-    else  // a reset keeps the error controller's memory of the last segment; a new initial step must be found
-      s.check(ERKStepReInit(s.memory, evaluate, t, s.state), "ERKStepReInit");
-  }
-  // Set after each restart: ERKStep forgets the stop time, CVODE keeps the old one.
-  const double last = std::isfinite(stop) ? stop : 1e300;
-  if (s.multistep)
-    s.check(CVodeSetStopTime(s.memory, last), "CVodeSetStopTime");
-  else
-    s.check(ERKStepSetStopTime(s.memory, last), "ERKStepSetStopTime");
+  s.stop = stop;
+  s.restart(t);
 }
 
 void Integrator::integrate_to(double t, double* state) {
   Impl& s = *impl_;
-  if (t > s.time) {
-    double reached = s.time;
-    if (s.multistep)
-      s.check(CVode(s.memory, t, s.state, &reached, CV_NORMAL), "CVode");
-    else
-      s.check(ERKStepEvolve(s.memory, t, s.state, &reached, ARK_NORMAL), "ERKStepEvolve");
-    s.time = reached;
-  }
+  s.refuse_unreachable(t);
+  s.evolve(t);
+  s.require_finite();
   const double* values = N_VGetArrayPointer(s.state);
-  for (sunindextype i = 0; i < N_VGetLength(s.state); ++i)
-    if (!std::isfinite(values[i])) {
-      std::ostringstream text;
-      text << s.settings.method << ": state " << i << " is not finite at t = " << s.time << " s";
-      throw IntegrationError(text.str());
-    }
   std::copy(values, values + N_VGetLength(s.state), state);
 }
 
 IntegratorStatistics Integrator::statistics() const {
-  IntegratorStatistics total = impl_->before_restart;
-  if (!impl_->memory) return total;
-  IntegratorStatistics saved = impl_->before_restart;
-  impl_->collect();
-  std::swap(saved, impl_->before_restart);
-  return saved;
+  return impl_->memory ? impl_->before_restart + impl_->since_restart() : impl_->before_restart;
 }
 
 }  // namespace backlash

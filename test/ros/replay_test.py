@@ -83,7 +83,7 @@ class ReplayTest(unittest.TestCase):
 
     def test_pause_changes_nothing(self):
         with Diagnoser({"curve": self.curve}).ready() as diagnoser:
-            player = subprocess.Popen(["rosbag", "play", "--clock", "--quiet", "--pause", SMALL_BAG, "__name:=player"],
+            player = subprocess.Popen(["rosbag", "play", "--clock", "--quiet", "--pause", "--rate=0.25", SMALL_BAG, "__name:=player"],
                                       stdin=subprocess.DEVNULL)
             self.addCleanup(player.kill)
             rospy.wait_for_service("/player/pause_playback", TIMEOUT)

@@ -78,7 +78,7 @@ class SimulatorTest(unittest.TestCase):
         self.assertEqual(latched("true_backlash", Float64).data, backlash)
         after = travel_between_walls(self.next_samples(needed)[settled:])
         base_radius = default_rig()["gear_train"]["mesh"]["base_radius"]
-        # At rest at a wall all springs carry the same torque with and without play: the travel grows by the play
+        # At rest at a wall all springs carry the same torque with and without play: travel grows by the play
         # alone. 1e-4 of it covers what is left of the motion after 250 ms. The motor's damper takes that down
         # with a time constant of 2 J / c = 27 ms (J = 2.24e-5 + 4.2e-5 kg m^2), that is by exp(-9) = 1e-4.
         self.assertAlmostEqual((after - before) * base_radius / backlash, 1, delta=1e-4)

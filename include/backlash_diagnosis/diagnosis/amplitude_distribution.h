@@ -49,9 +49,10 @@ class AmplitudeDistribution {
 
  private:
   double standardised_moment(int order) const;
+  double border(std::size_t k) const { return layout_.lower + static_cast<double>(k) * width_; }
 
   ApdLayout layout_;
-  double per_width_;
+  double width_;
   std::vector<std::size_t> counts_;
   std::size_t samples_ = 0, below_ = 0, above_ = 0;
 };

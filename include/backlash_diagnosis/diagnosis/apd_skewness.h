@@ -31,8 +31,14 @@ struct ApdResult {
 /// Excitation period of a record [s]: of motor_torque where recorded, else of `signal`. 0 where there is none.
 double excitation_period(const Record& record, Channel signal);
 
-/// The whole excitation periods of a record after settling, by period and settling of `settings` (0 s: found from the
-/// signal). Nothing where there is no period, or not one whole period after settling.
+constexpr double kFirstPeriodSearch = 0.25;  // s of a run after which a period is searched, then twice as long each time
+
+/// Period by which a run is cut into windows [s]: the declared one, else as a stream finds it while the run grows, else
+/// that of the whole record. 0 where there is none.
+double run_period(const Record& record, const ApdSettings& settings);
+
+/// The whole excitation periods of a record after settling, by period and settling of `settings` (0 s: run_period).
+/// Nothing where there is no period, or not one whole period after settling.
 std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings);
 
 /// Throws InvalidParameter for a layout or period outside its range; a record without the signal gives no periods.

@@ -5,6 +5,7 @@
 // samples). Only stamps count, never the time of arrival: live, replayed and offline give the same numbers.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -27,7 +28,8 @@ struct WindowGrid {
   long completed(double last) const { return std::max(0L, index(last + interval)); }
 };
 
-/// Grid of a run from its first stamps (increasing); nothing with fewer than kLeadingSamples of them.
+/// Grid of a run from its first stamps (increasing). Nothing with fewer than kLeadingSamples of them, or for a period
+/// shorter than the sampling interval.
 std::optional<WindowGrid> window_grid(const std::vector<double>& time, double period);
 
 /// One whole period.

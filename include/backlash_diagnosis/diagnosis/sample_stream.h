@@ -15,14 +15,14 @@ namespace backlash {
 /// How a stream is cut; from the diagnosis settings of a rig.
 struct StreamSettings {
   std::optional<ApdSettings> apd;  // absent: periods are found from motor_torque, no APD
-  double keep = 60;                // s of samples kept, > 0
+  double keep = 60;                // s of samples kept, > 0; always at least three periods
 };
 
 struct StreamCounters {
   long accepted = 0;
-  long not_a_number = 0;  // samples without a value that the stream began with
+  long not_a_number = 0;  // samples without a finite value in a channel that the run has
   long repeated = 0;      // stamps equal to the one before
-  long restarts = 0;      // stamps that went back or jumped: a new run begins
+  long restarts = 0;      // stamps that went back or jumped, or a channel that appeared: a new run begins
   std::string last_problem;
 };
 
@@ -30,16 +30,17 @@ class SampleStream {
  public:
   explicit SampleStream(const StreamSettings& settings);
 
-  /// Adds a sample; returns a whole settled period with its APD when this sample completes it. A stamp that goes back, or
-  /// jumps by more than `jump_limit()`, starts a new run: everything kept is forgotten and settling begins again.
-  /// Null where no period ends here; valid until the next call.
+  /// Adds a sample; returns a settled period with its APD (see PeriodResult::complete) when this sample ends it. A stamp
+  /// that goes back, or jumps by more than `jump_limit()`, or a channel that appears, starts a new run: everything kept
+  /// is forgotten and settling begins again. Null where no period ends here; valid until the next call. Throws
+  /// InvalidParameter for a stamp that is not finite.
   const PeriodResult* add(double time, const ChannelValues& values);
 
   /// Whole settled periods at hand.
   long periods() const;
 
-  /// The last `count` whole settled periods (0: all that are kept). All samples where no period is known, and for count 0
-  /// without APD.
+  /// The last `count` whole settled periods (0: all that are kept); empty where there are none yet. All samples where the
+  /// excitation has no period, and for count 0 without APD.
   Record latest(long count) const;
 
   double period() const { return period_; }  ///< s; 0 until known
@@ -50,18 +51,26 @@ class SampleStream {
   void restart();
 
  private:
-  bool acceptable(const ChannelValues& values);
+  enum class Fit { begin, take, drop, restart };
+  struct Windows {
+    long begin, end;  // settled and still kept whole: [begin, end)
+  };
+  Fit fit(const ChannelValues& values);
+  Fit fit(double time);
   void find_period();
-  void start_windows();
+  const PeriodResult* start_windows();
   void trim();
-  long completed_windows() const;
+  Windows windows() const;
 
   StreamSettings settings_;
   StampChecker stamps_;
   StreamCounters counters_;
   Record record_;
   std::vector<Channel> channels_;  // those that the run's first sample has
-  double period_ = 0, interval_ = 0, origin_ = 0, next_search_ = 0;
+  double period_ = 0, start_ = 0;    // s; first stamp of the run
+  double next_search_ = 0;           // s after start_
+  std::optional<double> dropped_;    // s, last stamp that was trimmed since the windows began
+  std::optional<WindowGrid> grid_;   // once the period and kLeadingSamples samples are there
   std::optional<PeriodAnalyser> analyser_;
 };
 

@@ -45,7 +45,9 @@ class Integrator {
   /// is not evaluated (infinite: none): the next jump of the right-hand side.
   void restart(double t, const double* state, double stop);
 
-  /// State at `t`: not before the last returned time, not beyond the stop time. Throws IntegrationError.
+  /// State at `t`: not before the last returned time, not beyond the stop time (both to within rounding). Throws
+  /// IntegrationError, also where more than 10^7 steps would be needed; passes on what the derivative throws. After
+  /// either only restart() helps.
   void integrate_to(double t, double* state);
 
   IntegratorStatistics statistics() const;
