@@ -26,16 +26,18 @@ constexpr long kMaxStepsPerCall = 10'000'000;
 
 const std::map<std::string, ARKODE_ERKTableID>& explicit_tables() {
   static const std::map<std::string, ARKODE_ERKTableID> tables = {
-      {"bogacki_shampine", ARKODE_BOGACKI_SHAMPINE_4_2_3}, {"cash_karp", ARKODE_CASH_KARP_6_4_5},
-      {"dormand_prince", ARKODE_DORMAND_PRINCE_7_4_5},     {"verner", ARKODE_VERNER_8_5_6},
+      {"bogacki_shampine", ARKODE_BOGACKI_SHAMPINE_4_2_3},
+      {"cash_karp", ARKODE_CASH_KARP_6_4_5},
+      {"dormand_prince", ARKODE_DORMAND_PRINCE_7_4_5},
+      {"verner", ARKODE_VERNER_8_5_6},
       {"fehlberg", ARKODE_FEHLBERG_6_4_5}};
   return tables;
 }
 
-// Verner's 6(5) pair with its solution appended as a ninth stage. SUNDIALS before 6.6.2 takes every table whose last
-// stage lies at the end of the step for "first same as last", and would start each step with the derivative at that
-// stage instead of at the solution: order 3 instead of 6. With the ninth stage the assumption holds, at no more
-// evaluations per step.
+// Verner's 6(5) pair with its solution appended as a ninth stage. SUNDIALS before 6.6.2 takes every table
+// whose last stage lies at the end of the step for "first same as last", and would start each step with the
+// derivative at that stage instead of at the solution: order 3 instead of 6. With the ninth stage the
+// assumption holds, at no more evaluations per step.
 ARKodeButcherTable verner_first_same_as_last() {
   ARKodeButcherTable pair = ARKodeButcherTable_LoadERK(ARKODE_VERNER_8_5_6);
   if (!pair) return nullptr;
@@ -54,7 +56,8 @@ ARKodeButcherTable verner_first_same_as_last() {
   return table;
 }
 
-/// Times closer to t than this are the same: the solvers refuse so short a way, and no state changes within it.
+/// Times closer to t than this are the same: the solvers refuse so short a way, and no state changes within
+/// it.
 double rounding(double t) {
   return 8 * std::numeric_limits<double>::epsilon() * std::fabs(t);
 }
@@ -180,8 +183,8 @@ void Integrator::Impl::create_explicit(double t) {
   if (!memory) throw IntegrationError("ERKStepCreate failed");
   check(ERKStepSetErrHandlerFn(memory, silence, nullptr), "ERKStepSetErrHandlerFn");
   if (settings.method == "verner") {
-    const std::unique_ptr<ARKodeButcherTableMem, void (*)(ARKodeButcherTable)> table(verner_first_same_as_last(),
-                                                                                     ARKodeButcherTable_Free);
+    const std::unique_ptr<ARKodeButcherTableMem, void (*)(ARKodeButcherTable)> table(
+        verner_first_same_as_last(), ARKodeButcherTable_Free);
     check(ERKStepSetTable(memory, table.get()), "ERKStepSetTable");
   } else {
     check(ERKStepSetTableNum(memory, explicit_tables().at(settings.method)), "ERKStepSetTableNum");
@@ -274,7 +277,8 @@ void Integrator::Impl::require_finite() const {
   for (sunindextype i = 0; i < N_VGetLength(state); ++i)
     if (!std::isfinite(values[i])) fail("state " + std::to_string(i) + " is not finite");
 }
-Integrator::Integrator(Derivative derivative, std::vector<double> absolute_tolerances, const SolverSettings& settings)
+Integrator::Integrator(Derivative derivative, std::vector<double> absolute_tolerances,
+                       const SolverSettings& settings)
     : impl_(std::make_unique<Impl>(std::move(derivative), std::move(absolute_tolerances), settings)) {}
 Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;
