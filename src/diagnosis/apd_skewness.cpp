@@ -2,23 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
+#include <utility>
 
+#include "backlash_diagnosis/diagnosis/robust.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 
 namespace backlash {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 double range_of(const std::vector<double>& x) {
   if (x.empty()) return 0;
   const auto [low, high] = std::minmax_element(x.begin(), x.end());
   return *high - *low;
-}
-
-double largest_magnitude(const std::vector<double>& x) {
-  double largest = 0;
-  for (double v : x) largest = std::max(largest, std::fabs(v));
-  return largest;
 }
 
 bool differs(double value, double reference, double tolerance) {
@@ -36,12 +35,16 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   if (torque.empty()) return {};
   if (range_of(torque) <= 0.05 * made.amplitude) return "motor_torque is constant: there is no excitation";
-  // The median of the upper half stands for the amplitude, so that a noisy or spiky channel does not.
+  // A level that a tenth of the time is exceeded stands for the amplitude: a few spikes or noise do not change it.
   if (differs(median_magnitude(torque), made.excitation_level, 0.05))
     return mismatch("excitation level (median of |motor_torque|)", median_magnitude(torque), made.excitation_level,
                     "N m");
-  if (largest_magnitude(torque) < 0.95 * made.amplitude)
-    return mismatch("excitation amplitude", largest_magnitude(torque), made.amplitude, "N m");
+  std::vector<double> magnitude;
+  for (const double v : torque) magnitude.push_back(std::fabs(v));
+  const double largest = *std::max_element(magnitude.begin(), magnitude.end());
+  if (largest < 0.95 * made.amplitude) return mismatch("excitation amplitude", largest, made.amplitude, "N m");
+  const double often = quantile(std::move(magnitude), 0.9);
+  if (often > 1.1 * made.amplitude) return mismatch("excitation amplitude", often, made.amplitude, "N m");
   return {};
 }
 
@@ -50,27 +53,31 @@ std::string motion_mismatch(const Record& record, const MonitoringCurve& curve) 
   std::ostringstream text;
   text.precision(4);
   const double load = range_of(record.column(Channel::load_position));
-  const double travel = range_of(record.column(Channel::motor_position));
+  const double travel = travel_of(record.column(Channel::motor_position));
   if (load > 0.05 * curve.conditions.motor_travel) {
     text << "the output moves by " << load << " rad, the rig says it is locked";
     return text.str();
   }
-  if (travel > 1.5 * curve.conditions.motor_travel) {
+  if (travel > 1.05 * curve.conditions.motor_travel) {
     text << "the motor travels " << travel << " rad, more than any backlash on the curve allows ("
-         << curve.conditions.motor_travel << " rad): output free, or backlash far above the curve";
+         << curve.conditions.motor_travel << " rad): output free, or backlash above the curve";
     return text.str();
   }
   return {};
 }
 
+/// Lowest and highest level of the signal on the curve.
+std::pair<double, double> signal_levels(const MonitoringCurve& curve) {
+  const auto [low, high] = std::minmax_element(
+      curve.points.begin(), curve.points.end(),
+      [](const CurvePoint& a, const CurvePoint& b) { return a.signal_level < b.signal_level; });
+  return {low->signal_level, high->signal_level};
+}
+
 /// Level of the signal, as a stand-in where motor_torque was not recorded.
 std::string level_mismatch(const Record& record, const ApdSettings& settings, const MonitoringCurve& curve) {
   if (record.has(Channel::motor_torque)) return {};
-  double low = 1e300, high = 0;
-  for (const CurvePoint& point : curve.points) {
-    low = std::min(low, point.signal_level);
-    high = std::max(high, point.signal_level);
-  }
+  const auto [low, high] = signal_levels(curve);
   const double level = median_magnitude(record.column(settings.signal));
   if (level < 0.75 * low) return mismatch("signal level (median magnitude)", level, low, "N m");
   if (level > 1.25 * high) return mismatch("signal level (median magnitude)", level, high, "N m");
@@ -79,20 +86,34 @@ std::string level_mismatch(const Record& record, const ApdSettings& settings, co
 
 }  // namespace
 
+double travel_of(const std::vector<double>& position) { return quantile(position, 0.95) - quantile(position, 0.05); }
+
 double excitation_period(const Record& record, Channel signal) {
   const Channel source = record.has(Channel::motor_torque) ? Channel::motor_torque : signal;
   if (!record.has(source)) return 0;
   return detect_period(record.time, record.column(source)).value_or(0);
 }
 
-std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings) {
-  const double period = settings.period > 0 ? settings.period : excitation_period(record, settings.signal);
-  if (!(period > 0) || record.size() < 2) return std::nullopt;
-  const double interval = record.time[1] - record.time[0];
-  const double origin = record.time[0] - 0.5 * interval;  // as PeriodAnalyser
-  const double count = std::floor((record.time.back() + interval - origin) / period);
-  if (count <= settings.settling_periods) return std::nullopt;
-  return record.slice(origin + settings.settling_periods * period, origin + count * period);
+double run_period(const Record& record, const ApdSettings& settings) {
+  if (settings.period > 0) return settings.period;
+  std::size_t end = 0;  // of the run so far
+  for (double length = kFirstPeriodSearch;; length *= 2) {
+    while (end < record.size() && record.time[end] - record.time[0] < length) ++end;
+    if (end >= record.size()) return excitation_period(record, settings.signal);
+    const Record run = record.slice(record.time[0], std::nextafter(record.time[end], kInfinity));
+    if (const double period = excitation_period(run, settings.signal); period > 0) return period;
+  }
+}
+
+std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings, long last) {
+  const double period = run_period(record, settings);
+  if (!(period > 0)) return std::nullopt;
+  const auto grid = window_grid(record.time, period);
+  if (!grid) return std::nullopt;
+  const long end = grid->completed(record.time.back());
+  const long begin = std::max<long>(settings.settling_periods, last > 0 ? end - last : 0);
+  if (begin >= end) return std::nullopt;
+  return record.slice(grid->start(begin), grid->start(end));
 }
 
 ApdResult analyse_apd(const Record& record, const ApdSettings& settings) {
@@ -103,8 +124,8 @@ ApdResult analyse_apd(const Record& record, const ApdSettings& settings) {
   const std::vector<double>& signal = record.column(settings.signal);
   PeriodAnalyser analyser(result.period, settings.layout);
   double sum = 0;
-  for (std::size_t i = 0; i < record.size(); ++i) {
-    const PeriodResult* period = analyser.add(record.time[i], signal[i]);
+  for (std::size_t i = 0; i <= record.size(); ++i) {
+    const PeriodResult* period = i < record.size() ? analyser.add(record.time[i], signal[i]) : analyser.finish();
     if (!period || period->index < settings.settling_periods) continue;
     if (!period->complete || std::isnan(period->apd.skewness())) {
       ++result.incomplete;
@@ -133,7 +154,7 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
   const double interval = record.sampling_interval();
   if (!(interval > 0) || differs(1 / interval, made.sampling_rate, 0.02))
     return mismatch("sampling rate", interval > 0 ? 1 / interval : 0, made.sampling_rate, "Hz");
-  if (range_of(record.column(settings.signal)) <= 0.05 * made.amplitude)
+  if (range_of(record.column(settings.signal)) <= 0.05 * signal_levels(curve).second)
     return "the signal does not move: there is no excitation, or the sensor is dead";
   std::string reason = excitation_mismatch(record, made);
   if (reason.empty()) reason = level_mismatch(record, settings, curve);
@@ -143,6 +164,13 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
     if (!(period > 0)) return "no excitation period found in the record";
     if (differs(1 / period, made.frequency, 0.02 + interval / period))
       return mismatch("excitation frequency", 1 / period, made.frequency, "Hz");
+  }
+  if (apd.noise > 1.2 * curve.noise_levels.back()) {
+    std::ostringstream text;
+    text.precision(4);
+    text << "sensor noise is " << apd.noise << " N m (standard deviation), the curve covers noise up to "
+         << curve.noise_levels.back() << " N m";
+    return text.str();
   }
   if (looks_saturated(record.column(settings.signal)))
     return "the signal stays at its extreme value: the sensor is saturated";
@@ -162,12 +190,17 @@ Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const
   if (!record.has(settings.signal))
     return refuse(Status::insufficient_data, "the record has no " + channel_name(settings.signal));
   if (!curve) return refuse(Status::insufficient_data, "no monitoring curve");
+  std::string lacking = "no complete excitation period";
+  if (settings.settling_periods > 0)
+    lacking += " after " + std::to_string(settings.settling_periods) + " settling period(s)";
+  const double expected = curve->conditions.frequency > 0 ? 1 / curve->conditions.frequency : apd.period;
+  if (record.size() < kLeadingSamples || record.time.back() - record.time.front() < 0.9 * expected)
+    return refuse(Status::insufficient_data, lacking + ": the record is too short");
   const std::string reason = out_of_domain(record, apd, settings, *curve);
   if (!reason.empty()) return refuse(Status::out_of_domain, reason);
   if (apd.periods.empty())
-    return refuse(Status::insufficient_data,
-                  "no complete excitation period after " + std::to_string(settings.settling_periods) +
-                      " settling period(s); " + std::to_string(apd.incomplete) + " had gaps");
+    return refuse(Status::insufficient_data, lacking + "; " + std::to_string(apd.incomplete) +
+                                                 " had gaps or no sample inside the classes");
   const double noise = std::isnan(apd.noise) ? curve->conditions.noise : apd.noise;
   return curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), noise);
 }

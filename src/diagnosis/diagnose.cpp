@@ -56,10 +56,10 @@ const std::vector<std::string>& diagnosis_methods() {
 
 Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
                    const std::optional<Baseline>& baseline, const std::string& method) {
-  if (settings.apd)
-    if (const auto settled = whole_periods(record, *settings.apd))
-      return diagnose_settled(*settled, without_settling(settings), curve, baseline, method);
-  return diagnose_settled(record, settings, curve, baseline, method);
+  const DiagnosisSettings settled = without_settling(settings);
+  if (!settings.apd || !(run_period(record, *settings.apd) > 0))
+    return diagnose_settled(record, settled, curve, baseline, method);
+  return diagnose_settled(whole_periods(record, *settings.apd).value_or(Record()), settled, curve, baseline, method);
 }
 
 Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
@@ -67,9 +67,15 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
   const auto& methods = diagnosis_methods();
   if (!method.empty() && std::find(methods.begin(), methods.end(), method) == methods.end())
     throw InvalidParameter("method", method, "must be one of " + joined(methods));
-  const auto wanted = [&method](const char* name) { return method.empty() || method == name; };
+  const auto wanted = [&method](const std::string& name) { return method.empty() || method == name; };
   Diagnosis diagnosis;
   if (settings.apd) diagnosis.apd = analyse_apd(record, *settings.apd);
+  if (record.time.empty()) {
+    for (const std::string& name : methods)
+      if (wanted(name)) diagnosis.estimates.push_back(not_served(name, "no whole excitation period after settling"));
+    diagnosis.verdict = combine(diagnosis.estimates, settings.limits, baseline);
+    return diagnosis;
+  }
   if (wanted("apd_skewness"))
     diagnosis.estimates.push_back(settings.apd
                                       ? estimate_apd_skewness(record, *diagnosis.apd, *settings.apd, curve)

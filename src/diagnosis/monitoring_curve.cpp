@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 
@@ -10,7 +12,8 @@ namespace backlash {
 namespace {
 
 constexpr double kNormal95 = 1.959964;  // two-sided 95 % quantile of the normal distribution
-constexpr int kRefinement = 20;         // inversion grid per curve interval
+constexpr double kFloor = 1e-6;         // smallest difference of skewness that may count as one
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double total(const SkewnessCell& cell, int periods) {
   return std::sqrt(cell.between * cell.between + cell.within * cell.within / std::max(1, periods));
@@ -43,37 +46,66 @@ double roughness(const std::vector<CurvePoint>& points, std::size_t i, std::size
   return count ? std::sqrt(sum / count) : 0;
 }
 
+/// Backlash values that agree with an observation.
 struct Accepted {
-  double best = kNaN, best_distance = 1e300;
+  double best = kNaN, best_distance = kInfinity;
   double lower = kNaN, upper = kNaN;
   bool touches_end = false, in_flagged_stretch = false;
   int pieces = 0;
 };
 
-/// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's construction).
+/// Solutions of a x^2 + b x + c <= 0 within [0, 1] as up to two intervals.
+std::vector<std::pair<double, double>> not_positive(double a, double b, double c) {
+  std::vector<double> cuts = {0, 1};
+  const double root = std::sqrt(b * b - 4 * a * c);  // NaN: no roots
+  const double q = -0.5 * (b + std::copysign(root, b));
+  for (const double x : {q / a, c / q})
+    if (x > 0 && x < 1) cuts.push_back(x);
+  std::sort(cuts.begin(), cuts.end());
+  std::vector<std::pair<double, double>> intervals;
+  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const double middle = 0.5 * (cuts[i] + cuts[i + 1]);
+    if (!((a * middle + b) * middle + c <= 0)) continue;
+    if (!intervals.empty() && intervals.back().second == cuts[i])
+      intervals.back().second = cuts[i + 1];
+    else
+      intervals.emplace_back(cuts[i], cuts[i + 1]);
+  }
+  return intervals;
+}
+
+/// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's construction):
+/// (skewness - mean(b))^2 <= (1.96 sigma(b))^2, between two points a quadratic inequality.
 Accepted accept(const MonitoringCurve& curve, double skewness, int periods, double noise) {
   Accepted result;
-  bool inside = false;
-  const std::size_t intervals = curve.points.size() - 1;
-  for (std::size_t step = 0; step <= intervals * kRefinement; ++step) {
-    const std::size_t i = std::min(step / kRefinement, intervals - 1);
-    const double share = double(step - i * kRefinement) / kRefinement;
-    const double b = curve.points[i].backlash + share * (curve.points[i + 1].backlash - curve.points[i].backlash);
-    const SkewnessCell cell = curve.at(b, noise);
-    const double distance = std::fabs(skewness - cell.mean) / std::max(total(cell, periods), 1e-6);
-    const bool ok = distance <= kNormal95;
-    if (distance < result.best_distance) {
-      result.best_distance = distance;
-      result.best = b;
-    }
-    if (ok && !inside) ++result.pieces;
-    if (ok) {
-      if (std::isnan(result.lower)) result.lower = b;
-      result.upper = b;
-      result.touches_end = step == intervals * kRefinement;
+  for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
+    const double from = curve.points[i].backlash, span = curve.points[i + 1].backlash - from;
+    const SkewnessCell cell = curve.at(from, noise), next = curve.at(from + span, noise);
+    const double offset = skewness - cell.mean, slope = next.mean - cell.mean;
+    double a = slope * slope, b = -2 * offset * slope, c = offset * offset - kFloor * kFloor;
+    const auto widen = [&](double at_start, double at_end, double divisor) {
+      const double factor = kNormal95 * kNormal95 / divisor, change = at_end - at_start;
+      a -= factor * change * change;
+      b -= factor * 2 * at_start * change;
+      c -= factor * at_start * at_start;
+    };
+    widen(cell.between, next.between, 1);
+    widen(cell.within, next.within, std::max(1, periods));
+    for (const auto& [begin, end] : not_positive(a, b, c)) {
+      if (result.pieces == 0) result.lower = from + begin * span;
+      if (result.pieces == 0 || from + begin * span > result.upper) ++result.pieces;
+      result.upper = from + end * span;
+      result.touches_end = i + 2 == curve.points.size() && end == 1;
       if (!curve.points[i + 1].monotonic || !curve.points[i].monotonic) result.in_flagged_stretch = true;
     }
-    inside = ok;
+    const double crossing = std::clamp(slope == 0 ? 0 : offset / slope, 0.0, 1.0);
+    for (const double share : {0.0, crossing, 1.0}) {
+      const SkewnessCell here = mix(cell, next, share);
+      const double distance = std::fabs(skewness - here.mean) / std::max(total(here, periods), kFloor);
+      if (!(distance < result.best_distance)) continue;
+      result.best_distance = distance;
+      result.best = from + share * span;
+    }
   }
   return result;
 }
@@ -139,22 +171,20 @@ Estimate MonitoringCurve::invert(double skewness, int periods, double noise) con
     return with_angle(estimate, *this);
   }
   const double span = points.back().backlash - points.front().backlash;
-  const bool wide = found.upper - found.lower > 0.5 * span;
   estimate.lower = found.lower;
-  estimate.upper = found.upper;
-  if (found.touches_end && found.best >= points.back().backlash - 1e-3 * span) {
-    estimate.status = Status::above_range;
-    text << " is at the end of the curve; backlash may be larger than it covers";
-  } else if (wide) {
+  if (!found.touches_end) estimate.upper = found.upper;
+  if (found.upper - found.lower > 0.5 * span) {
     estimate.status = Status::ambiguous;
     text << " fits more than half of the curve";
+  } else if (found.touches_end) {
+    estimate.status = Status::above_range;
+    text << " fits the end of the curve; backlash may be larger than it covers";
   } else {
     estimate.status = Status::ok;
     estimate.backlash = found.best;
     text << " on the curve of " << conditions.rig;
     if (found.pieces > 1 || found.in_flagged_stretch)
       text << "; the curve is not monotonic here, the interval covers all branches";
-    if (found.touches_end) text << "; the interval reaches the end of the curve";
   }
   estimate.message = text.str();
   return with_angle(estimate, *this);

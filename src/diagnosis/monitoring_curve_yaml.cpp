@@ -1,11 +1,13 @@
 // Monitoring curves as files.
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+#include "backlash_diagnosis/record/record.h"
 
 namespace backlash {
 namespace {
@@ -20,6 +22,9 @@ void emit_conditions(YAML::Emitter& out, const CurveConditions& c) {
   const auto number = [&out](const char* key, double value, const char* unit) {
     out << YAML::Key << key << YAML::Value << to_text(value) << YAML::Comment(unit);
   };
+  const auto integer = [&out](const char* key, int value, const char* unit) {
+    out << YAML::Key << key << YAML::Value << value << YAML::Comment(unit);
+  };
   text("rig", c.rig);
   text("rig_digest", c.rig_digest);
   text("version", c.version);
@@ -32,9 +37,9 @@ void emit_conditions(YAML::Emitter& out, const CurveConditions& c) {
   out << YAML::Key << "apd" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "classes" << YAML::Value
       << c.apd.classes << YAML::Key << "lower" << YAML::Value << to_text(c.apd.lower) << YAML::Key << "upper"
       << YAML::Value << to_text(c.apd.upper) << YAML::EndMap;
-  number("periods", c.periods, "per seed");
-  number("settling_periods", c.settling_periods, "discarded");
-  number("seeds", c.seeds, "runs with other noise and sampling phase");
+  integer("periods", c.periods, "per seed");
+  integer("settling_periods", c.settling_periods, "discarded");
+  integer("seeds", c.seeds, "runs with other noise and sampling phase");
   number("noise", c.noise, "declared standard deviation, unit of the signal");
   number("motor_travel", c.motor_travel, "rad, largest on the curve");
   out << YAML::Key << "output_locked" << YAML::Value << c.output_locked;
@@ -73,7 +78,9 @@ CurveConditions read_conditions(const YamlReader& yaml) {
   c.rig = yaml.text("rig");
   c.rig_digest = yaml.text("rig_digest");
   c.version = yaml.text("version");
-  c.signal = yaml.text("signal");
+  std::vector<std::string> channels;
+  for (const Channel channel : kChannels) channels.push_back(channel_name(channel));
+  c.signal = yaml.choice("signal", channels);
   c.excitation = yaml.text("excitation");
   c.amplitude = yaml.number("amplitude", Range::not_negative());
   c.excitation_level = yaml.number("excitation_level", Range::not_negative());
@@ -131,6 +138,9 @@ MonitoringCurve MonitoringCurve::from_yaml(const YamlReader& yaml) {
   if (curve.noise_levels.empty()) yaml.fail("noise_levels", "needs at least one level");
   for (std::size_t i = 1; i < curve.noise_levels.size(); ++i)
     if (!(curve.noise_levels[i] > curve.noise_levels[i - 1])) yaml.fail("noise_levels", "must increase");
+  const auto& levels = curve.noise_levels;
+  if (std::find(levels.begin(), levels.end(), curve.conditions.noise) == levels.end())
+    yaml.map("conditions").fail("noise", "must be one of noise_levels");
   for (const YamlReader& point : yaml.maps("points"))
     curve.points.push_back(read_point(point, curve.noise_levels.size()));
   if (curve.points.size() < 2) yaml.fail("points", "a curve needs at least two points");

@@ -9,7 +9,6 @@
 namespace backlash {
 namespace {
 
-constexpr double kFirstSearch = kFirstPeriodSearch;
 constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says
 
 double get(const ChannelValues& values, Channel channel) { return values[static_cast<std::size_t>(channel)]; }
@@ -31,7 +30,7 @@ void SampleStream::restart() {
   grid_.reset();
   dropped_.reset();
   period_ = settings_.apd ? settings_.apd->period : 0;
-  next_search_ = kFirstSearch;
+  next_search_ = kFirstPeriodSearch;
 }
 
 double SampleStream::jump_limit() const { return std::max(1.0, 3 * period_); }
@@ -111,7 +110,7 @@ const PeriodResult* SampleStream::add(double time, const ChannelValues& values) 
 /// Searched at fixed lengths of the run, so that the outcome does not depend on how the samples arrive.
 void SampleStream::find_period() {
   if (record_.time.back() - start_ < next_search_) return;
-  next_search_ += std::min(next_search_, next_search_ < settings_.keep ? next_search_ : 0.25 * settings_.keep);
+  next_search_ += next_search_ < settings_.keep ? next_search_ : 0.25 * settings_.keep;
   period_ = excitation_period(record_, settings_.apd ? settings_.apd->signal : Channel::motor_torque);
 }
 
@@ -150,7 +149,7 @@ Record SampleStream::latest(long count) const {
   if (!settings_.apd && (count == 0 || !grid_)) return record_;  // nothing that needs whole periods
   if (!grid_) {
     if (!(run_period(record_, *settings_.apd) > 0)) return record_;
-    return whole_periods(record_, *settings_.apd).value_or(Record());  // found sooner than at the next search
+    return whole_periods(record_, *settings_.apd, count).value_or(Record());  // found sooner than at the next search
   }
   Windows cut = windows();
   if (count > 0) cut.begin = std::max(cut.begin, cut.end - count);

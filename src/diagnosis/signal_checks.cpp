@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
@@ -14,6 +15,7 @@ namespace backlash {
 namespace {
 
 constexpr std::size_t kMaxSamples = 1 << 16;  // per search; a longer record is searched in growing stretches
+constexpr double kNearly = 0.75;  // a period that is no whole number of samples correlates less than its multiples
 constexpr std::size_t kBlock = 10;            // samples over which noise is judged
 
 /// Values at `count` equidistant times from the first stamp on, linear in between.
@@ -30,9 +32,12 @@ std::vector<double> resample(const std::vector<double>& time, const std::vector<
   return even;
 }
 
-/// Autocorrelation at lags 0 .. `lags`, unbiased (each lag divided by its number of pairs), 1 at lag 0.
+/// Autocorrelation at lags 0 .. `lags`, each normalised by the power of the two stretches that it compares: 1 where
+/// they are equal, less elsewhere, also in a record of a few periods. 0 where one of them is still.
 std::vector<double> autocorrelation(std::vector<double> x, std::size_t lags) {
   const std::size_t n = x.size();
+  std::vector<double> power(n + 1, 0.0);  // of the first samples
+  for (std::size_t i = 0; i < n; ++i) power[i + 1] = power[i] + x[i] * x[i];
   std::size_t padded = 1;
   while (padded < 2 * n) padded *= 2;
   x.resize(padded, 0.0);
@@ -43,9 +48,10 @@ std::vector<double> autocorrelation(std::vector<double> x, std::size_t lags) {
   std::vector<double> product;
   fft.inv(product, spectrum);
   std::vector<double> r(lags + 1, 0.0);
-  const double power = product[0] / n;
-  if (!(power > 0)) return r;
-  for (std::size_t lag = 0; lag <= lags; ++lag) r[lag] = product[lag] / (n - lag) / power;
+  for (std::size_t lag = 0; lag <= lags; ++lag) {
+    const double early = power[n - lag], late = power[n] - power[lag];
+    if (std::min(early, late) > 1e-9 * power[n]) r[lag] = product[lag] / std::sqrt(early * late);
+  }
   return r;
 }
 
@@ -73,7 +79,7 @@ std::size_t repetition_lag(std::vector<double> x) {
   const double highest = *std::max_element(r.begin() + first, r.begin() + longest + 1);
   if (!(highest >= 0.5)) return 0;
   std::size_t rise = first;
-  while (r[rise] < 0.9 * highest) ++rise;
+  while (r[rise] < kNearly * highest) ++rise;
   // The top of this first hill; noise may put smaller ones on its slope.
   const auto end = r.begin() + std::min(r.size(), rise + rise / 4 + 2);
   const std::size_t lag = std::max_element(r.begin() + rise, end) - r.begin();
@@ -169,18 +175,53 @@ std::optional<double> estimate_noise(const std::vector<double>& signal, double s
   return std::sqrt(variance * (white < kClearlyNotWhite ? white : 1));
 }
 
+namespace {
+
+/// Smallest step of a signal: its resolution, where it has one.
+double smallest_step(const std::vector<double>& signal) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < signal.size(); ++i)
+    if (const double step = std::fabs(signal[i] - signal[i - 1]); step > 0) smallest = std::min(smallest, step);
+  return smallest;
+}
+
+/// Runs of at least 3 samples at one value.
+struct Runs {
+  std::size_t samples = 0;  // at the value, in runs or not
+  int count = 0;
+  int hard = 0;  // runs that the signal entered at a speed that would have carried it past the value
+};
+
+Runs runs_at(const std::vector<double>& signal, double value, double step) {
+  Runs runs;
+  for (std::size_t begin = 0; begin < signal.size();) {
+    if (signal[begin] != value) {
+      ++begin;
+      continue;
+    }
+    std::size_t end = begin;
+    while (end < signal.size() && signal[end] == value) ++end;
+    runs.samples += end - begin;
+    if (end - begin >= 3) {
+      ++runs.count;
+      const double next = begin >= 2 ? 2 * signal[begin - 1] - signal[begin - 2] : value;
+      if (std::fabs(next - signal[begin - 1]) > std::fabs(value - signal[begin - 1]) + 2 * step) ++runs.hard;
+    }
+    begin = end;
+  }
+  return runs;
+}
+
+}  // namespace
+
 bool looks_saturated(const std::vector<double>& signal) {
   if (signal.size() < 8) return false;
   const auto [low, high] = std::minmax_element(signal.begin(), signal.end());
   if (*low == *high) return false;
+  const double step = smallest_step(signal);
   for (const double extreme : {*low, *high}) {
-    std::size_t total = 0, run = 0, longest = 0;
-    for (const double v : signal) {
-      run = v == extreme ? run + 1 : 0;
-      total += v == extreme;
-      longest = std::max(longest, run);
-    }
-    if (longest >= 3 && total * 200 > signal.size()) return true;
+    const Runs runs = runs_at(signal, extreme, step);
+    if (2 * runs.hard > runs.count && runs.samples * 200 > signal.size()) return true;
   }
   return false;
 }

@@ -1,15 +1,23 @@
 #include "backlash_diagnosis/diagnosis/verdict.h"
 
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 namespace backlash {
 namespace {
 
-double width(const Estimate& e) { return e.angle_upper - e.angle_lower; }
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool is_bound(const Estimate& e) { return e.status == Status::above_range && std::isfinite(e.angle_lower); }
+
+/// Upper end of the interval; infinite for a lower bound.
+double upper(const Estimate& e) { return std::isnan(e.angle_upper) ? kInfinity : e.angle_upper; }
+
+double width(const Estimate& e) { return std::isnan(e.angle_lower) ? kInfinity : upper(e) - e.angle_lower; }
 
 bool overlap(const Estimate& a, const Estimate& b) {
-  return a.angle_lower <= b.angle_upper && b.angle_lower <= a.angle_upper;
+  return a.angle_lower <= upper(b) && b.angle_lower <= upper(a);
 }
 
 /// Compares the others with the chosen estimate.
@@ -17,7 +25,7 @@ std::string agreement(const std::vector<Estimate>& estimates, int chosen) {
   std::string against;
   int sound = 0;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
-    if (estimates[i].status != Status::ok) continue;
+    if (estimates[i].status != Status::ok && !is_bound(estimates[i])) continue;
     ++sound;
     if (overlap(estimates[i], estimates[chosen])) continue;
     against += (against.empty() ? "" : ", ") + estimates[i].method;
@@ -39,8 +47,7 @@ int choose(const std::vector<Estimate>& estimates) {
     if (estimates[i].status == Status::ok && (best < 0 || width(estimates[i]) < width(estimates[best])))
       best = static_cast<int>(i);
   for (std::size_t i = 0; i < estimates.size() && best < 0; ++i)
-    if (estimates[i].status == Status::above_range && std::isfinite(estimates[i].angle_lower))
-      best = static_cast<int>(i);
+    if (is_bound(estimates[i])) best = static_cast<int>(i);
   return best;
 }
 

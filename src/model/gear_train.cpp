@@ -14,7 +14,9 @@ Coupling referred(Coupling coupling, double factor) {
   return coupling;
 }
 
-double spring(const Coupling& c, double twist) { return c.stiffness * twist; }
+double spring(const Coupling& c, double twist) {
+  return c.stiffness * twist;
+}
 
 }  // namespace
 
@@ -27,6 +29,7 @@ GearTrain::GearTrain(const Rig& rig)
       lever_(rig.mesh.lever()),
       contact_(rig.mesh.contact),
       terms_(rig.terms) {
+  if (!contact_) throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
   set_backlash(rig.mesh.backlash);
   join(rig);
 }
@@ -39,13 +42,14 @@ void GearTrain::join(const Rig& rig) {
   const bool gear_fixed = rig.link_locked && output_.rigid;
   node_[kGear] = gear_fixed ? kFixed : dof_++;
   node_[kLink] = rig.link_locked ? kFixed : output_.rigid ? node_[kGear] : dof_++;
-  const double part[kSlots] = {rig.motor.inertia * square + 0.5 * input_.inertia,
-                               rig.pinion.inertia * square + 0.5 * input_.inertia,
-                               rig.gear.inertia + 0.5 * output_.inertia, rig.link.inertia + 0.5 * output_.inertia};
+  const double part[kSlots] = {
+      rig.motor.inertia * square + 0.5 * input_.inertia, rig.pinion.inertia * square + 0.5 * input_.inertia,
+      rig.gear.inertia + 0.5 * output_.inertia, rig.link.inertia + 0.5 * output_.inertia};
   for (int slot = 0; slot < kSlots; ++slot)
     if (node_[slot] != kFixed) inertia_[node_[slot]] += part[slot];
   for (int node = 0; node < dof_; ++node)
-    if (!(inertia_[node] > 0)) throw InvalidParameter("inertia", inertia_[node], "every moving part needs inertia");
+    if (!(inertia_[node] > 0))
+      throw InvalidParameter("inertia", inertia_[node], "every moving part needs inertia");
 }
 
 void GearTrain::set_backlash(double backlash) {
@@ -129,7 +133,8 @@ Observation GearTrain::observe(const double* state, double motor_torque) const {
 double GearTrain::energy(const double* state) const {
   const Slots s = unpack(state);
   double energy = 0;
-  for (int node = 0; node < dof_; ++node) energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
+  for (int node = 0; node < dof_; ++node)
+    energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
   if (!input_.rigid) energy += 0.5 * input_.stiffness * std::pow(s.q[kMotor] - s.q[kPinion], 2);
   if (!output_.rigid) energy += 0.5 * output_.stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
   const double penetration = std::fabs(lever_ * (s.q[kPinion] - s.q[kGear])) - half_gap_;

@@ -27,16 +27,17 @@ Coupling read_coupling(const YamlReader& parent, const std::string& key) {
 Mesh read_mesh(const YamlReader& yaml) {
   Mesh mesh;
   if (yaml.has("base_radius")) mesh.base_radius = yaml.number("base_radius", Range::positive());
-  const char* const keys[] = {"backlash", "half_gap", "backlash_angle"};
-  int given = 0;
-  for (const char* key : keys) given += yaml.has(key);
-  if (given != 1) yaml.fail("backlash", "exactly one of backlash, half_gap, backlash_angle must be given");
-  if (yaml.has("half_gap")) mesh.backlash = 2 * yaml.number("half_gap", Range::not_negative());
-  if (yaml.has("backlash")) mesh.backlash = yaml.number("backlash", Range::not_negative());
-  if (yaml.has("backlash_angle"))
-    mesh.backlash = mesh.lever() * yaml.number("backlash_angle", Range::not_negative());
-  else if (mesh.angular())
-    yaml.fail("backlash", "a mesh without base_radius must state backlash_angle (rad)");
+  std::vector<std::string> given;
+  for (const char* key : {"backlash", "half_gap", "backlash_angle"})
+    if (yaml.has(key)) given.push_back(key);
+  if (given.size() != 1)
+    yaml.fail(given.empty() ? "backlash" : given.back(),
+              "exactly one of backlash, half_gap, backlash_angle must be given");
+  const std::string& key = given.front();
+  if (mesh.angular() && key != "backlash_angle")
+    yaml.fail(key, "a mesh without base_radius must state backlash_angle (rad)");
+  const double factor = key == "half_gap" ? 2 : key == "backlash_angle" ? mesh.lever() : 1;
+  mesh.backlash = factor * yaml.number(key, Range::not_negative());
   mesh.contact = read_contact_law(yaml.map("contact"));
   return mesh;
 }

@@ -50,8 +50,9 @@ double StampClock::seconds(const ros::Time& stamp) {
     started_ = true;
     origin_ = stamp;
   }
-  const double whole = double(stamp.sec) - double(origin_.sec);
-  return whole + (double(stamp.nsec) - double(origin_.nsec)) * 1e-9;
+  const std::int64_t whole = std::int64_t(stamp.sec) - std::int64_t(origin_.sec);
+  const std::int64_t nanoseconds = whole * 1'000'000'000 + std::int64_t(stamp.nsec) - std::int64_t(origin_.nsec);
+  return nanoseconds / 1e9;  // the double nearest to the decimal
 }
 
 bool mentions(const sensor_msgs::JointState& message, const JointNames& names) {

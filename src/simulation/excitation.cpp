@@ -1,8 +1,9 @@
 #include "backlash_diagnosis/simulation/excitation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 
@@ -10,6 +11,17 @@ namespace backlash {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
+
+void require(const char* name, double value, const Range& range) {
+  if (!range.contains(value)) throw InvalidParameter(std::string("excitation.") + name, value, range.text());
+}
+
+/// Greatest common divisor [Hz] by Euclid's algorithm; remainders below 1e-6 Hz count as none.
+double common_divisor(double a, double b) {
+  if (a < b) std::swap(a, b);
+  while (b > 1e-6) a = std::exchange(b, std::fabs(std::remainder(a, b)));
+  return a;
+}
 
 class Constant : public Excitation {
  public:
@@ -26,6 +38,7 @@ class External : public Excitation {
   double torque(double, long) const override { return torque_; }
   double segment_end(long) const override { return kNever; }
   bool set_torque(double torque) override {
+    require("torque", torque, Range::any());
     torque_ = torque;
     return true;
   }
@@ -53,15 +66,16 @@ class MultiSine : public Excitation {
   MultiSine(std::vector<SineLine> lines, double bias) : lines_(std::move(lines)), bias_(bias) {}
   double torque(double t, long) const override {
     double sum = bias_;
-    for (const SineLine& line : lines_) sum += line.amplitude * std::sin(2 * M_PI * line.frequency * t + line.phase);
+    for (const SineLine& line : lines_)
+      sum += line.amplitude * std::sin(2 * M_PI * line.frequency * t + line.phase);
     return sum;
   }
   double segment_end(long) const override { return kNever; }
   double period() const override {
     if (lines_.size() == 1) return 1 / lines_.front().frequency;
-    long common = 0;  // in mHz
-    for (const SineLine& line : lines_) common = std::gcd(common, std::lround(line.frequency * 1000));
-    return common > 0 ? 1000.0 / common : 0;
+    double common = 0;
+    for (const SineLine& line : lines_) common = common_divisor(common, line.frequency);
+    return common >= 1e-3 ? 1 / common : 0;
   }
 
  private:
@@ -72,7 +86,11 @@ class MultiSine : public Excitation {
 class Chirp : public Excitation {
  public:
   Chirp(double amplitude, double start, double end, double duration, double bias)
-      : amplitude_(amplitude), start_(start), rate_((end - start) / duration), duration_(duration), bias_(bias) {}
+      : amplitude_(amplitude),
+        start_(start),
+        rate_((end - start) / duration),
+        duration_(duration),
+        bias_(bias) {}
   double torque(double t, long segment) const override {
     const double s = t - segment * duration_;
     return bias_ + amplitude_ * std::sin(2 * M_PI * (start_ + 0.5 * rate_ * s) * s);
@@ -86,9 +104,15 @@ class Chirp : public Excitation {
 
 }  // namespace
 
-std::unique_ptr<Excitation> constant_excitation(double torque) { return std::make_unique<Constant>(torque); }
+std::unique_ptr<Excitation> constant_excitation(double torque) {
+  require("torque", torque, Range::any());
+  return std::make_unique<Constant>(torque);
+}
 
 std::unique_ptr<Excitation> square_excitation(double amplitude, double frequency, double bias) {
+  require("amplitude", amplitude, Range::any());
+  require("frequency", frequency, Range::positive());
+  require("bias", bias, Range::any());
   return std::make_unique<Square>(amplitude, frequency, bias);
 }
 
@@ -98,14 +122,27 @@ std::unique_ptr<Excitation> sine_excitation(double amplitude, double frequency, 
 
 std::unique_ptr<Excitation> chirp_excitation(double amplitude, double start, double end, double duration,
                                              double bias) {
+  require("amplitude", amplitude, Range::any());
+  require("start_frequency", start, Range::positive());
+  require("end_frequency", end, Range::positive());
+  require("duration", duration, Range::positive());
+  require("bias", bias, Range::any());
   return std::make_unique<Chirp>(amplitude, start, end, duration, bias);
 }
 
 std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, double bias) {
+  for (const SineLine& line : lines) {
+    require("amplitude", line.amplitude, Range::any());
+    require("frequency", line.frequency, Range::positive());
+    require("phase", line.phase, Range::any());
+  }
+  require("bias", bias, Range::any());
   return std::make_unique<MultiSine>(std::move(lines), bias);
 }
 
-std::unique_ptr<Excitation> external_excitation() { return std::make_unique<External>(); }
+std::unique_ptr<Excitation> external_excitation() {
+  return std::make_unique<External>();
+}
 
 std::unique_ptr<Excitation> ExcitationSettings::create() const {
   if (type == "square") return square_excitation(amplitude, frequency, bias);
@@ -114,7 +151,8 @@ std::unique_ptr<Excitation> ExcitationSettings::create() const {
   if (type == "multi_sine") return multi_sine_excitation(lines, bias);
   if (type == "constant") return constant_excitation(amplitude);
   if (type == "topic") return external_excitation();
-  throw InvalidParameter("excitation.type", type, "must be square, sine, chirp, multi_sine, constant or topic");
+  throw InvalidParameter("excitation.type", type,
+                         "must be square, sine, chirp, multi_sine, constant or topic");
 }
 
 ExcitationSettings read_excitation(const YamlReader& yaml) {

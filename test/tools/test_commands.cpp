@@ -28,8 +28,8 @@ std::string rig_variant(bool noise, bool fast) {
     text = changed;
   };
   if (noise) replace("\nsensors:\n", "\nsensors:\n  sensor_torque: {noise: 0.002}\n");
-  if (fast) replace("frequency: 10 ", "frequency: 50 ");
-  if (fast) replace("period: 0\\.1 ", "period: 0.02 ");
+  if (fast) replace("frequency: 10 ", "frequency: 20 ");
+  if (fast) replace("period: 0\\.1 ", "period: 0.05 ");
   return text;
 }
 
@@ -298,7 +298,7 @@ TEST_F(Commands, WithoutARigOnlyWhatTheCurveAllows) {
 
 TEST_F(Commands, CurveIsBuiltWhereNoneIsGiven) {
   write("fast.yaml", rig_variant(false, true));
-  done("simulate fast.yaml --duration 0.2 --sample-rate 2000 --backlash 6e-5 --out a.csv");
+  done("simulate fast.yaml --duration 0.4 --sample-rate 2000 --backlash 0 --out a.csv");
   const Outcome outcome = run("diagnose_record a.csv --rig fast.yaml --method apd_skewness --json -");
   expect_contains(outcome.err, "building one");
   const Json json = Json::parse(outcome.out);

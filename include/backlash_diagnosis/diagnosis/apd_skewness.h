@@ -22,11 +22,15 @@ struct ApdSettings {
 struct ApdResult {
   double period = 0;                   // s; 0 where none was found
   std::vector<PeriodResult> periods;   // complete ones, after settling
-  int incomplete = 0;                  // windows left out because of gaps
+  int incomplete = 0;                  // windows left out because of gaps, or with no sample inside the classes
   double skewness = kNaN;              // mean over the periods
   double noise = kNaN;                 // estimated from the signal; NaN with fewer than two periods
   AmplitudeDistribution total{ApdLayout{2, 0, 1}};  // all periods together
 };
+
+/// Travel from wall to wall [unit of the position]: distance between its 5 % and 95 % quantiles, so that ringing at the
+/// walls counts little. NaN for an empty list.
+double travel_of(const std::vector<double>& position);
 
 /// Excitation period of a record [s]: of motor_torque where recorded, else of `signal`. 0 where there is none.
 double excitation_period(const Record& record, Channel signal);
@@ -38,15 +42,17 @@ constexpr double kFirstPeriodSearch = 0.25;  // s of a run after which a period 
 double run_period(const Record& record, const ApdSettings& settings);
 
 /// The whole excitation periods of a record after settling, by period and settling of `settings` (0 s: run_period).
-/// Nothing where there is no period, or not one whole period after settling.
-std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings);
+/// `last` > 0: only so many of them, the last. Nothing where there is no period, or not one whole period after settling.
+std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings, long last = 0);
 
 /// Throws InvalidParameter for a layout or period outside its range; a record without the signal gives no periods.
 ApdResult analyse_apd(const Record& record, const ApdSettings& settings);
 
 /// Why a record was not taken under the conditions of a curve; empty where it was. Compares sampling rate (2 %),
 /// excitation amplitude and shape (5 %, from motor_torque where recorded, else 25 % on the signal's own level),
-/// frequency (2 %), saturation, and whether the output moves although it should be locked.
+/// frequency (2 %, with two periods or more), noise, saturation, and whether the output moves although it should be
+/// locked. Without motor_torque other amplitudes (within about 25 %) and shapes pass; without motor_position and
+/// load_position a moving output passes where it leaves the signal's level alone.
 std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
                           const MonitoringCurve& curve);
 

@@ -29,8 +29,9 @@ struct Diagnosis {
 const std::vector<std::string>& diagnosis_methods();
 
 /// Runs the estimators (`method` empty: all) on the whole excitation periods of a record after settling, or on all of it
-/// where the rig declares no APD. Throws InvalidParameter for an unknown method; everything that the record lacks becomes
-/// a status with its reason.
+/// where the rig declares no APD or the excitation has no period. Throws InvalidParameter for an unknown method;
+/// everything that the record lacks becomes a status with its reason. As a SampleStream that keeps all of the record:
+/// the same numbers, but for jumps of the stamps, at which a stream begins anew.
 Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
                    const std::optional<Baseline>& baseline = std::nullopt, const std::string& method = "");
 

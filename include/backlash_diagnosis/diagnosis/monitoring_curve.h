@@ -62,7 +62,11 @@ class MonitoringCurve {
   const SkewnessCell& nominal(const CurvePoint& point) const;
 
   /// Backlash values that explain a mean skewness over `periods` periods at the 95 % level, and the best of them.
-  /// Status ok, below_range, above_range or ambiguous.
+  ///   ok           the interval lies on the curve; where the curve is not monotonic it spans all branches
+  ///   below_range  skewness is higher than at the smallest backlash: no interval
+  ///   above_range  the largest backlash of the curve explains it, so may an even larger one, or it is lower than
+  ///                anywhere on the curve: a lower bound only
+  ///   ambiguous    the interval is longer than half of the curve; no upper bound where it reaches the end
   Estimate invert(double skewness, int periods, double noise) const;
 
   std::string to_yaml() const;

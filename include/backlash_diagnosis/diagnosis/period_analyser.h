@@ -52,7 +52,7 @@ class PeriodAnalyser {
   /// null; valid until the next call. Windows that end within the first kLeadingSamples samples are not returned.
   const PeriodResult* add(double time, double value);
 
-  /// No more samples will come: returns the open window if all but a fraction of a sample of it was seen, else null.
+  /// No more samples will come: returns the open window if its end is less than two samples away, else null.
   const PeriodResult* finish();
 
   /// Forgets all samples; the next one starts window 0.

@@ -37,7 +37,8 @@ struct Verdict {
   std::string message;
 };
 
-/// Stands on the estimate with status ok and the narrowest interval. Others agree where the intervals overlap.
+/// Stands on the estimate with status ok and the narrowest interval. Others with status ok, or above_range with its lower
+/// bound, agree where the intervals overlap.
 /// Without limits a sound estimate is graded good. An above_range estimate alone is graded by its lower bound.
 Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limits>& limits,
                 const std::optional<Baseline>& baseline);

@@ -26,6 +26,7 @@ class Excitation {
   virtual double period() const { return 0; }
 
   /// Torque set from outside [N m], held until the next call. Refused (false) by all but the `topic` excitation.
+  /// Throws InvalidParameter for a torque that is not finite.
   virtual bool set_torque(double) { return false; }
 };
 
@@ -36,6 +37,7 @@ struct SineLine {
   double phase;      // rad
 };
 
+/// All of them throw InvalidParameter for a value that is not finite or a frequency or duration that is not > 0.
 std::unique_ptr<Excitation> constant_excitation(double torque);
 /// +amplitude for the first half of each period, -amplitude for the second, plus bias.
 std::unique_ptr<Excitation> square_excitation(double amplitude, double frequency, double bias = 0);
@@ -43,7 +45,8 @@ std::unique_ptr<Excitation> sine_excitation(double amplitude, double frequency, 
 /// Sine whose frequency rises linearly from `start` to `end` [Hz] within `duration` [s], then starts again.
 std::unique_ptr<Excitation> chirp_excitation(double amplitude, double start, double end, double duration,
                                              double bias = 0);
-/// Sum of sines; its period is the inverse of the greatest common divisor of the frequencies (to 1 mHz).
+/// Sum of sines; its period is the inverse of the greatest common divisor of the frequencies (to 1e-6 Hz), 0 where that
+/// is below 1 mHz.
 std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, double bias = 0);
 /// Zero until set_torque() is called.
 std::unique_ptr<Excitation> external_excitation();

@@ -21,8 +21,9 @@ class Plant {
   /// Back to time 0 at rest in the middle of the gap, no external torque.
   void reset();
 
-  /// Integrates up to t [s], t >= time(). Stops and starts again at every switch of the excitation on the way.
-  /// Throws IntegrationError.
+  /// Integrates up to t [s], t >= time(). Stops and starts again at every switch of the excitation on the way; at a
+  /// switch (to within rounding) the torque is that after it, and time() the switch. Throws InvalidParameter for
+  /// another t, and IntegrationError, after which only reset() helps.
   void advance_to(double t);
 
   /// Changes that act from time() on; the integrator starts again there.

@@ -1,0 +1,260 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/simulation/excitation.h"
+
+namespace backlash {
+namespace {
+
+const double kNever = std::numeric_limits<double>::infinity();
+
+TEST(Excitation, SquareSwitchesAtExactTimes) {
+  const auto square = square_excitation(0.05, 10, 0.01);
+  EXPECT_EQ(square->period(), 0.1);
+  for (long k : {0L, 1L, 2L, 3L, 4L, 17L, 1000000L, 1000000007L}) {
+    EXPECT_EQ(square->segment_end(k), (k + 1) / 20.0) << k;  // rounded once, nothing accumulates
+    const double inside = (k + 0.5) / 20;
+    EXPECT_EQ(square->torque(inside, k), k % 2 == 0 ? 0.01 + 0.05 : 0.01 - 0.05);
+  }
+}
+
+TEST(Excitation, SquareIsDefinedFromBothSidesOfASwitch) {
+  const auto square = square_excitation(0.05, 10);
+  EXPECT_EQ(square->torque(0.05, 0), 0.05);
+  EXPECT_EQ(square->torque(0.05, 1), -0.05);
+}
+
+TEST(Excitation, SineFollowsTheFormulaAndNeverSwitches) {
+  const auto sine = sine_excitation(2, 3, -0.5);
+  EXPECT_DOUBLE_EQ(sine->period(), 1.0 / 3);
+  EXPECT_EQ(sine->segment_end(0), kNever);
+  EXPECT_DOUBLE_EQ(sine->torque(0, 0), -0.5);
+  EXPECT_NEAR(sine->torque(1.0 / 12, 0), 1.5, 1e-15);   // a quarter of a period
+  EXPECT_NEAR(sine->torque(3.0 / 12, 0), -2.5, 1e-15);  // three quarters
+  EXPECT_NEAR(sine->torque(1.0 / 18, 0), -0.5 + 2 * std::sqrt(0.75),
+              1e-14);  // 60 deg
+}
+
+// Where the torque crosses its bias in (from, to), by bisection.
+double crossing(const Excitation& excitation, double bias, double from, double to) {
+  const bool rising = excitation.torque(from, 0) < bias;
+  for (int i = 0; i < 80; ++i) {
+    const double middle = 0.5 * (from + to);
+    ((excitation.torque(middle, 0) < bias) == rising ? from : to) = middle;
+  }
+  return 0.5 * (from + to);
+}
+
+// Between two crossings the phase grows by half a turn: with a frequency that is linear in time, the
+// frequency in the middle times the distance is exactly 1/2.
+void expect_linear_frequency(double start, double end, double duration) {
+  const auto chirp = chirp_excitation(1, start, end, duration, 0.25);
+  const double step = 0.05 / std::max(start, end);
+  std::vector<double> crossings = {0};
+  for (double t = step; t + step < duration; t += step)
+    if ((chirp->torque(t, 0) < 0.25) != (chirp->torque(t + step, 0) < 0.25))
+      crossings.push_back(crossing(*chirp, 0.25, t, t + step));
+  for (std::size_t i = 1; i < crossings.size(); ++i) {
+    const double middle = 0.5 * (crossings[i] + crossings[i - 1]);
+    const double frequency = start + (end - start) * middle / duration;
+    // bisection to the last digit; the argument of the sine has an error of a few 1e-14 turns
+    EXPECT_NEAR(frequency * (crossings[i] - crossings[i - 1]), 0.5, 1e-11) << "at " << middle << " s";
+  }
+  // half turns within the sweep: its mean frequency times its length, the last one may be cut
+  EXPECT_NEAR(static_cast<double>(crossings.size() - 1), (start + end) * duration, 1);
+}
+
+TEST(Excitation, ChirpFrequencyRisesOrFallsLinearly) {
+  expect_linear_frequency(1, 50, 4);
+  expect_linear_frequency(40, 2, 3);
+  expect_linear_frequency(5, 5, 2);
+}
+
+TEST(Excitation, ChirpHasContinuousPhaseAndStartsAgainAfterItsDuration) {
+  const auto chirp = chirp_excitation(0.3, 1, 20, 2.5, 0.1);
+  EXPECT_EQ(chirp->period(), 2.5);
+  for (long k : {0L, 1L, 9L, 1000L}) {
+    EXPECT_EQ(chirp->segment_end(k), (k + 1) * 2.5);
+    EXPECT_NEAR(chirp->torque(k * 2.5, k), 0.1, 1e-15);
+    for (double s = 0; s < 2.5; s += 0.13)  // 2500 s have a rounding of 5e-13 s, times 2 pi 20 Hz
+      EXPECT_NEAR(chirp->torque(k * 2.5 + s, k), chirp->torque(s, 0), 2e-11);
+  }
+  for (double t = 0; t < 2.5; t += 1e-3)  // no jump: slope at most amplitude times 2 pi 20 Hz
+    EXPECT_LE(std::fabs(chirp->torque(t + 1e-3, 0) - chirp->torque(t, 0)), 0.3 * 2 * M_PI * 20 * 1e-3);
+}
+
+TEST(Excitation, MultiSineAddsItsLines) {
+  const auto sum = multi_sine_excitation({{1, 2, 0}, {0.5, 3, M_PI / 2}}, 0.25);
+  EXPECT_EQ(sum->segment_end(0), kNever);
+  EXPECT_DOUBLE_EQ(sum->torque(0, 0), 0.25 + 0.5);
+  for (double t = 0; t < 1; t += 0.07)
+    EXPECT_NEAR(sum->torque(t, 0), 0.25 + std::sin(4 * M_PI * t) + 0.5 * std::cos(6 * M_PI * t), 1e-14);
+}
+
+double multi_sine_period(const std::vector<double>& frequencies) {
+  std::vector<SineLine> lines;
+  for (double f : frequencies) lines.push_back({1, f, 0.3 * f});
+  const auto excitation = multi_sine_excitation(lines);
+  const double period = excitation->period();
+  if (period > 0) {
+    for (double t = 0.01; t < period; t += period / 7)
+      EXPECT_NEAR(excitation->torque(t, 0), excitation->torque(t + period, 0), 1e-6) << "does not repeat";
+  }
+  return period;
+}
+
+TEST(Excitation, MultiSinePeriodIsThatOfTheGreatestCommonDivisor) {
+  EXPECT_NEAR(multi_sine_period({10, 15, 25}), 0.2, 1e-15);
+  EXPECT_NEAR(multi_sine_period({1, 1.5}), 2, 1e-14);
+  EXPECT_NEAR(multi_sine_period({0.001, 7}), 1000, 1e-9);
+  EXPECT_NEAR(multi_sine_period({1.0 / 3, 2.0 / 3}), 3, 1e-12);  // not a multiple of 1 mHz
+  EXPECT_NEAR(multi_sine_period({12.5, 12.5}), 0.08, 1e-15);
+  EXPECT_NEAR(multi_sine_period({0.0004}), 2500, 1e-9);  // a single line always repeats
+  EXPECT_NEAR(multi_sine_period({101.7, 33.9, 67.8}), 1 / 33.9, 1e-12);
+}
+
+TEST(Excitation, MultiSineWithoutCommonPeriodSaysSo) {
+  EXPECT_EQ(multi_sine_period({1, std::sqrt(2)}), 0);
+  EXPECT_EQ(multi_sine_period({0.0004, 1}),
+            0);  // 0.4 mHz is below the limit; the line must not be overlooked
+}
+
+TEST(Excitation, ConstantHoldsForEver) {
+  const auto constant = constant_excitation(-0.7);
+  EXPECT_EQ(constant->torque(0, 0), -0.7);
+  EXPECT_EQ(constant->torque(1e9, 0), -0.7);
+  EXPECT_EQ(constant->segment_end(0), kNever);
+  EXPECT_EQ(constant->period(), 0);
+}
+
+TEST(Excitation, TopicHoldsTheLastTorqueAndRefusesNonsense) {
+  const auto topic = external_excitation();
+  EXPECT_EQ(topic->torque(3, 0), 0);
+  EXPECT_TRUE(topic->set_torque(0.4));
+  EXPECT_EQ(topic->torque(5, 0), 0.4);
+  EXPECT_EQ(topic->segment_end(0), kNever);
+  EXPECT_THROW(topic->set_torque(std::nan("")), InvalidParameter);
+  EXPECT_THROW(topic->set_torque(kNever), InvalidParameter);
+  EXPECT_EQ(topic->torque(6, 0), 0.4);
+}
+
+TEST(Excitation, AllButTopicRefuseATorqueFromOutside) {
+  const auto square = square_excitation(1, 1);
+  EXPECT_FALSE(square->set_torque(5));
+  EXPECT_EQ(square->torque(0.1, 0), 1);
+  EXPECT_FALSE(constant_excitation(1)->set_torque(5));
+  EXPECT_FALSE(sine_excitation(1, 1)->set_torque(5));
+  EXPECT_FALSE(chirp_excitation(1, 1, 2, 1)->set_torque(5));
+  EXPECT_FALSE(multi_sine_excitation({{1, 1, 0}})->set_torque(5));
+}
+
+TEST(Excitation, FactoriesRefuseWhatHasNoMeaning) {
+  const double nan = std::nan("");
+  const std::function<void()> bad[] = {
+      [=] { constant_excitation(nan); },
+      [=] { square_excitation(1, 0); },
+      [=] { square_excitation(1, -10); },
+      [=] { square_excitation(nan, 10); },
+      [=] { square_excitation(1, 10, kNever); },
+      [=] { sine_excitation(1, -1); },
+      [=] { chirp_excitation(1, 0, 10, 1); },
+      [=] { chirp_excitation(1, 1, nan, 1); },
+      [=] { chirp_excitation(1, 1, 10, 0); },
+      [=] {
+        multi_sine_excitation({{1, 1, 0}, {1, 0, 0}});
+      },
+      [=] {
+        multi_sine_excitation({{1, 1, nan}});
+      },
+      [=] {
+        ExcitationSettings settings;
+        settings.type = "triangle";
+        settings.create();
+      },
+  };
+  for (const auto& action : bad) EXPECT_THROW(action(), InvalidParameter) << "case " << &action - bad;
+  try {
+    square_excitation(1, -10);
+  } catch (const InvalidParameter& error) {
+    EXPECT_STREQ(error.what(), "excitation.frequency = -10: must be > 0");
+  }
+}
+
+YamlReader parse(const std::string& text) {
+  return YamlReader::from_text(text, "rig.yaml");
+}
+
+std::unique_ptr<Excitation> created(const std::string& text) {
+  const YamlReader yaml = parse(text);
+  const ExcitationSettings settings = read_excitation(yaml);
+  yaml.finish();
+  return settings.create();
+}
+
+TEST(ExcitationSettings, EveryTypeIsReadAndCreated) {
+  EXPECT_EQ(created("{type: square, amplitude: 0.05, frequency: 10, bias: 0.01}")->torque(0, 1), 0.01 - 0.05);
+  EXPECT_EQ(created("{type: sine, amplitude: 1, frequency: 2}")->period(), 0.5);
+  EXPECT_EQ(created("{type: constant, torque: -3}")->torque(0, 0), -3);
+  EXPECT_TRUE(created("type: topic")->set_torque(1));
+  const auto chirp =
+      created("{type: chirp, amplitude: 1, start_frequency: 8, end_frequency: 2, duration: 4, bias: 1}");
+  EXPECT_EQ(chirp->period(), 4);
+  EXPECT_NEAR(chirp->torque(1.0 / 32, 0), 1 + std::sin(2 * M_PI * (8 - 0.75 / 32) / 32), 1e-14);
+  const auto sum = created(
+      "{type: multi_sine, bias: 2, lines: [{amplitude: 1, frequency: 2, phase: 0.5}, "
+      "{amplitude: 3, frequency: 5}]}");
+  EXPECT_DOUBLE_EQ(sum->torque(0, 0), 2 + std::sin(0.5));
+}
+
+TEST(ExcitationSettings, CopiesAreIndependent) {
+  ExcitationSettings settings;
+  settings.type = "topic";
+  const auto a = settings.create(), b = settings.create();
+  a->set_torque(1);
+  EXPECT_EQ(b->torque(0, 0), 0);
+}
+
+TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
+  const struct {
+    const char* text;
+    const char* message;
+  } cases[] = {
+      {"amplitude: 1\n",
+       "rig.yaml:1: type: is missing, expected one of square, sine, chirp, multi_sine, constant, topic"},
+      {"type: triangle\n",
+       "rig.yaml:1: type = triangle: must be one of square, sine, chirp, multi_sine, constant, topic"},
+      {"type: square\nfrequency: 10\n", "rig.yaml:1: amplitude: is missing"},
+      {"type: square\namplitude: -1\nfrequency: 10\n", "rig.yaml:2: amplitude = -1: must be >= 0"},
+      {"type: square\namplitude: 1\nfrequency: 0\n", "rig.yaml:3: frequency = 0: must be > 0"},
+      {"type: square\namplitude: 1\nfrequency: 10 Hz\n", "rig.yaml:3: frequency = 10 Hz: not a number"},
+      {"type: square\namplitude: 1\nfrequency: 1\nbias: yes\n", "rig.yaml:4: bias = yes: not a number"},
+      {"type: square\namplitude: 1\nfrequency: 1\nduty: 1\n", "rig.yaml:4: duty = 1: unknown key"},
+      {"type: constant\namplitude: 1\n", "rig.yaml:1: torque: is missing"},
+      {"type: topic\namplitude: 1\n", "rig.yaml:2: amplitude = 1: unknown key"},
+      {"type: chirp\namplitude: 1\nstart_frequency: 1\nend_frequency: 2\n",
+       "rig.yaml:1: duration: is missing"},
+      {"type: chirp\namplitude: 1\nstart_frequency: 0\nend_frequency: 2\nduration: 1\n",
+       "rig.yaml:3: start_frequency = 0: must be > 0"},
+      {"type: multi_sine\nlines: []\n", "rig.yaml:2: lines = [...]: needs at least one line"},
+      {"type: multi_sine\nlines: [{amplitude: 1, frequency: -1}]\n",
+       "rig.yaml:2: lines[0].frequency = -1: must be > 0"},
+      {"type: multi_sine\nlines: 3\n", "rig.yaml:2: lines = 3: must be a list of maps"},
+  };
+  for (const auto& bad : cases) {
+    try {
+      created(bad.text);
+      ADD_FAILURE() << "accepted: " << bad.text;
+    } catch (const BadData& error) {
+      EXPECT_EQ(std::string(error.what()).substr(0, std::string(bad.message).size()), bad.message);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace backlash

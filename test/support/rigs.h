@@ -1,0 +1,57 @@
+// Rigs, excitations and tolerances that several tests share.
+#pragma once
+
+#include <string>
+
+#include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/simulation/plant.h"
+#include "support/data.h"
+
+namespace backlash::test {
+
+/// config/sarkar_1997.yaml with another half gap [m].
+inline Rig sarkar_rig(double half_gap) {
+  Rig rig = read_rig(YamlReader::from_file(package_file("config/sarkar_1997.yaml")));
+  rig.mesh.backlash = 2 * half_gap;
+  return rig;
+}
+
+/// A mass [kg] on the line of action between two walls, `half_gap` [m] from the middle: one degree of
+/// freedom.
+inline Rig wall_rig(double mass, double half_gap, std::shared_ptr<const ContactLaw> law) {
+  Rig rig;
+  rig.mesh.base_radius = 0.02;
+  rig.motor.inertia = mass * 0.02 * 0.02;
+  rig.link_locked = true;
+  rig.mesh.backlash = 2 * half_gap;
+  rig.mesh.contact = std::move(law);
+  return rig;
+}
+
+inline ExcitationSettings square(double amplitude, double frequency) {
+  ExcitationSettings settings;
+  settings.type = "square";
+  settings.amplitude = amplitude;
+  settings.frequency = frequency;
+  return settings;
+}
+
+inline ExcitationSettings constant(double torque) {
+  ExcitationSettings settings;
+  settings.type = "constant";
+  settings.amplitude = torque;
+  return settings;
+}
+
+inline ExcitationSettings topic() {
+  ExcitationSettings settings;
+  settings.type = "topic";
+  return settings;
+}
+
+/// Absolute tolerances fall with the relative one, from those of the shipped rigs at 1e-6.
+inline SolverSettings solver(double relative_tolerance, const std::string& method = "dormand_prince") {
+  return {method, relative_tolerance, 1e-4 * relative_tolerance, 0.1 * relative_tolerance};
+}
+
+}  // namespace backlash::test
