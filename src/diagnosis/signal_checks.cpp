@@ -221,7 +221,8 @@ bool looks_saturated(const std::vector<double>& signal) {
   const double step = smallest_step(signal);
   for (const double extreme : {*low, *high}) {
     const Runs runs = runs_at(signal, extreme, step);
-    if (2 * runs.hard > runs.count && runs.samples * 200 > signal.size()) return true;
+    // Some runs begin slowly also with a saturated sensor, where the signal happens to turn near its limit.
+    if (runs.hard > 0 && 3 * runs.hard >= runs.count && runs.samples * 200 > signal.size()) return true;
   }
   return false;
 }

@@ -18,6 +18,9 @@ using namespace std::chrono_literals;
 using std::chrono::nanoseconds;
 
 constexpr nanoseconds kBurst = 10ms;  // services are answered at least this often
+// A subscriber like rosbag record holds 100 messages: samples that are due together go out in smaller portions.
+constexpr long kPortion = 50;
+constexpr nanoseconds kBreath = 1ms;
 constexpr nanoseconds kIdle = 20ms;   // longest sleep, so that Ctrl-C ends fast
 constexpr nanoseconds kPoll = 1ms;    // of an external /clock
 constexpr nanoseconds kTolerableLag = 100ms;
@@ -96,7 +99,7 @@ int SimulatorNode::run() {
   while (ros::ok() && !finished()) {
     publish_burst();
     warn_if_behind();
-    const nanoseconds wait = finished() ? nanoseconds(0) : pacer_.wait(published_, elapsed());
+    const nanoseconds wait = finished() ? nanoseconds(0) : std::max(kBreath, pacer_.wait(published_, elapsed()));
     serve(std::min(wait, follows_ros_time_ ? kPoll : kIdle));
   }
   const auto end = WallClock::now() + kLinger;
@@ -155,7 +158,7 @@ void SimulatorNode::publish_burst() {
   const nanoseconds now = elapsed();
   lag_ = pacer_.lag(published_, now);
   const auto end = WallClock::now() + kBurst;
-  while (!finished() && pacer_.is_due(published_, now)) {
+  for (long count = 0; count < kPortion && !finished() && pacer_.is_due(published_, now); ++count) {
     publish_sample();
     if (WallClock::now() >= end) return;
   }

@@ -27,7 +27,7 @@ DiagnosisSettings diagnosis_settings(const ApdSettings& apd) {
   DiagnosisSettings settings;
   settings.apd = apd;
   LostMotionSettings lost_motion;
-  lost_motion.torque = 0.045;
+  lost_motion.torque = 0.05;
   lost_motion.base_radius = 0.015;
   settings.lost_motion = lost_motion;
   settings.limits = Limits{false, 1e-4, 1.5e-4, 2e-4};

@@ -53,7 +53,9 @@ TEST(Impact, UndampedLinearContactIsAHalfSine) {
       // 1e-10 tolerance per step over some 500 steps
       EXPECT_NEAR(bounce.penetration(), deepest * std::sin(omega * t), 1e-7 * deepest);
       EXPECT_NEAR(bounce.speed(), speed * std::cos(omega * t), 1e-7 * speed);
-      if (k == 25) EXPECT_NEAR(bounce.penetration(), speed * std::sqrt(kMass / stiffness), 1e-7 * deepest);
+      if (k == 25) {
+        EXPECT_NEAR(bounce.penetration(), speed * std::sqrt(kMass / stiffness), 1e-7 * deepest);
+      }
     }
     const double later = 1.5 * M_PI / omega;
     bounce.advance_to(later);
@@ -135,7 +137,7 @@ TEST(Impact, HuntCrossleyRestitutionFollowsTheExactRelation) {
         Bounce bounce(law, speed);
         const double deepest =  // of the undamped impact, from m v^2 / 2 = K d^(n+1) / (n+1)
             std::pow(0.5 * (exponent + 1) * kMass * speed * speed / stiffness, 1 / (exponent + 1));
-        bounce.advance_to(20 * deepest / speed);
+        bounce.advance_to(6 * deepest / speed);  // contact lasts about half of that
         ASSERT_LT(bounce.penetration(), 0);
         // independent of mass, stiffness and exponent; 1e-10 tolerance per step over some hundred steps
         EXPECT_NEAR(-bounce.speed() / speed, exact_restitution(1.5 * alpha * speed), 1e-7)
@@ -153,7 +155,7 @@ TEST(Impact, RestitutionAtSmallSpeedIsOneMinusAlphaTimesSpeed) {
 
 TEST(Impact, TheWallNeverPulls) {
   const std::shared_ptr<const ContactLaw> laws[] = {
-      linear(1e7, 0), linear(1e7, 2000),
+      linear(1e7, 0), linear(1e7, 500),
       make_contact_law("power_law", {{"stiffness", 1e8}, {"exponent", 1.5}}),
       make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 2}})};
   for (const auto& law : laws)
@@ -161,9 +163,11 @@ TEST(Impact, TheWallNeverPulls) {
       Bounce bounce(law, 1, test::solver(1e-6, method));
       double most = 0;
       for (int k = 1; k <= 500; ++k) {
-        bounce.advance_to(k * 2e-6);
+        bounce.advance_to(k * 3e-6);
         EXPECT_GE(bounce.push(), 0) << method;
-        if (bounce.penetration() < 0) EXPECT_EQ(bounce.push(), 0) << method;
+        if (bounce.penetration() < 0) {
+          EXPECT_EQ(bounce.push(), 0) << method;
+        }
         most = std::max(most, bounce.push());
       }
       EXPECT_GT(most, 100) << method << ": there was an impact";

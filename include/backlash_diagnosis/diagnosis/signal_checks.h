@@ -22,7 +22,7 @@ double median_magnitude(std::vector<double> signal);
 std::optional<double> estimate_noise(const std::vector<double>& signal, double samples_per_period);
 
 /// True when the extreme values repeat in runs as a saturated sensor's do: at least 3 samples in a row at exactly the
-/// largest (or smallest) value, making up more than 0.5 % of the record, where most runs begin at full speed. A signal
+/// largest (or smallest) value, making up more than 0.5 % of the record, where a third of the runs or more begin at full speed. A signal
 /// that comes to rest at its extreme slows down before.
 bool looks_saturated(const std::vector<double>& signal);
 

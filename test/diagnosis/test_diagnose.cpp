@@ -1,0 +1,174 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/diagnose.h"
+#include "support/curve.h"
+#include "support/records.h"
+
+namespace backlash {
+namespace {
+
+using test::linear_curve;
+using test::make_record;
+
+DiagnosisSettings all_settings() {
+  DiagnosisSettings settings;
+  settings.apd = ApdSettings{Channel::sensor_torque, 0.1, 2, {60, -0.4, 0.4}};
+  LostMotionSettings lost_motion;
+  lost_motion.torque = 0.05;
+  lost_motion.base_radius = 0.015;
+  settings.lost_motion = lost_motion;
+  settings.limits = Limits{false, 1e-4, 1.5e-4, 2e-4};
+  return settings;
+}
+
+TEST(Diagnose, AllMethodsInTheirOrder) {
+  const MonitoringCurve curve = linear_curve();
+  const Diagnosis d = diagnose(make_record({}), all_settings(), &curve);
+  EXPECT_EQ(diagnosis_methods(), (std::vector<std::string>{"apd_skewness", "lost_motion"}));
+  ASSERT_EQ(d.estimates.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(d.estimates[i].method, diagnosis_methods()[i]);
+  EXPECT_EQ(d.estimates[0].status, Status::ok) << d.estimates[0].message;
+  EXPECT_EQ(d.estimates[1].status, Status::ok) << d.estimates[1].message;
+  ASSERT_TRUE(d.apd);
+  EXPECT_EQ(d.apd->periods.size(), 13u);
+  EXPECT_EQ(d.verdict.estimate, 1);  // 0.01 rad times 0.015 m, the narrower interval
+  // 2 %: the ringing of 20 % has died out by exp(-5) where the wall is read.
+  EXPECT_NEAR(d.estimates[1].backlash, 1.5e-4, 3e-6);
+}
+
+TEST(Diagnose, TheVerdictUsesLimitsAndBaseline) {
+  const MonitoringCurve curve = linear_curve();
+  DiagnosisSettings settings = all_settings();
+  settings.limits = Limits{false, 1e-5, 2e-5, 1e-4};
+  EXPECT_EQ(diagnose(make_record({}), settings, &curve).verdict.grade, Grade::stop);
+  Baseline baseline;
+  baseline.backlash = 1.35e-4;
+  const Verdict v = diagnose(make_record({}), settings, &curve, baseline).verdict;
+  EXPECT_EQ(v.grade, Grade::watch);
+  EXPECT_NEAR(v.growth, 0.15e-4, 3e-6);  // as above
+}
+
+TEST(Diagnose, OneMethod) {
+  const MonitoringCurve curve = linear_curve();
+  for (const std::string& method : diagnosis_methods()) {
+    const Diagnosis d = diagnose(make_record({}), all_settings(), &curve, std::nullopt, method);
+    ASSERT_EQ(d.estimates.size(), 1u);
+    EXPECT_EQ(d.estimates[0].method, method);
+    EXPECT_EQ(d.verdict.estimate, 0);
+    EXPECT_EQ(d.verdict.agreement, "single");
+  }
+  for (const char* method : {"apd", "Lost_motion", "apd_skewness ", "all"}) try {
+      diagnose(make_record({}), all_settings(), &curve, std::nullopt, method);
+      ADD_FAILURE() << method;
+    } catch (const InvalidParameter& error) {
+      EXPECT_NE(std::string(error.what()).find("apd_skewness, lost_motion"), std::string::npos) << error.what();
+    }
+}
+
+TEST(Diagnose, WhatCannotBeServedIsListedWithItsReason) {
+  DiagnosisSettings settings = all_settings();
+  Diagnosis d = diagnose(make_record({}), settings, nullptr);
+  EXPECT_EQ(d.estimates[0].status, Status::insufficient_data);
+  EXPECT_NE(d.estimates[0].message.find("curve"), std::string::npos);
+  EXPECT_FALSE(std::isnan(d.estimates[0].skewness));  // of use as a baseline
+  settings.apd.reset();
+  settings.lost_motion.reset();
+  d = diagnose(make_record({}), settings, nullptr);
+  ASSERT_EQ(d.estimates.size(), 2u);
+  for (const Estimate& e : d.estimates) {
+    EXPECT_EQ(e.status, Status::insufficient_data);
+    EXPECT_NE(e.message.find("declares no diagnosis." + std::string(e.method == "lost_motion" ? "lost_motion" : "apd")),
+              std::string::npos)
+        << e.message;
+  }
+  EXPECT_EQ(d.verdict.grade, Grade::cannot_tell);
+  EXPECT_FALSE(d.apd);
+}
+
+TEST(Diagnose, RecordsTooShortForAWholeSettledPeriod) {
+  const MonitoringCurve curve = linear_curve();
+  for (const double duration : {0.0, 0.0005, 0.05, 0.15, 0.299}) {
+    const Diagnosis d = diagnose(make_record({}).slice(0, duration), all_settings(), &curve);
+    ASSERT_EQ(d.estimates.size(), 2u);
+    for (const Estimate& e : d.estimates) {
+      EXPECT_EQ(e.status, Status::insufficient_data) << duration << ' ' << e.message;
+      EXPECT_NE(e.message.find("whole excitation period"), std::string::npos) << e.message;
+    }
+    EXPECT_EQ(d.verdict.grade, Grade::cannot_tell);
+  }
+  EXPECT_EQ(diagnose(make_record({}).slice(0, 0.3), all_settings(), &curve).estimates[0].status, Status::ok);
+}
+
+TEST(Diagnose, SettlingIsDiscardedForAllMethods) {
+  const MonitoringCurve curve = linear_curve();
+  Record record = make_record({});
+  for (std::size_t i = 0; i < 200; ++i) {  // the first two periods are nonsense
+    record.column(Channel::sensor_torque)[i] = 0.3;
+    record.column(Channel::motor_position)[i] = 9;
+  }
+  const Diagnosis spoilt = diagnose(record, all_settings(), &curve), clean = diagnose(make_record({}), all_settings(), &curve);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(spoilt.estimates[i].backlash, clean.estimates[i].backlash);
+    EXPECT_EQ(spoilt.estimates[i].upper, clean.estimates[i].upper);
+  }
+}
+
+TEST(Diagnose, WithoutSettlingChangesNothingElse) {
+  DiagnosisSettings settings = all_settings();
+  const DiagnosisSettings cut = without_settling(settings);
+  EXPECT_EQ(cut.apd->settling_periods, 0);
+  EXPECT_EQ(cut.apd->period, 0.1);
+  EXPECT_TRUE(cut.lost_motion && cut.limits);
+  settings.apd.reset();
+  EXPECT_FALSE(without_settling(settings).apd);
+}
+
+TEST(DiagnosisSettings, ReadFromARigFile) {
+  const auto read = [](const std::string& text) {
+    const YamlReader yaml = YamlReader::from_text(text, "rig.yaml");
+    const DiagnosisSettings settings = read_diagnosis_settings(yaml);
+    yaml.finish();
+    return settings;
+  };
+  const DiagnosisSettings all = read(
+      "apd: {signal: motor_velocity, period: 0.2, settling_periods: 3, classes: 40, lower: -1, upper: 2}\n"
+      "lost_motion: {torque: 3.5, elastic_deflection: included}\n"
+      "limits: {backlash_angle: {watch: 1, service: 2, stop: 3}}\n");
+  ASSERT_TRUE(all.apd && all.lost_motion && all.limits);
+  EXPECT_EQ(all.apd->signal, Channel::motor_velocity);
+  EXPECT_EQ(all.apd->period, 0.2);
+  EXPECT_EQ(all.apd->settling_periods, 3);
+  EXPECT_TRUE(all.apd->layout == (ApdLayout{40, -1, 2}));
+  EXPECT_EQ(all.lost_motion->torque, 3.5);
+  EXPECT_FALSE(all.lost_motion->subtract_elastic_deflection);
+  EXPECT_TRUE(all.limits->angular);
+  const DiagnosisSettings few = read("apd: {signal: sensor_torque, settling_periods: 0, classes: 2, lower: 0, upper: 1}");
+  EXPECT_EQ(few.apd->period, 0);
+  EXPECT_FALSE(few.lost_motion || few.limits);
+
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"apd: {signal: torque, settling_periods: 0, classes: 2, lower: 0, upper: 1}", "apd.signal"},
+      {"apd: {signal: sensor_torque, classes: 2, lower: 0, upper: 1}", "apd.settling_periods"},
+      {"apd: {signal: sensor_torque, settling_periods: -1, classes: 2, lower: 0, upper: 1}", "apd.settling_periods"},
+      {"apd: {signal: sensor_torque, period: 0, settling_periods: 1, classes: 2, lower: 0, upper: 1}", "apd.period"},
+      {"apd: {signal: sensor_torque, settling_periods: 0, classes: 2, lower: 0, upper: 1, bins: 3}", "apd.bins"},
+      {"lost_motion: {torque: 0, elastic_deflection: included}", "lost_motion.torque"},
+      {"lost_motion: {torque: 1, elastic_deflection: both}", "lost_motion.elastic_deflection"},
+      {"lost_motion: {torque: 1}", "lost_motion.elastic_deflection"},
+      {"limits: {}", "limits.backlash"},
+      {"alarms: {}", "alarms"}};
+  for (const auto& [text, key] : cases) try {
+      read(text);
+      ADD_FAILURE() << text << " was accepted";
+    } catch (const BadData& error) {
+      EXPECT_NE(std::string(error.what()).find(key), std::string::npos) << error.what();
+    }
+}
+
+}  // namespace
+}  // namespace backlash

@@ -1,0 +1,202 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/simulation/simulation.h"
+#include "support/data.h"
+#include "support/rigs.h"
+
+namespace backlash {
+namespace {
+
+SimulationSettings shipped_settings() {
+  return read_simulation_settings(YamlReader::from_file(test::package_file("config/sarkar_1997.yaml")));
+}
+
+SimulationSettings noisy_settings(std::uint64_t seed) {
+  SimulationSettings settings = shipped_settings();
+  settings.sensors.seed = seed;
+  settings.sensors.of(Channel::sensor_torque).noise = 0.002;
+  settings.sensors.of(Channel::motor_position).noise = 1e-6;
+  return settings;
+}
+
+bool same(const Record& a, const Record& b) {
+  if (a.time != b.time) return false;
+  return std::all_of(kChannels.begin(), kChannels.end(),
+                     [&](Channel c) { return a.column(c) == b.column(c); });
+}
+
+double standard_deviation(const std::vector<double>& values) {
+  double sum = 0, squares = 0;
+  for (double v : values) sum += v;
+  const double mean = sum / values.size();
+  for (double v : values) squares += (v - mean) * (v - mean);
+  return std::sqrt(squares / (values.size() - 1));
+}
+
+TEST(Simulation, SamplesAtWholeMultiplesOfTheInterval) {
+  Simulation simulation(test::sarkar_rig(30e-6), shipped_settings());
+  EXPECT_EQ(simulation.index(), 0);
+  EXPECT_EQ(simulation.sampling_rate(), 1000);
+  const Observation first = simulation.step();
+  EXPECT_EQ(first.motor_position, 0);
+  EXPECT_EQ(first.motor_velocity, 0);
+  EXPECT_EQ(first.sensor_torque, 0);
+  EXPECT_EQ(first.motor_torque, 0.05);
+  Plant plant(test::sarkar_rig(30e-6), shipped_settings().excitation, shipped_settings().solver);
+  for (int k = 1; k < 120; ++k) {
+    EXPECT_EQ(simulation.index(), k);
+    const Observation o = simulation.step();
+    plant.advance_to(k / 1000.0);
+    EXPECT_EQ(o.sensor_torque, plant.observe().sensor_torque);
+    EXPECT_EQ(o.motor_torque, k / 50 % 2 == 0 ? 0.05 : -0.05) << k;
+  }
+}
+
+TEST(Simulation, RecordHoldsEverySensorOfTheRig) {
+  const Record record = simulate_record(test::sarkar_rig(30e-6), shipped_settings(), 0.25);
+  EXPECT_EQ(record.name, "sarkar_1997");
+  ASSERT_EQ(record.size(), 250u);
+  for (std::size_t k = 0; k < record.size(); ++k) EXPECT_EQ(record.time[k], k / 1000.0);
+  for (Channel channel : {Channel::motor_torque, Channel::motor_position, Channel::motor_velocity,
+                          Channel::sensor_torque, Channel::load_position, Channel::load_velocity})
+    EXPECT_EQ(record.column(channel).size(), 250u) << channel_name(channel);
+  EXPECT_FALSE(record.has(Channel::reference_position));
+  Rig rigid = test::sarkar_rig(30e-6);
+  rigid.input_coupling = Coupling{};
+  EXPECT_FALSE(simulate_record(rigid, shipped_settings(), 0.05).has(Channel::sensor_torque));
+}
+
+TEST(Simulation, IsDeterministicForASeed) {
+  const Rig rig = test::sarkar_rig(30e-6);
+  const Record one = simulate_record(rig, noisy_settings(1), 0.2);
+  EXPECT_TRUE(same(one, simulate_record(rig, noisy_settings(1), 0.2)));
+  const Record other = simulate_record(rig, noisy_settings(2), 0.2);
+  EXPECT_FALSE(same(one, other));
+  EXPECT_EQ(one.column(Channel::motor_velocity), other.column(Channel::motor_velocity));  // has no noise
+}
+
+TEST(Simulation, ResetBeginsAgainWithTheRigsBacklashAndTheSameNoise) {
+  Simulation simulation(test::sarkar_rig(30e-6), noisy_settings(3));
+  std::vector<double> before, after;
+  for (int k = 0; k < 77; ++k) before.push_back(simulation.step().sensor_torque);
+  simulation.plant().set_backlash(150e-6);
+  for (int k = 0; k < 20; ++k) simulation.step();
+  simulation.reset();
+  EXPECT_EQ(simulation.index(), 0);
+  EXPECT_EQ(simulation.plant().gear_train().backlash(), 60e-6);
+  for (int k = 0; k < 77; ++k) after.push_back(simulation.step().sensor_torque);
+  EXPECT_EQ(before, after);
+}
+
+TEST(Simulation, TwoSimulationsWithDifferentGapsDoNotInfluenceEachOther) {
+  const SimulationSettings settings = noisy_settings(4);
+  Simulation a(test::sarkar_rig(10e-6), settings), b(test::sarkar_rig(55e-6), settings);
+  const Record alone_a = simulate_record(test::sarkar_rig(10e-6), settings, 0.15);
+  const Record alone_b = simulate_record(test::sarkar_rig(55e-6), settings, 0.15);
+  for (std::size_t k = 0; k < 150; ++k) {
+    EXPECT_EQ(a.step().sensor_torque, alone_a.column(Channel::sensor_torque)[k]);
+    EXPECT_EQ(b.step().sensor_torque, alone_b.column(Channel::sensor_torque)[k]);
+  }
+  EXPECT_FALSE(same(alone_a, alone_b));
+}
+
+TEST(Simulation, BacklashInjectedWhileRunningShowsInTheTravel) {
+  Simulation simulation(test::sarkar_rig(10e-6), shipped_settings());
+  const auto travel_of_next_period = [&] {
+    double low = 1, high = -1;
+    for (int k = 0; k < 100; ++k) {
+      const double q = simulation.step().motor_position;
+      low = std::min(low, q);
+      high = std::max(high, q);
+    }
+    return high - low;
+  };
+  for (int k = 0; k < 300; ++k) simulation.step();
+  const double before = travel_of_next_period();
+  simulation.plant().set_backlash(2 * 40e-6);
+  travel_of_next_period();
+  // 30 um more half gap are 60 um / r of travel and more overshoot behind it
+  EXPECT_GT(travel_of_next_period() - before, 0.9 * 60e-6 / 0.014917);
+}
+
+TEST(Simulation, ProgressRisesAndMayCancel) {
+  std::vector<double> seen;
+  const Rig rig = test::sarkar_rig(30e-6);
+  simulate_record(rig, shipped_settings(), 3, [&](double fraction, const std::string& phase) {
+    seen.push_back(fraction);
+    EXPECT_EQ(phase, "simulating");
+    return true;
+  });
+  EXPECT_GE(seen.size(), 3u);
+  EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
+  EXPECT_EQ(seen.front(), 0);
+  EXPECT_EQ(seen.back(), 1);
+  EXPECT_THROW(
+      simulate_record(rig, shipped_settings(), 3, [](double f, const std::string&) { return f < 0.3; }),
+      Cancelled);
+}
+
+TEST(Simulation, RefusesDurationsWithoutSense) {
+  const Rig rig = test::sarkar_rig(30e-6);
+  for (double duration :
+       {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity(), 1e-4, 1e12, 1e300})
+    EXPECT_THROW(simulate_record(rig, shipped_settings(), duration), InvalidParameter) << duration;
+  EXPECT_EQ(simulate_record(rig, shipped_settings(), 6e-4).size(), 1u);
+}
+
+TEST(SimulationSettings, ShippedFileIsReadAndASolverMayBeLeftOut) {
+  const SimulationSettings settings = shipped_settings();
+  EXPECT_EQ(settings.excitation.type, "square");
+  EXPECT_EQ(settings.excitation.amplitude, 0.05);
+  EXPECT_EQ(settings.excitation.frequency, 10);
+  EXPECT_EQ(settings.sensors.sampling_rate, 1000);
+  EXPECT_EQ(settings.solver.method, "dormand_prince");
+  const YamlReader yaml =
+      YamlReader::from_text("excitation: {type: topic}\nsensors: {sampling_rate: 10, seed: 0}\n", "t");
+  EXPECT_EQ(read_simulation_settings(yaml).solver.relative_tolerance, 1e-6);
+  EXPECT_NO_THROW(yaml.finish());
+  EXPECT_THROW(read_simulation_settings(YamlReader::from_text("sensors: {sampling_rate: 10, seed: 0}", "t")),
+               BadData);
+  EXPECT_THROW(read_simulation_settings(YamlReader::from_text("excitation: {type: topic}", "t")), BadData);
+}
+
+// Records of the same rig by a separate program: sensor noise 0.002 N m, position noise 1e-6 rad.
+class ReferenceRecord : public testing::TestWithParam<int> {};
+
+TEST_P(ReferenceRecord, IsReproducedFromRestToWithinItsNoise) {
+  const auto path = test::find_data("rig/rig_halfgap_" + std::to_string(GetParam()) + "um.csv");
+  if (!path) GTEST_SKIP() << "no reference record for a half gap of " << GetParam() << " um";
+  const Record reference = read_csv(*path);
+  const Record simulated = simulate_record(test::sarkar_rig(GetParam() * 1e-6), shipped_settings(), 1);
+  const std::size_t n = simulated.size();
+  ASSERT_EQ(n, 1000u);
+  ASSERT_GE(reference.size(), n);
+  std::vector<double> torque, position;
+  for (std::size_t k = 0; k < n; ++k) {
+    ASSERT_NEAR(reference.time[k], simulated.time[k], 1e-9);
+    EXPECT_EQ(reference.column(Channel::motor_torque)[k], simulated.column(Channel::motor_torque)[k]) << k;
+    torque.push_back(reference.column(Channel::sensor_torque)[k] -
+                     simulated.column(Channel::sensor_torque)[k]);
+    position.push_back(reference.column(Channel::motor_position)[k] -
+                       simulated.column(Channel::motor_position)[k]);
+    // 5 standard deviations of either noise
+    EXPECT_NEAR(torque.back(), 0, 0.010) << "at " << simulated.time[k];
+    EXPECT_NEAR(position.back(), 0, 5e-6) << "at " << simulated.time[k];
+  }
+  // the standard deviation of n normal values scatters by 1 / sqrt(2 n) of itself: 2.2 %; 4 of those
+  EXPECT_NEAR(standard_deviation(torque), 0.002, 0.002 * 4 / std::sqrt(2.0 * n));
+  EXPECT_NEAR(standard_deviation(position), 1e-6, 1e-6 * 4 / std::sqrt(2.0 * n));
+  printf("REF %d %g %g\n", GetParam(), standard_deviation(torque), standard_deviation(position));
+}
+
+INSTANTIATE_TEST_SUITE_P(HalfGapMicrometres, ReferenceRecord, testing::Values(0, 30, 55));
+
+}  // namespace
+}  // namespace backlash
