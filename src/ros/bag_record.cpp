@@ -23,7 +23,6 @@ namespace backlash {
 namespace {
 
 const std::string kInfoTopic = "/record_info";
-constexpr double kNanosecond = 1e-9;
 
 std::string type_of(const rosbag::ConnectionInfo& c) {
   return printable(c.datatype);
@@ -231,7 +230,7 @@ class Reader {
                            " s of the message before: a looped or merged recording, or a clock that jumped");
     }
     last_stamp_ = stamp;
-    record_.time.push_back(nearest_nanosecond(clock_.seconds(stamp)));
+    record_.time.push_back(clock_.seconds(stamp));
     return true;
   }
 
@@ -239,14 +238,6 @@ class Reader {
     StampClock clock;
     clock.seconds(first_);
     return clock.seconds(stamp);
-  }
-
-  /// The double that a CSV with nine decimals would give, so that times survive the way through a bag bit by
-  /// bit.
-  static double nearest_nanosecond(double seconds) {
-    constexpr double kExactIntegers = 9007199254740992.0;  // 2^53
-    const double count = std::nearbyint(seconds / kNanosecond);
-    return std::abs(count) < kExactIntegers ? count / 1e9 : seconds;
   }
 
   /// A channel is there in all messages or in none.

@@ -50,9 +50,12 @@ double StampClock::seconds(const ros::Time& stamp) {
     started_ = true;
     origin_ = stamp;
   }
-  const std::int64_t whole = std::int64_t(stamp.sec) - std::int64_t(origin_.sec);
-  const std::int64_t nanoseconds = whole * 1'000'000'000 + std::int64_t(stamp.nsec) - std::int64_t(origin_.nsec);
-  return nanoseconds / 1e9;  // the double nearest to the decimal
+  // The double that a CSV with nine decimals would give, so that times survive the way through a bag bit by bit.
+  constexpr double kExactIntegers = 9007199254740992.0;  // 2^53
+  const double whole = double(stamp.sec) - double(origin_.sec);
+  const double rest = double(stamp.nsec) - double(origin_.nsec);
+  const double nanoseconds = whole * 1e9 + rest;
+  return std::fabs(nanoseconds) < kExactIntegers ? nanoseconds / 1e9 : whole + rest * 1e-9;
 }
 
 bool mentions(const sensor_msgs::JointState& message, const JointNames& names) {

@@ -83,12 +83,11 @@ class ReplayTest(unittest.TestCase):
 
     def test_pause_changes_nothing(self):
         with Diagnoser({"curve": self.curve}).ready() as diagnoser:
-            player = subprocess.Popen(["rosbag", "play", "--clock", "--quiet", "--pause", "--rate=0.25", SMALL_BAG, "__name:=player"],
+            player = subprocess.Popen(["rosbag", "play", "--clock", "--quiet", "--delay=1", "--rate=0.25", SMALL_BAG, "__name:=player"],
                                       stdin=subprocess.DEVNULL)
             self.addCleanup(player.kill)
             rospy.wait_for_service("/player/pause_playback", TIMEOUT)
             pause = rospy.ServiceProxy("/player/pause_playback", SetBool)
-            pause(False)
             diagnoser.diagnose(periods=1, timeout=TIMEOUT)  # in the middle of the run
             pause(True)
             early = diagnoser.diagnose(periods=SMALL_BAG_PERIODS, timeout=0.5)
