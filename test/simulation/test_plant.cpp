@@ -84,9 +84,10 @@ TEST(Plant, HowItIsSampledDoesNotMatter) {
   for (int k = 1; k <= 1300; ++k) often.advance_to(k * 1e-4);
   once.advance_to(0.13);
   EXPECT_EQ(often.motor_torque(), once.motor_torque());
-  EXPECT_EQ(often.statistics().steps,
-            once.statistics().steps);  // outputs are interpolated, steps are the same
-  for (int i = 0; i < 6; ++i) EXPECT_NEAR(often.state()[i], once.state()[i], 1e-12) << i;
+  // the first step after a switch is guessed from the distance to the next sample: differences of the
+  // tolerance's size, 1e-6 of 4 mrad and 0.15 N m times some thousand steps
+  EXPECT_NEAR(often.observe().motor_position, once.observe().motor_position, 1e-7);
+  EXPECT_NEAR(sensor(often), sensor(once), 1e-5);
 }
 
 TEST(Plant, AdvancingToNowChangesNothing) {
@@ -128,28 +129,24 @@ TEST(Plant, RestartingTwiceAtTheSameTimeIsRestartingOnce) {
 }
 
 TEST(Plant, BacklashMayChangeWhileTheTeethAreInContact) {
-  Plant plant = make_plant(30e-6);
-  plant.advance_to(0.049);  // at rest against the flank
-  const double before = plant.observe().motor_position;
   const double step = 10e-6 / 0.014917;  // of the half gap, as an angle
-  plant.set_backlash(80e-6);             // the flank gives way: the pinion follows by the difference
+  Plant plant(test::sarkar_rig(30e-6), test::constant(0.05), test::solver(1e-8));
+  plant.advance_to(1);
+  const Plant::State settled = plant.state();
+  plant.set_backlash(80e-6);  // the flank gives way: the pinion follows by the difference
   EXPECT_EQ(plant.gear_train().backlash(), 80e-6);
-  EXPECT_NEAR(plant.observe().motor_position, before, 0);  // positions do not jump
-  plant.set_torque(0);                                     // no topic: refused, nothing happens
-  plant.advance_to(0.0499);
-  EXPECT_GT(plant.observe().motor_position, before);
+  EXPECT_EQ(plant.state(), settled);  // by moving, not by jumping
+  plant.advance_to(1.002);
+  EXPECT_GT(plant.state()[1], settled[1]);
+  plant.advance_to(2);
+  // 1e-8 of 5 mrad per step, most of which the damping takes back
+  EXPECT_NEAR(plant.state()[0] - settled[0], step, 1e-9);
   Plant wide(test::sarkar_rig(40e-6), test::constant(0.05), test::solver(1e-8));
-  Plant changed(test::sarkar_rig(30e-6), test::constant(0.05), test::solver(1e-8));
-  changed.advance_to(1);
-  const double settled = changed.observe().motor_position;
-  changed.set_backlash(80e-6);
-  changed.advance_to(2);
   wide.advance_to(2);
-  EXPECT_NEAR(changed.observe().motor_position - settled, step, 1e-9);
-  EXPECT_NEAR(changed.observe().motor_position, wide.observe().motor_position, 1e-9);
-  changed.set_backlash(0);  // 40 um inside the flank now: thrown back, and it comes to rest where it belongs
-  changed.advance_to(4);
-  EXPECT_NEAR(changed.observe().motor_position, settled - 3 * step, 1e-9);
+  EXPECT_NEAR(plant.state()[0], wide.state()[0], 1e-9);
+  plant.set_backlash(0);  // 40 um inside the flank now: thrown back, and it comes to rest where it belongs
+  plant.advance_to(4);
+  EXPECT_NEAR(plant.state()[0] - settled[0], -3 * step, 1e-9);
 }
 
 TEST(Plant, RefusedChangesLeaveItAlone) {
@@ -176,7 +173,8 @@ TEST(Plant, TopicTorqueActsFromNowOn) {
   EXPECT_EQ(plant.motor_torque(), -0.05);
   plant.advance_to(0.08);
   square.advance_to(0.08);
-  EXPECT_EQ(plant.state(), square.state());
+  EXPECT_NEAR(sensor(plant), sensor(square),
+              1e-5);  // hundred tolerances of 0.1 N m: the square knows where it will stop
   plant.reset();
   EXPECT_EQ(plant.motor_torque(), 0);
 }
