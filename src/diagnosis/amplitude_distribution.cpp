@@ -20,7 +20,8 @@ ApdLayout read_apd_layout(const YamlReader& yaml) {
 AmplitudeDistribution::AmplitudeDistribution(const ApdLayout& layout)
     : layout_(layout), width_((layout.upper - layout.lower) / layout.classes) {
   if (layout.classes < 2) throw InvalidParameter("apd.classes", layout.classes, "must be >= 2");
-  if (!(layout.lower < layout.upper)) throw InvalidParameter("apd.upper", layout.upper, "must be greater than lower");
+  if (!(layout.lower < layout.upper))
+    throw InvalidParameter("apd.upper", layout.upper, "must be greater than lower");
   if (!std::isfinite(layout.lower)) throw InvalidParameter("apd.lower", layout.lower, "must be finite");
   if (!std::isfinite(width_)) throw InvalidParameter("apd.upper", layout.upper, "must be finite");
   counts_.assign(layout.classes, 0);
@@ -43,7 +44,8 @@ void AmplitudeDistribution::add(double value) {
 }
 
 void AmplitudeDistribution::merge(const AmplitudeDistribution& other) {
-  if (!(layout_ == other.layout_)) throw InvalidParameter("apd", "another class layout", "must be equal to merge");
+  if (!(layout_ == other.layout_))
+    throw InvalidParameter("apd", "another class layout", "must be equal to merge");
   for (std::size_t k = 0; k < counts_.size(); ++k) counts_[k] += other.counts_[k];
   samples_ += other.samples_;
   below_ += other.below_;
@@ -55,7 +57,9 @@ void AmplitudeDistribution::clear() {
   samples_ = below_ = above_ = 0;
 }
 
-double AmplitudeDistribution::centre(int k) const { return layout_.lower + (k + 0.5) * width_; }
+double AmplitudeDistribution::centre(int k) const {
+  return layout_.lower + (k + 0.5) * width_;
+}
 
 std::vector<double> AmplitudeDistribution::percentages() const {
   std::vector<double> y(counts_.size(), 0);
@@ -79,9 +83,15 @@ double AmplitudeDistribution::standardised_moment(int order) const {
   return moment / (order == 3 ? variance * std::sqrt(variance) : variance * variance);
 }
 
-double AmplitudeDistribution::skewness() const { return standardised_moment(3); }
-double AmplitudeDistribution::kurtosis() const { return standardised_moment(4); }
+double AmplitudeDistribution::skewness() const {
+  return standardised_moment(3);
+}
+double AmplitudeDistribution::kurtosis() const {
+  return standardised_moment(4);
+}
 
-double RunningMoments::standard_deviation() const { return count_ ? std::sqrt(squares_ / count_) : 0; }
+double RunningMoments::standard_deviation() const {
+  return count_ ? std::sqrt(squares_ / count_) : 0;
+}
 
 }  // namespace backlash

@@ -12,6 +12,7 @@
 namespace backlash {
 namespace {
 
+constexpr double kNoiseExcess = 1.2;  // noise estimate over the largest on the curve that may be by chance
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double range_of(const std::vector<double>& x) {
@@ -35,14 +36,16 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   if (torque.empty()) return {};
   if (range_of(torque) <= 0.05 * made.amplitude) return "motor_torque is constant: there is no excitation";
-  // A level that a tenth of the time is exceeded stands for the amplitude: a few spikes or noise do not change it.
+  // A level that a tenth of the time is exceeded stands for the amplitude: a few spikes or noise do not
+  // change it.
   if (differs(median_magnitude(torque), made.excitation_level, 0.05))
-    return mismatch("excitation level (median of |motor_torque|)", median_magnitude(torque), made.excitation_level,
-                    "N m");
+    return mismatch("excitation level (median of |motor_torque|)", median_magnitude(torque),
+                    made.excitation_level, "N m");
   std::vector<double> magnitude;
   for (const double v : torque) magnitude.push_back(std::fabs(v));
   const double largest = *std::max_element(magnitude.begin(), magnitude.end());
-  if (largest < 0.95 * made.amplitude) return mismatch("excitation amplitude", largest, made.amplitude, "N m");
+  if (largest < 0.95 * made.amplitude)
+    return mismatch("excitation amplitude", largest, made.amplitude, "N m");
   const double often = quantile(std::move(magnitude), 0.9);
   if (often > 1.1 * made.amplitude) return mismatch("excitation amplitude", often, made.amplitude, "N m");
   return {};
@@ -74,19 +77,20 @@ std::pair<double, double> signal_levels(const MonitoringCurve& curve) {
   return {low->signal_level, high->signal_level};
 }
 
-/// Level of the signal, as a stand-in where motor_torque was not recorded.
+/// Level of the signal: with the output locked it follows the torque, whether that was recorded or not.
 std::string level_mismatch(const Record& record, const ApdSettings& settings, const MonitoringCurve& curve) {
-  if (record.has(Channel::motor_torque)) return {};
   const auto [low, high] = signal_levels(curve);
   const double level = median_magnitude(record.column(settings.signal));
-  if (level < 0.75 * low) return mismatch("signal level (median magnitude)", level, low, "N m");
-  if (level > 1.25 * high) return mismatch("signal level (median magnitude)", level, high, "N m");
+  if (level < 0.88 * low) return mismatch("signal level (median magnitude)", level, low, "N m");
+  if (level > 1.12 * high) return mismatch("signal level (median magnitude)", level, high, "N m");
   return {};
 }
 
 }  // namespace
 
-double travel_of(const std::vector<double>& position) { return quantile(position, 0.95) - quantile(position, 0.05); }
+double travel_of(const std::vector<double>& position) {
+  return quantile(position, 0.95) - quantile(position, 0.05);
+}
 
 double excitation_period(const Record& record, Channel signal) {
   const Channel source = record.has(Channel::motor_torque) ? Channel::motor_torque : signal;
@@ -125,7 +129,8 @@ ApdResult analyse_apd(const Record& record, const ApdSettings& settings) {
   PeriodAnalyser analyser(result.period, settings.layout);
   double sum = 0;
   for (std::size_t i = 0; i <= record.size(); ++i) {
-    const PeriodResult* period = i < record.size() ? analyser.add(record.time[i], signal[i]) : analyser.finish();
+    const PeriodResult* period =
+        i < record.size() ? analyser.add(record.time[i], signal[i]) : analyser.finish();
     if (!period || period->index < settings.settling_periods) continue;
     if (!period->complete || std::isnan(period->apd.skewness())) {
       ++result.incomplete;
@@ -140,7 +145,9 @@ ApdResult analyse_apd(const Record& record, const ApdSettings& settings) {
   if (interval > 0) {
     const double start = record.time.front() + settings.settling_periods * result.period;
     const Record settled = record.slice(start - 0.5 * interval, record.time.back() + interval);
-    result.noise = estimate_noise(settled.column(settings.signal), result.period / interval).value_or(kNaN);
+    const double samples_per_period = result.period / interval;
+    result.noise_range = estimate_noise(settled.column(settings.signal), samples_per_period);
+    if (settled.size() >= 2 * samples_per_period) result.noise = result.noise_range.upper;
   }
   return result;
 }
@@ -157,6 +164,8 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
   if (range_of(record.column(settings.signal)) <= 0.05 * signal_levels(curve).second)
     return "the signal does not move: there is no excitation, or the sensor is dead";
   std::string reason = excitation_mismatch(record, made);
+  if (reason.empty() && looks_saturated(record.column(settings.signal)))
+    reason = "the signal stays at its extreme value: the sensor is saturated";
   if (reason.empty()) reason = level_mismatch(record, settings, curve);
   if (!reason.empty()) return reason;
   const double period = excitation_period(record, settings.signal);
@@ -165,15 +174,13 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
     if (differs(1 / period, made.frequency, 0.02 + interval / period))
       return mismatch("excitation frequency", 1 / period, made.frequency, "Hz");
   }
-  if (apd.noise > 1.2 * curve.noise_levels.back()) {
+  if (apd.noise > kNoiseExcess * curve.noise_levels.back()) {
     std::ostringstream text;
     text.precision(4);
     text << "sensor noise is " << apd.noise << " N m (standard deviation), the curve covers noise up to "
          << curve.noise_levels.back() << " N m";
     return text.str();
   }
-  if (looks_saturated(record.column(settings.signal)))
-    return "the signal stays at its extreme value: the sensor is saturated";
   return motion_mismatch(record, curve);
 }
 
@@ -201,8 +208,10 @@ Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const
   if (apd.periods.empty())
     return refuse(Status::insufficient_data, lacking + "; " + std::to_string(apd.incomplete) +
                                                  " had gaps or no sample inside the classes");
-  const double noise = std::isnan(apd.noise) ? curve->conditions.noise : apd.noise;
-  return curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), noise);
+  if (std::isnan(apd.noise) && apd.noise_range.upper > kNoiseExcess * curve->noise_levels.back())
+    return refuse(Status::insufficient_data,
+                  "one period does not tell the sensor noise at this sampling rate: two or more are needed");
+  return curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), apd.noise_range);
 }
 
 }  // namespace backlash

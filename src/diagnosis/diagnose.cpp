@@ -39,7 +39,8 @@ LostMotionSettings read_lost_motion(const YamlReader& yaml) {
 DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
   DiagnosisSettings settings;
   if (const auto apd = yaml.optional_map("apd")) settings.apd = read_apd(*apd);
-  if (const auto lost_motion = yaml.optional_map("lost_motion")) settings.lost_motion = read_lost_motion(*lost_motion);
+  if (const auto lost_motion = yaml.optional_map("lost_motion"))
+    settings.lost_motion = read_lost_motion(*lost_motion);
   if (const auto limits = yaml.optional_map("limits")) settings.limits = read_limits(*limits);
   return settings;
 }
@@ -59,11 +60,13 @@ Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, cons
   const DiagnosisSettings settled = without_settling(settings);
   if (!settings.apd || !(run_period(record, *settings.apd) > 0))
     return diagnose_settled(record, settled, curve, baseline, method);
-  return diagnose_settled(whole_periods(record, *settings.apd).value_or(Record()), settled, curve, baseline, method);
+  return diagnose_settled(whole_periods(record, *settings.apd).value_or(Record()), settled, curve, baseline,
+                          method);
 }
 
-Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
-                           const std::optional<Baseline>& baseline, const std::string& method) {
+Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings,
+                           const MonitoringCurve* curve, const std::optional<Baseline>& baseline,
+                           const std::string& method) {
   const auto& methods = diagnosis_methods();
   if (!method.empty() && std::find(methods.begin(), methods.end(), method) == methods.end())
     throw InvalidParameter("method", method, "must be one of " + joined(methods));
@@ -72,7 +75,8 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
   if (settings.apd) diagnosis.apd = analyse_apd(record, *settings.apd);
   if (record.time.empty()) {
     for (const std::string& name : methods)
-      if (wanted(name)) diagnosis.estimates.push_back(not_served(name, "no whole excitation period after settling"));
+      if (wanted(name))
+        diagnosis.estimates.push_back(not_served(name, "no whole excitation period after settling"));
     diagnosis.verdict = combine(diagnosis.estimates, settings.limits, baseline);
     return diagnosis;
   }
@@ -81,9 +85,9 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
                                       ? estimate_apd_skewness(record, *diagnosis.apd, *settings.apd, curve)
                                       : not_served("apd_skewness", "the rig file declares no diagnosis.apd"));
   if (wanted("lost_motion"))
-    diagnosis.estimates.push_back(settings.lost_motion
-                                      ? estimate_lost_motion(record, *settings.lost_motion)
-                                      : not_served("lost_motion", "the rig file declares no diagnosis.lost_motion"));
+    diagnosis.estimates.push_back(
+        settings.lost_motion ? estimate_lost_motion(record, *settings.lost_motion)
+                             : not_served("lost_motion", "the rig file declares no diagnosis.lost_motion"));
   diagnosis.verdict = combine(diagnosis.estimates, settings.limits, baseline);
   return diagnosis;
 }

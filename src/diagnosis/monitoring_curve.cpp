@@ -40,7 +40,8 @@ double roughness(const std::vector<CurvePoint>& points, std::size_t i, std::size
   for (std::size_t k = i < 2 ? 1 : i - 1; k <= i + 1 && k + 1 < points.size(); ++k) {
     const double bend = points[k].cells[level].mean -
                         0.5 * (points[k - 1].cells[level].mean + points[k + 1].cells[level].mean);
-    sum += bend * bend / 1.5;  // variance of a point minus the mean of two others, all with variance 1, is 1.5
+    sum +=
+        bend * bend / 1.5;  // variance of a point minus the mean of two others, all with variance 1, is 1.5
     ++count;
   }
   return count ? std::sqrt(sum / count) : 0;
@@ -74,8 +75,8 @@ std::vector<std::pair<double, double>> not_positive(double a, double b, double c
   return intervals;
 }
 
-/// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's construction):
-/// (skewness - mean(b))^2 <= (1.96 sigma(b))^2, between two points a quadratic inequality.
+/// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's
+/// construction): (skewness - mean(b))^2 <= (1.96 sigma(b))^2, between two points a quadratic inequality.
 Accepted accept(const MonitoringCurve& curve, double skewness, int periods, double noise) {
   Accepted result;
   for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
@@ -110,19 +111,55 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
   return result;
 }
 
+/// The part of a range that the curve covers.
+NoiseRange within(const NoiseRange& noise, const std::vector<double>& levels) {
+  const double upper = std::isnan(noise.upper) ? levels.back() : noise.upper;
+  return {std::clamp(noise.lower, levels.front(), levels.back()),
+          std::clamp(upper, levels.front(), levels.back())};
+}
+
+/// The same at any noise of a range, in steps as fine as an eighth of the distance of the curve's levels.
+Accepted accept(const MonitoringCurve& curve, double skewness, int periods, const NoiseRange& noise) {
+  Accepted result = accept(curve, skewness, periods, noise.upper);
+  if (!(noise.lower < noise.upper)) return result;
+  std::vector<double> others = {noise.lower};
+  for (std::size_t i = 0; i + 1 < curve.noise_levels.size(); ++i)
+    for (int step = 0; step < 8; ++step) {
+      const double from = curve.noise_levels[i], other = from + (curve.noise_levels[i + 1] - from) * step / 8;
+      if (other > noise.lower && other < noise.upper) others.push_back(other);
+    }
+  for (const double other : others) {
+    const Accepted more = accept(curve, skewness, periods, other);
+    if (more.pieces == 0) continue;
+    if (result.pieces == 0) {
+      result = more;
+      continue;
+    }
+    result.lower = std::min(result.lower, more.lower);
+    result.upper = std::max(result.upper, more.upper);
+    result.pieces = std::max(result.pieces, more.pieces);
+    result.touches_end |= more.touches_end;
+    result.in_flagged_stretch |= more.in_flagged_stretch;
+  }
+  return result;
+}
+
 Estimate with_angle(Estimate estimate, const MonitoringCurve& curve) {
   estimate.backlash_angle = estimate.backlash * curve.backlash_to_angle;
   estimate.angle_lower = estimate.lower * curve.backlash_to_angle;
   estimate.angle_upper = estimate.upper * curve.backlash_to_angle;
-  if (curve.conditions.angular) estimate.backlash = estimate.lower = estimate.upper = kNaN;  // no length known
+  if (curve.conditions.angular)
+    estimate.backlash = estimate.lower = estimate.upper = kNaN;  // no length known
   return estimate;
 }
 
 }  // namespace
 
 SkewnessCell MonitoringCurve::at(double backlash, double noise) const {
-  const auto [p, along] = locate(points.size(), [this](std::size_t i) { return points[i].backlash; }, backlash);
-  const auto [n, across] = locate(noise_levels.size(), [this](std::size_t i) { return noise_levels[i]; }, noise);
+  const auto [p, along] = locate(
+      points.size(), [this](std::size_t i) { return points[i].backlash; }, backlash);
+  const auto [n, across] = locate(
+      noise_levels.size(), [this](std::size_t i) { return noise_levels[i]; }, noise);
   const auto cell = [&](std::size_t i) {
     const auto& cells = points[i].cells;
     return n + 1 < cells.size() ? mix(cells[n], cells[n + 1], across) : cells[n];
@@ -138,7 +175,8 @@ const SkewnessCell& MonitoringCurve::nominal(const CurvePoint& point) const {
 void MonitoringCurve::finish() {
   std::vector<std::vector<double>> rough(points.size(), std::vector<double>(noise_levels.size(), 0));
   for (std::size_t i = 0; i < points.size(); ++i)
-    for (std::size_t level = 0; level < noise_levels.size(); ++level) rough[i][level] = roughness(points, i, level);
+    for (std::size_t level = 0; level < noise_levels.size(); ++level)
+      rough[i][level] = roughness(points, i, level);
   double lowest = 1e300;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const SkewnessCell& cell = nominal(points[i]);
@@ -153,19 +191,23 @@ void MonitoringCurve::finish() {
     }
 }
 
-Estimate MonitoringCurve::invert(double skewness, int periods, double noise) const {
+Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange& range) const {
   Estimate estimate;
   estimate.method = "apd_skewness";
   estimate.skewness = skewness;
+  const NoiseRange noise = within(range, noise_levels);
   const Accepted found = accept(*this, skewness, periods, noise);
   std::ostringstream text;
   text.precision(4);
   text << "skewness " << skewness << " over " << periods << " period(s)";
   if (found.pieces == 0) {
-    const bool above_start = skewness > at(points.front().backlash, noise).mean;
+    const double first = at(points.front().backlash, noise.lower).mean,
+                 last = at(points.back().backlash, noise.upper).mean;
+    const bool above_start = skewness > at(points.front().backlash, noise.upper).mean;
     estimate.status = above_start ? Status::below_range : Status::above_range;
-    text << (above_start ? " is higher than the curve at its smallest backlash (" : " is lower than the curve anywhere (");
-    text << at(above_start ? points.front().backlash : points.back().backlash, noise).mean << ")";
+    text << (above_start ? " is higher than the curve at its smallest backlash ("
+                         : " is lower than the curve anywhere (");
+    text << (above_start ? first : last) << ")";
     if (!above_start) estimate.lower = points.back().backlash;
     estimate.message = text.str();
     return with_angle(estimate, *this);

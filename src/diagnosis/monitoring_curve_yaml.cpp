@@ -34,9 +34,9 @@ void emit_conditions(YAML::Emitter& out, const CurveConditions& c) {
   number("excitation_level", c.excitation_level, "N m, median magnitude");
   number("frequency", c.frequency, "Hz");
   number("sampling_rate", c.sampling_rate, "Hz");
-  out << YAML::Key << "apd" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "classes" << YAML::Value
-      << c.apd.classes << YAML::Key << "lower" << YAML::Value << to_text(c.apd.lower) << YAML::Key << "upper"
-      << YAML::Value << to_text(c.apd.upper) << YAML::EndMap;
+  out << YAML::Key << "apd" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "classes"
+      << YAML::Value << c.apd.classes << YAML::Key << "lower" << YAML::Value << to_text(c.apd.lower)
+      << YAML::Key << "upper" << YAML::Value << to_text(c.apd.upper) << YAML::EndMap;
   integer("periods", c.periods, "per seed");
   integer("settling_periods", c.settling_periods, "discarded");
   integer("seeds", c.seeds, "runs with other noise and sampling phase");
@@ -100,7 +100,8 @@ CurveConditions read_conditions(const YamlReader& yaml) {
 CurvePoint read_point(const YamlReader& yaml, std::size_t levels) {
   CurvePoint point;
   point.backlash = yaml.number("backlash", Range::not_negative());
-  for (const char* derived : {"half_gap", "skewness", "scatter"}) yaml.ignore(derived);  // repeated for readers
+  for (const char* derived : {"half_gap", "skewness", "scatter"})
+    yaml.ignore(derived);  // repeated for readers
   point.monotonic = yaml.boolean("monotonic");
   point.signal_level = yaml.number("signal_level", Range::not_negative());
   const auto mean = yaml.numbers("mean", Range::any());
@@ -116,7 +117,8 @@ CurvePoint read_point(const YamlReader& yaml, std::size_t levels) {
 
 std::string MonitoringCurve::to_yaml() const {
   YAML::Emitter out;
-  out << YAML::Comment("Monitoring curve: skewness of the class values of the APD against backlash.") << YAML::Newline;
+  out << YAML::Comment("Monitoring curve: skewness of the class values of the APD against backlash.")
+      << YAML::Newline;
   out << YAML::Comment("backlash: total free play along the line of action [m]; half_gap is half of it.");
   out << YAML::BeginMap << YAML::Key << "schema_version" << YAML::Value << kSchema;
   emit_conditions(out, conditions);
@@ -145,13 +147,18 @@ MonitoringCurve MonitoringCurve::from_yaml(const YamlReader& yaml) {
     curve.points.push_back(read_point(point, curve.noise_levels.size()));
   if (curve.points.size() < 2) yaml.fail("points", "a curve needs at least two points");
   for (std::size_t i = 1; i < curve.points.size(); ++i)
-    if (!(curve.points[i].backlash > curve.points[i - 1].backlash)) yaml.fail("points", "backlash must increase");
+    if (!(curve.points[i].backlash > curve.points[i - 1].backlash))
+      yaml.fail("points", "backlash must increase");
   yaml.finish();
   return curve;
 }
 
-MonitoringCurve read_curve(const std::string& path) { return MonitoringCurve::from_yaml(YamlReader::from_file(path)); }
+MonitoringCurve read_curve(const std::string& path) {
+  return MonitoringCurve::from_yaml(YamlReader::from_file(path));
+}
 
-void write_curve(const MonitoringCurve& curve, const std::string& path) { write_file(path, curve.to_yaml()); }
+void write_curve(const MonitoringCurve& curve, const std::string& path) {
+  write_file(path, curve.to_yaml());
+}
 
 }  // namespace backlash

@@ -65,15 +65,16 @@ const PeriodResult* PeriodAnalyser::take(double time, double value) {
     if (current_.signal.count() > 1) current_.largest_gap = std::max(current_.largest_gap, time - last_time_);
   }
   last_time_ = time;
-  // Closed as soon as the next sample, even a quarter early, would lie beyond: no waiting for a stream that ends here.
+  // Closed as soon as the next sample, even a quarter early, would lie beyond: no waiting for a stream that
+  // ends here.
   if (open_ && !finished && time + 0.75 * grid_.interval >= current_.end) finished = close();
   return finished;
 }
 
 const PeriodResult* PeriodAnalyser::finish() {
-  // A record cut at windows that are no whole number of samples: the first stamp may lie up to an interval after the cut
-  // and the last up to one before it, so that windows counted from the first stamp end up to 1.5 intervals after the
-  // last; jitter comes on top.
+  // A record cut at windows that are no whole number of samples: the first stamp may lie up to an interval
+  // after the cut and the last up to one before it, so that windows counted from the first stamp end up
+  // to 1.5 intervals after the last; jitter comes on top.
   return open_ && last_time_ + 2 * grid_.interval >= current_.end ? close() : nullptr;
 }
 

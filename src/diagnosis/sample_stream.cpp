@@ -11,7 +11,9 @@ namespace {
 
 constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says
 
-double get(const ChannelValues& values, Channel channel) { return values[static_cast<std::size_t>(channel)]; }
+double get(const ChannelValues& values, Channel channel) {
+  return values[static_cast<std::size_t>(channel)];
+}
 
 }  // namespace
 
@@ -33,9 +35,12 @@ void SampleStream::restart() {
   next_search_ = kFirstPeriodSearch;
 }
 
-double SampleStream::jump_limit() const { return std::max(1.0, 3 * period_); }
+double SampleStream::jump_limit() const {
+  return std::max(1.0, 3 * period_);
+}
 
-/// A run has the channels of its first sample: every later one must have them, and one that has more begins a new run.
+/// A run has the channels of its first sample: every later one must have them, and one that has more begins a
+/// new run.
 SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
   const Channel needed = settings_.apd ? settings_.apd->signal : Channel::motor_torque;
   if (channels_.empty() && !std::isfinite(get(values, needed))) {
@@ -49,7 +54,8 @@ SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
     }
   if (channels_.empty()) return Fit::begin;
   for (const Channel channel : kChannels)
-    if (std::isfinite(get(values, channel)) && std::find(channels_.begin(), channels_.end(), channel) == channels_.end()) {
+    if (std::isfinite(get(values, channel)) &&
+        std::find(channels_.begin(), channels_.end(), channel) == channels_.end()) {
       counters_.last_problem = channel_name(channel) + " appeared";
       return Fit::restart;
     }
@@ -143,13 +149,16 @@ SampleStream::Windows SampleStream::windows() const {
   return {std::min(end, std::max(settling, untrimmed)), end};
 }
 
-long SampleStream::periods() const { return windows().end - windows().begin; }
+long SampleStream::periods() const {
+  return windows().end - windows().begin;
+}
 
 Record SampleStream::latest(long count) const {
   if (!settings_.apd && (count == 0 || !grid_)) return record_;  // nothing that needs whole periods
   if (!grid_) {
     if (!(run_period(record_, *settings_.apd) > 0)) return record_;
-    return whole_periods(record_, *settings_.apd, count).value_or(Record());  // found sooner than at the next search
+    return whole_periods(record_, *settings_.apd, count)
+        .value_or(Record());  // found sooner than at the next search
   }
   Windows cut = windows();
   if (count > 0) cut.begin = std::max(cut.begin, cut.end - count);

@@ -1,7 +1,6 @@
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 
 #include <algorithm>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -15,12 +14,12 @@ namespace backlash {
 namespace {
 
 constexpr std::size_t kMaxSamples = 1 << 16;  // per search; a longer record is searched in growing stretches
-constexpr double kNearly = 0.75;  // a period that is no whole number of samples correlates less than its multiples
-constexpr std::size_t kBlock = 10;            // samples over which noise is judged
+constexpr double kNearly =
+    0.75;  // a period that is no whole number of samples correlates less than its multiples
 
 /// Values at `count` equidistant times from the first stamp on, linear in between.
-std::vector<double> resample(const std::vector<double>& time, const std::vector<double>& signal, double interval,
-                             std::size_t count) {
+std::vector<double> resample(const std::vector<double>& time, const std::vector<double>& signal,
+                             double interval, std::size_t count) {
   std::vector<double> even(count);
   std::size_t i = 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -32,8 +31,8 @@ std::vector<double> resample(const std::vector<double>& time, const std::vector<
   return even;
 }
 
-/// Autocorrelation at lags 0 .. `lags`, each normalised by the power of the two stretches that it compares: 1 where
-/// they are equal, less elsewhere, also in a record of a few periods. 0 where one of them is still.
+/// Autocorrelation at lags 0 .. `lags`, each normalised by the power of the two stretches that it compares: 1
+/// where they are equal, less elsewhere, also in a record of a few periods. 0 where one of them is still.
 std::vector<double> autocorrelation(std::vector<double> x, std::size_t lags) {
   const std::size_t n = x.size();
   std::vector<double> power(n + 1, 0.0);  // of the first samples
@@ -63,7 +62,8 @@ bool dies_out(const std::vector<double>& x) {
   return late < 0.1 * early;
 }
 
-/// Lag of the first maximum of the autocorrelation that is nearly as high as the highest; 0 where there is none.
+/// Lag of the first maximum of the autocorrelation that is nearly as high as the highest; 0 where there is
+/// none.
 std::size_t repetition_lag(std::vector<double> x) {
   const std::size_t n = x.size();
   if (n < 8) return 0;
@@ -97,8 +97,8 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
   const double interval = median_interval(time), span = time.back() - time.front();
   if (!(interval > 0)) return std::nullopt;
   const double samples = span / interval + 1;
-  // A long record is first searched in its beginning, at full resolution, then in stretches of twice the length at
-  // half the resolution: what is found then has a lag of thousands of steps.
+  // A long record is first searched in its beginning, at full resolution, then in stretches of twice the
+  // length at half the resolution: what is found then has a lag of thousands of steps.
   for (double stride = 1;; stride *= 2) {
     const bool all = samples <= stride * kMaxSamples;
     const auto count = all ? static_cast<std::size_t>(std::lround(samples / stride)) : kMaxSamples;
@@ -106,7 +106,8 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
     // Unless the excitation began late: then the end of the record shows it at full resolution.
     if (lag > 0 && stride > 1 && lag * stride < 0.25 * kMaxSamples) {
       const auto tail = static_cast<std::ptrdiff_t>(std::min(time.size(), kMaxSamples / 2));
-      if (const auto fine = detect_period({time.end() - tail, time.end()}, {signal.end() - tail, signal.end()}))
+      if (const auto fine =
+              detect_period({time.end() - tail, time.end()}, {signal.end() - tail, signal.end()}))
         return fine;
     }
     if (lag > 0) return lag * stride * interval;
@@ -115,7 +116,8 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
 }
 
 double median_magnitude(std::vector<double> signal) {
-  signal.erase(std::remove_if(signal.begin(), signal.end(), [](double v) { return std::isnan(v); }), signal.end());
+  signal.erase(std::remove_if(signal.begin(), signal.end(), [](double v) { return std::isnan(v); }),
+               signal.end());
   if (signal.empty()) return 0;
   for (double& v : signal) v = std::fabs(v);
   std::nth_element(signal.begin(), signal.begin() + signal.size() / 2, signal.end());
@@ -124,64 +126,12 @@ double median_magnitude(std::vector<double> signal) {
 
 namespace {
 
-/// A stretch of the differences between a signal and itself one period later.
-struct Stretch {
-  double sum = 0;  // of squares
-  std::size_t begin = 0;
-};
-
-/// Share of the power of the differences that is white: smallest over mean eigenvalue of the covariance of five
-/// successive ones. A few oscillations leave the smallest eigenvalue to the white part (Pisarenko 1973).
-double white_share(const std::vector<double>& differences, const std::vector<Stretch>& calm) {
-  constexpr int kOrder = 5;
-  Eigen::Matrix<double, kOrder, kOrder> covariance = Eigen::Matrix<double, kOrder, kOrder>::Zero();
-  for (const Stretch& stretch : calm)
-    for (std::size_t i = stretch.begin; i + kOrder <= stretch.begin + kBlock; ++i) {
-      const Eigen::Map<const Eigen::Matrix<double, kOrder, 1>> successive(&differences[i]);
-      covariance += successive * successive.transpose();
-    }
-  const double mean = covariance.trace() / kOrder;
-  if (!(mean > 0)) return 1;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kOrder, kOrder>> solver(covariance,
-                                                                                   Eigen::EigenvaluesOnly);
-  return std::max(0.0, solver.eigenvalues()[0]) / mean;
-}
-
-}  // namespace
-
-std::optional<double> estimate_noise(const std::vector<double>& signal, double samples_per_period) {
-  constexpr double kQuantile = 0.2;
-  constexpr double kChiSquare = 6.179;       // 20 % quantile of chi-square with 10 degrees of freedom
-  constexpr std::size_t kEnoughCalm = 20;    // stretches; with fewer, chance alone makes eigenvalues unequal
-  constexpr double kClearlyNotWhite = 0.5;   // with so many, the share is above 0.6 for white noise
-  if (!(samples_per_period >= kBlock && samples_per_period <= 0.5 * signal.size())) return std::nullopt;
-  const auto lag = static_cast<std::size_t>(std::lround(samples_per_period));
-  std::vector<double> differences;
-  for (std::size_t i = 0; i + lag < signal.size(); ++i) differences.push_back(signal[i + lag] - signal[i]);
-  std::vector<Stretch> stretches;
-  for (std::size_t i = 0; i + kBlock <= differences.size(); i += kBlock) {
-    double sum = 0;
-    for (std::size_t j = i; j < i + kBlock; ++j) sum += differences[j] * differences[j];
-    if (std::isfinite(sum)) stretches.push_back({sum, i});
-  }
-  if (stretches.empty()) return std::nullopt;
-  const auto at = stretches.begin() + static_cast<std::ptrdiff_t>(kQuantile * stretches.size());
-  std::nth_element(stretches.begin(), at, stretches.end(),
-                   [](const Stretch& a, const Stretch& b) { return a.sum < b.sum; });
-  const double variance = at->sum / kChiSquare / 2;  // a difference of two samples has twice the variance
-  stretches.erase(at, stretches.end());
-  if (stretches.size() < kEnoughCalm) return std::sqrt(variance);
-  const double white = white_share(differences, stretches);
-  return std::sqrt(variance * (white < kClearlyNotWhite ? white : 1));
-}
-
-namespace {
-
 /// Smallest step of a signal: its resolution, where it has one.
 double smallest_step(const std::vector<double>& signal) {
   double smallest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < signal.size(); ++i)
-    if (const double step = std::fabs(signal[i] - signal[i - 1]); step > 0) smallest = std::min(smallest, step);
+    if (const double step = std::fabs(signal[i] - signal[i - 1]); step > 0)
+      smallest = std::min(smallest, step);
   return smallest;
 }
 

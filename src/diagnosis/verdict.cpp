@@ -9,12 +9,18 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-bool is_bound(const Estimate& e) { return e.status == Status::above_range && std::isfinite(e.angle_lower); }
+bool is_bound(const Estimate& e) {
+  return e.status == Status::above_range && std::isfinite(e.angle_lower);
+}
 
 /// Upper end of the interval; infinite for a lower bound.
-double upper(const Estimate& e) { return std::isnan(e.angle_upper) ? kInfinity : e.angle_upper; }
+double upper(const Estimate& e) {
+  return std::isnan(e.angle_upper) ? kInfinity : e.angle_upper;
+}
 
-double width(const Estimate& e) { return std::isnan(e.angle_lower) ? kInfinity : upper(e) - e.angle_lower; }
+double width(const Estimate& e) {
+  return std::isnan(e.angle_lower) ? kInfinity : upper(e) - e.angle_lower;
+}
 
 bool overlap(const Estimate& a, const Estimate& b) {
   return a.angle_lower <= upper(b) && b.angle_lower <= upper(a);
@@ -40,7 +46,8 @@ Grade grade_of(double value, const Limits& limits) {
   return value >= limits.watch ? Grade::watch : Grade::good;
 }
 
-/// Index of the sound estimate with the narrowest interval, else of one that at least gives a lower bound, else -1.
+/// Index of the sound estimate with the narrowest interval, else of one that at least gives a lower bound,
+/// else -1.
 int choose(const std::vector<Estimate>& estimates) {
   int best = -1;
   for (std::size_t i = 0; i < estimates.size(); ++i)
@@ -55,11 +62,16 @@ int choose(const std::vector<Estimate>& estimates) {
 
 const char* to_string(Grade grade) {
   switch (grade) {
-    case Grade::good: return "good";
-    case Grade::watch: return "watch";
-    case Grade::service: return "service";
-    case Grade::stop: return "stop";
-    case Grade::cannot_tell: break;
+    case Grade::good:
+      return "good";
+    case Grade::watch:
+      return "watch";
+    case Grade::service:
+      return "service";
+    case Grade::stop:
+      return "stop";
+    case Grade::cannot_tell:
+      break;
   }
   return "cannot_tell";
 }

@@ -18,17 +18,23 @@ constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // 
 constexpr double kFinestSampling = 1e5;                                      // Hz
 constexpr double kFewestPerPeriod = 16;                                      // samples
 constexpr double kMostSamples = 5e7;                                         // of one run, about 1 GB
-constexpr long kTicks = 10;                                                  // reports of progress per point
 
 double signal_of(const Observation& o, Channel channel) {
   switch (channel) {
-    case Channel::motor_torque: return o.motor_torque;
-    case Channel::motor_position: return o.motor_position;
-    case Channel::motor_velocity: return o.motor_velocity;
-    case Channel::load_position: return o.load_position;
-    case Channel::load_velocity: return o.load_velocity;
-    case Channel::sensor_torque: return o.sensor_torque;
-    case Channel::reference_position: break;
+    case Channel::motor_torque:
+      return o.motor_torque;
+    case Channel::motor_position:
+      return o.motor_position;
+    case Channel::motor_velocity:
+      return o.motor_velocity;
+    case Channel::load_position:
+      return o.load_position;
+    case Channel::load_velocity:
+      return o.load_velocity;
+    case Channel::sensor_torque:
+      return o.sensor_torque;
+    case Channel::reference_position:
+      break;
   }
   return kNaN;
 }
@@ -62,7 +68,8 @@ class Ticker {
   void tick() {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++done_;
-    if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, "building the curve")) stop_ = true;
+    if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, "building the curve"))
+      stop_ = true;
     if (stop_) throw Cancelled();
   }
   void stop() { stop_ = true; }
@@ -75,16 +82,19 @@ class Ticker {
   std::atomic<bool> stop_{false};
 };
 
+long periods_of(const Plan& plan) {
+  return static_cast<long>(plan.apd.settling_periods) + plan.request.periods;
+}
+
 double fine_samples(const Plan& plan) {
-  const double duration = (plan.apd.settling_periods + plan.request.periods) * plan.apd.period;
-  return duration * plan.request.sampling_rate * plan.phases + plan.phases;
+  return periods_of(plan) * plan.apd.period * plan.request.sampling_rate * plan.phases + plan.phases;
 }
 
 FineRun run_fine(const Plan& plan, double backlash, Ticker& ticker) {
   Plant plant(plan.file.rig, plan.file.simulation.excitation, plan.file.simulation.solver);
   plant.set_backlash(backlash);
   const double rate = plan.request.sampling_rate * plan.phases;
-  const long count = std::lround(fine_samples(plan));
+  const long count = std::lround(fine_samples(plan)), ticks = periods_of(plan);
   FineRun run;
   for (long k = 0; k < count; ++k) {
     plant.advance_to(k / rate);
@@ -92,13 +102,14 @@ FineRun run_fine(const Plan& plan, double backlash, Ticker& ticker) {
     run.signal.push_back(signal_of(o, plan.apd.signal));
     run.torque.push_back(o.motor_torque);
     run.position.push_back(o.motor_position);
-    if ((k + 1) * kTicks / count > k * kTicks / count) ticker.tick();
+    if ((k + 1) * ticks / count > k * ticks / count) ticker.tick();
   }
   return run;
 }
 
 /// Skewness of each period of one seed at one noise level.
-std::vector<double> sample_run(const Plan& plan, const FineRun& run, int seed, double noise, CurvePoint& point) {
+std::vector<double> sample_run(const Plan& plan, const FineRun& run, int seed, double noise,
+                               CurvePoint& point) {
   SensorsSettings sensors = plan.file.simulation.sensors;
   sensors.seed += static_cast<std::uint64_t>(seed);
   sensors.of(plan.apd.signal).noise = noise;
@@ -152,7 +163,8 @@ Cell make_cell(const Plan& plan, double backlash, Ticker& ticker) {
       cell.point.signal_level = scratch.signal_level;
     cell.point.cells.push_back(summarise(skewness));
     if (std::isnan(cell.point.cells.back().mean))
-      throw InvalidParameter("diagnosis.apd", plan.apd.layout.upper, "the classes hold no sample of the signal");
+      throw InvalidParameter("diagnosis.apd", plan.apd.layout.upper,
+                             "the classes hold no sample of the signal");
   }
   cell.motor_travel = travel_of(run.position);
   for (double torque : run.torque) cell.amplitude = std::max(cell.amplitude, std::fabs(torque));
@@ -177,16 +189,19 @@ double largest_torque(const ExcitationSettings& excitation) {
 }
 
 Plan make_plan(const RigFile& file, CurveRequest request) {
-  if (!file.diagnosis.apd) throw InvalidParameter("diagnosis.apd", "absent", "a curve needs the layout of its APD");
+  if (!file.diagnosis.apd)
+    throw InvalidParameter("diagnosis.apd", "absent", "a curve needs the layout of its APD");
   if (request.sampling_rate == 0) request.sampling_rate = file.simulation.sensors.sampling_rate;
   check(request);
   Plan plan{file, request, *file.diagnosis.apd, 1, {}};
   const double period = file.simulation.excitation.create()->period();
   if (!(period > 0))
-    throw InvalidParameter("excitation.type", file.simulation.excitation.type, "a curve needs a periodic excitation");
+    throw InvalidParameter("excitation.type", file.simulation.excitation.type,
+                           "a curve needs a periodic excitation");
   if (!(plan.apd.period > 0)) plan.apd.period = period;
   if (file.rig.input_coupling.rigid && plan.apd.signal == Channel::sensor_torque)
-    throw InvalidParameter("diagnosis.apd.signal", "sensor_torque", "the rig's input coupling is rigid: no sensor");
+    throw InvalidParameter("diagnosis.apd.signal", "sensor_torque",
+                           "the rig's input coupling is rigid: no sensor");
   if (!(request.sampling_rate * plan.apd.period >= kFewestPerPeriod))
     throw InvalidParameter("sample_rate", request.sampling_rate,
                            "must give at least 16 samples per period of " + to_text(plan.apd.period) + " s");
@@ -198,7 +213,8 @@ Plan make_plan(const RigFile& file, CurveRequest request) {
     plan.noise_levels.push_back(share * largest_torque(file.simulation.excitation));
   plan.noise_levels.push_back(declared);
   std::sort(plan.noise_levels.begin(), plan.noise_levels.end());
-  plan.noise_levels.erase(std::unique(plan.noise_levels.begin(), plan.noise_levels.end()), plan.noise_levels.end());
+  plan.noise_levels.erase(std::unique(plan.noise_levels.begin(), plan.noise_levels.end()),
+                          plan.noise_levels.end());
   return plan;
 }
 
@@ -206,7 +222,7 @@ Plan make_plan(const RigFile& file, CurveRequest request) {
 std::vector<Cell> make_cells(const Plan& plan, const Progress& progress) {
   const int count = plan.request.points;
   std::vector<Cell> cells(count);
-  Ticker ticker(progress, count * kTicks);
+  Ticker ticker(progress, count * periods_of(plan));
   std::atomic<int> next{0};
   std::mutex mutex;
   std::exception_ptr failure;

@@ -48,6 +48,8 @@ RigFile load_rig_file(const std::string& path) {
   return parse(text, path);
 }
 
-RigFile default_rig_file() { return parse(kDefaultRig, "built-in sarkar_1997"); }
+RigFile default_rig_file() {
+  return parse(kDefaultRig, "built-in sarkar_1997");
+}
 
 }  // namespace backlash

@@ -94,8 +94,8 @@ TEST(AmplitudeDistribution, NoSamplesNoPercentages) {
 }
 
 TEST(AmplitudeDistribution, BordersBelongToTheClassAbove) {
-  for (const ApdLayout& layout :
-       {ApdLayout{60, -0.4, 0.4}, ApdLayout{50, -0.2, 0.2}, ApdLayout{7, -1, 1}, ApdLayout{100, -3, 5}, ApdLayout{3, 0, 1}}) {
+  for (const ApdLayout& layout : {ApdLayout{60, -0.4, 0.4}, ApdLayout{50, -0.2, 0.2}, ApdLayout{7, -1, 1},
+                                  ApdLayout{100, -3, 5}, ApdLayout{3, 0, 1}}) {
     const double width = (layout.upper - layout.lower) / layout.classes;
     for (int k = 0; k < layout.classes; ++k) {
       const double border = layout.lower + k * width;
@@ -123,7 +123,8 @@ TEST(AmplitudeDistribution, SineFollowsTheArcsineLaw) {
   const auto law = [](double x) { return 0.5 + std::asin(std::min(1.0, x)) / M_PI; };
   for (int k = 0; k < classes; ++k) {
     const double share = law(-1 + 2.0 * (k + 1) / classes) - law(-1 + 2.0 * k / classes);
-    // Each class is crossed on one rising and one falling stretch; each may gain or lose a sample at either end.
+    // Each class is crossed on one rising and one falling stretch; each may gain or lose a sample at either
+    // end.
     EXPECT_NEAR(y[k], 100 * share, 100 * 4.0 / samples) << k;
   }
 }
@@ -132,7 +133,8 @@ TEST(AmplitudeDistribution, TriangleIsUniform) {
   const int classes = 16, samples = 64000;
   AmplitudeDistribution apd({classes, -1, 1});
   for (int i = 0; i < samples; ++i) apd.add(4 * std::fabs((i + 0.5) / samples - 0.5) - 1);
-  for (const double y : apd.percentages()) EXPECT_NEAR(y, 100.0 / classes, 100 * 4.0 / samples);  // as for the sine
+  for (const double y : apd.percentages())
+    EXPECT_NEAR(y, 100.0 / classes, 100 * 4.0 / samples);  // as for the sine
 }
 
 TEST(AmplitudeDistribution, MergeIsTheSameAsAddingAll) {
@@ -156,19 +158,25 @@ TEST(AmplitudeDistribution, MergeIsTheSameAsAddingAll) {
 }
 
 TEST(AmplitudeDistribution, RefusesLayoutsOutsideTheirRange) {
-  for (const ApdLayout& layout : {ApdLayout{1, 0, 1}, ApdLayout{0, 0, 1}, ApdLayout{-3, 0, 1}, ApdLayout{5, 1, 1},
-                                  ApdLayout{5, 1, 0}, ApdLayout{5, -kInfinity, 1}, ApdLayout{5, 0, kInfinity},
-                                  ApdLayout{5, std::nan(""), 1}, ApdLayout{5, 0, std::nan("")}})
+  for (const ApdLayout& layout :
+       {ApdLayout{1, 0, 1}, ApdLayout{0, 0, 1}, ApdLayout{-3, 0, 1}, ApdLayout{5, 1, 1}, ApdLayout{5, 1, 0},
+        ApdLayout{5, -kInfinity, 1}, ApdLayout{5, 0, kInfinity}, ApdLayout{5, std::nan(""), 1},
+        ApdLayout{5, 0, std::nan("")}})
     EXPECT_THROW(AmplitudeDistribution{layout}, InvalidParameter) << layout.classes << ' ' << layout.lower;
 }
 
 TEST(ApdLayout, ReadsAndNamesTheKey) {
-  const auto read = [](const std::string& text) { return read_apd_layout(YamlReader::from_text(text, "rig.yaml")); };
+  const auto read = [](const std::string& text) {
+    return read_apd_layout(YamlReader::from_text(text, "rig.yaml"));
+  };
   EXPECT_EQ(read("{classes: 60, lower: -0.4, upper: 0.4}"), (ApdLayout{60, -0.4, 0.4}));
   const std::vector<std::pair<std::string, std::string>> cases = {
-      {"{classes: 1, lower: 0, upper: 1}", "classes"},    {"{classes: 2.5, lower: 0, upper: 1}", "classes"},
-      {"{lower: 0, upper: 1}", "classes"},                {"{classes: 5, lower: 1, upper: 1}", "upper"},
-      {"{classes: 5, lower: 0, upper: .inf}", "upper"},   {"{classes: 5, lower: low, upper: 1}", "lower"},
+      {"{classes: 1, lower: 0, upper: 1}", "classes"},
+      {"{classes: 2.5, lower: 0, upper: 1}", "classes"},
+      {"{lower: 0, upper: 1}", "classes"},
+      {"{classes: 5, lower: 1, upper: 1}", "upper"},
+      {"{classes: 5, lower: 0, upper: .inf}", "upper"},
+      {"{classes: 5, lower: low, upper: 1}", "lower"},
       {"{classes: 5, upper: 1}", "lower"}};
   for (const auto& [text, key] : cases) try {
       read(text);

@@ -28,8 +28,8 @@ Estimate estimate(const Record& record, const MonitoringCurve& curve, const ApdS
 }
 
 TEST(AnalyseApd, MeanOverThePeriodsOfASquareRoot) {
-  // Two periods with different distributions: n samples in class 0, 100 - n in class 1 of two; skewness of two class
-  // values is 0, of three with one empty it has a closed form.
+  // Two periods with different distributions: n samples in class 0, 100 - n in class 1 of two; skewness of
+  // two class values is 0, of three with one empty it has a closed form.
   Record record;
   for (int i = 0; i < 300; ++i) {
     record.time.push_back(i * 1e-3);
@@ -38,7 +38,7 @@ TEST(AnalyseApd, MeanOverThePeriodsOfASquareRoot) {
   const ApdSettings apd = {Channel::sensor_torque, 0.1, 0, {3, 0, 3}};
   const ApdResult result = analyse_apd(record, apd);
   ASSERT_EQ(result.periods.size(), 3u);
-  const double one = 1 / std::sqrt(2.0);  // (M - 2) / sqrt(M - 1) with M = 3
+  const double one = 1 / std::sqrt(2.0);   // (M - 2) / sqrt(M - 1) with M = 3
   const double two = -1 / std::sqrt(2.0);  // two equal and one empty: (M - 4) / sqrt(2 (M - 2))
   EXPECT_NEAR(result.periods[0].apd.skewness(), one, 1e-12);
   EXPECT_NEAR(result.periods[1].apd.skewness(), two, 1e-12);
@@ -68,7 +68,7 @@ TEST(AnalyseApd, RecordsThatGiveNothing) {
   for (double& v : outside.column(Channel::sensor_torque)) v += 7;
   const ApdResult result = analyse_apd(outside, settings());
   EXPECT_TRUE(result.periods.empty());
-  EXPECT_EQ(result.incomplete, 15);
+  EXPECT_EQ(result.incomplete, 15);  // no sample inside the classes
   EXPECT_THROW(analyse_apd(record, {Channel::sensor_torque, 0.1, 0, {1, 0, 1}}), InvalidParameter);
 }
 
@@ -76,10 +76,15 @@ TEST(AnalyseApd, EstimatesTheNoise) {
   RecordRecipe recipe;
   recipe.duration = 10;
   recipe.noise = 0.002;
-  // Five standard errors with 990 stretches of 10 samples, see test_signal_checks.cpp: 7 %.
-  EXPECT_NEAR(analyse_apd(make_record(recipe), settings(0.1, 2)).noise / 0.002, 1, 0.07);
+  // Five standard errors with 990 stretches of 10 samples, see test_noise.cpp: 8 %.
+  const ApdResult many = analyse_apd(make_record(recipe), settings(0.1, 2));
+  EXPECT_NEAR(many.noise / 0.002, 1, 0.08);
+  EXPECT_EQ(many.noise_range.lower, many.noise);
   recipe.duration = 0.1;
-  EXPECT_TRUE(std::isnan(analyse_apd(make_record(recipe), settings()).noise));
+  const ApdResult one = analyse_apd(make_record(recipe), settings());
+  EXPECT_TRUE(std::isnan(one.noise));
+  EXPECT_EQ(one.noise_range.lower, 0);
+  EXPECT_GT(one.noise_range.upper, 0.001);
 }
 
 TEST(ExcitationPeriod, PrefersTheMotorTorque) {
@@ -104,7 +109,8 @@ TEST(RunPeriod, AsItGrewFirst) {
   const Record later = make_record(recipe);
   record.time.insert(record.time.end(), later.time.begin(), later.time.end());
   for (const Channel channel : kChannels)
-    record.column(channel).insert(record.column(channel).end(), later.column(channel).begin(), later.column(channel).end());
+    record.column(channel).insert(record.column(channel).end(), later.column(channel).begin(),
+                                  later.column(channel).end());
   EXPECT_NEAR(run_period(record, settings(0)), 0.1, 1e-12);
   recipe.duration = 0.6;  // 2.4 periods: found in the whole record, not at 0.25 or 0.5 s
   EXPECT_NEAR(run_period(make_record(recipe), settings(0)), 0.25, 1e-12);
@@ -147,7 +153,7 @@ TEST(EstimateApdSkewness, InvertsTheMeanSkewness) {
   const Record record = make_record(recipe);
   const ApdResult apd = analyse_apd(record, settings());
   const MonitoringCurve curve = linear_curve();
-  const Estimate e = estimate(record, curve), expected = curve.invert(apd.skewness, 15, apd.noise);
+  const Estimate e = estimate(record, curve), expected = curve.invert(apd.skewness, 15, apd.noise_range);
   ASSERT_EQ(e.status, Status::ok) << e.message;
   EXPECT_EQ(e.backlash, expected.backlash);
   EXPECT_EQ(e.lower, expected.lower);
@@ -162,6 +168,25 @@ TEST(EstimateApdSkewness, ExactlyTwoPeriodsAreEnough) {
     const Estimate e = estimate(make_record(recipe), linear_curve());
     EXPECT_EQ(e.status, Status::ok) << periods << ": " << e.message;
   }
+}
+
+// A single period does not show the noise as a difference to the next.
+TEST(EstimateApdSkewness, OfASinglePeriodAllNoiseThatItMayHoldCounts) {
+  RecordRecipe recipe;
+  recipe.duration = 0.1;
+  recipe.noise = 0.001;
+  MonitoringCurve curve = linear_curve();
+  for (CurvePoint& point : curve.points) point.cells[1].mean += 1;  // at the largest noise
+  const ApdResult apd = analyse_apd(make_record(recipe), settings());
+  const Estimate e = estimate(make_record(recipe), curve), silent = curve.invert(apd.skewness, 1, 0);
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_EQ(e.lower, silent.lower);
+  EXPECT_NEAR(e.upper - silent.upper, 100 * apd.noise_range.upper / -test::kCurveSlope,
+              1e-12);   // 1 per 0.01 N m
+  recipe.noise = 0.02;  // more than the curve covers, and nothing tells it from ringing
+  const Estimate noisy = estimate(make_record(recipe), linear_curve());
+  EXPECT_EQ(noisy.status, Status::insufficient_data);
+  EXPECT_NE(noisy.message.find("noise"), std::string::npos) << noisy.message;
 }
 
 struct Variant {
@@ -190,9 +215,12 @@ TEST(EstimateApdSkewness, RecordsOutsideTheDomainAreRefusedWithTheReason) {
     };
   };
   const std::vector<Variant> variants = {
-      {"20 % more torque", remake([](auto& r) { r.amplitude *= 1.2; }), Status::out_of_domain, "excitation level"},
-      {"20 % less torque", remake([](auto& r) { r.amplitude *= 0.8; }), Status::out_of_domain, "excitation level"},
-      {"6 % more torque", remake([](auto& r) { r.amplitude *= 1.06; }), Status::out_of_domain, "excitation level"},
+      {"20 % more torque", remake([](auto& r) { r.amplitude *= 1.2; }), Status::out_of_domain,
+       "excitation level"},
+      {"20 % less torque", remake([](auto& r) { r.amplitude *= 0.8; }), Status::out_of_domain,
+       "excitation level"},
+      {"6 % more torque", remake([](auto& r) { r.amplitude *= 1.06; }), Status::out_of_domain,
+       "excitation level"},
       {"8 Hz", remake([](auto& r) { r.frequency = 8; }), Status::out_of_domain, "excitation frequency"},
       {"12.5 Hz", remake([](auto& r) { r.frequency = 12.5; }), Status::out_of_domain, "excitation frequency"},
       {"5 Hz", remake([](auto& r) { r.frequency = 5; }), Status::out_of_domain, "excitation frequency"},
@@ -201,8 +229,10 @@ TEST(EstimateApdSkewness, RecordsOutsideTheDomainAreRefusedWithTheReason) {
       {"950 Hz", remake([](auto& r) { r.rate = 950; }), Status::out_of_domain, "sampling rate"},
       {"sine", sine(0.05), Status::out_of_domain, "excitation level"},
       {"sine of the same level", sine(0.05 * std::sqrt(2.0)), Status::out_of_domain, "excitation amplitude"},
-      {"no torque", [](Record& r) { scale(r.column(Channel::motor_torque), 0); }, Status::out_of_domain, "constant"},
-      {"dead sensor", [](Record& r) { scale(r.column(Channel::sensor_torque), 0); }, Status::out_of_domain, "does not move"},
+      {"no torque", [](Record& r) { scale(r.column(Channel::motor_torque), 0); }, Status::out_of_domain,
+       "constant"},
+      {"dead sensor", [](Record& r) { scale(r.column(Channel::sensor_torque), 0); }, Status::out_of_domain,
+       "does not move"},
       {"too noisy", remake([](auto& r) { r.noise = 0.02; }), Status::out_of_domain, "noise"},
       {"saturated",
        [](Record& r) {
@@ -211,11 +241,14 @@ TEST(EstimateApdSkewness, RecordsOutsideTheDomainAreRefusedWithTheReason) {
        Status::out_of_domain, "saturated"},
       {"output moves",
        [](Record& r) {
-         for (std::size_t i = 0; i < r.size(); ++i) r.column(Channel::load_position)[i] = 2e-3 * std::sin(60 * r.time[i]);
+         for (std::size_t i = 0; i < r.size(); ++i)
+           r.column(Channel::load_position)[i] = 2e-3 * std::sin(60 * r.time[i]);
        },
        Status::out_of_domain, "output moves"},
-      {"motor travels too far", remake([](auto& r) { r.travel = 0.03; }), Status::out_of_domain, "motor travels"},
-      {"no signal", [](Record& r) { r.column(Channel::sensor_torque).clear(); }, Status::insufficient_data, "no sensor_torque"},
+      {"motor travels too far", remake([](auto& r) { r.travel = 0.03; }), Status::out_of_domain,
+       "motor travels"},
+      {"no signal", [](Record& r) { r.column(Channel::sensor_torque).clear(); }, Status::insufficient_data,
+       "no sensor_torque"},
       {"half a period", [](Record& r) { r = r.slice(0, 0.05); }, Status::insufficient_data, "too short"},
       {"a few samples", [](Record& r) { r = r.slice(0, 0.004); }, Status::insufficient_data, "too short"},
       {"one sample", [](Record& r) { r = r.slice(0, 0.0005); }, Status::insufficient_data, "too short"},
@@ -223,7 +256,7 @@ TEST(EstimateApdSkewness, RecordsOutsideTheDomainAreRefusedWithTheReason) {
        [](Record& r) {
          for (double& v : r.column(Channel::sensor_torque)) v += 3;
        },
-       Status::insufficient_data, "classes"},
+       Status::out_of_domain, "signal level"},
   };
   for (const Variant& variant : variants) {
     Record record = make_record({});

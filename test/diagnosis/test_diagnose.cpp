@@ -66,7 +66,8 @@ TEST(Diagnose, OneMethod) {
       diagnose(make_record({}), all_settings(), &curve, std::nullopt, method);
       ADD_FAILURE() << method;
     } catch (const InvalidParameter& error) {
-      EXPECT_NE(std::string(error.what()).find("apd_skewness, lost_motion"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("apd_skewness, lost_motion"), std::string::npos)
+          << error.what();
     }
 }
 
@@ -82,7 +83,8 @@ TEST(Diagnose, WhatCannotBeServedIsListedWithItsReason) {
   ASSERT_EQ(d.estimates.size(), 2u);
   for (const Estimate& e : d.estimates) {
     EXPECT_EQ(e.status, Status::insufficient_data);
-    EXPECT_NE(e.message.find("declares no diagnosis." + std::string(e.method == "lost_motion" ? "lost_motion" : "apd")),
+    EXPECT_NE(e.message.find("declares no diagnosis." +
+                             std::string(e.method == "lost_motion" ? "lost_motion" : "apd")),
               std::string::npos)
         << e.message;
   }
@@ -111,7 +113,8 @@ TEST(Diagnose, SettlingIsDiscardedForAllMethods) {
     record.column(Channel::sensor_torque)[i] = 0.3;
     record.column(Channel::motor_position)[i] = 9;
   }
-  const Diagnosis spoilt = diagnose(record, all_settings(), &curve), clean = diagnose(make_record({}), all_settings(), &curve);
+  const Diagnosis spoilt = diagnose(record, all_settings(), &curve),
+                  clean = diagnose(make_record({}), all_settings(), &curve);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(spoilt.estimates[i].backlash, clean.estimates[i].backlash);
     EXPECT_EQ(spoilt.estimates[i].upper, clean.estimates[i].upper);
@@ -147,16 +150,20 @@ TEST(DiagnosisSettings, ReadFromARigFile) {
   EXPECT_EQ(all.lost_motion->torque, 3.5);
   EXPECT_FALSE(all.lost_motion->subtract_elastic_deflection);
   EXPECT_TRUE(all.limits->angular);
-  const DiagnosisSettings few = read("apd: {signal: sensor_torque, settling_periods: 0, classes: 2, lower: 0, upper: 1}");
+  const DiagnosisSettings few =
+      read("apd: {signal: sensor_torque, settling_periods: 0, classes: 2, lower: 0, upper: 1}");
   EXPECT_EQ(few.apd->period, 0);
   EXPECT_FALSE(few.lost_motion || few.limits);
 
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"apd: {signal: torque, settling_periods: 0, classes: 2, lower: 0, upper: 1}", "apd.signal"},
       {"apd: {signal: sensor_torque, classes: 2, lower: 0, upper: 1}", "apd.settling_periods"},
-      {"apd: {signal: sensor_torque, settling_periods: -1, classes: 2, lower: 0, upper: 1}", "apd.settling_periods"},
-      {"apd: {signal: sensor_torque, period: 0, settling_periods: 1, classes: 2, lower: 0, upper: 1}", "apd.period"},
-      {"apd: {signal: sensor_torque, settling_periods: 0, classes: 2, lower: 0, upper: 1, bins: 3}", "apd.bins"},
+      {"apd: {signal: sensor_torque, settling_periods: -1, classes: 2, lower: 0, upper: 1}",
+       "apd.settling_periods"},
+      {"apd: {signal: sensor_torque, period: 0, settling_periods: 1, classes: 2, lower: 0, upper: 1}",
+       "apd.period"},
+      {"apd: {signal: sensor_torque, settling_periods: 0, classes: 2, lower: 0, upper: 1, bins: 3}",
+       "apd.bins"},
       {"lost_motion: {torque: 0, elastic_deflection: included}", "lost_motion.torque"},
       {"lost_motion: {torque: 1, elastic_deflection: both}", "lost_motion.elastic_deflection"},
       {"lost_motion: {torque: 1}", "lost_motion.elastic_deflection"},

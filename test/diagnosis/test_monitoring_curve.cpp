@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -7,8 +8,6 @@
 #include <random>
 #include <string>
 #include <vector>
-
-#include <unistd.h>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
@@ -21,9 +20,15 @@ using test::linear_curve;
 
 constexpr double kZ = 1.959964;  // 97.5 % quantile of the normal distribution
 
-double sigma(int periods) { return std::hypot(test::kCurveBetween, test::kCurveWithin / std::sqrt(periods)); }
-double backlash_at(double skewness) { return (skewness - test::kCurveStart) / test::kCurveSlope; }
-double skewness_at(double backlash) { return test::kCurveStart + test::kCurveSlope * backlash; }
+double sigma(int periods) {
+  return std::hypot(test::kCurveBetween, test::kCurveWithin / std::sqrt(periods));
+}
+double backlash_at(double skewness) {
+  return (skewness - test::kCurveStart) / test::kCurveSlope;
+}
+double skewness_at(double backlash) {
+  return test::kCurveStart + test::kCurveSlope * backlash;
+}
 
 /// A curve through the given skewness values at 0, 1, 2, ... um.
 MonitoringCurve curve_through(const std::vector<double>& means, double between) {
@@ -92,7 +97,8 @@ TEST(MonitoringCurve, StatusAtTheEnds) {
 
   Estimate e = curve.invert(test::kCurveStart + 1.01 * limit, 5, 0);
   EXPECT_EQ(e.status, Status::below_range);
-  EXPECT_TRUE(std::isnan(e.backlash) && std::isnan(e.lower) && std::isnan(e.upper) && std::isnan(e.angle_lower));
+  EXPECT_TRUE(std::isnan(e.backlash) && std::isnan(e.lower) && std::isnan(e.upper) &&
+              std::isnan(e.angle_lower));
 
   e = curve.invert(test::kCurveStart + 0.5 * limit, 5, 0);  // scatter explains it
   EXPECT_EQ(e.status, Status::ok);
@@ -139,7 +145,8 @@ TEST(MonitoringCurve, ARisingStretchIsFlaggedAndAllBranchesCovered) {
   curve.points[3].monotonic = false;
   const Estimate e = curve.invert(3.3, 1, 0);
   ASSERT_EQ(e.status, Status::ok) << e.message;
-  // Branches at 1.7 um (slope -1), 2.6 um (slope 0.5) and 3.67 um (slope -0.3); 0.0392 is 1.96 times the scatter.
+  // Branches at 1.7 um (slope -1), 2.6 um (slope 0.5) and 3.67 um (slope -0.3); 0.0392 is 1.96 times the
+  // scatter.
   EXPECT_NEAR(e.lower, (1.7 - kZ * 0.02) * 1e-6, 1e-15);
   EXPECT_NEAR(e.upper, (3 + (0.2 + kZ * 0.02) / 0.3) * 1e-6, 1e-15);
   EXPECT_NE(e.message.find("not monotonic"), std::string::npos) << e.message;
@@ -178,6 +185,30 @@ TEST(MonitoringCurve, NoiseIsInterpolatedAndHeldOutsideItsLevels) {
   EXPECT_NEAR(curve.invert(2.5, 3, 0.01).backlash, backlash_at(3.5), 1e-12);
   curve.conditions.noise = 0.01;
   EXPECT_EQ(curve.nominal(curve.points[1]).between, 0.25);
+}
+
+TEST(MonitoringCurve, AnUnknownNoiseWidensTheInterval) {
+  MonitoringCurve curve = linear_curve();
+  for (CurvePoint& point : curve.points) point.cells[1].mean -= 0.5;  // at a noise of 0.01
+  const double half = kZ * sigma(5) / -test::kCurveSlope;
+  const Estimate e = curve.invert(3, 5, {0.002, 0.006});
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_NEAR(e.backlash, backlash_at(3.3), 1e-12);  // at the upper end
+  EXPECT_NEAR(e.lower, backlash_at(3.3) - half, 1e-12);
+  EXPECT_NEAR(e.upper, backlash_at(3.1) + half, 1e-12);
+  EXPECT_NEAR(curve.invert(3, 5, {0.006, 0.006}).upper, backlash_at(3.3) + half, 1e-12);
+  const Estimate any = curve.invert(3, 5, NoiseRange());
+  EXPECT_NEAR(any.lower, backlash_at(3.5) - half, 1e-12);
+  EXPECT_NEAR(any.upper, backlash_at(3.0) + half, 1e-12);
+  EXPECT_EQ(curve.invert(3, 5, {-1, 99}).upper, any.upper);
+  // Only noise explains so little skewness.
+  EXPECT_EQ(curve.invert(1.2, 5, {0, 0}).status, Status::above_range);
+  EXPECT_EQ(curve.invert(1.2, 5, {0.01, 0.01}).status, Status::ok);
+  const Estimate either = curve.invert(1.2, 5, {0, 0.01});
+  EXPECT_EQ(either.status, Status::above_range);
+  EXPECT_NEAR(either.lower, backlash_at(1.7) - half, 1e-12);
+  EXPECT_EQ(curve.invert(5, 5, {0, 0.01}).status, Status::below_range);
+  EXPECT_EQ(curve.invert(0.5, 5, {0, 0.01}).status, Status::above_range);
 }
 
 TEST(MonitoringCurve, AnAngularCurveGivesAnglesOnly) {
@@ -233,7 +264,8 @@ void expect_same(const MonitoringCurve& a, const MonitoringCurve& b) {
        {&CurveConditions::amplitude, &CurveConditions::excitation_level, &CurveConditions::frequency,
         &CurveConditions::sampling_rate, &CurveConditions::noise, &CurveConditions::motor_travel})
     EXPECT_EQ(x.*member, y.*member);
-  for (const auto member : {&CurveConditions::periods, &CurveConditions::settling_periods, &CurveConditions::seeds})
+  for (const auto member :
+       {&CurveConditions::periods, &CurveConditions::settling_periods, &CurveConditions::seeds})
     EXPECT_EQ(x.*member, y.*member);
   EXPECT_TRUE(x.apd == y.apd);
   EXPECT_EQ(x.output_locked, y.output_locked);
@@ -254,7 +286,9 @@ void expect_same(const MonitoringCurve& a, const MonitoringCurve& b) {
   }
 }
 
-MonitoringCurve parse(const std::string& text) { return MonitoringCurve::from_yaml(YamlReader::from_text(text, "curve.yaml")); }
+MonitoringCurve parse(const std::string& text) {
+  return MonitoringCurve::from_yaml(YamlReader::from_text(text, "curve.yaml"));
+}
 
 TEST(MonitoringCurve, FilesKeepEveryBit) {
   std::mt19937_64 random(5);
@@ -270,20 +304,23 @@ TEST(MonitoringCurve, FilesKeepEveryBit) {
   c.seeds = 1000000;
   c.angular = true;
   c.output_locked = false;
-  for (double* value : {&c.amplitude, &c.excitation_level, &c.frequency, &c.sampling_rate, &c.motor_travel}) *value = uniform(random);
+  for (double* value : {&c.amplitude, &c.excitation_level, &c.frequency, &c.sampling_rate, &c.motor_travel})
+    *value = uniform(random);
   c.apd = {77, -uniform(random), uniform(random)};
   curve.noise_levels = {0, 1e-300, uniform(random) / 3, 1e9};
   c.noise = curve.noise_levels[2];
   for (CurvePoint& point : curve.points) {
     point.monotonic = uniform(random) < 0.5;
     point.cells.clear();
-    for (int k = 0; k < 4; ++k) point.cells.push_back({uniform(random) - 0.5, uniform(random), uniform(random) * 1e-9});
+    for (int k = 0; k < 4; ++k)
+      point.cells.push_back({uniform(random) - 0.5, uniform(random), uniform(random) * 1e-9});
   }
   const std::string text = curve.to_yaml();
   expect_same(curve, parse(text));
   EXPECT_EQ(parse(text).to_yaml(), text);
 
-  const std::string path = (std::filesystem::temp_directory_path() / ("curve_" + std::to_string(::getpid()) + ".yaml")).string();
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("curve_" + std::to_string(::getpid()) + ".yaml")).string();
   write_curve(curve, path);
   expect_same(curve, read_curve(path));
   std::remove(path.c_str());

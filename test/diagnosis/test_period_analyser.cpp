@@ -54,8 +54,7 @@ TEST(PeriodAnalyser, EveryWindowHasItsSamplesAtAnyStart) {
 
 TEST(PeriodAnalyser, ClosesWithTheLastSampleOfAWindow) {
   PeriodAnalyser analyser(0.1, kLayout);
-  for (int i = 0; i < 250; ++i)
-    EXPECT_EQ(analyser.add(i * 1e-3, 0) != nullptr, i == 99 || i == 199) << i;
+  for (int i = 0; i < 250; ++i) EXPECT_EQ(analyser.add(i * 1e-3, 0) != nullptr, i == 99 || i == 199) << i;
 }
 
 TEST(PeriodAnalyser, JitterUnderAQuarterOfASampleChangesNothing) {
@@ -150,14 +149,16 @@ TEST(PeriodAnalyser, AGapOverWholeWindowsSkipsThem) {
 
 TEST(PeriodAnalyser, VeryLongAndVeryShortPeriods) {
   EXPECT_TRUE(windows_of(stamps(2000, 1e-3), 1e9).empty());
-  EXPECT_TRUE(windows_of(stamps(2000, 1e-3), 1e-300).empty());  // shorter than the sampling interval: no windows
+  EXPECT_TRUE(
+      windows_of(stamps(2000, 1e-3), 1e-300).empty());  // shorter than the sampling interval: no windows
   const auto windows = windows_of(stamps(2000, 1), 1000);
   ASSERT_EQ(windows.size(), 2u);
   EXPECT_EQ(windows[1].signal.count(), 1000u);
 }
 
 TEST(PeriodAnalyser, FinishAcceptsAWindowThatLacksAFractionOfASample) {
-  const double period = 99.75e-3;  // the second window ends 1.0 intervals after sample 198, 1.5 samples after it began
+  const double period =
+      99.75e-3;  // the second window ends 1.0 intervals after sample 198, 1.5 samples after it began
   PeriodAnalyser analyser(period, kLayout);
   int returned = 0;
   for (int i = 0; i < 199; ++i) returned += analyser.add(i * 1e-3, 0) != nullptr;

@@ -42,15 +42,19 @@ struct Live {
 
   void push(const Record& record) {
     for (std::size_t i = 0; i < record.size(); ++i)
-      if (const PeriodResult* period = stream.add(record.time[i], values_at(record, i))) periods.push_back(*period);
+      if (const PeriodResult* period = stream.add(record.time[i], values_at(record, i)))
+        periods.push_back(*period);
   }
 };
 
-bool same(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+bool same(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
 
 void expect_same(const Record& a, const Record& b) {
   EXPECT_EQ(a.time, b.time);
-  for (const Channel channel : kChannels) EXPECT_EQ(a.column(channel), b.column(channel)) << channel_name(channel);
+  for (const Channel channel : kChannels)
+    EXPECT_EQ(a.column(channel), b.column(channel)) << channel_name(channel);
 }
 
 void expect_same(const Diagnosis& a, const Diagnosis& b) {
@@ -60,8 +64,9 @@ void expect_same(const Diagnosis& a, const Diagnosis& b) {
     EXPECT_EQ(x.method, y.method);
     EXPECT_EQ(x.status, y.status) << x.message << " / " << y.message;
     EXPECT_EQ(x.message, y.message);
-    for (const auto member : {&Estimate::backlash, &Estimate::lower, &Estimate::upper, &Estimate::backlash_angle,
-                              &Estimate::angle_lower, &Estimate::angle_upper, &Estimate::skewness})
+    for (const auto member :
+         {&Estimate::backlash, &Estimate::lower, &Estimate::upper, &Estimate::backlash_angle,
+          &Estimate::angle_lower, &Estimate::angle_upper, &Estimate::skewness})
       EXPECT_TRUE(same(x.*member, y.*member)) << x.method << ' ' << x.*member << ' ' << y.*member;
   }
   EXPECT_EQ(a.verdict.grade, b.verdict.grade);
@@ -82,7 +87,8 @@ void expect_live_equals_offline(const Record& record, const ApdSettings& apd, co
   Live run(StreamSettings{apd, 60});
   run.push(record);
   EXPECT_EQ(run.stream.counters().restarts, 0);
-  expect_same(diagnose_settled(run.stream.latest(0), without_settling(settings), &curve), diagnose(record, settings, &curve));
+  expect_same(diagnose_settled(run.stream.latest(0), without_settling(settings), &curve),
+              diagnose(record, settings, &curve));
 }
 
 TEST(SampleStream, LiveEqualsOffline) {
@@ -97,8 +103,9 @@ TEST(SampleStream, LiveEqualsOffline) {
             recipe.jitter = jitter;
             recipe.noise = 1e-3;
             expect_live_equals_offline(make_record(recipe), apd_settings(period, settling),
-                                       std::to_string(rate) + " Hz from " + std::to_string(start) + " jitter " +
-                                           std::to_string(jitter) + " period " + std::to_string(period));
+                                       std::to_string(rate) + " Hz from " + std::to_string(start) +
+                                           " jitter " + std::to_string(jitter) + " period " +
+                                           std::to_string(period));
           }
 }
 
@@ -116,7 +123,8 @@ TEST(SampleStream, LiveEqualsOfflineAtAnyLength) {
       SCOPED_TRACE(i);
       const Record so_far = record.slice(0, 0.5 * (record.time[i] + (i + 1) * 1e-3));
       ASSERT_EQ(so_far.size(), i + 1);
-      expect_same(diagnose_settled(stream.latest(0), without_settling(settings), &curve), diagnose(so_far, settings, &curve));
+      expect_same(diagnose_settled(stream.latest(0), without_settling(settings), &curve),
+                  diagnose(so_far, settings, &curve));
     }
   }
 }
@@ -155,7 +163,8 @@ TEST(SampleStream, ReportsEachSettledPeriodOnceWithTheOfflineDistribution) {
   for (std::size_t i = 0; i < run.periods.size(); ++i) {
     EXPECT_EQ(run.periods[i].index, static_cast<long>(i) + 2);
     AmplitudeDistribution expected(kLayout);
-    for (std::size_t k = 0; k < 100; ++k) expected.add(record.column(Channel::sensor_torque)[100 * (i + 2) + k]);
+    for (std::size_t k = 0; k < 100; ++k)
+      expected.add(record.column(Channel::sensor_torque)[100 * (i + 2) + k]);
     EXPECT_EQ(run.periods[i].apd.counts(), expected.counts()) << i;
   }
 }
@@ -170,7 +179,8 @@ TEST(SampleStream, LatestGivesExactlyTheSamplesAskedFor) {
     ASSERT_EQ(latest.size(), samples);
     EXPECT_EQ(latest.time.front(), record.time[1500 - samples]);
     EXPECT_EQ(latest.time.back(), record.time.back());
-    EXPECT_EQ(latest.column(Channel::motor_position).front(), record.column(Channel::motor_position)[1500 - samples]);
+    EXPECT_EQ(latest.column(Channel::motor_position).front(),
+              record.column(Channel::motor_position)[1500 - samples]);
   }
 }
 
@@ -192,7 +202,8 @@ TEST(SampleStream, TrimmedBuffersGiveWholeWindows) {
           for (std::size_t i = 0; i < record.size(); ++i) {
             stream.add(record.time[i], values_at(record, i));
             if (i % 41 != 0) continue;
-            SCOPED_TRACE(std::to_string(rate) + " Hz, keep " + std::to_string(keep) + ", sample " + std::to_string(i));
+            SCOPED_TRACE(std::to_string(rate) + " Hz, keep " + std::to_string(keep) + ", sample " +
+                         std::to_string(i));
             EXPECT_LE(stream.kept().size(), 1.26 * keep * rate + 2);
             const long periods = stream.periods(), end = grid ? grid->completed(record.time[i]) : 0;
             // At least what the buffer surely holds, at most what has passed.
@@ -201,8 +212,11 @@ TEST(SampleStream, TrimmedBuffersGiveWholeWindows) {
             for (const long count : {1L, periods}) {
               if (count > periods || periods == 0) continue;
               const Record latest = stream.latest(count);
-              expect_same(latest, record.slice(grid->start(end - count), std::min(grid->start(end), std::nextafter(record.time[i], 1e300))));
-              EXPECT_EQ(analyse_apd(latest, apd_settings(0.1, 0)).periods.size(), static_cast<std::size_t>(count));
+              expect_same(latest,
+                          record.slice(grid->start(end - count),
+                                       std::min(grid->start(end), std::nextafter(record.time[i], 1e300))));
+              EXPECT_EQ(analyse_apd(latest, apd_settings(0.1, 0)).periods.size(),
+                        static_cast<std::size_t>(count));
             }
           }
         }

@@ -55,8 +55,8 @@ Verdict combined(const std::vector<Estimate>& estimates, const std::optional<Lim
 }
 
 TEST(Verdict, StandsOnTheNarrowestSoundEstimate) {
-  const Verdict v = combined({ok("wide", 9e-5, 3e-5), unable("off", Status::out_of_domain, "x"), ok("narrow", 8e-5, 1e-6),
-                              ok("middle", 8e-5, 1e-5)});
+  const Verdict v = combined({ok("wide", 9e-5, 3e-5), unable("off", Status::out_of_domain, "x"),
+                              ok("narrow", 8e-5, 1e-6), ok("middle", 8e-5, 1e-5)});
   EXPECT_EQ(v.estimate, 2);
   EXPECT_EQ(v.agreement, "agree");
   EXPECT_EQ(v.grade, Grade::good);
@@ -67,7 +67,7 @@ TEST(Verdict, StandsOnTheNarrowestSoundEstimate) {
 
 TEST(Verdict, GradesAtTheLimits) {
   const std::vector<std::pair<double, Grade>> cases = {
-      {0, Grade::good},       {0.999e-4, Grade::good},    {1e-4, Grade::watch}, {1.49e-4, Grade::watch},
+      {0, Grade::good},         {0.999e-4, Grade::good},   {1e-4, Grade::watch}, {1.49e-4, Grade::watch},
       {1.5e-4, Grade::service}, {1.99e-4, Grade::service}, {2e-4, Grade::stop},  {1, Grade::stop}};
   for (const auto& [value, grade] : cases) {
     const Verdict v = combined({ok("m", value, 1e-6)});
@@ -113,12 +113,14 @@ TEST(Verdict, ALowerBoundBesideASoundEstimate) {
 }
 
 TEST(Verdict, NothingSoundCannotTellAndSaysWhy) {
-  const Verdict v = combined({unable("a", Status::ambiguous, "flat"), unable("b", Status::below_range, "high"),
-                              unable("c", Status::insufficient_data, "no channel"), unable("d", Status::above_range, "low")});
+  const Verdict v = combined(
+      {unable("a", Status::ambiguous, "flat"), unable("b", Status::below_range, "high"),
+       unable("c", Status::insufficient_data, "no channel"), unable("d", Status::above_range, "low")});
   EXPECT_EQ(v.grade, Grade::cannot_tell);
   EXPECT_EQ(v.estimate, -1);
   EXPECT_EQ(v.agreement, "none");
-  for (const char* part : {"a: ambiguous (flat)", "b: below_range (high)", "c: insufficient_data (no channel)", "d: above_range (low)"})
+  for (const char* part : {"a: ambiguous (flat)", "b: below_range (high)",
+                           "c: insufficient_data (no channel)", "d: above_range (low)"})
     EXPECT_NE(v.message.find(part), std::string::npos) << v.message;
   EXPECT_EQ(combined({}).grade, Grade::cannot_tell);
   EXPECT_EQ(combined({}).estimate, -1);
@@ -164,7 +166,9 @@ TEST(Verdict, AnEstimateWithoutIntervalIsTheLastChoice) {
 }
 
 TEST(Limits, ReadAndRefuse) {
-  const auto read = [](const std::string& text) { return read_limits(YamlReader::from_text(text, "rig.yaml")); };
+  const auto read = [](const std::string& text) {
+    return read_limits(YamlReader::from_text(text, "rig.yaml"));
+  };
   const Limits limits = read("backlash: {watch: 1e-4, service: 2e-4, stop: 2e-4}");
   EXPECT_FALSE(limits.angular);
   EXPECT_EQ(limits.watch, 1e-4);

@@ -5,11 +5,11 @@
 
 namespace backlash::test {
 
-constexpr double kCurveStart = 4.5;      // skewness at backlash 0
-constexpr double kCurveSlope = -15000;   // 1/m
-constexpr double kCurveEnd = 2e-4;       // m
+constexpr double kCurveStart = 4.5;     // skewness at backlash 0
+constexpr double kCurveSlope = -15000;  // 1/m
+constexpr double kCurveEnd = 2e-4;      // m
 constexpr double kCurveBetween = 0.05, kCurveWithin = 0.1;
-constexpr double kCurveToAngle = 67;     // rad/m
+constexpr double kCurveToAngle = 67;  // rad/m
 
 /// Conditions: a square wave of 0.05 N m at 10 Hz, sampled at 1 kHz.
 inline MonitoringCurve linear_curve(int points = 21) {

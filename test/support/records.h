@@ -34,7 +34,8 @@ inline Record make_record(const RecordRecipe& recipe) {
     record.time.push_back(recipe.start + (i + shift) / recipe.rate);
     record.column(Channel::motor_torque).push_back(recipe.amplitude * sign);
     record.column(Channel::motor_position).push_back(0.5 * recipe.travel * sign * (1 - 0.2 * ring));
-    record.column(Channel::sensor_torque).push_back(recipe.amplitude * sign * (1 - 2 * ring) + recipe.noise * normal(random));
+    record.column(Channel::sensor_torque)
+        .push_back(recipe.amplitude * sign * (1 - 2 * ring) + recipe.noise * normal(random));
     record.column(Channel::load_position).push_back(0);
   }
   return record;
@@ -43,7 +44,8 @@ inline Record make_record(const RecordRecipe& recipe) {
 inline ChannelValues values_at(const Record& record, std::size_t i) {
   ChannelValues values;
   for (const Channel channel : kChannels)
-    values[static_cast<std::size_t>(channel)] = record.has(channel) ? record.column(channel)[i] : std::nan("");
+    values[static_cast<std::size_t>(channel)] =
+        record.has(channel) ? record.column(channel)[i] : std::nan("");
   return values;
 }
 
@@ -51,7 +53,8 @@ inline ChannelValues values_at(const Record& record, std::size_t i) {
 inline void cut_out(Record& record, std::ptrdiff_t from, std::ptrdiff_t to) {
   record.time.erase(record.time.begin() + from, record.time.begin() + to);
   for (const Channel channel : kChannels)
-    if (auto& column = record.column(channel); !column.empty()) column.erase(column.begin() + from, column.begin() + to);
+    if (auto& column = record.column(channel); !column.empty())
+      column.erase(column.begin() + from, column.begin() + to);
 }
 
 }  // namespace backlash::test

@@ -1,8 +1,8 @@
 // Amplitude probability distribution (APD): which share of the time a signal spends in each amplitude class.
 //
 //   class k covers [lower + k w, lower + (k+1) w),   w = (upper - lower) / classes,   k = 0 .. classes - 1
-//   y_k = 100 N_k / N                                percent; N counts all samples, also those outside the range
-//   skewness = 1/M sum ((y_k - mean) / s)^3          s with divisor M = classes (population standard deviation)
+//   y_k = 100 N_k / N                          percent; N counts all samples, also those outside the range
+//   skewness = 1/M sum ((y_k - mean) / s)^3    s with divisor M = classes (population standard deviation)
 //   kurtosis = 1/M sum ((y_k - mean) / s)^4
 //
 // The moments are those of the class values y_k, not of the signal. They depend on the number of classes and
@@ -18,8 +18,8 @@
 namespace backlash {
 
 struct ApdLayout {
-  int classes = 0;               // >= 2
-  double lower = 0, upper = 0;   // unit of the signal, lower < upper
+  int classes = 0;              // >= 2
+  double lower = 0, upper = 0;  // unit of the signal, lower < upper
   bool operator==(const ApdLayout& o) const {
     return classes == o.classes && lower == o.lower && upper == o.upper;
   }
@@ -32,8 +32,8 @@ class AmplitudeDistribution {
   /// Throws InvalidParameter for a layout outside its range.
   explicit AmplitudeDistribution(const ApdLayout& layout);
 
-  void add(double value);  ///< one sample; a NaN counts as outside (above)
-  void merge(const AmplitudeDistribution& other);  ///< adds the samples of a distribution with the same layout
+  void add(double value);                          ///< one sample; a NaN counts as outside (above)
+  void merge(const AmplitudeDistribution& other);  ///< adds its samples; the layouts must be equal
   void clear();
 
   const ApdLayout& layout() const { return layout_; }

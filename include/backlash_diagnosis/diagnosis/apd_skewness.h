@@ -20,39 +20,46 @@ struct ApdSettings {
 
 /// The APDs of a record.
 struct ApdResult {
-  double period = 0;                   // s; 0 where none was found
-  std::vector<PeriodResult> periods;   // complete ones, after settling
-  int incomplete = 0;                  // windows left out because of gaps, or with no sample inside the classes
-  double skewness = kNaN;              // mean over the periods
-  double noise = kNaN;                 // estimated from the signal; NaN with fewer than two periods
+  double period = 0;                  // s; 0 where none was found
+  std::vector<PeriodResult> periods;  // complete ones, after settling
+  int incomplete = 0;      // windows left out because of gaps, or with no sample inside the classes
+  double skewness = kNaN;  // mean over the periods
+  NoiseRange noise_range;  // of the signal after settling
+  double noise = kNaN;     // its upper end; NaN with fewer than two periods
   AmplitudeDistribution total{ApdLayout{2, 0, 1}};  // all periods together
 };
 
-/// Travel from wall to wall [unit of the position]: distance between its 5 % and 95 % quantiles, so that ringing at the
-/// walls counts little. NaN for an empty list.
+/// Travel from wall to wall [unit of the position]: distance between its 5 % and 95 % quantiles, so that
+/// ringing at the walls counts little. NaN for an empty list.
 double travel_of(const std::vector<double>& position);
 
-/// Excitation period of a record [s]: of motor_torque where recorded, else of `signal`. 0 where there is none.
+/// Excitation period of a record [s]: of motor_torque where recorded, else of `signal`. 0 where there is
+/// none.
 double excitation_period(const Record& record, Channel signal);
 
-constexpr double kFirstPeriodSearch = 0.25;  // s of a run after which a period is searched, then twice as long each time
+/// Length of a run after which its period is searched [s]; after that twice as long each time.
+constexpr double kFirstPeriodSearch = 0.25;
 
-/// Period by which a run is cut into windows [s]: the declared one, else as a stream finds it while the run grows, else
-/// that of the whole record. 0 where there is none.
+/// Period by which a run is cut into windows [s]: the declared one, else as a stream finds it while the run
+/// grows, else that of the whole record. 0 where there is none.
 double run_period(const Record& record, const ApdSettings& settings);
 
-/// The whole excitation periods of a record after settling, by period and settling of `settings` (0 s: run_period).
-/// `last` > 0: only so many of them, the last. Nothing where there is no period, or not one whole period after settling.
+/// The whole excitation periods of a record after settling, by period and settling of `settings` (0 s:
+/// run_period). `last` > 0: only so many of them, the last. Nothing where there is no period, or not one
+/// whole period after settling.
 std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings, long last = 0);
 
-/// Throws InvalidParameter for a layout or period outside its range; a record without the signal gives no periods.
+/// Throws InvalidParameter for a layout or period outside its range; a record without the signal gives no
+/// periods.
 ApdResult analyse_apd(const Record& record, const ApdSettings& settings);
 
-/// Why a record was not taken under the conditions of a curve; empty where it was. Compares sampling rate (2 %),
-/// excitation amplitude and shape (5 %, from motor_torque where recorded, else 25 % on the signal's own level),
-/// frequency (2 %, with two periods or more), noise, saturation, and whether the output moves although it should be
-/// locked. Without motor_torque other amplitudes (within about 25 %) and shapes pass; without motor_position and
-/// load_position a moving output passes where it leaves the signal's level alone.
+/// Why a record was not taken under the conditions of a curve; empty where it was. Compares sampling rate
+/// (2 %), excitation amplitude and shape (5 %, from motor_torque where recorded), the signal's own level
+/// (12 % beyond those on the curve), frequency (2 %, with two periods or more), noise, saturation, and
+/// whether the output moves although it should be locked. What cannot be told: without motor_torque, other
+/// amplitudes within about 12 % and another shape with the same median magnitude; without motor_position,
+/// backlash beyond the end of the curve; without it and load_position, an output that moves but leaves the
+/// signal's level alone.
 std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
                           const MonitoringCurve& curve);
 

@@ -20,7 +20,8 @@ struct DiagnosisSettings {
 DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml);
 
 struct Diagnosis {
-  std::vector<Estimate> estimates;  // one per method of diagnosis_methods(), in that order, or the one asked for
+  std::vector<Estimate>
+      estimates;  // one per method of diagnosis_methods(), in that order, or the one asked for
   std::optional<ApdResult> apd;
   Verdict verdict;
 };
@@ -28,16 +29,18 @@ struct Diagnosis {
 /// Names of all estimators.
 const std::vector<std::string>& diagnosis_methods();
 
-/// Runs the estimators (`method` empty: all) on the whole excitation periods of a record after settling, or on all of it
-/// where the rig declares no APD or the excitation has no period. Throws InvalidParameter for an unknown method;
-/// everything that the record lacks becomes a status with its reason. As a SampleStream that keeps all of the record:
-/// the same numbers, but for jumps of the stamps, at which a stream begins anew.
+/// Runs the estimators (`method` empty: all) on the whole excitation periods of a record after settling, or
+/// on all of it where the rig declares no APD or the excitation has no period. Throws InvalidParameter for an
+/// unknown method; everything that the record lacks becomes a status with its reason. As a SampleStream that
+/// keeps all of the record: the same numbers, but for jumps of the stamps, at which a stream begins anew.
 Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
                    const std::optional<Baseline>& baseline = std::nullopt, const std::string& method = "");
 
 /// The same for a record that was cut already, as a SampleStream does; `settings` without settling.
-Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
-                           const std::optional<Baseline>& baseline = std::nullopt, const std::string& method = "");
+Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings,
+                           const MonitoringCurve* curve,
+                           const std::optional<Baseline>& baseline = std::nullopt,
+                           const std::string& method = "");
 DiagnosisSettings without_settling(DiagnosisSettings settings);
 
 }  // namespace backlash

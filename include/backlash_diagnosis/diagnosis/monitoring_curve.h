@@ -1,10 +1,12 @@
-// Monitoring curve: skewness of the APD as a function of backlash, with its scatter and the conditions it holds for.
+// Monitoring curve: skewness of the APD as a function of backlash, with its scatter and the conditions it
+// holds for.
 //
-// At each backlash and each sensor noise level a number of simulated runs (seeds: other noise, other sampling phase)
-// give skewness per period. The model of a record's mean over n periods is
+// At each backlash and each sensor noise level a number of simulated runs (seeds: other noise, other sampling
+// phase) give skewness per period. The model of a record's mean over n periods is
 //   mean(b)  +-  sqrt(between(b)^2 + within(b)^2 / n)
-// `between` is what a run keeps from its seed (sampling phase, attractor), `within` what changes from period to period;
-// both are standard deviations. After Sarkar, Ellis and Moore (1997), Section 9.1 and Fig. 10(f), who give no scatter.
+// `between` is what a run keeps from its seed (sampling phase, attractor), `within` what changes from period
+// to period; both are standard deviations. After Sarkar, Ellis and Moore (1997), Section 9.1 and Fig. 10(f),
+// who give no scatter.
 #pragma once
 
 #include <string>
@@ -12,26 +14,27 @@
 
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 #include "backlash_diagnosis/diagnosis/estimate.h"
+#include "backlash_diagnosis/diagnosis/noise.h"
 
 namespace backlash {
 
 /// All that a curve depends on. A record taken under other conditions is out of its domain.
 struct CurveConditions {
-  std::string rig;                // name in the rig file
-  std::string rig_digest;         // of the rig file's text, to recognise a stale curve
-  std::string version;            // of the package that made it
-  std::string signal;             // channel name
-  std::string excitation;         // type
-  double amplitude = 0;           // N m, largest motor torque
-  double excitation_level = 0;    // N m, median of |motor torque|: tells a square wave from a sine
-  double frequency = 0;           // Hz
-  double sampling_rate = 0;       // Hz
+  std::string rig;              // name in the rig file
+  std::string rig_digest;       // of the rig file's text, to recognise a stale curve
+  std::string version;          // of the package that made it
+  std::string signal;           // channel name
+  std::string excitation;       // type
+  double amplitude = 0;         // N m, largest motor torque
+  double excitation_level = 0;  // N m, median of |motor torque|: tells a square wave from a sine
+  double frequency = 0;         // Hz
+  double sampling_rate = 0;     // Hz
   ApdLayout apd;
   int periods = 0, settling_periods = 0, seeds = 0;
-  double noise = 0;               // N m (unit of the signal), declared for the sensor
-  double motor_travel = 0;        // rad, largest range of motor_position over the whole curve
+  double noise = 0;         // N m (unit of the signal), declared for the sensor
+  double motor_travel = 0;  // rad, largest range of motor_position over the whole curve
   bool output_locked = false;
-  bool angular = false;           // a rig without base radius: backlash is an angle at the load [rad]
+  bool angular = false;  // a rig without base radius: backlash is an angle at the load [rad]
 };
 
 struct SkewnessCell {
@@ -39,9 +42,9 @@ struct SkewnessCell {
 };
 
 struct CurvePoint {
-  double backlash = 0;      // m, total free play (angular mesh: rad)
-  double signal_level = 0;  // median of |signal| at the declared noise
-  bool monotonic = true;    // false: skewness rises here by more than its scatter explains
+  double backlash = 0;              // m, total free play (angular mesh: rad)
+  double signal_level = 0;          // median of |signal| at the declared noise
+  bool monotonic = true;            // false: skewness rises here by more than its scatter explains
   std::vector<SkewnessCell> cells;  // one per noise level
 };
 
@@ -52,7 +55,8 @@ class MonitoringCurve {
   std::vector<CurvePoint> points;    // increasing backlash
   double backlash_to_angle = kNaN;   // rad (at the axis of motor_position) per unit of backlash
 
-  /// Marks points that rise; adds to `between` the roughness that the grid does not resolve. Called once by the builder.
+  /// Marks points that rise; adds to `between` the roughness that the grid does not resolve. Called once by
+  /// the builder.
   void finish();
 
   /// Skewness model at any backlash within the curve and any noise (held constant outside the levels).
@@ -61,20 +65,24 @@ class MonitoringCurve {
   /// At the declared noise: what a plot of the curve shows.
   const SkewnessCell& nominal(const CurvePoint& point) const;
 
-  /// Backlash values that explain a mean skewness over `periods` periods at the 95 % level, and the best of them.
-  ///   ok           the interval lies on the curve; where the curve is not monotonic it spans all branches
+  /// Backlash values that explain a mean skewness over `periods` periods at the 95 % level, at any noise of
+  /// the range (NaN: any that the curve covers), and the best of them at its upper end.
+  ///   ok           the interval lies on the curve; where it is not monotonic the interval spans all branches
   ///   below_range  skewness is higher than at the smallest backlash: no interval
-  ///   above_range  the largest backlash of the curve explains it, so may an even larger one, or it is lower than
-  ///                anywhere on the curve: a lower bound only
+  ///   above_range  the largest backlash of the curve explains it, so may an even larger one; or it is lower
+  ///                than anywhere on the curve: a lower bound only
   ///   ambiguous    the interval is longer than half of the curve; no upper bound where it reaches the end
-  Estimate invert(double skewness, int periods, double noise) const;
+  Estimate invert(double skewness, int periods, const NoiseRange& noise) const;
+  Estimate invert(double skewness, int periods, double noise) const {
+    return invert(skewness, periods, {noise, noise});
+  }
 
   std::string to_yaml() const;
   /// Throws BadData for a file that is no curve, has an unknown schema or breaks the rules above.
   static MonitoringCurve from_yaml(const YamlReader& yaml);
 };
 
-MonitoringCurve read_curve(const std::string& path);                    ///< MissingInput, BadData
+MonitoringCurve read_curve(const std::string& path);                      ///< MissingInput, BadData
 void write_curve(const MonitoringCurve& curve, const std::string& path);  ///< CannotWrite
 
 }  // namespace backlash

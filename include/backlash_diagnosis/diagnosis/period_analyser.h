@@ -1,8 +1,9 @@
 // Cuts a signal into whole excitation periods by its stamps and computes the APD of each, sample by sample.
 //
-// Window k holds the samples with origin + k T <= t < origin + (k+1) T, where the origin lies half a sample before the
-// first one, so that stamps that jitter by less than a quarter of a sample never change windows (T a whole number of
-// samples). Only stamps count, never the time of arrival: live, replayed and offline give the same numbers.
+// Window k holds the samples with origin + k T <= t < origin + (k+1) T, where the origin lies half a sample
+// before the first one, so that stamps that jitter by less than a quarter of a sample never change windows (T
+// a whole number of samples). Only stamps count, never the time of arrival: live, replayed and offline give
+// the same numbers.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +15,8 @@
 
 namespace backlash {
 
-/// Samples from which the sampling interval of a run is known: the median of the first eight distances, which a lost
-/// sample or jitter at the start cannot spoil.
+/// Samples from which the sampling interval of a run is known: the median of the first eight distances, which
+/// a lost sample or jitter at the start cannot spoil.
 constexpr std::size_t kLeadingSamples = 9;
 
 /// The borders of a run's windows. All that cut a run ask here, so that they agree to the last bit.
@@ -28,8 +29,8 @@ struct WindowGrid {
   long completed(double last) const { return std::max(0L, index(last + interval)); }
 };
 
-/// Grid of a run from its first stamps (increasing). Nothing with fewer than kLeadingSamples of them, or for a period
-/// shorter than the sampling interval.
+/// Grid of a run from its first stamps (increasing). Nothing with fewer than kLeadingSamples of them, or for
+/// a period shorter than the sampling interval.
 std::optional<WindowGrid> window_grid(const std::vector<double>& time, double period);
 
 /// One whole period.
@@ -48,8 +49,9 @@ class PeriodAnalyser {
   /// Period [s] > 0; it should span many more than kLeadingSamples samples. Throws InvalidParameter.
   PeriodAnalyser(double period, const ApdLayout& layout);
 
-  /// Adds a sample; stamps must increase (the caller sees to that). Returns a window when this sample completes it, else
-  /// null; valid until the next call. Windows that end within the first kLeadingSamples samples are not returned.
+  /// Adds a sample; stamps must increase (the caller sees to that). Returns a window when this sample
+  /// completes it, else null; valid until the next call. Windows that end within the first kLeadingSamples
+  /// samples are not returned.
   const PeriodResult* add(double time, double value);
 
   /// No more samples will come: returns the open window if its end is less than two samples away, else null.

@@ -1,5 +1,6 @@
-// Samples of one joint as they arrive: keeps the most recent ones as a Record, counts whole excitation periods, and says
-// what was wrong with those it had to leave out. Knows stamps only, no clock: replayed at any rate it does the same.
+// Samples of one joint as they arrive: keeps the most recent ones as a Record, counts whole excitation
+// periods, and says what was wrong with those it had to leave out. Knows stamps only, no clock: replayed at
+// any rate it does the same.
 #pragma once
 
 #include <memory>
@@ -30,17 +31,17 @@ class SampleStream {
  public:
   explicit SampleStream(const StreamSettings& settings);
 
-  /// Adds a sample; returns a settled period with its APD (see PeriodResult::complete) when this sample ends it. A stamp
-  /// that goes back, or jumps by more than `jump_limit()`, or a channel that appears, starts a new run: everything kept
-  /// is forgotten and settling begins again. Null where no period ends here; valid until the next call. Throws
-  /// InvalidParameter for a stamp that is not finite.
+  /// Adds a sample; returns a settled period with its APD (see PeriodResult::complete) when this sample ends
+  /// it. A stamp that goes back, or jumps by more than `jump_limit()`, or a channel that appears, starts a
+  /// new run: everything kept is forgotten and settling begins again. Null where no period ends here; valid
+  /// until the next call. Throws InvalidParameter for a stamp that is not finite.
   const PeriodResult* add(double time, const ChannelValues& values);
 
   /// Whole settled periods at hand.
   long periods() const;
 
-  /// The last `count` whole settled periods (0: all that are kept); empty where there are none yet. All samples where the
-  /// excitation has no period, and for count 0 without APD.
+  /// The last `count` whole settled periods (0: all that are kept); empty where there are none yet. All
+  /// samples where the excitation has no period, and for count 0 without APD.
   Record latest(long count) const;
 
   double period() const { return period_; }  ///< s; 0 until known
@@ -66,11 +67,11 @@ class SampleStream {
   StampChecker stamps_;
   StreamCounters counters_;
   Record record_;
-  std::vector<Channel> channels_;  // those that the run's first sample has
-  double period_ = 0, start_ = 0;    // s; first stamp of the run
-  double next_search_ = 0;           // s after start_
-  std::optional<double> dropped_;    // s, last stamp that was trimmed since the windows began
-  std::optional<WindowGrid> grid_;   // once the period and kLeadingSamples samples are there
+  std::vector<Channel> channels_;   // those that the run's first sample has
+  double period_ = 0, start_ = 0;   // s; first stamp of the run
+  double next_search_ = 0;          // s after start_
+  std::optional<double> dropped_;   // s, last stamp that was trimmed since the windows began
+  std::optional<WindowGrid> grid_;  // once the period and kLeadingSamples samples are there
   std::optional<PeriodAnalyser> analyser_;
 };
 

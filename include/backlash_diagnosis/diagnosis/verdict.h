@@ -13,8 +13,8 @@ namespace backlash {
 enum class Grade { good, watch, service, stop, cannot_tell };
 const char* to_string(Grade grade);
 
-/// Backlash from which a grade begins, by experience with the machine: in m (`backlash`) or rad (`backlash_angle`).
-/// With a baseline they limit the growth since then.
+/// Backlash from which a grade begins, by experience with the machine: in m (`backlash`) or rad
+/// (`backlash_angle`). With a baseline they limit the growth since then.
 struct Limits {
   bool angular = false;
   double watch = 0, service = 0, stop = 0;  // increasing
@@ -37,9 +37,9 @@ struct Verdict {
   std::string message;
 };
 
-/// Stands on the estimate with status ok and the narrowest interval. Others with status ok, or above_range with its lower
-/// bound, agree where the intervals overlap.
-/// Without limits a sound estimate is graded good. An above_range estimate alone is graded by its lower bound.
+/// Stands on the estimate with status ok and the narrowest interval. Others with status ok, or above_range
+/// with its lower bound, agree where the intervals overlap. Without limits a sound estimate is graded good.
+/// An above_range estimate alone is graded by its lower bound.
 Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limits>& limits,
                 const std::optional<Baseline>& baseline);
 

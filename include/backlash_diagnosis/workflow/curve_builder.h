@@ -1,9 +1,10 @@
-// Builds a monitoring curve: simulates the rig over a grid of backlash values, with several sensor noise seeds and
-// sampling phases at each, and stores mean and scatter of the skewness.
+// Builds a monitoring curve: simulates the rig over a grid of backlash values, with several sensor noise
+// seeds and sampling phases at each, and stores mean and scatter of the skewness.
 //
-// The motion is simulated once per backlash value, finer than the sampling; each seed then samples it at another phase
-// between two samples (a recorder does not know where between its samples the excitation switches) and adds its own
-// sensor noise. The same is done at several noise levels, so that a record can be compared with the curve at the noise that it has.
+// The motion is simulated once per backlash value, finer than the sampling; each seed then samples it at
+// another phase between two samples (a recorder does not know where between its samples the excitation
+// switches) and adds its own sensor noise. The same is done at several noise levels, so that a record can be
+// compared with the curve at the noise that it has.
 #pragma once
 
 #include "backlash_diagnosis/base/progress.h"
@@ -20,12 +21,13 @@ struct CurveRequest {
   int seeds = 8;
 };
 
-/// Sampling rate [Hz] of a recorder whose samples are `interval` [s] apart, to four significant digits: the rate it was
-/// set to, without the jitter of its stamps. Curves for records are built at this rate.
+/// Sampling rate [Hz] of a recorder whose samples are `interval` [s] apart, to four significant digits: the
+/// rate it was set to, without the jitter of its stamps. Curves for records are built at this rate.
 double nominal_sampling_rate(double interval);
 
-/// Throws InvalidParameter (also where the rig declares no APD or an excitation without period), IntegrationError,
-/// Cancelled. Uses all processors; the result does not depend on their number.
-MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, const Progress& progress = nullptr);
+/// Throws InvalidParameter (also where the rig declares no APD or an excitation without period),
+/// IntegrationError, Cancelled. Uses all processors; the result does not depend on their number.
+MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request,
+                            const Progress& progress = nullptr);
 
 }  // namespace backlash

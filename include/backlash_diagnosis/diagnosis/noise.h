@@ -1,0 +1,25 @@
+// White noise on a periodic signal whose motion need not repeat exactly.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+namespace backlash {
+
+/// Standard deviation of white noise: the same value twice where it could be measured; `lower` is 0 where
+/// only an upper bound is known; `upper` is NaN for a signal too short for either.
+struct NoiseRange {
+  double lower = 0, upper = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// The smaller of two estimates, each from the calmest fifth of all stretches of 10 samples:
+///   from period to period  differences between successive periods. Exact where the motion repeats in a
+///                          fifth of the time. Where it does not, the white part of the differences counts
+///                          (smallest eigenvalue of their covariance, Pisarenko 1973): an upper bound.
+///   within a period        residual of a cubic through the stretch: an upper bound, close where the motion
+///                          is slow compared with 10 samples.
+/// `samples_per_period` is rounded. With fewer than two periods, or fewer than 10 samples in one, only the
+/// second.
+NoiseRange estimate_noise(const std::vector<double>& signal, double samples_per_period);
+
+}  // namespace backlash
