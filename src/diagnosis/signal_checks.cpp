@@ -154,8 +154,10 @@ Runs runs_at(const std::vector<double>& signal, double value, double step) {
     runs.samples += end - begin;
     if (end - begin >= 3) {
       ++runs.count;
-      const double next = begin >= 2 ? 2 * signal[begin - 1] - signal[begin - 2] : value;
-      if (std::fabs(next - signal[begin - 1]) > std::fabs(value - signal[begin - 1]) + 2 * step) ++runs.hard;
+      if (begin >= 2) {
+        const double before = signal[begin - 1], speed = before - signal[begin - 2];
+        if (std::fabs(speed) > std::fabs(value - before) + 2 * step) ++runs.hard;
+      }
     }
     begin = end;
   }

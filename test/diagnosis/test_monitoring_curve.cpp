@@ -38,7 +38,7 @@ MonitoringCurve curve_through(const std::vector<double>& means, double between) 
     CurvePoint point;
     point.backlash = 1e-6 * i;
     point.signal_level = 0.05;
-    point.cells = {{means[i], between, 0}, {means[i], between, 0}};
+    point.cells.assign(2, SkewnessCell{means[i], between, 0});
     curve.points.push_back(point);
   }
   return curve;

@@ -64,7 +64,9 @@ class DiagnoserTest(unittest.TestCase):
             for estimate in answer.estimates:
                 self.assertIn(estimate.status_name, ("ok", "ambiguous", "above_range"), estimate.message)
                 self.assertLessEqual(estimate.lower, backlash, estimate.method)
-                self.assertGreaterEqual(estimate.upper, backlash, estimate.method)
+                open_end = math.isnan(estimate.upper)  # a lower bound only, which no sound estimate may be
+                self.assertFalse(open_end and estimate.status_name == "ok", estimate.message)
+                self.assertTrue(open_end or estimate.upper >= backlash, estimate.method)
 
     def test_injected_fault_is_seen_within_a_second(self):
         self.settle(self.inject(2e-5), 8)

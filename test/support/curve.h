@@ -36,7 +36,7 @@ inline MonitoringCurve linear_curve(int points = 21) {
     point.backlash = kCurveEnd * i / (points - 1);
     point.signal_level = 0.05;
     const SkewnessCell cell{kCurveStart + kCurveSlope * point.backlash, kCurveBetween, kCurveWithin};
-    point.cells = {cell, cell};
+    point.cells.assign(2, cell);
     curve.points.push_back(point);
   }
   return curve;
