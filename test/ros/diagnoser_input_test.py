@@ -3,6 +3,7 @@
 import copy
 import shutil
 import tempfile
+import threading
 import unittest
 
 import rospy
@@ -14,6 +15,17 @@ from simulator_support import TIMEOUT
 HALF_GAP = 4e-5  # m
 START = 1_000_000_000  # s, stamp of the first sample
 NAN, INF = float("nan"), float("inf")
+
+
+class Connected(rospy.SubscribeListener, threading.Event):
+    """Set as soon as a publisher has a subscriber."""
+
+    def __init__(self):
+        rospy.SubscribeListener.__init__(self)
+        threading.Event.__init__(self)
+
+    def peer_subscribe(self, *unused):
+        self.set()
 
 
 class DiagnoserInputTest(unittest.TestCase):
@@ -29,14 +41,12 @@ class DiagnoserInputTest(unittest.TestCase):
 
     def setUp(self):
         self.topic = "/states_of_" + self.id().rpartition(".")[2]
-        self.publisher = rospy.Publisher(self.topic, JointState, queue_size=10000)
+        connected = Connected()
+        self.publisher = rospy.Publisher(self.topic, JointState, connected, queue_size=10000)
         self.diagnoser = Diagnoser({"curve": self.curve}, self.topic).ready()
         self.addCleanup(self.diagnoser.__exit__)
         self.diagnostics = Diagnostics()
-        deadline = rospy.Time.now() + rospy.Duration(TIMEOUT)
-        while self.publisher.get_num_connections() == 0:
-            self.assertLess(rospy.Time.now(), deadline, "the diagnoser does not subscribe")
-            rospy.rostime.wallsleep(0.01)  # rospy has no event for this
+        self.assertTrue(connected.wait(TIMEOUT), "the diagnoser does not subscribe")
 
     def send(self, message, time):
         message = copy.deepcopy(message)
