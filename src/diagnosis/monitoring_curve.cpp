@@ -156,15 +156,17 @@ Estimate with_angle(Estimate estimate, const MonitoringCurve& curve) {
 }  // namespace
 
 SkewnessCell MonitoringCurve::at(double backlash, double noise) const {
-  const auto [p, along] = locate(
+  const auto place = locate(
       points.size(), [this](std::size_t i) { return points[i].backlash; }, backlash);
-  const auto [n, across] = locate(
+  const auto level = locate(
       noise_levels.size(), [this](std::size_t i) { return noise_levels[i]; }, noise);
-  const auto cell = [&](std::size_t i) {
+  const auto cell = [this, &level](std::size_t i) {
     const auto& cells = points[i].cells;
-    return n + 1 < cells.size() ? mix(cells[n], cells[n + 1], across) : cells[n];
+    const std::size_t n = level.first;
+    return n + 1 < cells.size() ? mix(cells[n], cells[n + 1], level.second) : cells[n];
   };
-  return p + 1 < points.size() ? mix(cell(p), cell(p + 1), along) : cell(p);
+  const std::size_t p = place.first;
+  return p + 1 < points.size() ? mix(cell(p), cell(p + 1), place.second) : cell(p);
 }
 
 const SkewnessCell& MonitoringCurve::nominal(const CurvePoint& point) const {

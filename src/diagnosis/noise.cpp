@@ -49,17 +49,17 @@ std::size_t sort_calm(std::vector<Stretch>& stretches) {
 /// covariance of five successive values. A few oscillations leave the smallest eigenvalue to the white part.
 double white_share(const std::vector<double>& values, const std::vector<Stretch>& stretches,
                    std::size_t calm) {
-  constexpr int kOrder = 5;
-  Eigen::Matrix<double, kOrder, kOrder> covariance = Eigen::Matrix<double, kOrder, kOrder>::Zero();
+  constexpr int order = 5;
+  Eigen::Matrix<double, order, order> covariance = Eigen::Matrix<double, order, order>::Zero();
   for (std::size_t s = 0; s < calm; ++s)
-    for (std::size_t i = stretches[s].begin; i + kOrder <= stretches[s].begin + kStretch; ++i) {
-      const Eigen::Map<const Eigen::Matrix<double, kOrder, 1>> successive(&values[i]);
+    for (std::size_t i = stretches[s].begin; i + order <= stretches[s].begin + kStretch; ++i) {
+      const Eigen::Map<const Eigen::Matrix<double, order, 1>> successive(&values[i]);
       covariance += successive * successive.transpose();
     }
-  const double mean = covariance.trace() / kOrder;
+  const double mean = covariance.trace() / order;
   if (!(mean > 0)) return 1;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kOrder, kOrder>> solver(covariance,
-                                                                                    Eigen::EigenvaluesOnly);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, order, order>> solver(covariance,
+                                                                                  Eigen::EigenvaluesOnly);
   return std::max(0.0, solver.eigenvalues()[0]) / mean;
 }
 
