@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/hysteresis_loop.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "backlash_diagnosis/diagnosis/wall_reading.h"
 #include "backlash_diagnosis/diagnosis/wall_to_wall.h"
 
@@ -28,6 +29,10 @@ constexpr double kUnsettled = 0.1;
 // ... or if rms ringing is this share of the elastic deflection, so that the flank is left again.
 constexpr double kContactLoss = 0.5;
 constexpr std::size_t kFewest = 2;  // excursions per side
+// Torque in the sensor rings with the motor, so that its excursions need not be those of the excitation. It is not
+// trusted with this share of deviating passages, or with so many times more excursions than half cycles.
+constexpr double kManyOutliers = 0.15;
+constexpr double kManyExcursions = 1.25;
 
 // A status with its reason, raised where the record turns out unfit.
 struct Refusal {
@@ -185,6 +190,17 @@ void require_rest(const WallToWall& play, double deflection) {
                     " rad rms there (travel " + text(play.travel) + " rad); apply torque more slowly"};
 }
 
+void require_calm_sensor(const LockedMotion& motion, const Walls& walls, const WallToWall& play) {
+  const double period = detect_period(motion.time, motion.torque).value_or(0);
+  const double cycles = period > 0 ? 2 * (motion.time.back() - motion.time.front()) / period : 0;
+  const bool too_many = cycles > 0 && walls.excursions.size() > kManyExcursions * cycles + 1;
+  if (!too_many && play.outliers <= kManyOutliers * play.passages) return;
+  throw Refusal{Status::out_of_domain,
+                "sensor_torque rings where the walls are read (" + std::to_string(walls.excursions.size()) +
+                    " excursions, " + std::to_string(play.outliers) + " of " + std::to_string(play.passages) +
+                    " passages far from the others) and the record has no motor_torque to go by"};
+}
+
 struct Parts {
   PlayComponents components;
   double flank_friction = kNaN;  // N m
@@ -255,6 +271,7 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
   const std::vector<double> deflections = deflections_of(walls, settings, exceeds);
   const WallToWall play = measure_wall_to_wall(motion, walls.readings, deflections, walls.switched);
   require_rest(play, settings.subtract_elastic_deflection ? median(deflections) : 0);
+  if (!record.has(Channel::motor_torque)) require_calm_sensor(motion, walls, play);
   if (!(play.travel > 0)) {
     throw Refusal{Status::out_of_domain,
                   "positive torque moves the motor to smaller positions, or not at all"};

@@ -59,6 +59,21 @@ bool right(const Estimate& e, double truth) {
   return true;
 }
 
+TEST(RigDiagnosis, WithoutMotorTorqueNoRingingOfTheSensorIsTakenForAWall) {
+  int answers = 0;
+  for (const double half_gap : {10e-6, 20e-6, 60e-6, 80e-6})
+    for (const double frequency : {5.0, 8.0, 10.0}) {
+      Record record = record_of(half_gap, 5, 2.2,
+                                [frequency](RigFile& f) { f.simulation.excitation.frequency = frequency; });
+      record.column(Channel::motor_torque).clear();
+      const Estimate e =
+          diagnose(record, rig().diagnosis, nullptr, std::nullopt, "lost_motion").estimates.front();
+      EXPECT_TRUE(right(e, 2 * half_gap)) << half_gap << ' ' << frequency << ' ' << e.backlash;
+      answers += e.status == Status::ok;
+    }
+  EXPECT_GE(answers, 6);  // small gaps ring little and must be answered
+}
+
 TEST(RigDiagnosis, IntervalsHoldTheTruth) {
   int answers = 0, wrong = 0, informative = 0;
   for (const double half_gap :
