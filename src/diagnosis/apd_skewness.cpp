@@ -184,12 +184,10 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
   return motion_mismatch(record, curve);
 }
 
-Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                               const MonitoringCurve* curve) {
-  Estimate estimate;
-  estimate.method = "apd_skewness";
-  estimate.skewness = apd.skewness;
-  const auto refuse = [&estimate](Status status, const std::string& reason) {
+std::optional<Estimate> refuse_for_curve(const Record& record, const ApdResult& apd,
+                                         const ApdSettings& settings, const MonitoringCurve* curve) {
+  const auto refuse = [](Status status, const std::string& reason) {
+    Estimate estimate;
     estimate.status = status;
     estimate.message = reason;
     return estimate;
@@ -211,7 +209,17 @@ Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const
   if (std::isnan(apd.noise) && apd.noise_range.upper > kNoiseExcess * curve->noise_levels.back())
     return refuse(Status::insufficient_data,
                   "one period does not tell the sensor noise at this sampling rate: two or more are needed");
-  return curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), apd.noise_range);
+  return std::nullopt;
+}
+
+Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                               const MonitoringCurve* curve) {
+  const auto refused = refuse_for_curve(record, apd, settings, curve);
+  Estimate estimate = refused ? *refused
+                              : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), apd.noise_range);
+  estimate.method = "apd_skewness";
+  estimate.skewness = apd.skewness;
+  return estimate;
 }
 
 }  // namespace backlash

@@ -4,13 +4,13 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/diagnosis/apd_shape.h"
 
 namespace backlash {
 namespace {
 
-Estimate not_served(const std::string& method, const std::string& reason) {
+Estimate not_served(const std::string& reason) {
   Estimate estimate;
-  estimate.method = method;
   estimate.message = reason;
   return estimate;
 }
@@ -34,6 +34,17 @@ LostMotionSettings read_lost_motion(const YamlReader& yaml) {
   return lost_motion;
 }
 
+template <Estimate (*estimate)(const Record&, const ApdResult&, const ApdSettings&, const MonitoringCurve*)>
+Estimate by_apd(const DiagnosisInput& in) {
+  if (!in.settings.apd) return not_served("the rig file declares no diagnosis.apd");
+  return estimate(in.record, *in.apd, *in.settings.apd, in.curve);
+}
+
+Estimate by_lost_motion(const DiagnosisInput& in) {
+  if (!in.settings.lost_motion) return not_served("the rig file declares no diagnosis.lost_motion");
+  return estimate_lost_motion(in.record, *in.settings.lost_motion);
+}
+
 }  // namespace
 
 DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
@@ -50,9 +61,22 @@ DiagnosisSettings without_settling(DiagnosisSettings settings) {
   return settings;
 }
 
-const std::vector<std::string>& diagnosis_methods() {
-  static const std::vector<std::string> methods = {"apd_skewness", "lost_motion"};
+const std::vector<DiagnosisMethod>& diagnosis_method_table() {
+  static const std::vector<DiagnosisMethod> methods = {
+      {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", by_apd<estimate_apd_skewness>},
+      {"apd_shape", "the signal of diagnosis.apd and a monitoring curve", by_apd<estimate_apd_shape>},
+      {"lost_motion", "motor_position, and motor_torque or sensor_torque; output locked", by_lost_motion},
+  };
   return methods;
+}
+
+const std::vector<std::string>& diagnosis_methods() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const DiagnosisMethod& method : diagnosis_method_table()) all.push_back(method.name);
+    return all;
+  }();
+  return names;
 }
 
 Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
@@ -70,24 +94,16 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
   const auto& methods = diagnosis_methods();
   if (!method.empty() && std::find(methods.begin(), methods.end(), method) == methods.end())
     throw InvalidParameter("method", method, "must be one of " + joined(methods));
-  const auto wanted = [&method](const std::string& name) { return method.empty() || method == name; };
   Diagnosis diagnosis;
   if (settings.apd) diagnosis.apd = analyse_apd(record, *settings.apd);
-  if (record.time.empty()) {
-    for (const std::string& name : methods)
-      if (wanted(name))
-        diagnosis.estimates.push_back(not_served(name, "no whole excitation period after settling"));
-    diagnosis.verdict = combine(diagnosis.estimates, settings.limits, baseline);
-    return diagnosis;
+  const DiagnosisInput input{record, settings, diagnosis.apd, curve};
+  for (const DiagnosisMethod& each : diagnosis_method_table()) {
+    if (!method.empty() && method != each.name) continue;
+    diagnosis.estimates.push_back(record.time.empty()
+                                      ? not_served("no whole excitation period after settling")
+                                      : each.estimate(input));
+    diagnosis.estimates.back().method = each.name;
   }
-  if (wanted("apd_skewness"))
-    diagnosis.estimates.push_back(settings.apd
-                                      ? estimate_apd_skewness(record, *diagnosis.apd, *settings.apd, curve)
-                                      : not_served("apd_skewness", "the rig file declares no diagnosis.apd"));
-  if (wanted("lost_motion"))
-    diagnosis.estimates.push_back(
-        settings.lost_motion ? estimate_lost_motion(record, *settings.lost_motion)
-                             : not_served("lost_motion", "the rig file declares no diagnosis.lost_motion"));
   diagnosis.verdict = combine(diagnosis.estimates, settings.limits, baseline);
   return diagnosis;
 }

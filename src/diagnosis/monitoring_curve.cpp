@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/quadratic.h"
 
 namespace backlash {
 namespace {
@@ -54,26 +55,6 @@ struct Accepted {
   bool touches_end = false, in_flagged_stretch = false;
   int pieces = 0;
 };
-
-/// Solutions of a x^2 + b x + c <= 0 within [0, 1] as up to two intervals.
-std::vector<std::pair<double, double>> not_positive(double a, double b, double c) {
-  std::vector<double> cuts = {0, 1};
-  const double root = std::sqrt(b * b - 4 * a * c);  // NaN: no roots
-  const double q = -0.5 * (b + std::copysign(root, b));
-  for (const double x : {q / a, c / q})
-    if (x > 0 && x < 1) cuts.push_back(x);
-  std::sort(cuts.begin(), cuts.end());
-  std::vector<std::pair<double, double>> intervals;
-  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
-    const double middle = 0.5 * (cuts[i] + cuts[i + 1]);
-    if (!((a * middle + b) * middle + c <= 0)) continue;
-    if (!intervals.empty() && intervals.back().second == cuts[i])
-      intervals.back().second = cuts[i + 1];
-    else
-      intervals.emplace_back(cuts[i], cuts[i + 1]);
-  }
-  return intervals;
-}
 
 /// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's
 /// construction): (skewness - mean(b))^2 <= (1.96 sigma(b))^2, between two points a quadratic inequality.

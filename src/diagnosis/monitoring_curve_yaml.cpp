@@ -73,6 +73,26 @@ void emit_point(YAML::Emitter& out, const MonitoringCurve& curve, const CurvePoi
   out << YAML::EndMap;
 }
 
+void emit_family(YAML::Emitter& out, const ApdFamily& family) {
+  out << YAML::Key << "family" << YAML::Value << YAML::BeginMap;
+  out << YAML::Key << "segments" << YAML::Value << YAML::BeginSeq;
+  for (const FamilySegment& segment : family.segments) {
+    out << YAML::BeginMap << YAML::Key << "floor" << YAML::Value << to_text(segment.floor);
+    emit_row(out, "threshold", segment.threshold);
+    emit_row(out, "misfit", segment.misfit);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::Key << "members" << YAML::Value << YAML::BeginSeq;
+  for (const auto& phases : family.members) {
+    std::vector<double> values;  // all phases in one row
+    for (const Quantiles& member : phases) values.insert(values.end(), member.begin(), member.end());
+    out << YAML::BeginMap;
+    emit_row(out, "quantiles", values);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+}
+
 CurveConditions read_conditions(const YamlReader& yaml) {
   CurveConditions c;
   c.rig = yaml.text("rig");
@@ -113,6 +133,39 @@ CurvePoint read_point(const YamlReader& yaml, std::size_t levels) {
   return point;
 }
 
+std::vector<Quantiles> read_member(const YamlReader& yaml) {
+  const std::vector<double> values = yaml.numbers("quantiles", Range::any());
+  if (values.empty() || values.size() % kQuantiles != 0)
+    yaml.fail("quantiles", "needs " + std::to_string(kQuantiles) + " values per phase");
+  std::vector<Quantiles> phases;
+  for (auto begin = values.begin(); begin != values.end(); begin += kQuantiles) {
+    phases.emplace_back(begin, begin + kQuantiles);
+    if (!std::is_sorted(begin, begin + kQuantiles)) yaml.fail("quantiles", "must not decrease within a phase");
+  }
+  return phases;
+}
+
+ApdFamily read_family(const YamlReader& yaml, std::size_t points, std::size_t levels) {
+  ApdFamily family;
+  for (const YamlReader& segment : yaml.maps("segments")) {
+    FamilySegment s;
+    s.floor = segment.number("floor", Range::not_negative());
+    s.threshold = segment.numbers("threshold", Range::not_negative());
+    s.misfit = segment.numbers("misfit", Range::not_negative());
+    if (s.threshold.size() != levels || s.misfit.size() != levels)
+      segment.fail("threshold", "threshold and misfit need one value per noise level");
+    family.segments.push_back(std::move(s));
+  }
+  for (const YamlReader& member : yaml.maps("members")) {
+    family.members.push_back(read_member(member));
+    if (family.members.back().size() != family.members.front().size())
+      member.fail("quantiles", "every member needs the same number of phases");
+  }
+  if (family.members.size() != points) yaml.fail("members", "needs one member per point of the curve");
+  if (family.segments.size() + 1 != points) yaml.fail("segments", "needs one segment between two points");
+  return family;
+}
+
 }  // namespace
 
 std::string MonitoringCurve::to_yaml() const {
@@ -127,7 +180,9 @@ std::string MonitoringCurve::to_yaml() const {
   emit_row(out, "noise_levels", noise_levels);
   out << YAML::Key << "points" << YAML::Value << YAML::BeginSeq;
   for (const CurvePoint& point : points) emit_point(out, *this, point);
-  out << YAML::EndSeq << YAML::EndMap << YAML::Newline;
+  out << YAML::EndSeq;
+  if (family) emit_family(out, *family);
+  out << YAML::EndMap << YAML::Newline;
   return out.c_str();
 }
 
@@ -149,6 +204,8 @@ MonitoringCurve MonitoringCurve::from_yaml(const YamlReader& yaml) {
   for (std::size_t i = 1; i < curve.points.size(); ++i)
     if (!(curve.points[i].backlash > curve.points[i - 1].backlash))
       yaml.fail("points", "backlash must increase");
+  if (const auto family = yaml.optional_map("family"))
+    curve.family = read_family(*family, curve.points.size(), curve.noise_levels.size());
   yaml.finish();
   return curve;
 }

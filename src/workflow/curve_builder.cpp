@@ -1,128 +1,32 @@
 #include "backlash_diagnosis/workflow/curve_builder.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
-#include <thread>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
+#include "family_builder.h"
+#include "fine_run.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the excitation level
-constexpr double kFinestSampling = 1e5;                                      // Hz
-constexpr double kFewestPerPeriod = 16;                                      // samples
-constexpr double kMostSamples = 5e7;                                         // of one run, about 1 GB
-
-double signal_of(const Observation& o, Channel channel) {
-  switch (channel) {
-    case Channel::motor_torque:
-      return o.motor_torque;
-    case Channel::motor_position:
-      return o.motor_position;
-    case Channel::motor_velocity:
-      return o.motor_velocity;
-    case Channel::load_position:
-      return o.load_position;
-    case Channel::load_velocity:
-      return o.load_velocity;
-    case Channel::sensor_torque:
-      return o.sensor_torque;
-    case Channel::reference_position:
-      break;
-  }
-  return kNaN;
-}
-
 /// What one backlash value contributes.
 struct Cell {
   CurvePoint point;
+  std::vector<Quantiles> members;
   double motor_travel = 0, amplitude = 0, excitation_level = 0;
 };
 
-/// Everything that is the same for all backlash values.
-struct Plan {
-  const RigFile& file;
-  CurveRequest request;
-  ApdSettings apd;
-  int phases;
-  std::vector<double> noise_levels;
-};
-
-/// The exact signal, `phases` times finer than the sampling.
-struct FineRun {
-  std::vector<double> signal, torque, position;
-};
-
-/// Progress of all workers together; learns from it whether to stop.
-class Ticker {
- public:
-  Ticker(const Progress& progress, long total) : progress_(progress), total_(total) {}
-
-  /// One more tick is done. Throws Cancelled.
-  void tick() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++done_;
-    if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, "building the curve"))
-      stop_ = true;
-    if (stop_) throw Cancelled();
-  }
-  void stop() { stop_ = true; }
-  bool stopped() const { return stop_; }
-
- private:
-  const Progress& progress_;
-  long total_, done_ = 0;
-  std::mutex mutex_;
-  std::atomic<bool> stop_{false};
-};
-
-long periods_of(const Plan& plan) {
-  return static_cast<long>(plan.apd.settling_periods) + plan.request.periods;
-}
-
-double fine_samples(const Plan& plan) {
-  return periods_of(plan) * plan.apd.period * plan.request.sampling_rate * plan.phases + plan.phases;
-}
-
-FineRun run_fine(const Plan& plan, double backlash, Ticker& ticker) {
-  Plant plant(plan.file.rig, plan.file.simulation.excitation, plan.file.simulation.solver);
-  plant.set_backlash(backlash);
-  const double rate = plan.request.sampling_rate * plan.phases;
-  const long count = std::lround(fine_samples(plan)), ticks = periods_of(plan);
-  FineRun run;
-  for (long k = 0; k < count; ++k) {
-    plant.advance_to(k / rate);
-    const Observation o = plant.observe();
-    run.signal.push_back(signal_of(o, plan.apd.signal));
-    run.torque.push_back(o.motor_torque);
-    run.position.push_back(o.motor_position);
-    if ((k + 1) * ticks / count > k * ticks / count) ticker.tick();
-  }
-  return run;
-}
-
-/// Skewness of each period of one seed at one noise level.
-std::vector<double> sample_run(const Plan& plan, const FineRun& run, int seed, double noise,
-                               CurvePoint& point) {
-  SensorsSettings sensors = plan.file.simulation.sensors;
-  sensors.seed += static_cast<std::uint64_t>(seed);
-  sensors.of(plan.apd.signal).noise = noise;
-  SensorModel sensor(sensors);
+/// Skewness of each period of one sampled run.
+std::vector<double> skewness_of(const CurvePlan& plan, const std::vector<double>& samples) {
   PeriodAnalyser analyser(plan.apd.period, plan.apd.layout);
-  std::vector<double> skewness, values;
-  for (std::size_t i = seed % plan.phases, k = 0; i < run.signal.size(); i += plan.phases, ++k) {
-    const double value = sensor.measure(plan.apd.signal, run.signal[i]);
-    values.push_back(value);
-    const PeriodResult* period = analyser.add(k / plan.request.sampling_rate, value);
+  std::vector<double> skewness;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const PeriodResult* period =
+        analyser.add(static_cast<double>(k) / plan.request.sampling_rate, samples[k]);
     if (period && period->index >= plan.apd.settling_periods) skewness.push_back(period->apd.skewness());
   }
-  point.signal_level = median_magnitude(std::move(values));
   return skewness;
 }
 
@@ -150,97 +54,74 @@ SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
   return cell;
 }
 
-Cell make_cell(const Plan& plan, double backlash, Ticker& ticker) {
+Cell make_cell(const CurvePlan& plan, double backlash, Ticker& ticker) {
   const FineRun run = run_fine(plan, backlash, ticker);
   Cell cell;
   cell.point.backlash = backlash;
   for (const double noise : plan.noise_levels) {
     std::vector<std::vector<double>> skewness;
-    CurvePoint scratch;
-    for (int seed = 0; seed < plan.request.seeds; ++seed)
-      skewness.push_back(sample_run(plan, run, seed, noise, scratch));
-    if (noise == plan.file.simulation.sensors.of(plan.apd.signal).noise)
-      cell.point.signal_level = scratch.signal_level;
+    for (int seed = 0; seed < plan.request.seeds; ++seed) {
+      auto samples = sample(plan, run, plan.phase_of(seed), seed, noise);
+      skewness.push_back(skewness_of(plan, samples));
+      if (noise == plan.file.simulation.sensors.of(plan.apd.signal).noise)
+        cell.point.signal_level = median_magnitude(std::move(samples));
+    }
     cell.point.cells.push_back(summarise(skewness));
     if (std::isnan(cell.point.cells.back().mean))
       throw InvalidParameter("diagnosis.apd", plan.apd.layout.upper,
                              "the classes hold no sample of the signal");
   }
+  cell.members = family_members(plan, run);
   cell.motor_travel = travel_of(run.position);
   for (double torque : run.torque) cell.amplitude = std::max(cell.amplitude, std::fabs(torque));
   cell.excitation_level = median_magnitude(run.torque);
   return cell;
 }
 
-void check(const CurveRequest& request) {
-  if (request.points < 2) throw InvalidParameter("points", request.points, "must be >= 2");
-  if (!(request.max_backlash > 0 && std::isfinite(request.max_backlash)))
-    throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
-  if (request.periods < 1) throw InvalidParameter("periods", request.periods, "must be >= 1");
-  if (request.seeds < 1) throw InvalidParameter("seeds", request.seeds, "must be >= 1");
-  if (!(request.sampling_rate > 0 && std::isfinite(request.sampling_rate)))
-    throw InvalidParameter("sample_rate", request.sampling_rate, "must be > 0 Hz and finite");
+/// A run between two grid points: only its signal is of use.
+FineRun make_between(const CurvePlan& plan, double backlash, Ticker& ticker) {
+  FineRun run = run_fine(plan, backlash, ticker);
+  run.torque = {};
+  run.position = {};
+  return run;
 }
 
-double largest_torque(const ExcitationSettings& excitation) {
-  double largest = excitation.amplitude;
-  for (const SineLine& line : excitation.lines) largest += line.amplitude;
-  return largest;
-}
+/// Cells of all grid points, and the runs between them that calibrate the family.
+struct Cells {
+  std::vector<Cell> cells;
+  std::vector<FineRun> between;
+};
 
-Plan make_plan(const RigFile& file, CurveRequest request) {
-  if (!file.diagnosis.apd)
-    throw InvalidParameter("diagnosis.apd", "absent", "a curve needs the layout of its APD");
-  if (request.sampling_rate == 0) request.sampling_rate = file.simulation.sensors.sampling_rate;
-  check(request);
-  Plan plan{file, request, *file.diagnosis.apd, 1, {}};
-  const double period = file.simulation.excitation.create()->period();
-  if (!(period > 0))
-    throw InvalidParameter("excitation.type", file.simulation.excitation.type,
-                           "a curve needs a periodic excitation");
-  if (!(plan.apd.period > 0)) plan.apd.period = period;
-  if (file.rig.input_coupling.rigid && plan.apd.signal == Channel::sensor_torque)
-    throw InvalidParameter("diagnosis.apd.signal", "sensor_torque",
-                           "the rig's input coupling is rigid: no sensor");
-  if (!(request.sampling_rate * plan.apd.period >= kFewestPerPeriod))
-    throw InvalidParameter("sample_rate", request.sampling_rate,
-                           "must give at least 16 samples per period of " + to_text(plan.apd.period) + " s");
-  plan.phases = std::clamp(static_cast<int>(kFinestSampling / request.sampling_rate), 1, request.seeds);
-  if (!(fine_samples(plan) <= kMostSamples))
-    throw InvalidParameter("periods", request.periods, "too many samples at this sampling rate");
-  const double declared = file.simulation.sensors.of(plan.apd.signal).noise;
-  for (const double share : kRelativeNoise)
-    plan.noise_levels.push_back(share * largest_torque(file.simulation.excitation));
-  plan.noise_levels.push_back(declared);
-  std::sort(plan.noise_levels.begin(), plan.noise_levels.end());
-  plan.noise_levels.erase(std::unique(plan.noise_levels.begin(), plan.noise_levels.end()),
-                          plan.noise_levels.end());
-  return plan;
-}
-
-/// Cells of all grid points, worked on by all processors.
-std::vector<Cell> make_cells(const Plan& plan, const Progress& progress) {
+Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   const int count = plan.request.points;
-  std::vector<Cell> cells(count);
-  Ticker ticker(progress, count * periods_of(plan));
-  std::atomic<int> next{0};
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (int i = next++; i < count && !ticker.stopped(); i = next++) try {
-        cells[i] = make_cell(plan, plan.request.max_backlash * i / (count - 1), ticker);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        if (!failure) failure = std::current_exception();
-        ticker.stop();
-      }
-  };
-  std::vector<std::thread> helpers;
-  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) helpers.emplace_back(work);
-  work();
-  for (std::thread& helper : helpers) helper.join();
-  if (failure) std::rethrow_exception(failure);
-  return cells;
+  Cells all{std::vector<Cell>(count), std::vector<FineRun>(count - 1)};
+  for_each_in_parallel(2 * count - 1, ticker, [&](int i) {
+    const double backlash = 0.5 * plan.request.max_backlash * i / (count - 1);
+    if (i % 2 == 0)
+      all.cells[i / 2] = make_cell(plan, backlash, ticker);
+    else
+      all.between[i / 2] = make_between(plan, backlash, ticker);
+  });
+  return all;
+}
+
+CurveConditions conditions_of(const CurvePlan& plan) {
+  CurveConditions c;
+  c.rig = plan.file.rig.name;
+  c.rig_digest = plan.file.digest;
+  c.version = BACKLASH_DIAGNOSIS_VERSION;
+  c.signal = channel_name(plan.apd.signal);
+  c.excitation = plan.file.simulation.excitation.type;
+  c.frequency = 1 / plan.apd.period;
+  c.sampling_rate = plan.request.sampling_rate;
+  c.apd = plan.apd.layout;
+  c.periods = plan.request.periods;
+  c.settling_periods = plan.apd.settling_periods;
+  c.seeds = plan.request.seeds;
+  c.noise = plan.file.simulation.sensors.of(plan.apd.signal).noise;
+  c.output_locked = plan.file.rig.link_locked;
+  c.angular = plan.file.rig.mesh.angular();
+  return c;
 }
 
 }  // namespace
@@ -252,32 +133,26 @@ double nominal_sampling_rate(double interval) {
 }
 
 MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, const Progress& progress) {
-  const Plan plan = make_plan(file, request);
+  const CurvePlan plan = plan_curve(file, request);
+  const long runs = 2L * plan.request.points - 1;
+  const long calibration = (plan.request.points - 1L) * static_cast<long>(plan.noise_levels.size() + 1);
+  Ticker ticker(progress, runs * plan.run_periods() + calibration);
+  Cells all = make_cells(plan, ticker);
   MonitoringCurve curve;
-  CurveConditions& c = curve.conditions;
-  c.rig = file.rig.name;
-  c.rig_digest = file.digest;
-  c.version = BACKLASH_DIAGNOSIS_VERSION;
-  c.signal = channel_name(plan.apd.signal);
-  c.excitation = file.simulation.excitation.type;
-  c.frequency = 1 / plan.apd.period;
-  c.sampling_rate = plan.request.sampling_rate;
-  c.apd = plan.apd.layout;
-  c.periods = plan.request.periods;
-  c.settling_periods = plan.apd.settling_periods;
-  c.seeds = plan.request.seeds;
-  c.noise = file.simulation.sensors.of(plan.apd.signal).noise;
-  c.output_locked = file.rig.link_locked;
-  c.angular = file.rig.mesh.angular();
+  curve.conditions = conditions_of(plan);
   curve.noise_levels = plan.noise_levels;
   curve.backlash_to_angle = file.rig.backlash_angle(1);
-  for (Cell& cell : make_cells(plan, progress)) {
+  curve.family.emplace();
+  for (Cell& cell : all.cells) {
+    CurveConditions& c = curve.conditions;
     c.motor_travel = std::max(c.motor_travel, cell.motor_travel);
     c.amplitude = std::max(c.amplitude, cell.amplitude);
     c.excitation_level = cell.excitation_level;
     curve.points.push_back(std::move(cell.point));
+    curve.family->members.push_back(std::move(cell.members));
   }
   curve.finish();
+  calibrate_family(plan, all.between, ticker, *curve.family);
   return curve;
 }
 

@@ -63,6 +63,11 @@ ApdResult analyse_apd(const Record& record, const ApdSettings& settings);
 std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
                           const MonitoringCurve& curve);
 
+/// Why no estimate by a curve (null: none is there) can be made, as an estimate with status and reason; empty
+/// where one can.
+std::optional<Estimate> refuse_for_curve(const Record& record, const ApdResult& apd,
+                                         const ApdSettings& settings, const MonitoringCurve* curve);
+
 /// The estimate, or a status with its reason. `curve` may be null: then insufficient_data says so.
 Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const ApdSettings& settings,
                                const MonitoringCurve* curve);

@@ -26,6 +26,22 @@ struct Diagnosis {
   Verdict verdict;
 };
 
+/// What an estimator may look at.
+struct DiagnosisInput {
+  const Record& record;
+  const DiagnosisSettings& settings;
+  const std::optional<ApdResult>& apd;
+  const MonitoringCurve* curve;
+};
+
+/// An estimator: its name in reports, what it needs in plain words, and itself. All are in one table, in the
+/// order of reports; a new one is a file in this room and a line there.
+struct DiagnosisMethod {
+  std::string name, needs;
+  Estimate (*estimate)(const DiagnosisInput&);
+};
+const std::vector<DiagnosisMethod>& diagnosis_method_table();
+
 /// Names of all estimators.
 const std::vector<std::string>& diagnosis_methods();
 

@@ -9,10 +9,12 @@
 // who give no scatter.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
+#include "backlash_diagnosis/diagnosis/apd_family.h"
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/diagnosis/noise.h"
 
@@ -53,6 +55,7 @@ class MonitoringCurve {
   CurveConditions conditions;
   std::vector<double> noise_levels;  // increasing, unit of the signal; contains conditions.noise
   std::vector<CurvePoint> points;    // increasing backlash
+  std::optional<ApdFamily> family;   // at the same backlash values; for apd_shape
   double backlash_to_angle = kNaN;   // rad (at the axis of motor_position) per unit of backlash
 
   /// Marks points that rise; adds to `between` the roughness that the grid does not resolve. Called once by

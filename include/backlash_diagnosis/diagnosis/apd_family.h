@@ -1,0 +1,73 @@
+// The family of amplitude probability distributions that a rig shows as its backlash grows, in their
+// cumulative form, and how far a record's distribution is from it.
+//
+// A distribution is held as its quantile function Q at the probabilities (k + 1/2) / 100, so that no class
+// borders blur it. The distance of two distributions is the mean square difference of their quantile
+// functions, the squared Wasserstein metric of second order in one dimension:
+//   T = 1/100 sum_k (Q_k - Q'_k)^2                                                  (unit of the signal)^2
+// A recorder does not know where between its samples the excitation switches: the family has members for
+// several such phases. Between two backlash values each phase is interpolated linearly in Q, which makes T
+// quadratic there; the distance of a record is the smallest over the phases.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace backlash {
+
+constexpr int kQuantiles = 100;
+using Quantiles = std::vector<double>;  ///< kQuantiles values, not decreasing
+
+/// Quantile function of samples (at least one), interpolated linearly between the sorted samples (Hazen
+/// 1914). Throws InvalidParameter without samples.
+Quantiles quantiles_of(std::vector<double> samples);
+
+/// Quantile function of the same signal plus independent normal noise of standard deviation sigma >= 0.
+Quantiles with_noise(const Quantiles& exact, double sigma);
+
+/// What simulated records with a backlash between two neighbouring values of the family taught. A record
+/// accepts a backlash b where T(b) <= T_min + threshold max(T_min, floor), T_min its smallest distance.
+struct FamilySegment {
+  double floor = 0;               // T of noise-free records: what interpolation and irregular motion leave
+  std::vector<double> threshold;  // per noise level: 95 % of the records accept their own backlash
+  std::vector<double> misfit;     // per noise level: largest root of T_min among the records
+};
+
+/// Members by backlash value and phase, free of noise; one segment between each two backlash values.
+struct ApdFamily {
+  std::vector<std::vector<Quantiles>> members;
+  std::vector<FamilySegment> segments;
+
+  std::vector<std::vector<Quantiles>> members_with_noise(double sigma) const;
+};
+
+/// Distance of one observed distribution from all members, over backlash. Positions are segment + share: the
+/// backlash value that lies at `share` [0, 1] between those of the segment's two ends.
+class FamilyDistance {
+ public:
+  FamilyDistance(const std::vector<std::vector<Quantiles>>& members, const Quantiles& observed);
+
+  double at(std::size_t segment, double share) const;
+
+  struct Place {
+    double distance = 0;
+    std::size_t segment = 0;
+    double share = 0;
+  };
+  const Place& smallest() const { return smallest_; }
+
+  /// The shares of a segment where the distance is <= limit, as intervals that may overlap.
+  std::vector<std::pair<double, double>> within(std::size_t segment, double limit) const;
+
+ private:
+  /// Coefficients of T(share) = (a share + b) share + c of one phase.
+  struct Parabola {
+    double a, b, c;
+    double at(double share) const { return (a * share + b) * share + c; }
+  };
+  std::vector<std::vector<Parabola>> parabolas_;  // by segment and phase
+  Place smallest_;
+};
+
+}  // namespace backlash

@@ -1,0 +1,18 @@
+// Backlash from the whole APD: which member of the rig's family of distributions a record resembles most.
+//
+// Where skewness is one number of the APD, its shape keeps apart what skewness confuses: the curve may be
+// flat or rise while the distribution still changes. Needs the signal of the curve and a curve with its
+// family; see apd_family.h for the distance and how the 95 % interval is calibrated.
+#pragma once
+
+#include "backlash_diagnosis/diagnosis/apd_skewness.h"
+
+namespace backlash {
+
+/// The estimate, or a status with its reason; as estimate_apd_skewness and under the same conditions. A
+/// record whose distribution is farther from the whole family than any that was simulated is out_of_domain:
+/// the machine does something that the rig does not contain.
+Estimate estimate_apd_shape(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                            const MonitoringCurve* curve);
+
+}  // namespace backlash

@@ -1,0 +1,119 @@
+#include "backlash_diagnosis/diagnosis/apd_family.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/quadratic.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kReach = 4.5;         // standard deviations beyond which a normal distribution is 0 or 1
+constexpr double kCellsPerSigma = 4;   // of the grid on which distributions are summed
+constexpr double kMostCells = 20'000;  // where noise is tiny against the range
+
+double normal_distribution(double z) {
+  return 0.5 * std::erfc(-z * M_SQRT1_2);
+}
+
+double product(const std::vector<double>& x, const std::vector<double>& y) {
+  double sum = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) sum += x[k] * y[k];
+  return sum / static_cast<double>(x.size());
+}
+
+std::vector<double> difference(const Quantiles& x, const Quantiles& y) {
+  std::vector<double> d(x.size());
+  for (std::size_t k = 0; k < x.size(); ++k) d[k] = x[k] - y[k];
+  return d;
+}
+
+}  // namespace
+
+Quantiles quantiles_of(std::vector<double> samples) {
+  if (samples.empty()) throw InvalidParameter("samples", "none", "a distribution needs at least one");
+  std::sort(samples.begin(), samples.end());
+  Quantiles q(kQuantiles);
+  const double n = static_cast<double>(samples.size());
+  for (int k = 0; k < kQuantiles; ++k) {
+    const double place = std::clamp(n * (k + 0.5) / kQuantiles - 0.5, 0.0, n - 1);
+    const auto i = static_cast<std::size_t>(place);
+    const double share = place - static_cast<double>(i);
+    q[k] = i + 1 < samples.size() ? samples[i] + share * (samples[i + 1] - samples[i]) : samples[i];
+  }
+  return q;
+}
+
+// The mixture of equal normal distributions about the exact quantiles, summed on a grid and inverted.
+Quantiles with_noise(const Quantiles& exact, double sigma) {
+  if (!(sigma > 0)) return exact;
+  const double lower = exact.front() - kReach * sigma, range = exact.back() - exact.front() + 2 * kReach * sigma;
+  const double cell = std::max(sigma / kCellsPerSigma, range / kMostCells);
+  const auto cells = static_cast<std::size_t>(std::ceil(range / cell)) + 1;
+  std::vector<double> cumulative(cells + 1, 0), whole(cells + 2, 0);
+  for (const double centre : exact) {
+    const auto begin = static_cast<std::size_t>(std::max(0.0, (centre - kReach * sigma - lower) / cell));
+    const auto end = std::min(cells + 1, static_cast<std::size_t>((centre + kReach * sigma - lower) / cell) + 1);
+    for (std::size_t i = begin; i < end; ++i)
+      cumulative[i] += normal_distribution((lower + static_cast<double>(i) * cell - centre) / sigma);
+    whole[end] += 1;
+  }
+  double passed = 0;
+  for (std::size_t i = 0; i <= cells; ++i) cumulative[i] += passed += whole[i];
+  Quantiles noisy(exact.size());
+  std::size_t i = 1;
+  for (std::size_t k = 0; k < exact.size(); ++k) {
+    const double wanted = static_cast<double>(k) + 0.5;
+    while (i < cells && cumulative[i] < wanted) ++i;
+    const double step = cumulative[i] - cumulative[i - 1];
+    const double share = step > 0 ? std::clamp((wanted - cumulative[i - 1]) / step, 0.0, 1.0) : 0.5;
+    noisy[k] = lower + (static_cast<double>(i - 1) + share) * cell;
+  }
+  return noisy;
+}
+
+std::vector<std::vector<Quantiles>> ApdFamily::members_with_noise(double sigma) const {
+  auto noisy = members;
+  for (auto& phases : noisy)
+    for (Quantiles& member : phases) member = with_noise(member, sigma);
+  return noisy;
+}
+
+FamilyDistance::FamilyDistance(const std::vector<std::vector<Quantiles>>& members, const Quantiles& observed) {
+  const std::size_t phases = members.front().size();
+  parabolas_.resize(members.size() - 1);
+  for (std::size_t phase = 0; phase < phases; ++phase) {
+    std::vector<double> start = difference(observed, members[0][phase]);
+    double at_start = product(start, start);
+    for (std::size_t i = 0; i + 1 < members.size(); ++i) {
+      std::vector<double> end = difference(observed, members[i + 1][phase]);
+      const double at_end = product(end, end), cross = product(start, end);
+      parabolas_[i].push_back({at_start - 2 * cross + at_end, 2 * (cross - at_start), at_start});
+      start = std::move(end);
+      at_start = at_end;
+    }
+  }
+  smallest_.distance = parabolas_[0][0].at(0);
+  for (std::size_t i = 0; i < parabolas_.size(); ++i)
+    for (const Parabola& p : parabolas_[i]) {
+      const double lowest = p.a > 0 ? std::clamp(-p.b / (2 * p.a), 0.0, 1.0) : 0;
+      for (const double share : {0.0, lowest, 1.0})
+        if (p.at(share) < smallest_.distance) smallest_ = {std::max(0.0, p.at(share)), i, share};
+    }
+}
+
+double FamilyDistance::at(std::size_t segment, double share) const {
+  double smallest = parabolas_[segment][0].at(share);
+  for (const Parabola& p : parabolas_[segment]) smallest = std::min(smallest, p.at(share));
+  return std::max(0.0, smallest);
+}
+
+std::vector<std::pair<double, double>> FamilyDistance::within(std::size_t segment, double limit) const {
+  std::vector<std::pair<double, double>> all;
+  for (const Parabola& p : parabolas_[segment])
+    for (const auto& interval : not_positive(p.a, p.b, p.c - limit)) all.push_back(interval);
+  return all;
+}
+
+}  // namespace backlash

@@ -1,0 +1,149 @@
+#include "fine_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <thread>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the excitation level
+constexpr double kFinestSampling = 1e5;                                      // Hz
+constexpr int kMostPhases = 16;
+constexpr double kFewestPerPeriod = 16;  // samples
+constexpr double kMostSamples = 5e7;     // of one run, about 1 GB
+
+double signal_of(const Observation& o, Channel channel) {
+  switch (channel) {
+    case Channel::motor_torque:
+      return o.motor_torque;
+    case Channel::motor_position:
+      return o.motor_position;
+    case Channel::motor_velocity:
+      return o.motor_velocity;
+    case Channel::load_position:
+      return o.load_position;
+    case Channel::load_velocity:
+      return o.load_velocity;
+    case Channel::sensor_torque:
+      return o.sensor_torque;
+    case Channel::reference_position:
+      break;
+  }
+  return kNaN;
+}
+
+double fine_samples(const CurvePlan& plan) {
+  return static_cast<double>(plan.run_periods()) * plan.apd.period * plan.request.sampling_rate * plan.phases +
+         plan.phases;
+}
+
+void check(const CurveRequest& request) {
+  if (request.points < 2) throw InvalidParameter("points", request.points, "must be >= 2");
+  if (!(request.max_backlash > 0 && std::isfinite(request.max_backlash)))
+    throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
+  if (request.periods < 1) throw InvalidParameter("periods", request.periods, "must be >= 1");
+  if (request.seeds < 1) throw InvalidParameter("seeds", request.seeds, "must be >= 1");
+  if (!(request.sampling_rate > 0 && std::isfinite(request.sampling_rate)))
+    throw InvalidParameter("sample_rate", request.sampling_rate, "must be > 0 Hz and finite");
+}
+
+double largest_torque(const ExcitationSettings& excitation) {
+  double largest = excitation.amplitude;
+  for (const SineLine& line : excitation.lines) largest += line.amplitude;
+  return largest;
+}
+
+}  // namespace
+
+CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
+  if (!file.diagnosis.apd)
+    throw InvalidParameter("diagnosis.apd", "absent", "a curve needs the layout of its APD");
+  if (request.sampling_rate == 0) request.sampling_rate = file.simulation.sensors.sampling_rate;
+  check(request);
+  CurvePlan plan{file, request, *file.diagnosis.apd, 1, {}};
+  const double period = file.simulation.excitation.create()->period();
+  if (!(period > 0))
+    throw InvalidParameter("excitation.type", file.simulation.excitation.type,
+                           "a curve needs a periodic excitation");
+  if (!(plan.apd.period > 0)) plan.apd.period = period;
+  if (file.rig.input_coupling.rigid && plan.apd.signal == Channel::sensor_torque)
+    throw InvalidParameter("diagnosis.apd.signal", "sensor_torque",
+                           "the rig's input coupling is rigid: no sensor");
+  if (!(request.sampling_rate * plan.apd.period >= kFewestPerPeriod))
+    throw InvalidParameter("sample_rate", request.sampling_rate,
+                           "must give at least 16 samples per period of " + to_text(plan.apd.period) + " s");
+  plan.phases = std::clamp(static_cast<int>(kFinestSampling / request.sampling_rate), 1, kMostPhases);
+  if (!(fine_samples(plan) <= kMostSamples))
+    throw InvalidParameter("periods", request.periods, "too many samples at this sampling rate");
+  const double declared = file.simulation.sensors.of(plan.apd.signal).noise;
+  for (const double share : kRelativeNoise)
+    plan.noise_levels.push_back(share * largest_torque(file.simulation.excitation));
+  plan.noise_levels.push_back(declared);
+  std::sort(plan.noise_levels.begin(), plan.noise_levels.end());
+  plan.noise_levels.erase(std::unique(plan.noise_levels.begin(), plan.noise_levels.end()),
+                          plan.noise_levels.end());
+  return plan;
+}
+
+void Ticker::tick() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++done_;
+  if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, "building the curve"))
+    stop_ = true;
+  if (stop_) throw Cancelled();
+}
+
+void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job) {
+  std::atomic<int> next{0};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (int i = next++; i < count && !ticker.stopped(); i = next++) try {
+        job(i);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (!failure) failure = std::current_exception();
+        ticker.stop();
+      }
+  };
+  std::vector<std::thread> helpers;
+  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) helpers.emplace_back(work);
+  work();
+  for (std::thread& helper : helpers) helper.join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker) {
+  Plant plant(plan.file.rig, plan.file.simulation.excitation, plan.file.simulation.solver);
+  plant.set_backlash(backlash);
+  const double rate = plan.request.sampling_rate * plan.phases;
+  const long count = std::lround(fine_samples(plan)), ticks = plan.run_periods();
+  FineRun run;
+  for (long k = 0; k < count; ++k) {
+    plant.advance_to(k / rate);
+    const Observation o = plant.observe();
+    run.signal.push_back(signal_of(o, plan.apd.signal));
+    run.torque.push_back(o.motor_torque);
+    run.position.push_back(o.motor_position);
+    if ((k + 1) * ticks / count > k * ticks / count) ticker.tick();
+  }
+  return run;
+}
+
+std::vector<double> sample(const CurvePlan& plan, const FineRun& run, int phase, int seed, double noise) {
+  SensorsSettings sensors = plan.file.simulation.sensors;
+  sensors.seed += static_cast<std::uint64_t>(seed);
+  sensors.of(plan.apd.signal).noise = noise;
+  SensorModel sensor(sensors);
+  std::vector<double> values;
+  for (std::size_t i = phase; i < run.signal.size(); i += plan.phases)
+    values.push_back(sensor.measure(plan.apd.signal, run.signal[i]));
+  return values;
+}
+
+}  // namespace backlash

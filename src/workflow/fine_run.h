@@ -1,0 +1,59 @@
+// One simulated run of a rig, finer than it will be sampled, and what all runs of a curve share.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <vector>
+
+#include "backlash_diagnosis/base/progress.h"
+#include "backlash_diagnosis/workflow/curve_builder.h"
+
+namespace backlash {
+
+/// Everything that is the same for all backlash values of a curve.
+struct CurvePlan {
+  const RigFile& file;
+  CurveRequest request;
+  ApdSettings apd;
+  int phases;  // samplings of a fine run, each a fraction of a sample later than the one before
+  std::vector<double> noise_levels;
+
+  long run_periods() const { return static_cast<long>(apd.settling_periods) + request.periods; }
+  /// Phase that a seed samples at: all are used evenly.
+  int phase_of(int seed) const { return seed * phases / request.seeds % phases; }
+};
+
+/// Throws InvalidParameter for a request or rig that no curve can be made of.
+CurvePlan plan_curve(const RigFile& file, CurveRequest request);
+
+/// Progress of all workers together; learns from it whether to stop.
+class Ticker {
+ public:
+  Ticker(const Progress& progress, long total) : progress_(progress), total_(total) {}
+
+  void tick();  ///< one more tick is done; throws Cancelled
+  void stop() { stop_ = true; }
+  bool stopped() const { return stop_; }
+
+ private:
+  const Progress& progress_;
+  long total_, done_ = 0;
+  std::mutex mutex_;
+  std::atomic<bool> stop_{false};
+};
+
+/// Calls job(0) .. job(count - 1) on all processors; the first exception stops them and is thrown.
+void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job);
+
+/// The exact signal, `phases` times finer than the sampling, from rest.
+struct FineRun {
+  std::vector<double> signal, torque, position;
+};
+FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker);
+
+/// What the sensor reads of a fine run at one phase; `seed` is that of its noise (standard deviation, unit of
+/// the signal).
+std::vector<double> sample(const CurvePlan& plan, const FineRun& run, int phase, int seed, double noise);
+
+}  // namespace backlash

@@ -1,0 +1,18 @@
+// Finding the estimate of a method among those of a diagnosis.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/estimate.h"
+
+namespace backlash::test {
+
+inline const Estimate& by(const std::string& method, const std::vector<Estimate>& estimates) {
+  for (const Estimate& estimate : estimates)
+    if (estimate.method == method) return estimate;
+  throw std::runtime_error("no estimate by " + method);
+}
+
+}  // namespace backlash::test
