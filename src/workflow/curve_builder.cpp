@@ -136,7 +136,7 @@ MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, co
   const CurvePlan plan = plan_curve(file, request);
   const long runs = 2L * plan.request.points - 1;
   const long calibration = (plan.request.points - 1L) * static_cast<long>(plan.noise_levels.size() + 1);
-  Ticker ticker(progress, runs * plan.run_periods() + calibration);
+  Ticker ticker(progress, runs * plan.run_periods() + calibration, "building the curve");
   Cells all = make_cells(plan, ticker);
   MonitoringCurve curve;
   curve.conditions = conditions_of(plan);

@@ -1,13 +1,10 @@
 // One simulated run of a rig, finer than it will be sampled, and what all runs of a curve share.
 #pragma once
 
-#include <atomic>
-#include <functional>
-#include <mutex>
 #include <vector>
 
-#include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/workflow/curve_builder.h"
+#include "parallel.h"
 
 namespace backlash {
 
@@ -26,25 +23,6 @@ struct CurvePlan {
 
 /// Throws InvalidParameter for a request or rig that no curve can be made of.
 CurvePlan plan_curve(const RigFile& file, CurveRequest request);
-
-/// Progress of all workers together; learns from it whether to stop.
-class Ticker {
- public:
-  Ticker(const Progress& progress, long total) : progress_(progress), total_(total) {}
-
-  void tick();  ///< one more tick is done; throws Cancelled
-  void stop() { stop_ = true; }
-  bool stopped() const { return stop_; }
-
- private:
-  const Progress& progress_;
-  long total_, done_ = 0;
-  std::mutex mutex_;
-  std::atomic<bool> stop_{false};
-};
-
-/// Calls job(0) .. job(count - 1) on all processors; the first exception stops them and is thrown.
-void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job);
 
 /// The exact signal, `phases` times finer than the sampling, from rest.
 struct FineRun {

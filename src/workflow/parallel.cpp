@@ -1,0 +1,38 @@
+#include "parallel.h"
+
+#include <exception>
+#include <thread>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+
+void Ticker::tick() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++done_;
+  if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, phase_)) stop_ = true;
+  if (stop_) throw Cancelled();
+}
+
+void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job) {
+  std::atomic<int> next{0};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (int i = next++; i < count && !ticker.stopped(); i = next++) try {
+        job(i);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (!failure) failure = std::current_exception();
+        ticker.stop();
+      }
+  };
+  std::vector<std::thread> helpers;
+  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) helpers.emplace_back(work);
+  work();
+  for (std::thread& helper : helpers) helper.join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace backlash

@@ -1,0 +1,282 @@
+#include "backlash_diagnosis/workflow/uncertainty_study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/robust.h"
+#include "parallel.h"
+
+namespace backlash {
+namespace {
+
+constexpr int kPhases = 16;      // starts of a record between two samples
+constexpr double kMisses = 2;    // widths of an interval beyond which a miss was confident
+
+/// A record of the study before it is simulated.
+struct Draw {
+  double backlash, noise, start;  // m, of the signal's rms, s
+  int periods;
+  std::uint64_t seed;  // of the noise
+};
+
+/// Independent of std::uniform_*_distribution, whose results depend on the library.
+double uniform(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1p-53;
+}
+
+Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
+  std::seed_seq sequence{static_cast<std::uint32_t>(request.seed), static_cast<std::uint32_t>(request.seed >> 32),
+                         static_cast<std::uint32_t>(index)};
+  std::mt19937_64 random(sequence);
+  Draw d{};
+  d.backlash = request.max_backlash * uniform(random);
+  d.noise = request.noise[static_cast<std::size_t>(uniform(random) * static_cast<double>(request.noise.size()))];
+  d.start = period * uniform(random);
+  d.periods = request.fewest_periods +
+              static_cast<int>(uniform(random) * (request.most_periods - request.fewest_periods + 1));
+  d.seed = random();
+  return d;
+}
+
+/// Every kPhases-th sample of a record from `start` [s] on, as a recorder that begins there gives them.
+Record thinned(const Record& fine, double start, double rate, std::size_t count) {
+  Record record;
+  record.name = "study";
+  const auto first = static_cast<std::size_t>(start * rate * kPhases);
+  for (std::size_t k = 0; k < count && first + k * kPhases < fine.size(); ++k) {
+    record.time.push_back(static_cast<double>(k) / rate);
+    for (const Channel channel : kChannels)
+      if (fine.has(channel)) record.column(channel).push_back(fine.column(channel)[first + k * kPhases]);
+  }
+  return record;
+}
+
+void add_noise(Record& record, Channel signal, double relative, double limit, std::uint64_t seed) {
+  std::vector<double>& values = record.column(signal);
+  double square = 0;
+  for (const double v : values) square += v * v / static_cast<double>(values.size());
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, relative * std::sqrt(square));
+  for (double& v : values) v = std::clamp(v + normal(random), -limit, limit);
+  if (signal == Channel::motor_torque) return;
+  for (double& v : record.column(Channel::motor_torque)) v += normal(random);
+}
+
+using Change = std::function<void(RigFile&)>;
+
+/// What the rig's sensors give for a draw, on a machine that was changed.
+Record simulate_draw(RigFile machine, const Draw& d, const Channel signal, int settling) {
+  Rig& rig = machine.rig;
+  SimulationSettings& simulation = machine.simulation;
+  rig.mesh.backlash = d.backlash;
+  const double rate = simulation.sensors.sampling_rate;
+  simulation.sensors.sampling_rate = rate * kPhases;
+  const double limit = simulation.sensors.of(signal).limit;
+  for (const Channel channel : {signal, Channel::motor_torque}) simulation.sensors.of(channel) = {};
+  const double period = machine.diagnosis.apd->period;
+  const double duration = (settling + d.periods) * period;
+  const Record fine = simulate_record(rig, simulation, duration + d.start + 2 / rate);
+  Record record = thinned(fine, d.start, rate, static_cast<std::size_t>(std::lround(duration * rate)));
+  add_noise(record, signal, d.noise, limit, d.seed);
+  return record;
+}
+
+Record signal_alone(const Record& record, Channel signal) {
+  Record alone;
+  alone.name = record.name;
+  alone.time = record.time;
+  alone.column(signal) = record.column(signal);
+  return alone;
+}
+
+Estimate combined(const Diagnosis& diagnosis) {
+  Estimate estimate;
+  if (diagnosis.verdict.estimate >= 0) estimate = diagnosis.estimates[diagnosis.verdict.estimate];
+  estimate.method = "combined";
+  return estimate;
+}
+
+std::vector<Estimate> estimates_of(const Record& record, const RigFile& file, const MonitoringCurve& curve) {
+  const Diagnosis diagnosis = diagnose(record, file.diagnosis, &curve);
+  std::vector<Estimate> all = diagnosis.estimates;
+  all.push_back(combined(diagnosis));
+  return all;
+}
+
+void check(const RigFile& file, const StudyRequest& request) {
+  if (!file.diagnosis.apd) throw InvalidParameter("diagnosis.apd", "absent", "the study needs its signal");
+  if (!(file.diagnosis.apd->period > 0))
+    throw InvalidParameter("diagnosis.apd.period", "absent", "the study counts in periods");
+  if (request.records < 1) throw InvalidParameter("records", request.records, "must be >= 1");
+  if (!(request.max_backlash > 0 && std::isfinite(request.max_backlash)))
+    throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
+  if (request.fewest_periods < 1 || request.most_periods < request.fewest_periods)
+    throw InvalidParameter("periods", request.fewest_periods, "must be >= 1 and not above the most");
+  if (request.noise.empty()) throw InvalidParameter("noise", "none", "needs at least one level");
+  for (const double level : request.noise)
+    if (!(level >= 0 && std::isfinite(level))) throw InvalidParameter("noise", level, "must be >= 0");
+}
+
+RigFile at_rate(RigFile file, double rate) {
+  if (rate > 0) file.simulation.sensors.sampling_rate = rate;
+  return file;
+}
+
+double width(const Estimate& e) {
+  return e.upper - e.lower;
+}
+
+bool holds(const Estimate& e, double truth) {
+  return truth >= e.lower && truth <= e.upper;
+}
+
+bool confident_miss(const Estimate& e, double truth) {
+  return std::fabs(e.backlash - truth) > kMisses * width(e);
+}
+
+struct Variant {
+  std::string name;
+  Change change;
+  double shortest = 0;  // of max_backlash: the smallest backlash drawn
+  double duration = 0;  // periods after settling; 0: as drawn
+};
+
+std::vector<Variant> variants_of(const RigFile& file) {
+  const auto amplitude = [](double factor) {
+    return [factor](RigFile& f) { f.simulation.excitation.amplitude *= factor; };
+  };
+  const auto frequency = [](double factor) {
+    return [factor](RigFile& f) { f.simulation.excitation.frequency *= factor; };
+  };
+  const auto sampling = [](double factor) {
+    return [factor](RigFile& f) { f.simulation.sensors.sampling_rate *= factor; };
+  };
+  const double torque = file.simulation.excitation.amplitude;
+  const auto limit = [torque](double factor) {
+    return [torque, factor](RigFile& f) {
+      f.simulation.sensors.of(f.diagnosis.apd->signal).limit = factor * torque;
+    };
+  };
+  const auto free_output = [](double inertia) {
+    return [inertia](RigFile& f) {
+      f.rig.link_locked = false;
+      f.rig.link.inertia = inertia;
+    };
+  };
+  return {{"amplitude -20 %", amplitude(0.8)},
+          {"amplitude +20 %", amplitude(1.2)},
+          {"frequency -20 %", frequency(0.8)},
+          {"frequency +25 %", frequency(1.25)},
+          {"sampling halved", sampling(0.5)},
+          {"sampling doubled", sampling(2)},
+          {"saturated at 0.8", limit(0.8)},
+          {"saturated at 1.2", limit(1.2)},
+          {"output free", free_output(1e-3)},
+          {"output free and light", free_output(5e-5)},
+          {"constant torque", [](RigFile& f) { f.simulation.excitation.type = "constant"; }},
+          {"too short", [](RigFile&) {}, 0, -1.2},
+          {"above the range", [](RigFile&) {}, 1.1}};
+}
+
+Record simulate_variant(const RigFile& file, const Variant& variant, Draw d, double max_backlash, int settling) {
+  RigFile machine = file;
+  variant.change(machine);
+  if (variant.shortest > 0) d.backlash = max_backlash * variant.shortest + d.backlash;
+  Record record = simulate_draw(machine, d, file.diagnosis.apd->signal, settling);
+  if (variant.duration != 0)
+    record = record.slice(0, (settling + variant.duration) * file.diagnosis.apd->period);
+  return record;
+}
+
+}  // namespace
+
+std::vector<StudyTrial> run_study(const RigFile& rig_file, const MonitoringCurve& curve,
+                                  const StudyRequest& request, const Progress& progress) {
+  check(rig_file, request);
+  const RigFile file = at_rate(rig_file, request.sampling_rate);
+  const ApdSettings& apd = *file.diagnosis.apd;
+  std::vector<StudyTrial> trials(2 * static_cast<std::size_t>(request.records));
+  Ticker ticker(progress, request.records, "simulating and diagnosing records");
+  for_each_in_parallel(request.records, ticker, [&](int i) {
+    const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(i));
+    const Record record = simulate_draw(file, d, apd.signal, apd.settling_periods);
+    trials[2 * i] = {d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
+    trials[2 * i + 1] = {d.backlash, d.noise, d.periods, false,
+                         estimates_of(signal_alone(record, apd.signal), file, curve)};
+    ticker.tick();
+  });
+  return trials;
+}
+
+std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, bool position, double max_half_gap,
+                                      double noise) {
+  std::vector<StudyRow> rows;
+  const std::size_t methods = trials.empty() ? 0 : trials.front().estimates.size();
+  for (std::size_t m = 0; m < methods; ++m) {
+    StudyRow row;
+    std::vector<double> errors, widths;
+    int held = 0;
+    for (const StudyTrial& trial : trials) {
+      if (trial.position != position || trial.backlash > 2 * max_half_gap) continue;
+      if (!std::isnan(noise) && trial.noise != noise) continue;
+      const Estimate& e = trial.estimates[m];
+      row.method = e.method;
+      ++row.trials;
+      if (e.status != Status::ok) continue;
+      errors.push_back(std::fabs(e.backlash - trial.backlash));
+      widths.push_back(width(e));
+      held += holds(e, trial.backlash);
+      row.confident_misses += confident_miss(e, trial.backlash);
+    }
+    row.told = static_cast<int>(errors.size());
+    if (row.trials > 0) row.cannot_tell = 1 - static_cast<double>(row.told) / row.trials;
+    if (row.told > 0) {
+      row.coverage = static_cast<double>(held) / row.told;
+      row.p95_error = quantile(errors, 0.95);
+      row.median_error = median(std::move(errors));
+      row.median_width = median(std::move(widths));
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<VariantRow> run_variants(const RigFile& rig_file, const MonitoringCurve& curve,
+                                     const StudyRequest& request, int records, const Progress& progress) {
+  check(rig_file, request);
+  const RigFile file = at_rate(rig_file, request.sampling_rate);
+  const ApdSettings& apd = *file.diagnosis.apd;
+  const std::vector<Variant> variants = variants_of(file);
+  const int count = records * static_cast<int>(variants.size());
+  std::vector<StudyTrial> trials(2 * static_cast<std::size_t>(count));
+  Ticker ticker(progress, count, "records under other conditions");
+  for_each_in_parallel(count, ticker, [&](int i) {
+    const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records + i));
+    const Record record =
+        simulate_variant(file, variants[i / records], d, request.max_backlash, apd.settling_periods);
+    const double truth = variants[i / records].shortest * request.max_backlash + d.backlash;
+    trials[2 * i] = {truth, d.noise, d.periods, true, estimates_of(record, file, curve)};
+    trials[2 * i + 1] = {truth, d.noise, d.periods, false,
+                         estimates_of(signal_alone(record, apd.signal), file, curve)};
+    ticker.tick();
+  });
+  std::vector<VariantRow> rows;
+  for (std::size_t v = 0; v < variants.size(); ++v)
+    for (const bool position : {true, false})
+      for (std::size_t m = 0; m < trials.front().estimates.size(); ++m) {
+        VariantRow row{variants[v].name, trials.front().estimates[m].method, position};
+        for (int i = 0; i < records; ++i) {
+          const StudyTrial& trial = trials[2 * (v * records + i) + (position ? 0 : 1)];
+          const Estimate& e = trial.estimates[m];
+          const bool near = std::fabs(e.backlash - trial.backlash) <= width(e);
+          ++(e.status != Status::ok ? row.recognised : near ? row.right : row.wrong);
+        }
+        rows.push_back(row);
+      }
+  return rows;
+}
+
+}  // namespace backlash
