@@ -13,6 +13,7 @@ namespace backlash {
 namespace {
 
 constexpr double kNoiseExcess = 1.2;  // noise estimate over the largest on the curve that may be by chance
+constexpr double kOftenNoise = 1.65;  // standard deviations of noise that a twentieth of the time exceeds
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double range_of(const std::vector<double>& x) {
@@ -32,7 +33,8 @@ std::string mismatch(const char* what, double value, double reference, const cha
   return text.str();
 }
 
-std::string excitation_mismatch(const Record& record, const CurveConditions& made) {
+/// `noise`: standard deviation of that of motor_torque.
+std::string excitation_mismatch(const Record& record, const CurveConditions& made, double noise) {
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   if (torque.empty()) return {};
   if (range_of(torque) <= 0.05 * made.amplitude) return "motor_torque is constant: there is no excitation";
@@ -47,7 +49,7 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
   if (largest < 0.95 * made.amplitude)
     return mismatch("excitation amplitude", largest, made.amplitude, "N m");
   const double often = quantile(std::move(magnitude), 0.9);
-  if (often > 1.1 * made.amplitude) return mismatch("excitation amplitude", often, made.amplitude, "N m");
+  if (often > 1.1 * made.amplitude + kOftenNoise * noise) return mismatch("excitation amplitude", often, made.amplitude, "N m");
   return {};
 }
 
@@ -163,7 +165,10 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
     return mismatch("sampling rate", interval > 0 ? 1 / interval : 0, made.sampling_rate, "Hz");
   if (range_of(record.column(settings.signal)) <= 0.05 * signal_levels(curve).second)
     return "the signal does not move: there is no excitation, or the sensor is dead";
-  std::string reason = excitation_mismatch(record, made);
+  const double per_period = made.frequency > 0 ? 1 / (made.frequency * interval) : 0;
+  const NoiseRange torque_noise = estimate_noise(record.column(Channel::motor_torque), per_period);
+  std::string reason =
+      excitation_mismatch(record, made, std::isnan(torque_noise.lower) ? 0 : torque_noise.lower);
   if (reason.empty() && looks_saturated(record.column(settings.signal)))
     reason = "the signal stays at its extreme value: the sensor is saturated";
   if (reason.empty()) reason = level_mismatch(record, settings, curve);
@@ -184,14 +189,17 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
   return motion_mismatch(record, curve);
 }
 
-std::optional<Estimate> refuse_for_curve(const Record& record, const ApdResult& apd,
-                                         const ApdSettings& settings, const MonitoringCurve* curve) {
-  const auto refuse = [](Status status, const std::string& reason) {
-    Estimate estimate;
-    estimate.status = status;
-    estimate.message = reason;
-    return estimate;
-  };
+namespace {
+
+Estimate refuse(Status status, const std::string& reason) {
+  Estimate estimate;
+  estimate.status = status;
+  estimate.message = reason;
+  return estimate;
+}
+
+std::optional<Estimate> refusal(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                                const MonitoringCurve* curve) {
   if (!record.has(settings.signal))
     return refuse(Status::insufficient_data, "the record has no " + channel_name(settings.signal));
   if (!curve) return refuse(Status::insufficient_data, "no monitoring curve");
@@ -212,11 +220,42 @@ std::optional<Estimate> refuse_for_curve(const Record& record, const ApdResult& 
   return std::nullopt;
 }
 
-Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                               const MonitoringCurve* curve) {
-  const auto refused = refuse_for_curve(record, apd, settings, curve);
-  Estimate estimate = refused ? *refused
-                              : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), apd.noise_range);
+/// Samples of the complete periods.
+std::vector<double> samples_of(const Record& record, const ApdResult& apd, Channel signal) {
+  std::vector<double> samples;
+  const std::vector<double>& values = record.column(signal);
+  std::size_t i = 0;
+  for (const PeriodResult& period : apd.periods) {
+    while (i < record.size() && record.time[i] < period.start) ++i;
+    for (; i < record.size() && record.time[i] < period.end; ++i)
+      if (std::isfinite(values[i])) samples.push_back(values[i]);
+  }
+  return samples;
+}
+
+}  // namespace
+
+CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                       const MonitoringCurve* curve) {
+  CurveMatch match;
+  match.refused = refusal(record, apd, settings, curve);
+  if (match.refused || !curve->family) return match;
+  match.family = match_family(*curve, samples_of(record, apd, settings.signal), apd.noise_range);
+  if (match.family->alien()) {
+    std::ostringstream text;
+    text.precision(3);
+    text << "the distribution is " << match.family->misfit << " (rms) from the nearest of " << curve->conditions.rig
+         << ", simulated records were within " << match.family->usual_misfit
+         << ": the machine does something that the rig does not contain";
+    match.refused = refuse(Status::out_of_domain, text.str());
+  }
+  return match;
+}
+
+Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, const MonitoringCurve* curve) {
+  Estimate estimate =
+      match.refused ? *match.refused
+                    : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), apd.noise_range);
   estimate.method = "apd_skewness";
   estimate.skewness = apd.skewness;
   return estimate;

@@ -34,10 +34,10 @@ LostMotionSettings read_lost_motion(const YamlReader& yaml) {
   return lost_motion;
 }
 
-template <Estimate (*estimate)(const Record&, const ApdResult&, const ApdSettings&, const MonitoringCurve*)>
+template <Estimate (*estimate)(const ApdResult&, const CurveMatch&, const MonitoringCurve*)>
 Estimate by_apd(const DiagnosisInput& in) {
   if (!in.settings.apd) return not_served("the rig file declares no diagnosis.apd");
-  return estimate(in.record, *in.apd, *in.settings.apd, in.curve);
+  return estimate(*in.apd, in.match, in.curve);
 }
 
 Estimate by_lost_motion(const DiagnosisInput& in) {
@@ -96,7 +96,9 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
     throw InvalidParameter("method", method, "must be one of " + joined(methods));
   Diagnosis diagnosis;
   if (settings.apd) diagnosis.apd = analyse_apd(record, *settings.apd);
-  const DiagnosisInput input{record, settings, diagnosis.apd, curve};
+  CurveMatch match;
+  if (settings.apd) match = match_curve(record, *diagnosis.apd, *settings.apd, curve);
+  const DiagnosisInput input{record, settings, curve, diagnosis.apd, match};
   for (const DiagnosisMethod& each : diagnosis_method_table()) {
     if (!method.empty() && method != each.name) continue;
     diagnosis.estimates.push_back(record.time.empty()

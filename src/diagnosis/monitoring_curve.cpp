@@ -34,18 +34,34 @@ std::pair<std::size_t, double> locate(std::size_t count, Get value, double x) {
   return {i, std::clamp((x - value(i)) / (value(i + 1) - value(i)), 0.0, 1.0)};
 }
 
-/// Scatter of the points about the straight line through their neighbours: structure finer than the grid.
-double roughness(const std::vector<CurvePoint>& points, std::size_t i, std::size_t level) {
+/// Structure finer than the grid about point i: rms distance of the runs in the middle of the segments around it
+/// from the straight line. Divided by 1.5, the variance of a value minus the mean of two others of variance 1.
+double roughness(const std::vector<CurvePoint>& points, const std::vector<std::vector<SkewnessCell>>& middle,
+                 std::size_t i, std::size_t level) {
   double sum = 0;
   int count = 0;
-  for (std::size_t k = i < 2 ? 1 : i - 1; k <= i + 1 && k + 1 < points.size(); ++k) {
-    const double bend = points[k].cells[level].mean -
-                        0.5 * (points[k - 1].cells[level].mean + points[k + 1].cells[level].mean);
-    sum +=
-        bend * bend / 1.5;  // variance of a point minus the mean of two others, all with variance 1, is 1.5
-    ++count;
+  for (std::size_t k = i < 2 ? 0 : i - 2; k < std::min(i + 2, middle.size()); ++k, ++count) {
+    const double line = 0.5 * (points[k].cells[level].mean + points[k + 1].cells[level].mean);
+    sum += std::pow(middle[k][level].mean - line, 2) / 1.5;
   }
-  return count ? std::sqrt(sum / count) : 0;
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+/// Scatter at point i, together with its two neighbours in the middle of segments: eight runs at one backlash
+/// say little.
+SkewnessCell shared_scatter(const std::vector<CurvePoint>& points,
+                            const std::vector<std::vector<SkewnessCell>>& middle, std::size_t i,
+                            std::size_t level) {
+  SkewnessCell cell = points[i].cells[level];
+  double between = cell.between * cell.between, within = cell.within * cell.within;
+  int count = 1;
+  for (std::size_t k = i < 1 ? 0 : i - 1; k < std::min(i + 1, middle.size()); ++k, ++count) {
+    between += std::pow(middle[k][level].between, 2);
+    within += std::pow(middle[k][level].within, 2);
+  }
+  cell.between = std::sqrt(between / count);
+  cell.within = std::sqrt(within / count);
+  return cell;
 }
 
 /// Backlash values that agree with an observation.
@@ -155,23 +171,22 @@ const SkewnessCell& MonitoringCurve::nominal(const CurvePoint& point) const {
   return point.cells[level == noise_levels.end() ? noise_levels.size() - 1 : level - noise_levels.begin()];
 }
 
-void MonitoringCurve::finish() {
-  std::vector<std::vector<double>> rough(points.size(), std::vector<double>(noise_levels.size(), 0));
-  for (std::size_t i = 0; i < points.size(); ++i)
-    for (std::size_t level = 0; level < noise_levels.size(); ++level)
-      rough[i][level] = roughness(points, i, level);
-  double lowest = 1e300;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const SkewnessCell& cell = nominal(points[i]);
-    const double error = total(cell, conditions.periods * conditions.seeds);
-    points[i].monotonic = cell.mean <= lowest + 2 * error;
-    lowest = std::min(lowest, cell.mean);
-  }
+void MonitoringCurve::finish(const std::vector<std::vector<SkewnessCell>>& middle) {
+  std::vector<std::vector<SkewnessCell>> finished(points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
     for (std::size_t level = 0; level < noise_levels.size(); ++level) {
-      double& between = points[i].cells[level].between;
-      between = std::hypot(between, rough[i][level]);
+      SkewnessCell cell = shared_scatter(points, middle, i, level);
+      cell.between = std::hypot(cell.between, roughness(points, middle, i, level));
+      finished[i].push_back(cell);
     }
+  double lowest = 1e300;
+  for (CurvePoint& point : points) {
+    const SkewnessCell& cell = nominal(point);
+    const double error = total(cell, conditions.periods * conditions.seeds);
+    point.monotonic = cell.mean <= lowest + 2 * error;
+    lowest = std::min(lowest, cell.mean);
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].cells = std::move(finished[i]);
 }
 
 Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange& range) const {

@@ -54,23 +54,30 @@ SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
   return cell;
 }
 
-Cell make_cell(const CurvePlan& plan, double backlash, Ticker& ticker) {
-  const FineRun run = run_fine(plan, backlash, ticker);
-  Cell cell;
-  cell.point.backlash = backlash;
+/// Skewness at each noise level, and the level of the signal at the declared one.
+CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash) {
+  CurvePoint point;
+  point.backlash = backlash;
   for (const double noise : plan.noise_levels) {
     std::vector<std::vector<double>> skewness;
     for (int seed = 0; seed < plan.request.seeds; ++seed) {
       auto samples = sample(plan, run, plan.phase_of(seed), seed, noise);
       skewness.push_back(skewness_of(plan, samples));
       if (noise == plan.file.simulation.sensors.of(plan.apd.signal).noise)
-        cell.point.signal_level = median_magnitude(std::move(samples));
+        point.signal_level = median_magnitude(std::move(samples));
     }
-    cell.point.cells.push_back(summarise(skewness));
-    if (std::isnan(cell.point.cells.back().mean))
+    point.cells.push_back(summarise(skewness));
+    if (std::isnan(point.cells.back().mean))
       throw InvalidParameter("diagnosis.apd", plan.apd.layout.upper,
                              "the classes hold no sample of the signal");
   }
+  return point;
+}
+
+Cell make_cell(const CurvePlan& plan, double backlash, Ticker& ticker) {
+  const FineRun run = run_fine(plan, backlash, ticker);
+  Cell cell;
+  cell.point = make_point(plan, run, backlash);
   cell.members = family_members(plan, run);
   cell.motor_travel = travel_of(run.position);
   for (double torque : run.torque) cell.amplitude = std::max(cell.amplitude, std::fabs(torque));
@@ -78,29 +85,33 @@ Cell make_cell(const CurvePlan& plan, double backlash, Ticker& ticker) {
   return cell;
 }
 
-/// A run between two grid points: only its signal is of use.
-FineRun make_between(const CurvePlan& plan, double backlash, Ticker& ticker) {
-  FineRun run = run_fine(plan, backlash, ticker);
-  run.torque = {};
-  run.position = {};
-  return run;
-}
+/// What lies in the middle between two points, to learn how well the curve and its family hold there.
+struct Middle {
+  std::vector<std::vector<SkewnessCell>> cells;
+  std::vector<FineRun> runs;  // of use: the signal
+};
 
-/// Cells of all grid points, and the runs between them that calibrate the family.
 struct Cells {
-  std::vector<Cell> cells;
-  std::vector<FineRun> between;
+  std::vector<Cell> points;
+  Middle middle;
 };
 
 Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   const int count = plan.request.points;
-  Cells all{std::vector<Cell>(count), std::vector<FineRun>(count - 1)};
+  Cells all;
+  all.points.resize(count);
+  all.middle.cells.resize(count - 1);
+  all.middle.runs.resize(count - 1);
   for_each_in_parallel(2 * count - 1, ticker, [&](int i) {
     const double backlash = 0.5 * plan.request.max_backlash * i / (count - 1);
-    if (i % 2 == 0)
-      all.cells[i / 2] = make_cell(plan, backlash, ticker);
-    else
-      all.between[i / 2] = make_between(plan, backlash, ticker);
+    if (i % 2 == 0) {
+      all.points[i / 2] = make_cell(plan, backlash, ticker);
+      return;
+    }
+    FineRun run = run_fine(plan, backlash, ticker);
+    run.torque = run.position = {};
+    all.middle.cells[i / 2] = make_point(plan, run, backlash).cells;
+    all.middle.runs[i / 2] = std::move(run);
   });
   return all;
 }
@@ -143,7 +154,7 @@ MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, co
   curve.noise_levels = plan.noise_levels;
   curve.backlash_to_angle = file.rig.backlash_angle(1);
   curve.family.emplace();
-  for (Cell& cell : all.cells) {
+  for (Cell& cell : all.points) {
     CurveConditions& c = curve.conditions;
     c.motor_travel = std::max(c.motor_travel, cell.motor_travel);
     c.amplitude = std::max(c.amplitude, cell.amplitude);
@@ -151,8 +162,8 @@ MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, co
     curve.points.push_back(std::move(cell.point));
     curve.family->members.push_back(std::move(cell.members));
   }
-  curve.finish();
-  calibrate_family(plan, all.between, ticker, *curve.family);
+  curve.finish(all.middle.cells);
+  calibrate_family(plan, all.middle.runs, ticker, *curve.family);
   return curve;
 }
 

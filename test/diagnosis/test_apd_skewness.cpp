@@ -24,7 +24,8 @@ ApdSettings settings(double period = 0.1, int settling = 0) {
 }
 
 Estimate estimate(const Record& record, const MonitoringCurve& curve, const ApdSettings& apd = settings()) {
-  return estimate_apd_skewness(record, analyse_apd(record, apd), apd, &curve);
+  const ApdResult result = analyse_apd(record, apd);
+  return estimate_apd_skewness(result, match_curve(record, result, apd, &curve), &curve);
 }
 
 TEST(AnalyseApd, MeanOverThePeriodsOfASquareRoot) {
@@ -306,7 +307,8 @@ TEST(EstimateApdSkewness, ConditionsOfTheCurve) {
   Record moving = record;
   for (std::size_t i = 0; i < moving.size(); ++i) moving.column(Channel::load_position)[i] = i;
   EXPECT_EQ(estimate(moving, curve).status, Status::ok);
-  const Estimate none = estimate_apd_skewness(record, analyse_apd(record, settings()), settings(), nullptr);
+  const ApdResult apd = analyse_apd(record, settings());
+  const Estimate none = estimate_apd_skewness(apd, match_curve(record, apd, settings(), nullptr), nullptr);
   EXPECT_EQ(none.status, Status::insufficient_data);
   EXPECT_NE(none.message.find("no monitoring curve"), std::string::npos);
 }

@@ -44,6 +44,17 @@ MonitoringCurve curve_through(const std::vector<double>& means, double between) 
   return curve;
 }
 
+/// Cells on the straight lines in the middle between the points.
+std::vector<std::vector<SkewnessCell>> straight_middle(const MonitoringCurve& curve) {
+  std::vector<std::vector<SkewnessCell>> middle;
+  for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
+    middle.push_back(curve.points[i].cells);
+    for (std::size_t level = 0; level < middle[i].size(); ++level)
+      middle[i][level].mean = 0.5 * (middle[i][level].mean + curve.points[i + 1].cells[level].mean);
+  }
+  return middle;
+}
+
 TEST(MonitoringCurve, InvertsALinearCurveInClosedForm) {
   for (const int points : {2, 3, 21, 200})
     for (const int periods : {1, 5, 100})
@@ -137,7 +148,7 @@ TEST(MonitoringCurve, AFlatCurveIsAmbiguous) {
 TEST(MonitoringCurve, ARisingStretchIsFlaggedAndAllBranchesCovered) {
   MonitoringCurve curve = curve_through({5, 4, 3, 3.5, 3.2, 2, 1, 0, -1, -2}, 0.02);
   std::vector<bool> monotonic;
-  curve.finish();
+  curve.finish(straight_middle(curve));
   for (const CurvePoint& point : curve.points) monotonic.push_back(point.monotonic);
   EXPECT_EQ(monotonic, (std::vector<bool>{true, true, true, false, false, true, true, true, true, true}));
 
@@ -155,21 +166,35 @@ TEST(MonitoringCurve, ARisingStretchIsFlaggedAndAllBranchesCovered) {
 
 TEST(MonitoringCurve, FinishAddsTheRoughnessThatTheGridDoesNotResolve) {
   MonitoringCurve straight = linear_curve();
-  straight.finish();
+  straight.finish(straight_middle(straight));
   for (const CurvePoint& point : straight.points) {
     EXPECT_NEAR(point.cells[0].between, test::kCurveBetween, 1e-12);  // rounding
     EXPECT_TRUE(point.monotonic);
   }
-  // Points scattered about a line with standard deviation s bend by s sqrt(1.5) against their neighbours.
+  // A value scattered with standard deviation s lies s sqrt(1.5) from the mean of two others.
   std::mt19937 random(11);
   std::normal_distribution<double> normal(0, 0.05);
   std::vector<double> means;
   for (int i = 0; i < 2000; ++i) means.push_back(-0.001 * i + normal(random));
   MonitoringCurve rough = curve_through(means, 0);
-  rough.finish();
+  std::vector<std::vector<SkewnessCell>> middle = straight_middle(rough);
+  for (std::size_t i = 0; i < middle.size(); ++i)
+    for (SkewnessCell& cell : middle[i]) cell.mean = -0.001 * (static_cast<double>(i) + 0.5) + normal(random);
+  rough.finish(middle);
   double squares = 0;
   for (const CurvePoint& point : rough.points) squares += point.cells[1].between * point.cells[1].between;
   EXPECT_NEAR(std::sqrt(squares / means.size()), 0.05, 0.005);  // 2000 values: 2 %, five times that
+}
+
+TEST(MonitoringCurve, FinishSharesTheScatterOfNeighbours) {
+  MonitoringCurve curve = linear_curve();
+  auto middle = straight_middle(curve);
+  for (auto& cells : middle) cells[0].between = 3 * test::kCurveBetween;
+  curve.finish(middle);
+  // Mean of the squares of 1 and 3 (one neighbour) or of 1, 3 and 3 (two).
+  EXPECT_NEAR(curve.points[0].cells[0].between, std::sqrt(5.0) * test::kCurveBetween, 1e-12);
+  EXPECT_NEAR(curve.points[5].cells[0].between, std::sqrt(19 / 3.0) * test::kCurveBetween, 1e-12);
+  EXPECT_NEAR(curve.points[5].cells[1].between, test::kCurveBetween, 1e-12);
 }
 
 TEST(MonitoringCurve, NoiseIsInterpolatedAndHeldOutsideItsLevels) {

@@ -9,10 +9,7 @@
 
 namespace backlash {
 
-/// The estimate, or a status with its reason; as estimate_apd_skewness and under the same conditions. A
-/// record whose distribution is farther from the whole family than any that was simulated is out_of_domain:
-/// the machine does something that the rig does not contain.
-Estimate estimate_apd_shape(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                            const MonitoringCurve* curve);
+/// The estimate, or a status with its reason. `match` is that of the same record and curve.
+Estimate estimate_apd_shape(const ApdResult& apd, const CurveMatch& match, const MonitoringCurve* curve);
 
 }  // namespace backlash

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/diagnosis/family_match.h"
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 #include "backlash_diagnosis/diagnosis/period_analyser.h"
 #include "backlash_diagnosis/record/record.h"
@@ -63,13 +64,18 @@ ApdResult analyse_apd(const Record& record, const ApdSettings& settings);
 std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
                           const MonitoringCurve& curve);
 
-/// Why no estimate by a curve (null: none is there) can be made, as an estimate with status and reason; empty
-/// where one can.
-std::optional<Estimate> refuse_for_curve(const Record& record, const ApdResult& apd,
-                                         const ApdSettings& settings, const MonitoringCurve* curve);
+/// What a curve says about a record before an estimator inverts it.
+struct CurveMatch {
+  std::optional<Estimate> refused;    // why no estimate can be made: status and reason
+  std::optional<FamilyMatch> family;  // where none was refused and the curve has a family
+};
 
-/// The estimate, or a status with its reason. `curve` may be null: then insufficient_data says so.
-Estimate estimate_apd_skewness(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                               const MonitoringCurve* curve);
+/// Checks a record against the conditions of a curve (null: none is there), and its distribution against the
+/// curve's family: one that resembles no member is out_of_domain.
+CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                       const MonitoringCurve* curve);
+
+/// The estimate, or a status with its reason. `match` is that of the same record and curve.
+Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, const MonitoringCurve* curve);
 
 }  // namespace backlash

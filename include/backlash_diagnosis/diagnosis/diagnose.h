@@ -30,8 +30,9 @@ struct Diagnosis {
 struct DiagnosisInput {
   const Record& record;
   const DiagnosisSettings& settings;
-  const std::optional<ApdResult>& apd;
   const MonitoringCurve* curve;
+  const std::optional<ApdResult>& apd;
+  const CurveMatch& match;  // of the record and the curve
 };
 
 /// An estimator: its name in reports, what it needs in plain words, and itself. All are in one table, in the

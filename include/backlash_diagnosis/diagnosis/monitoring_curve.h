@@ -58,9 +58,10 @@ class MonitoringCurve {
   std::optional<ApdFamily> family;   // at the same backlash values; for apd_shape
   double backlash_to_angle = kNaN;   // rad (at the axis of motor_position) per unit of backlash
 
-  /// Marks points that rise; adds to `between` the roughness that the grid does not resolve. Called once by
-  /// the builder.
-  void finish();
+  /// Marks points that rise, and widens the scatter of all points by what runs in the middle between two
+  /// points teach (middle[i][level] lies between points i and i + 1): their own scatter, and how far they are
+  /// from the straight line, which is structure that the grid does not resolve. Called once by the builder.
+  void finish(const std::vector<std::vector<SkewnessCell>>& middle);
 
   /// Skewness model at any backlash within the curve and any noise (held constant outside the levels).
   SkewnessCell at(double backlash, double noise) const;

@@ -1,0 +1,24 @@
+// Where in the family of distributions a record belongs.
+#pragma once
+
+#include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+
+namespace backlash {
+
+struct FamilyMatch {
+  double backlash = kNaN;              // m (angular mesh: rad), of the nearest distribution
+  double lower = kNaN, upper = kNaN;   // 95 % interval, see apd_family.h
+  bool touches_end = false;            // the largest backlash of the curve lies in the interval
+  double misfit = kNaN;                // rms distance from the nearest distribution, unit of the signal
+  double usual_misfit = kNaN;          // the largest among the simulated records there
+
+  /// Whether the record is farther from the whole family than chance explains: the machine does something
+  /// that the rig does not contain.
+  bool alien() const { return misfit > 2 * usual_misfit; }
+};
+
+/// Compares samples of whole periods with the curve's family (which must be there), at any noise of a range
+/// (NaN: any that the curve covers).
+FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> samples, const NoiseRange& noise);
+
+}  // namespace backlash

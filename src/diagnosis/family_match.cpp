@@ -1,0 +1,73 @@
+#include "backlash_diagnosis/diagnosis/family_match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace backlash {
+namespace {
+
+constexpr int kNoiseSteps = 5;  // where only bounds of the noise are known
+
+std::vector<double> noises_of(const NoiseRange& range, const std::vector<double>& levels) {
+  const double upper = std::min(std::isnan(range.upper) ? levels.back() : range.upper, levels.back());
+  const double lower = std::min(range.lower, upper);
+  if (lower == upper) return {upper};
+  std::vector<double> noises;
+  for (int step = 0; step < kNoiseSteps; ++step)
+    noises.push_back(lower + (upper - lower) * step / (kNoiseSteps - 1));
+  return noises;
+}
+
+/// The larger of the values at the noise levels on both sides of `noise`.
+double larger(const std::vector<double>& values, const std::vector<double>& levels, double noise) {
+  const auto place = std::lower_bound(levels.begin(), levels.end(), noise) - levels.begin();
+  const auto upper = std::min(place, static_cast<std::ptrdiff_t>(levels.size()) - 1);
+  const auto lower = std::max<std::ptrdiff_t>(0, place - 1);
+  return std::max(values[upper], values[lower]);
+}
+
+/// A point of the curve's backlash axis: segment + share.
+double backlash_at(const MonitoringCurve& curve, std::size_t segment, double share) {
+  const double from = curve.points[segment].backlash;
+  return from + share * (curve.points[segment + 1].backlash - from);
+}
+
+/// Widens the interval by all that is accepted at one noise; `smallest` is the record's distance.
+void accept(const MonitoringCurve& curve, const FamilyDistance& fit, double noise, double smallest,
+            FamilyMatch& match) {
+  const auto& segments = curve.family->segments;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    const double threshold = larger(segments[i].threshold, curve.noise_levels, noise);
+    const double limit = smallest + threshold * std::max(smallest, segments[i].floor);
+    for (const auto& [begin, end] : fit.within(i, limit)) {
+      match.lower = std::fmin(match.lower, backlash_at(curve, i, begin));
+      match.upper = std::fmax(match.upper, backlash_at(curve, i, end));
+      match.touches_end |= i + 1 == segments.size() && end == 1;
+    }
+  }
+}
+
+}  // namespace
+
+FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> samples, const NoiseRange& noise) {
+  const Quantiles observed = quantiles_of(std::move(samples));
+  std::vector<std::pair<double, FamilyDistance>> fits;  // by noise
+  for (const double sigma : noises_of(noise, curve.noise_levels))
+    fits.emplace_back(sigma, FamilyDistance(curve.family->members_with_noise(sigma), observed));
+  FamilyMatch match;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const auto& [sigma, fit] : fits) {
+    const FamilyDistance::Place& best = fit.smallest();
+    if (!(best.distance < smallest)) continue;
+    smallest = best.distance;
+    match.backlash = backlash_at(curve, best.segment, best.share);
+    match.usual_misfit = larger(curve.family->segments[best.segment].misfit, curve.noise_levels, sigma);
+  }
+  match.misfit = std::sqrt(smallest);
+  for (const auto& [sigma, fit] : fits) accept(curve, fit, sigma, smallest, match);
+  return match;
+}
+
+}  // namespace backlash
