@@ -49,9 +49,11 @@ Estimate by_lost_motion(const DiagnosisInput& in) {
 
 DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
   DiagnosisSettings settings;
+  settings.stiffness_uncertainty = yaml.number_or("stiffness_uncertainty", 0, Range::between(0, 0.2));
   if (const auto apd = yaml.optional_map("apd")) settings.apd = read_apd(*apd);
   if (const auto lost_motion = yaml.optional_map("lost_motion"))
     settings.lost_motion = read_lost_motion(*lost_motion);
+  if (settings.lost_motion) settings.lost_motion->elastic_uncertainty = 2 * settings.stiffness_uncertainty;
   if (const auto limits = yaml.optional_map("limits")) settings.limits = read_limits(*limits);
   return settings;
 }

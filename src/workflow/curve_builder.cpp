@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "family_builder.h"
 #include "fine_run.h"
+#include "machine.h"
 
 namespace backlash {
 namespace {
@@ -75,7 +76,7 @@ CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash
 }
 
 Cell make_cell(const CurvePlan& plan, double backlash, Ticker& ticker) {
-  const FineRun run = run_fine(plan, backlash, ticker);
+  const FineRun run = run_fine(plan, backlash, ticker, plan.file.rig);
   Cell cell;
   cell.point = make_point(plan, run, backlash);
   cell.members = family_members(plan, run);
@@ -108,7 +109,7 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
       all.points[i / 2] = make_cell(plan, backlash, ticker);
       return;
     }
-    FineRun run = run_fine(plan, backlash, ticker);
+    FineRun run = run_fine(plan, backlash, ticker, machine_of(plan.file, static_cast<std::uint64_t>(i)));
     run.torque = run.position = {};
     all.middle.cells[i / 2] = make_point(plan, run, backlash).cells;
     all.middle.runs[i / 2] = std::move(run);

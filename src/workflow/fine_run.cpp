@@ -88,8 +88,8 @@ CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
   return plan;
 }
 
-FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker) {
-  Plant plant(plan.file.rig, plan.file.simulation.excitation, plan.file.simulation.solver);
+FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker, const Rig& machine) {
+  Plant plant(machine, plan.file.simulation.excitation, plan.file.simulation.solver);
   plant.set_backlash(backlash);
   const double rate = plan.request.sampling_rate * plan.phases;
   const long count = std::lround(fine_samples(plan)), ticks = plan.run_periods();

@@ -28,7 +28,7 @@ CurvePlan plan_curve(const RigFile& file, CurveRequest request);
 struct FineRun {
   std::vector<double> signal, torque, position;
 };
-FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker);
+FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker, const Rig& machine);
 
 /// What the sensor reads of a fine run at one phase; `seed` is that of its noise (standard deviation, unit of
 /// the signal).

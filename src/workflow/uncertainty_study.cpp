@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
+#include "machine.h"
 #include "parallel.h"
 
 namespace backlash {
@@ -69,7 +70,7 @@ using Change = std::function<void(RigFile&)>;
 
 /// What the rig's sensors give for a draw, on a machine that was changed.
 Record simulate_draw(RigFile machine, const Draw& d, const Channel signal, int settling) {
-  Rig& rig = machine.rig;
+  Rig rig = machine_of(machine, d.seed);
   SimulationSettings& simulation = machine.simulation;
   rig.mesh.backlash = d.backlash;
   const double rate = simulation.sensors.sampling_rate;

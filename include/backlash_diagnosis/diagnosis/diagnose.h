@@ -12,6 +12,8 @@ namespace backlash {
 
 /// What a rig file says under `diagnosis`. An absent part means that its estimator cannot be served.
 struct DiagnosisSettings {
+  /// How well the rig file knows the machine: relative standard deviation of the stiffness of its couplings.
+  double stiffness_uncertainty = 0;
   std::optional<ApdSettings> apd;
   std::optional<LostMotionSettings> lost_motion;
   std::optional<Limits> limits;

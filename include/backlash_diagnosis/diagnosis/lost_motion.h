@@ -50,7 +50,7 @@ struct LostMotionSettings {
   std::function<double(double torque)> elastic_deflection;
 
   /// Relative 95 % uncertainty of elastic_deflection, >= 0.
-  double elastic_uncertainty = 0.02;
+  double elastic_uncertainty = 0;
 
   /// m, > 0; NaN where the rig gives none, then Estimate::backlash is NaN.
   double base_radius = kNaN;

@@ -1,0 +1,17 @@
+#include "machine.h"
+
+#include <algorithm>
+#include <random>
+
+namespace backlash {
+
+Rig machine_of(const RigFile& file, std::uint64_t seed) {
+  Rig rig = file.rig;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  for (Coupling* coupling : {&rig.input_coupling, &rig.output_coupling})
+    coupling->stiffness *= 1 + file.diagnosis.stiffness_uncertainty * std::clamp(normal(random), -3.0, 3.0);
+  return rig;
+}
+
+}  // namespace backlash
