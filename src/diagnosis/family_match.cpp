@@ -20,12 +20,13 @@ std::vector<double> noises_of(const NoiseRange& range, const std::vector<double>
   return noises;
 }
 
-/// The larger of the values at the noise levels on both sides of `noise`.
-double larger(const std::vector<double>& values, const std::vector<double>& levels, double noise) {
-  const auto place = std::lower_bound(levels.begin(), levels.end(), noise) - levels.begin();
-  const auto upper = std::min(place, static_cast<std::ptrdiff_t>(levels.size()) - 1);
-  const auto lower = std::max<std::ptrdiff_t>(0, place - 1);
-  return std::max(values[upper], values[lower]);
+/// Value at `noise`, linear between the levels and constant outside of them.
+double interpolated(const std::vector<double>& values, const std::vector<double>& levels, double noise) {
+  const auto above = std::lower_bound(levels.begin(), levels.end(), noise) - levels.begin();
+  if (above == 0) return values.front();
+  if (above == static_cast<std::ptrdiff_t>(levels.size())) return values.back();
+  const double share = (noise - levels[above - 1]) / (levels[above] - levels[above - 1]);
+  return values[above - 1] + share * (values[above] - values[above - 1]);
 }
 
 /// A point of the curve's backlash axis: segment + share.
@@ -39,7 +40,7 @@ void accept(const MonitoringCurve& curve, const FamilyDistance& fit, double nois
             FamilyMatch& match) {
   const auto& segments = curve.family->segments;
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    const double threshold = larger(segments[i].threshold, curve.noise_levels, noise);
+    const double threshold = interpolated(segments[i].threshold, curve.noise_levels, noise);
     const double limit = smallest + threshold * std::max(smallest, segments[i].floor);
     for (const auto& [begin, end] : fit.within(i, limit)) {
       match.lower = std::fmin(match.lower, backlash_at(curve, i, begin));
@@ -63,7 +64,7 @@ FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> sampl
     if (!(best.distance < smallest)) continue;
     smallest = best.distance;
     match.backlash = backlash_at(curve, best.segment, best.share);
-    match.usual_misfit = larger(curve.family->segments[best.segment].misfit, curve.noise_levels, sigma);
+    match.usual_misfit = interpolated(curve.family->segments[best.segment].misfit, curve.noise_levels, sigma);
   }
   match.misfit = std::sqrt(smallest);
   for (const auto& [sigma, fit] : fits) accept(curve, fit, sigma, smallest, match);

@@ -12,13 +12,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kNormal95 = 1.959964;  // two-sided 95 % quantile of the normal distribution
 constexpr double kFloor = 1e-6;         // smallest difference of skewness that may count as one
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double total(const SkewnessCell& cell, int periods) {
-  return std::sqrt(cell.between * cell.between + cell.within * cell.within / std::max(1, periods));
-}
 
 SkewnessCell mix(const SkewnessCell& a, const SkewnessCell& b, double share) {
   const auto line = [share](double x, double y) { return x + share * (y - x); };
@@ -73,7 +68,7 @@ struct Accepted {
 };
 
 /// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's
-/// construction): (skewness - mean(b))^2 <= (1.96 sigma(b))^2, between two points a quadratic inequality.
+/// construction): (skewness - mean(b))^2 <= (coverage_factor sigma(b))^2, between two points a quadratic inequality.
 Accepted accept(const MonitoringCurve& curve, double skewness, int periods, double noise) {
   Accepted result;
   for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
@@ -82,7 +77,7 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
     const double offset = skewness - cell.mean, slope = next.mean - cell.mean;
     double a = slope * slope, b = -2 * offset * slope, c = offset * offset - kFloor * kFloor;
     const auto widen = [&](double at_start, double at_end, double divisor) {
-      const double factor = kNormal95 * kNormal95 / divisor, change = at_end - at_start;
+      const double factor = curve.coverage_factor * curve.coverage_factor / divisor, change = at_end - at_start;
       a -= factor * change * change;
       b -= factor * 2 * at_start * change;
       c -= factor * at_start * at_start;
@@ -99,7 +94,7 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
     const double crossing = std::clamp(slope == 0 ? 0 : offset / slope, 0.0, 1.0);
     for (const double share : {0.0, crossing, 1.0}) {
       const SkewnessCell here = mix(cell, next, share);
-      const double distance = std::fabs(skewness - here.mean) / std::max(total(here, periods), kFloor);
+      const double distance = std::fabs(skewness - here.mean) / std::max(MonitoringCurve::deviation(here, periods), kFloor);
       if (!(distance < result.best_distance)) continue;
       result.best_distance = distance;
       result.best = from + share * span;
@@ -166,6 +161,10 @@ SkewnessCell MonitoringCurve::at(double backlash, double noise) const {
   return p + 1 < points.size() ? mix(cell(p), cell(p + 1), place.second) : cell(p);
 }
 
+double MonitoringCurve::deviation(const SkewnessCell& cell, int periods) {
+  return std::sqrt(cell.between * cell.between + cell.within * cell.within / std::max(1, periods));
+}
+
 const SkewnessCell& MonitoringCurve::nominal(const CurvePoint& point) const {
   const auto level = std::lower_bound(noise_levels.begin(), noise_levels.end(), conditions.noise);
   return point.cells[level == noise_levels.end() ? noise_levels.size() - 1 : level - noise_levels.begin()];
@@ -182,7 +181,7 @@ void MonitoringCurve::finish(const std::vector<std::vector<SkewnessCell>>& middl
   double lowest = 1e300;
   for (CurvePoint& point : points) {
     const SkewnessCell& cell = nominal(point);
-    const double error = total(cell, conditions.periods * conditions.seeds);
+    const double error = MonitoringCurve::deviation(cell, conditions.periods * conditions.seeds);
     point.monotonic = cell.mean <= lowest + 2 * error;
     lowest = std::min(lowest, cell.mean);
   }

@@ -177,6 +177,8 @@ std::string MonitoringCurve::to_yaml() const {
   emit_conditions(out, conditions);
   out << YAML::Key << "backlash_to_angle" << YAML::Value << to_text(backlash_to_angle)
       << YAML::Comment("rad at the axis of motor_position per unit of backlash");
+  out << YAML::Key << "coverage_factor" << YAML::Value << to_text(coverage_factor)
+      << YAML::Comment("standard deviations that hold 95 % of simulated records");
   emit_row(out, "noise_levels", noise_levels);
   out << YAML::Key << "points" << YAML::Value << YAML::BeginSeq;
   for (const CurvePoint& point : points) emit_point(out, *this, point);
@@ -191,6 +193,7 @@ MonitoringCurve MonitoringCurve::from_yaml(const YamlReader& yaml) {
   yaml.integer("schema_version", kSchema, kSchema);
   curve.conditions = read_conditions(yaml.map("conditions"));
   curve.backlash_to_angle = yaml.number("backlash_to_angle", Range::positive());
+  curve.coverage_factor = yaml.number("coverage_factor", Range::positive());
   curve.noise_levels = yaml.numbers("noise_levels", Range::not_negative());
   if (curve.noise_levels.empty()) yaml.fail("noise_levels", "needs at least one level");
   for (std::size_t i = 1; i < curve.noise_levels.size(); ++i)

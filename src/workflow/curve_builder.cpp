@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
@@ -55,8 +56,14 @@ SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
   return cell;
 }
 
-/// Skewness at each noise level, and the level of the signal at the declared one.
-CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash) {
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// Skewness at each noise level, and the level of the signal at the declared one. `means` (may be null)
+/// becomes the mean skewness by level and seed.
+CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash,
+                      std::vector<std::vector<double>>* means = nullptr) {
   CurvePoint point;
   point.backlash = backlash;
   for (const double noise : plan.noise_levels) {
@@ -68,6 +75,10 @@ CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash
         point.signal_level = median_magnitude(std::move(samples));
     }
     point.cells.push_back(summarise(skewness));
+    if (means) {
+      means->emplace_back();
+      for (const auto& seed : skewness) means->back().push_back(mean_of(seed));
+    }
     if (std::isnan(point.cells.back().mean))
       throw InvalidParameter("diagnosis.apd", plan.apd.layout.upper,
                              "the classes hold no sample of the signal");
@@ -88,8 +99,10 @@ Cell make_cell(const CurvePlan& plan, double backlash, Ticker& ticker) {
 
 /// What lies in the middle between two points, to learn how well the curve and its family hold there.
 struct Middle {
+  std::vector<double> backlash;
   std::vector<std::vector<SkewnessCell>> cells;
-  std::vector<FineRun> runs;  // of use: the signal
+  std::vector<std::vector<std::vector<double>>> means;  // of skewness, by noise level and seed
+  std::vector<FineRun> runs;                            // of use: the signal
 };
 
 struct Cells {
@@ -101,7 +114,9 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   const int count = plan.request.points;
   Cells all;
   all.points.resize(count);
+  all.middle.backlash.resize(count - 1);
   all.middle.cells.resize(count - 1);
+  all.middle.means.resize(count - 1);
   all.middle.runs.resize(count - 1);
   for_each_in_parallel(2 * count - 1, ticker, [&](int i) {
     const double backlash = 0.5 * plan.request.max_backlash * i / (count - 1);
@@ -111,10 +126,33 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
     }
     FineRun run = run_fine(plan, backlash, ticker, machine_of(plan.file, static_cast<std::uint64_t>(i)));
     run.torque = run.position = {};
-    all.middle.cells[i / 2] = make_point(plan, run, backlash).cells;
+    all.middle.backlash[i / 2] = backlash;
+    all.middle.cells[i / 2] = make_point(plan, run, backlash, &all.middle.means[i / 2]).cells;
     all.middle.runs[i / 2] = std::move(run);
   });
   return all;
+}
+
+/// Share of the runs between the points whose interval holds their own backlash, of those that get one.
+double coverage(const MonitoringCurve& curve, const Middle& middle) {
+  int told = 0, held = 0;
+  for (std::size_t i = 0; i < middle.means.size(); ++i)
+    for (std::size_t level = 0; level < middle.means[i].size(); ++level)
+      for (const double mean : middle.means[i][level]) {
+        const Estimate e = curve.invert(mean, curve.conditions.periods, curve.noise_levels[level]);
+        if (e.status != Status::ok) continue;
+        ++told;
+        held += e.lower <= middle.backlash[i] && middle.backlash[i] <= e.upper;
+      }
+  return told > 0 ? static_cast<double>(held) / told : 1;
+}
+
+/// The smallest factor with which 95 % of the intervals hold, not below that of a normal distribution: the
+/// same runs also set the scatter.
+double calibrated_factor(MonitoringCurve curve, const Middle& middle) {
+  for (; curve.coverage_factor < 5; curve.coverage_factor += 0.1)
+    if (coverage(curve, middle) >= 0.95) break;
+  return curve.coverage_factor;
 }
 
 CurveConditions conditions_of(const CurvePlan& plan) {
@@ -164,6 +202,7 @@ MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, co
     curve.family->members.push_back(std::move(cell.members));
   }
   curve.finish(all.middle.cells);
+  curve.coverage_factor = calibrated_factor(curve, all.middle);
   calibrate_family(plan, all.middle.runs, ticker, *curve.family);
   return curve;
 }

@@ -56,6 +56,8 @@ class MonitoringCurve {
   std::vector<double> noise_levels;  // increasing, unit of the signal; contains conditions.noise
   std::vector<CurvePoint> points;    // increasing backlash
   std::optional<ApdFamily> family;   // at the same backlash values; for apd_shape
+  /// Standard deviations within which 95 % of simulated records lie about the curve; normal by default.
+  double coverage_factor = 1.959964;
   double backlash_to_angle = kNaN;   // rad (at the axis of motor_position) per unit of backlash
 
   /// Marks points that rise, and widens the scatter of all points by what runs in the middle between two
@@ -65,6 +67,9 @@ class MonitoringCurve {
 
   /// Skewness model at any backlash within the curve and any noise (held constant outside the levels).
   SkewnessCell at(double backlash, double noise) const;
+
+  /// Standard deviation of the mean skewness over `periods` periods.
+  static double deviation(const SkewnessCell& cell, int periods);
 
   /// At the declared noise: what a plot of the curve shows.
   const SkewnessCell& nominal(const CurvePoint& point) const;
