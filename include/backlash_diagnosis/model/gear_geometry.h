@@ -21,8 +21,7 @@ struct SpurGear {
   int teeth = 0;
   double addendum = 1;       // modules, tip circle above the reference circle without profile shift; 0.1 to 2
   double profile_shift = 0;  // modules, > 0 outwards; -1 to 1.5
-  double thinning =
-      0;  // m, by which a tooth is thinner than pi/2 modules (plus shift), along the reference circle
+  double thinning = 0;       // m, by which a tooth is too thin, along the reference circle
 };
 
 struct GearPair {

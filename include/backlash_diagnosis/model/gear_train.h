@@ -2,7 +2,7 @@
 //
 //   J_M a_M = tau_M - c_M w_M - T_I            T_I = k_I (q_M - q_P) + c_I (w_M - w_P)
 //   J_P a_P = T_I - c_P w_P - r F              x   = r (q_P - q_G), contact where |x| > backlash / 2
-//   J_G a_G = r F - c_G w_G - T_O              F   = contact law, sign of x (times the variation of mesh stiffness)
+//   J_G a_G = r F - c_G w_G - T_O              F   = contact law, sign of x, times variation if any
 //   J_L a_L = T_O - c_L w_L + terms            T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
 //
 // Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its neighbours one

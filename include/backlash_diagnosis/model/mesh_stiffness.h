@@ -5,25 +5,23 @@
 // pairs come one base pitch apart. With 0 <= u < contact_ratio the travel of one pair since its first touch
 // [base pitches],
 //
-//   k(phase) = sum over the pairs u = phase, phase + 1, ... of k_pair(u)        [N/m], phase in base pitches,
-//   period 1
+//   k(phase) = sum over the pairs u = phase, phase + 1, ... of k_pair(u)     [N/m], phase in base pitches
 //
 // Laws of k_pair:
-//   step           every pair K = pi E L / (4 (1 - nu^2)), alike over its life. Hertz contact of two
-//   cylinders alone,
-//                  linearised by Yang and Sun (1985); one pair K, two pairs 2 K: Sarkar et al. (1997),
-//                  Sections 3.2, 4.1. Tooth bending is left out: some ten times too stiff in size, the jump
-//                  from one pair to two as well.
-//   lin_parker     kmax (-1.8 t^2 + 1.8 t + 0.55), t = u / contact_ratio: Yumrukcal (2013), Eqs. 2.30
-//   and 2.31, after Lin
-//                  and Parker; mean of a pair 0.85 kmax. kmax by the single stiffness c' of ISO 6336-1,
-//                  method B (solid blanks, basic rack 1/1.25, 0.8 of the theoretical value, times E / 206
-//                  GPa): profile shifts -0.5 to 2 in sum, not smaller at the smaller gear.
-//   hertz_bending  F / k_pair = 1/k1'(r1) + 1/k2'(r2) + 1/kh': Hertz contact kh' = K / L in series with the
-//   bending of
-//                  both teeth loaded at r1 and r2, a polynomial in teeth and shift: Yumrukcal (2013),
-//                  Eqs. 2.28 and 2.29, after Kuang and Yang (1992). Steel only (E from 180 to 220 GPa), 12 to
-//                  100 teeth, shift -0.6 to 0.6.
+//
+// step: K = pi E L / (4 (1 - nu^2)), alike over a pair's life. Hertz contact of two cylinders alone,
+// linearised by Yang and Sun (1985); one pair K, two pairs 2 K: Sarkar, Ellis and Moore (1997), Sections 3.2
+// and 4.1. Tooth bending is left out, which makes it some ten times too stiff.
+//
+// lin_parker: kmax (-1.8 t^2 + 1.8 t + 0.55), t = u / contact_ratio: Yumrukcal (2013), Eqs. 2.30 and 2.31,
+// after Lin and Parker; mean of a pair 0.85 kmax. kmax is the single stiffness c' of ISO 6336-1, method B
+// (solid blanks, basic rack 1/1.25, 0.8 of the theoretical value, times E / 206 GPa): profile shifts -0.5 to
+// 2 in sum, not less at the smaller gear.
+//
+// hertz_bending: L / k_pair = 1/k1'(r1) + 1/k2'(r2) + 1/kh'. Hertz contact kh' = K / L in series with the
+// bending of both teeth, loaded at the radii r1 and r2, by a polynomial in teeth and shift: Yumrukcal (2013),
+// Eqs. 2.28 and 2.29, after Kuang and Yang (1992). Steel only (E from 180 to 220 GPa), 12 to 100 teeth, shift
+// -0.6 to 0.6.
 //
 // All laws are linear: the stiffness does not depend on the load. Extended contact under load is left out;
 // the `transition` stands for it, see below.

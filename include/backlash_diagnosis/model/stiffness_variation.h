@@ -40,12 +40,11 @@ class StiffnessVariation {
 ///   law          step, lin_parker or hertz_bending
 ///   phase        0 to 1, base pitches: the forward flank's phase at pinion angle 0
 ///   transition   0 to 0.5, base pitches, see MeshStiffnessSettings
-///   gear_pair    pinion_teeth, gear_teeth, module [m], pressure_angle_deg, addendum [modules]; absent means
-///   zero for
-///                centre_distance_change [m], pinion_thinning, gear_thinning [m], pinion_shift, gear_shift
-///                [modules]
-///   youngs_modulus [Pa], poisson_ratio   for hertz_bending only; in the other laws they cancel, as the face
-///   width does
+///   gear_pair    pinion_teeth, gear_teeth, module [m], pressure_angle_deg, addendum [modules]
+///                absent means 0: centre_distance_change, pinion_thinning, gear_thinning [m],
+///                pinion_shift, gear_shift [modules]
+///   youngs_modulus [Pa], poisson_ratio
+///                for hertz_bending only; in the other laws they cancel, as the face width does
 ///
 /// The gear pair tells how its teeth meet; the play of the rig is that of mesh.backlash (or half_gap), which
 /// wear and set_backlash() change. Throws BadData, also where the gear's base radius differs from the rig's
