@@ -28,6 +28,7 @@ GearTrain::GearTrain(const Rig& rig)
       output_(rig.output_coupling),
       lever_(rig.mesh.lever()),
       contact_(rig.mesh.contact),
+      variation_(rig.mesh.variation),
       terms_(rig.terms) {
   if (!contact_) throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
   set_backlash(rig.mesh.backlash);
@@ -74,7 +75,8 @@ double GearTrain::contact_force(const Slots& s) const {
   if (penetration <= 0) return 0;
   const double side = x > 0 ? 1 : -1;
   const double rate = side * lever_ * (s.w[kPinion] - s.w[kGear]);
-  return side * contact_->force(penetration, rate);
+  const double force = side * contact_->force(penetration, rate);
+  return variation_ ? force * variation_->factor(lever_ * s.q[kPinion], side) : force;
 }
 
 void GearTrain::derivative(double t, const double* state, double motor_torque, double* rate) const {
@@ -137,8 +139,9 @@ double GearTrain::energy(const double* state) const {
     energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
   if (!input_.rigid) energy += 0.5 * input_.stiffness * std::pow(s.q[kMotor] - s.q[kPinion], 2);
   if (!output_.rigid) energy += 0.5 * output_.stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
-  const double penetration = std::fabs(lever_ * (s.q[kPinion] - s.q[kGear])) - half_gap_;
-  if (penetration > 0) energy += contact_->elastic_energy(penetration);
+  const double x = lever_ * (s.q[kPinion] - s.q[kGear]), penetration = std::fabs(x) - half_gap_;
+  if (penetration > 0)
+    energy += contact_->elastic_energy(penetration) * (variation_ ? variation_->factor(lever_ * s.q[kPinion], x) : 1);
   return energy;
 }
 

@@ -39,6 +39,8 @@ Mesh read_mesh(const YamlReader& yaml) {
   const double factor = key == "half_gap" ? 2 : key == "backlash_angle" ? mesh.lever() : 1;
   mesh.backlash = factor * yaml.number(key, Range::not_negative());
   mesh.contact = read_contact_law(yaml.map("contact"));
+  if (const auto variation = yaml.optional_map("stiffness_variation"))
+    mesh.variation = read_stiffness_variation(*variation, mesh.base_radius);
   return mesh;
 }
 

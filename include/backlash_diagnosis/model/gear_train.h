@@ -2,7 +2,7 @@
 //
 //   J_M a_M = tau_M - c_M w_M - T_I            T_I = k_I (q_M - q_P) + c_I (w_M - w_P)
 //   J_P a_P = T_I - c_P w_P - r F              x   = r (q_P - q_G), contact where |x| > backlash / 2
-//   J_G a_G = r F - c_G w_G - T_O              F   = contact law, sign of x
+//   J_G a_G = r F - c_G w_G - T_O              F   = contact law, sign of x, times variation if any
 //   J_L a_L = T_O - c_L w_L + terms            T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
 //
 // Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its neighbours one
@@ -46,7 +46,7 @@ class GearTrain {
   double damping_power(const double* state) const;
 
   /// Twist between motor and link under a static torque in one contact, without the gap. Torque and angle in the
-  /// units of motor_torque and motor_position; odd in torque.
+  /// units of motor_torque and motor_position; odd in torque. With the mean stiffness of the mesh cycle.
   double elastic_deflection(double motor_torque) const;
 
   /// Total free play [m] (angular mesh: [rad] at the load side), >= 0; takes effect at the next derivative().
@@ -71,6 +71,7 @@ class GearTrain {
   Coupling input_, output_;  // referred to the load side
   double half_gap_, lever_;
   std::shared_ptr<const ContactLaw> contact_;
+  std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;
   static constexpr int kFixed = -1;
 };

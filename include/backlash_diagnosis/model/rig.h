@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/model/contact_law.h"
+#include "backlash_diagnosis/model/stiffness_variation.h"
 #include "backlash_diagnosis/model/term.h"
 
 namespace backlash {
@@ -36,6 +37,7 @@ struct Mesh {
   double backlash = 0;
   double base_radius = std::numeric_limits<double>::quiet_NaN();  // m, of the load gear; NaN: angular mesh
   std::shared_ptr<const ContactLaw> contact;
+  std::shared_ptr<const StiffnessVariation> variation;  // null: the same stiffness in every position
 
   bool angular() const { return std::isnan(base_radius); }
   double lever() const { return angular() ? 1 : base_radius; }  // m (or 1): torque per contact force

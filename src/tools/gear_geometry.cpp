@@ -1,0 +1,284 @@
+// Geometry and mesh stiffness of a pair of spur gears, from shim to backlash and back.
+#include "backlash_diagnosis/model/gear_geometry.h"
+
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/model/mesh_stiffness.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const std::string kStandardOutput = "-";
+constexpr double kDegree = M_PI / 180;
+constexpr int kCyclePoints = 400;  // per mesh cycle
+
+// Table 2 of Sarkar, Ellis and Moore (1997); addendum and material are not printed there.
+constexpr int kTeeth = 40;
+constexpr double kModule = 0.79375e-3, kPressureAngleDeg = 20, kFaceWidth = 6.35e-3, kAddendum = 1;
+constexpr double kYoungsModulus = 193e9, kPoissonRatio = 0.29;
+
+Command command() {
+  const auto fallback = [](double value) { return "; default: " + to_text(value); };
+  Command c;
+  c.name = "gear_geometry";
+  c.summary =
+      "Tells how a pair of external involute spur gears meets: radii, contact ratio, backlash from centre "
+      "distance and "
+      "tooth thinning (or the shim for a wanted backlash), and the stiffness along the mesh cycle.";
+  c.options = {
+      {"teeth1", "N", "of the pinion" + fallback(kTeeth)},
+      {"teeth2", "N", "of the gear" + fallback(kTeeth)},
+      {"module", "M", "[m]" + fallback(kModule)},
+      {"pressure-angle-deg", "DEG", "of the basic rack" + fallback(kPressureAngleDeg)},
+      {"addendum", "X", "of both, in modules" + fallback(kAddendum)},
+      {"shift1", "X", "profile shift of the pinion, in modules; default: 0"},
+      {"shift2", "X", "of the gear; default: 0"},
+      {"thinning1", "M", "of the pinion's teeth along the reference circle [m]; default: 0"},
+      {"thinning2", "M", "of the gear's teeth; default: 0"},
+      {"centre-distance-change", "M",
+       "shim: from the centre distance at which unthinned teeth mesh without play [m]; default: 0"},
+      {"backlash", "M",
+       "wanted play along the line of action [m]: gives the shim instead of --centre-distance-change"},
+      {"table", "N",
+       "a table of N rows, from 0 to --centre-distance-change or to --backlash, instead of one pair"},
+      {"face-width", "M", "[m]" + fallback(kFaceWidth)},
+      {"youngs-modulus", "PA", "of both gears [Pa]" + fallback(kYoungsModulus)},
+      {"poisson-ratio", "X", "of both gears" + fallback(kPoissonRatio)},
+      {"transition", "X", "travel over which a pair takes up its load, base pitches, 0 to 0.5; default: 0"},
+      {"json", "OUT.json",
+       "also write the numbers, with the stiffness over two mesh cycles; '-' writes them to standard output "
+       "instead of the text"},
+  };
+  c.notes =
+      "The defaults are the gears of Sarkar, Ellis and Moore (1997), Table 2, with an addendum of one module "
+      "and "
+      "stainless steel 303. Backlash is the full free play. A hinged bracket moves the centre by d r2/r1 "
+      "cos(psi) for "
+      "a stop setting d (Yumrukcal 2013, Eq. A.1). plot_mesh_stiffness.py draws OUT.json.";
+  c.examples = {"gear_geometry --centre-distance-change 50e-6", "gear_geometry --backlash 50e-6",
+                "gear_geometry --centre-distance-change 100e-6 --table 5",
+                "gear_geometry --teeth1 20 --teeth2 40 --module 2e-3 --face-width 20e-3 --json gears.json"};
+  c.exit_codes =
+      "  0   done\n"
+      "  2   the pair does not run: contact ratio below 1, interference or pointed teeth\n";
+  return c;
+}
+
+struct Request {
+  GearPair pair;
+  MeshStiffnessSettings mesh;
+  bool inverse = false;  // backlash given
+  double last = 0;       // m: centre-distance change, or backlash
+  int rows = 0;          // 0: one pair
+};
+
+Request read_request(const Arguments& a) {
+  Request r;
+  GearPair& p = r.pair;
+  p.pinion.teeth = static_cast<int>(a.integer("teeth1", kTeeth, 3, 1'000'000));
+  p.gear.teeth = static_cast<int>(a.integer("teeth2", kTeeth, 3, 1'000'000));
+  p.module = a.number("module", kModule, Range::positive());
+  p.pressure_angle = a.number("pressure-angle-deg", kPressureAngleDeg, Range::between(5, 45)) * kDegree;
+  p.pinion.addendum = p.gear.addendum = a.number("addendum", kAddendum, Range::between(0.1, 2));
+  p.pinion.profile_shift = a.number("shift1", 0, Range::between(-1, 1.5));
+  p.gear.profile_shift = a.number("shift2", 0, Range::between(-1, 1.5));
+  p.pinion.thinning = a.number("thinning1", 0, Range::any());
+  p.gear.thinning = a.number("thinning2", 0, Range::any());
+  r.mesh.face_width = a.number("face-width", kFaceWidth, Range::positive());
+  r.mesh.youngs_modulus = a.number("youngs-modulus", kYoungsModulus, Range::positive());
+  r.mesh.poisson_ratio = a.number("poisson-ratio", kPoissonRatio, Range::between(0, 0.5));
+  r.mesh.transition = a.number("transition", 0, Range::between(0, 0.5));
+  r.inverse = a.has("backlash");
+  if (r.inverse && a.has("centre-distance-change"))
+    throw UsageError("--backlash and --centre-distance-change exclude each other");
+  r.last = r.inverse ? a.number("backlash", 0, Range::not_negative())
+                     : a.number("centre-distance-change", 0, Range::any());
+  if (a.has("table")) r.rows = static_cast<int>(a.integer("table", 0, 2, 10'000));
+  return r;
+}
+
+/// The pair at a centre-distance change, or at the one that a backlash needs.
+GearPair pair_at(const Request& request, double value) {
+  GearPair pair = request.pair;
+  pair.centre_distance_change = request.inverse ? centre_distance_change_for(pair, value) : value;
+  return pair;
+}
+
+double small_change_backlash(const GearPair& pair) {
+  return 2 * pair.centre_distance_change * std::sin(pair.pressure_angle) +
+         (pair.pinion.thinning + pair.gear.thinning) * std::cos(pair.pressure_angle);
+}
+
+Json to_json(const GearCircles& c) {
+  return {{"reference_radius", c.reference_radius},
+          {"base_radius", c.base_radius},
+          {"tip_radius", c.tip_radius},
+          {"operating_radius", c.operating_radius},
+          {"operating_tooth_thickness", c.operating_tooth_thickness},
+          {"tip_thickness", c.tip_thickness}};
+}
+
+Json to_json(const GearPair& pair, const GearGeometry& g) {
+  return {{"centre_distance_change", pair.centre_distance_change},
+          {"centre_distance", g.centre_distance},
+          {"operating_pressure_angle", g.operating_pressure_angle},
+          {"base_pitch", g.base_pitch},
+          {"approach", g.approach},
+          {"recess", g.recess},
+          {"length_of_contact", g.length_of_contact},
+          {"contact_ratio", g.contact_ratio},
+          {"backlash", g.backlash},
+          {"small_change_backlash", small_change_backlash(pair)},
+          {"pitch_circle_backlash", g.pitch_circle_backlash},
+          {"backlash_angle", {{"pinion", g.pinion_backlash_angle()}, {"gear", g.gear_backlash_angle()}}},
+          {"pinion", to_json(g.pinion)},
+          {"gear", to_json(g.gear)},
+          {"faults", g.faults},
+          {"remarks", g.remarks}};
+}
+
+/// Mean and course over two mesh cycles of every law; one that the gears do not suit has the reason instead.
+Json stiffness_to_json(const GearPair& pair, MeshStiffnessSettings settings) {
+  Json phase = Json::array(), pairs = Json::array(), laws = Json::object();
+  for (int i = 0; i < 2 * kCyclePoints; ++i) phase.push_back(static_cast<double>(i) / kCyclePoints);
+  for (const std::string& law : mesh_stiffness_laws()) {
+    settings.law = law;
+    try {
+      const MeshStiffness mesh(pair, settings);
+      Json course = Json::array();
+      for (const double p : phase) course.push_back(mesh.stiffness(p));
+      laws[law] = {{"mean", mesh.mean()}, {"stiffness", course}};
+      if (pairs.empty())
+        for (const double p : phase) pairs.push_back(mesh.pairs(p));
+    } catch (const InvalidParameter& error) {
+      laws[law] = {{"mean", nullptr}, {"reason", error.what()}};
+    }
+  }
+  return {{"face_width", settings.face_width},
+          {"youngs_modulus", settings.youngs_modulus},
+          {"poisson_ratio", settings.poisson_ratio},
+          {"transition", settings.transition},
+          {"phase", phase},
+          {"pairs", pairs},
+          {"laws", laws}};
+}
+
+template <typename... Values>
+void line(const char* format, Values... values) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, values...);
+  std::cout << text << '\n';
+}
+
+void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffness) {
+  line("%-34s%12s%12s", "", "pinion", "gear");
+  line("%-34s%12d%12d", "teeth", pair.pinion.teeth, pair.gear.teeth);
+  const auto both = [](const char* name, double pinion, double gear) {
+    line("%-34s%12.4f%12.4f", name, 1e3 * pinion, 1e3 * gear);
+  };
+  both("reference radius [mm]", g.pinion.reference_radius, g.gear.reference_radius);
+  both("base radius [mm]", g.pinion.base_radius, g.gear.base_radius);
+  both("tip radius [mm]", g.pinion.tip_radius, g.gear.tip_radius);
+  both("operating pitch radius [mm]", g.pinion.operating_radius, g.gear.operating_radius);
+  line("");
+  const auto one = [](const char* name, double value, int digits) {
+    line("%-34s%12.*f", name, digits, value);
+  };
+  one("centre distance [mm]", 1e3 * g.centre_distance, 4);
+  one("  change (shim) [um]", 1e6 * pair.centre_distance_change, 2);
+  one("operating pressure angle [deg]", g.operating_pressure_angle / kDegree, 3);
+  one("base pitch [mm]", 1e3 * g.base_pitch, 4);
+  one("length of contact [mm]", 1e3 * g.length_of_contact, 4);
+  one("contact ratio [-]", g.contact_ratio, 3);
+  line("");
+  one("backlash, line of action [um]", 1e6 * g.backlash, 2);
+  one("  small-change form [um]", 1e6 * small_change_backlash(pair), 2);
+  one("backlash, pitch circle [um]", 1e6 * g.pitch_circle_backlash, 2);
+  const auto angle = [](const char* name, double value) {
+    line("%-34s%12.4f%12.4f deg", name, 1e3 * value, value / kDegree);
+  };
+  angle("backlash at the pinion [mrad]", g.pinion_backlash_angle());
+  angle("backlash at the gear [mrad]", g.gear_backlash_angle());
+  line("\nmean mesh stiffness, face width %g mm", 1e3 * stiffness["face_width"].get<double>());
+  for (const auto& [law, value] : stiffness["laws"].items()) {
+    if (value["mean"].is_null())
+      std::cout << "  " << law << ": " << value["reason"].get<std::string>() << '\n';
+    else
+      line("  %-32s%12.3g N/m", law.c_str(), value["mean"].get<double>());
+  }
+}
+
+void warn(const GearGeometry& g) {
+  for (const auto* list : {&g.faults, &g.remarks})
+    for (const std::string& text : *list) std::cerr << "gear_geometry: " << text << '\n';
+}
+
+/// The report; fills `faults` with whether any pair in it does not run.
+Json report(const Request& request, bool print, bool& faults) {
+  Json json = {{"schema_version", 1},
+               {"pinion_teeth", request.pair.pinion.teeth},
+               {"gear_teeth", request.pair.gear.teeth},
+               {"module", request.pair.module},
+               {"pressure_angle", request.pair.pressure_angle}};
+  if (request.rows == 0) {
+    const GearPair pair = pair_at(request, request.last);
+    const GearGeometry g = gear_geometry(pair);
+    json["geometry"] = to_json(pair, g);
+    json["mesh_stiffness"] = stiffness_to_json(pair, request.mesh);
+    faults = !g.faults.empty();
+    if (print) print_pair(pair, g, json["mesh_stiffness"]);
+    warn(g);
+    return json;
+  }
+  json["table"] = Json::array();
+  if (print)
+    line("%10s%13s%9s%15s%19s%15s%14s", "shim [um]", "angle [deg]", "eps [-]", "backlash [um]",
+         "small-change [um]", "pitch c. [um]", "pinion [deg]");
+  for (int i = 0; i < request.rows; ++i) {
+    const GearPair pair = pair_at(request, request.last * i / (request.rows - 1));
+    const GearGeometry g = gear_geometry(pair);
+    json["table"].push_back(to_json(pair, g));
+    faults = faults || !g.faults.empty();
+    if (print)
+      line("%10.2f%13.3f%9.3f%15.2f%19.2f%15.2f%14.4f%s", 1e6 * pair.centre_distance_change,
+           g.operating_pressure_angle / kDegree, g.contact_ratio, 1e6 * g.backlash,
+           1e6 * small_change_backlash(pair), 1e6 * g.pitch_circle_backlash,
+           g.pinion_backlash_angle() / kDegree, g.faults.empty() ? "" : "  does not run");
+  }
+  return json;
+}
+
+int run(const Arguments& arguments) {
+  const Request request = read_request(arguments);
+  const std::string out = arguments.text("json");
+  if (!out.empty() && out != kStandardOutput) check_output(out, {});
+  bool faults = false;
+  Json json;
+  try {
+    json = report(request, out != kStandardOutput, faults);
+  } catch (const InvalidParameter& error) {  // the options are all there is
+    throw UsageError(error.what());
+  }
+  const std::string text = json.dump(2) + "\n";
+  if (out == kStandardOutput) std::cout << text;
+  if (!out.empty() && out != kStandardOutput) write_text(out, text);
+  return faults ? kFault : kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, run);
+}
