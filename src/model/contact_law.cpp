@@ -21,7 +21,10 @@ std::vector<std::string> names() {
 }  // namespace
 
 const std::vector<ContactLawType>& contact_laws() {
-  static const std::vector<ContactLawType> laws = {linear_contact(), power_law_contact(), hunt_crossley_contact()};
+  static const std::vector<ContactLawType> laws = {
+      linear_contact(),       power_law_contact(),           hunt_crossley_contact(),
+      kelvin_voigt_contact(), herbert_mcwhannell_contact(),  yang_sun_contact(),
+      jankowski_contact(),    lankarani_nikravesh_contact(), stereomechanical_contact()};
   return laws;
 }
 

@@ -1,8 +1,12 @@
 #include "backlash_diagnosis/model/gear_train.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/model/restitution.h"
 
 namespace backlash {
 namespace {
@@ -56,7 +60,7 @@ void GearTrain::join(const Rig& rig) {
 void GearTrain::set_backlash(double backlash) {
   if (!(backlash >= 0) || !std::isfinite(backlash))
     throw InvalidParameter("backlash", backlash, "must be >= 0 and finite");
-  half_gap_ = 0.5 * backlash;
+  half_gap_ = acting_gap_ = 0.5 * backlash;
 }
 
 GearTrain::Slots GearTrain::unpack(const double* state) const {
@@ -71,11 +75,11 @@ GearTrain::Slots GearTrain::unpack(const double* state) const {
 
 double GearTrain::contact_force(const Slots& s) const {
   const double x = lever_ * (s.q[kPinion] - s.q[kGear]);
-  const double penetration = std::fabs(x) - half_gap_;
+  const double penetration = std::fabs(x) - acting_gap_;
   if (penetration <= 0) return 0;
   const double side = x > 0 ? 1 : -1;
   const double rate = side * lever_ * (s.w[kPinion] - s.w[kGear]);
-  const double force = side * contact_->force(penetration, rate);
+  const double force = side * contact_->force(penetration, rate, impact_speed_);
   return variation_ ? force * variation_->factor(lever_ * s.q[kPinion], side) : force;
 }
 
@@ -152,6 +156,80 @@ double GearTrain::damping_power(const double* state) const {
   if (!input_.rigid) power += input_.damping * std::pow(s.w[kMotor] - s.w[kPinion], 2);
   if (!output_.rigid) power += output_.damping * std::pow(s.w[kGear] - s.w[kLink], 2);
   return power;
+}
+
+double GearTrain::penetration(const Slots& s, Flank flank) const {
+  return flank * lever_ * (s.q[kPinion] - s.q[kGear]) - half_gap_;
+}
+
+double GearTrain::approach(const Slots& s, Flank flank) const {
+  return flank * lever_ * (s.w[kPinion] - s.w[kGear]);
+}
+
+void GearTrain::enter(Flank flank) {
+  flank_ = flank;
+  acting_gap_ = flank == kApart ? std::numeric_limits<double>::infinity() : half_gap_;
+}
+
+// Closing of either flank; then the parting of a contact or, between contacts, the turning points of the
+// motion: a flank that closes and opens within one step of the integrator is found there. A speed of exactly
+// zero, which may last, is no turning point.
+void GearTrain::contact_events(const double* state, double* values) const {
+  const Slots s = unpack(state);
+  values[0] = penetration(s, kForward);
+  values[1] = penetration(s, kReverse);
+  const double rate = approach(s, kForward), no_turn = -std::numeric_limits<double>::min();
+  values[2] = flank_ != kApart ? -penetration(s, flank_) : rate == 0 ? no_turn : rate;
+  values[3] = flank_ != kApart ? no_turn : rate == 0 ? no_turn : -rate;
+}
+
+void GearTrain::begin_contact(double* state) {
+  const Slots s = unpack(state);
+  const double farthest =
+      std::max({lever_ * std::fabs(s.q[kPinion]), lever_ * std::fabs(s.q[kGear]), half_gap_});
+  const double rounding = 4 * std::numeric_limits<double>::epsilon() * farthest;
+  impact_speed_ = 0;
+  enter(kApart);
+  for (Flank flank : {kForward, kReverse}) {
+    const double depth = penetration(s, flank), rate = approach(s, flank);
+    if (rate > 0 && std::fabs(depth) <= rounding) return touch(flank, state);
+    if (depth > rounding || (rate == 0 && depth >= 0)) return enter(flank);
+  }
+}
+
+bool GearTrain::update_contact(double* state) {
+  const Slots s = unpack(state);
+  bool changed = false;
+  if (flank_ != kApart && penetration(s, flank_) <= 0) {
+    enter(kApart);
+    changed = true;
+  }
+  for (Flank flank : {kForward, kReverse}) {
+    const double depth = penetration(s, flank);
+    if (depth > 0 || (depth == 0 && approach(s, flank) >= 0)) {
+      touch(flank, state);
+      return true;
+    }
+    changed |=
+        depth == 0;  // on its way out; SUNDIALS does not go on from a zero that it cannot leave at once
+  }
+  return changed;
+}
+
+void GearTrain::touch(Flank flank, double* state) {
+  const Slots s = unpack(state);
+  impact_speed_ = std::max(0.0, approach(s, flank));
+  enter(flank);
+  const std::optional<double> restitution = contact_->jump_restitution(impact_speed_);
+  if (!restitution || half_gap_ == 0) return;  // without play there is no room to bounce
+  const int pinion = node_[kPinion], gear = node_[kGear];
+  const double square = lever_ * lever_, wall = std::numeric_limits<double>::infinity();
+  const ImpactSpeeds after =
+      speeds_after_impact(inertia_[pinion] / square, gear == kFixed ? wall : inertia_[gear] / square,
+                          {flank * lever_ * s.w[kPinion], flank * lever_ * s.w[kGear]}, *restitution);
+  state[dof_ + pinion] = flank * after.first / lever_;
+  if (gear != kFixed) state[dof_ + gear] = flank * after.second / lever_;
+  if (contact_->jump_restitution(*restitution * impact_speed_)) enter(kApart);  // else too slow to leave
 }
 
 double GearTrain::elastic_deflection(double motor_torque) const {

@@ -94,15 +94,17 @@ SolverSettings read_solver(const YamlReader& yaml) {
 }
 
 struct Integrator::Impl {
-  Impl(Derivative f, std::vector<double> tolerances, const SolverSettings& s);
+  Impl(Derivative f, std::vector<double> tolerances, const SolverSettings& s, Events e, int count);
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
   void create_explicit(double t);
   void create_multistep(double t);
+  void find_events();
   void restart(double t);
-  void evolve(double t);
+  int evolve(double t);
+  int risen() const;
   void refuse_unreachable(double t) const;
   void require_finite() const;
   IntegratorStatistics since_restart() const;
@@ -110,7 +112,13 @@ struct Integrator::Impl {
   void check(int code, const char* function) const;
   [[noreturn]] void fail(const std::string& what) const;
 
+  /// Calls what must not throw through the solver's C frames.
+  template <typename Function>
+  int guarded(Function function);
+
   Derivative derivative;
+  Events events;
+  int event_count;
   SolverSettings settings;
   bool multistep;
   SUNContext context = nullptr;
@@ -125,27 +133,44 @@ struct Integrator::Impl {
   IntegratorStatistics before_restart;  // the solvers' counters start again at each reset
 
   static int evaluate(realtype t, N_Vector y, N_Vector ydot, void* user);
+  static int evaluate_events(realtype t, N_Vector y, realtype* values, void* user);
 };
+
+template <typename Function>
+int Integrator::Impl::guarded(Function function) {
+  if (thrown) return -1;  // the fixed-point iteration takes any failure for one that a smaller step mends
+  try {
+    function();
+    return 0;
+  } catch (...) {
+    thrown = std::current_exception();
+    return -1;
+  }
+}
 
 int Integrator::Impl::evaluate(realtype t, N_Vector y, N_Vector ydot, void* user) {
   Impl& self = *static_cast<Impl*>(user);
-  if (self.thrown)
-    return -1;  // the fixed-point iteration takes any failure for one that a smaller step mends
-  try {
+  return self.guarded([&] {
     const double* rate = N_VGetArrayPointer(ydot);
     self.derivative(t, N_VGetArrayPointer(y), N_VGetArrayPointer(ydot));
     const bool finite =
         std::all_of(rate, rate + N_VGetLength(ydot), [](double r) { return std::isfinite(r); });
     if (!finite && ++self.not_finite > kMaxNotFinitePerCall) self.fail("the derivative is not finite");
-    return 0;
-  } catch (...) {
-    self.thrown = std::current_exception();
-    return -1;
-  }
+  });
 }
 
-Integrator::Impl::Impl(Derivative f, std::vector<double> absolute, const SolverSettings& s)
-    : derivative(std::move(f)), settings(s), multistep(s.method == "bdf" || s.method == "adams") {
+int Integrator::Impl::evaluate_events(realtype t, N_Vector y, realtype* values, void* user) {
+  Impl& self = *static_cast<Impl*>(user);
+  return self.guarded([&] { self.events(t, N_VGetArrayPointer(y), values); });
+}
+
+Integrator::Impl::Impl(Derivative f, std::vector<double> absolute, const SolverSettings& s, Events e,
+                       int count)
+    : derivative(std::move(f)),
+      events(std::move(e)),
+      event_count(count),
+      settings(s),
+      multistep(s.method == "bdf" || s.method == "adams") {
   if (!multistep && !explicit_tables().count(s.method))
     throw InvalidParameter("solver.method", s.method, "is not a known method");
   const auto require_tolerance = [](const char* name, double value) {
@@ -224,6 +249,19 @@ void Integrator::Impl::create_multistep(double t) {
   }
 }
 
+void Integrator::Impl::find_events() {
+  std::vector<int> rising(event_count, 1);
+  if (multistep) {
+    check(CVodeRootInit(memory, event_count, evaluate_events), "CVodeRootInit");
+    check(CVodeSetRootDirection(memory, rising.data()), "CVodeSetRootDirection");
+    check(CVodeSetNoInactiveRootWarn(memory), "CVodeSetNoInactiveRootWarn");
+  } else {
+    check(ERKStepRootInit(memory, event_count, evaluate_events), "ERKStepRootInit");
+    check(ERKStepSetRootDirection(memory, rising.data()), "ERKStepSetRootDirection");
+    check(ERKStepSetNoInactiveRootWarn(memory), "ERKStepSetNoInactiveRootWarn");
+  }
+}
+
 IntegratorStatistics Integrator::Impl::since_restart() const {
   IntegratorStatistics count;
   if (multistep) {
@@ -246,6 +284,7 @@ IntegratorStatistics Integrator::Impl::since_restart() const {
 void Integrator::Impl::restart(double t) {
   if (!memory) {
     multistep ? create_multistep(t) : create_explicit(t);
+    if (event_count > 0) find_events();
   } else {
     before_restart = before_restart + since_restart();
     if (multistep)
@@ -274,8 +313,17 @@ void Integrator::Impl::refuse_unreachable(double t) const {
   fail(text.str());
 }
 
-void Integrator::Impl::evolve(double t) {
-  if (t - time <= rounding(t)) return;
+int Integrator::Impl::risen() const {
+  std::vector<int> found(event_count);
+  if (multistep)
+    check(CVodeGetRootInfo(memory, found.data()), "CVodeGetRootInfo");
+  else
+    check(ERKStepGetRootInfo(memory, found.data()), "ERKStepGetRootInfo");
+  return static_cast<int>(std::find(found.begin(), found.end(), 1) - found.begin());
+}
+
+int Integrator::Impl::evolve(double t) {
+  if (t - time <= rounding(t)) return kNoEvent;
   double reached = time;
   thrown = nullptr;
   not_finite = 0;
@@ -284,6 +332,8 @@ void Integrator::Impl::evolve(double t) {
   if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
   check(code, multistep ? "CVode" : "ERKStepEvolve");
   time = reached;
+  static_assert(CV_ROOT_RETURN == ARK_ROOT_RETURN, "one name for both solvers");
+  return code == CV_ROOT_RETURN ? risen() : kNoEvent;
 }
 
 void Integrator::Impl::require_finite() const {
@@ -293,8 +343,9 @@ void Integrator::Impl::require_finite() const {
 }
 
 Integrator::Integrator(Derivative derivative, std::vector<double> absolute_tolerances,
-                       const SolverSettings& settings)
-    : impl_(std::make_unique<Impl>(std::move(derivative), std::move(absolute_tolerances), settings)) {}
+                       const SolverSettings& settings, Events events, int event_count)
+    : impl_(std::make_unique<Impl>(std::move(derivative), std::move(absolute_tolerances), settings,
+                                   std::move(events), event_count)) {}
 Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;
 Integrator& Integrator::operator=(Integrator&&) noexcept = default;
@@ -307,13 +358,18 @@ void Integrator::restart(double t, const double* state, double stop) {
   s.restart(t);
 }
 
-void Integrator::integrate_to(double t, double* state) {
+int Integrator::integrate_to(double t, double* state) {
   Impl& s = *impl_;
   s.refuse_unreachable(t);
-  s.evolve(t);
+  const int event = s.evolve(t);
   s.require_finite();
   const double* values = N_VGetArrayPointer(s.state);
   std::copy(values, values + N_VGetLength(s.state), state);
+  return event;
+}
+
+double Integrator::time() const {
+  return impl_->time;
 }
 
 IntegratorStatistics Integrator::statistics() const {

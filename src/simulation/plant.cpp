@@ -15,6 +15,8 @@ std::vector<double> absolute_tolerances(int dof, const SolverSettings& solver) {
   return tolerances;
 }
 
+constexpr long kMaxTouchesPerCall = 100'000;
+
 /// A sample k / rate and a switch n / (2 f) that are meant to coincide may differ by this much.
 double rounding(double t) {
   return 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
@@ -30,7 +32,9 @@ Plant::Plant(const Rig& rig, const ExcitationSettings& excitation, const SolverS
           [this](double t, const double* state, double* rate) {
             gear_train_.derivative(t, state, excitation_->torque(t, segment_), rate);
           },
-          absolute_tolerances(gear_train_.dof(), solver), solver),
+          absolute_tolerances(gear_train_.dof(), solver), solver,
+          [this](double, const double* state, double* values) { gear_train_.contact_events(state, values); },
+          gear_train_.needs_touches() ? GearTrain::kContactEvents : 0),
       initial_backlash_(rig.mesh.backlash) {
   reset();
 }
@@ -41,11 +45,30 @@ void Plant::reset() {
   state_.fill(0);
   time_ = 0;
   segment_ = 0;
-  restart();
+  begin_contact();
 }
 
 void Plant::restart() {
   integrator_.restart(time_, state_.data(), excitation_->segment_end(segment_));
+}
+
+/// Starts from a state that did not come about by motion.
+void Plant::begin_contact() {
+  if (gear_train_.needs_touches()) gear_train_.begin_contact(state_.data());
+  restart();
+}
+
+/// Moves on to t, which lies in this segment, from touch to touch.
+void Plant::integrate_to(double t) {
+  long changes = 0;
+  while (integrator_.integrate_to(t, state_.data()) != Integrator::kNoEvent) {
+    time_ = integrator_.time();
+    if (!gear_train_.update_contact(state_.data())) continue;
+    if (++changes > kMaxTouchesPerCall)
+      throw IntegrationError("the teeth touch without end, now at t = " + std::to_string(time_) + " s");
+    restart();
+  }
+  time_ = t;
 }
 
 void Plant::advance_to(double t) {
@@ -54,18 +77,16 @@ void Plant::advance_to(double t) {
   const double reach = t + rounding(t);
   for (double end = excitation_->segment_end(segment_); end <= reach;
        end = excitation_->segment_end(segment_)) {
-    integrator_.integrate_to(end, state_.data());
-    time_ = end;
+    integrate_to(end);
     ++segment_;
     restart();
   }
-  integrator_.integrate_to(std::max(t, time_), state_.data());
-  time_ = std::max(t, time_);
+  integrate_to(std::max(t, time_));
 }
 
 void Plant::set_backlash(double backlash) {
   gear_train_.set_backlash(backlash);
-  restart();
+  begin_contact();
 }
 
 bool Plant::set_torque(double torque) {
@@ -76,7 +97,7 @@ bool Plant::set_torque(double torque) {
 
 void Plant::set_state(const State& state) {
   state_ = state;
-  restart();
+  begin_contact();
 }
 
 }  // namespace backlash

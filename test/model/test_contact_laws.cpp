@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -32,12 +34,35 @@ std::vector<NamedLaw> all_laws() {
         laws.push_back(
             {"hunt_crossley", k, n,
              make_contact_law("hunt_crossley", {{"stiffness", k}, {"exponent", n}, {"alpha", alpha}})});
+      for (const char* name : {"herbert_mcwhannell", "yang_sun"})
+        laws.push_back({name, k, n,
+                        make_contact_law(name, {{"stiffness", k},
+                                                {"exponent", n},
+                                                {"alpha", 0.5},
+                                                {"beta", 0.25},
+                                                {"minimum_speed", 0.01}})});
+      laws.push_back(
+          {"lankarani_nikravesh", k, n,
+           make_contact_law(
+               "lankarani_nikravesh",
+               {{"stiffness", k}, {"exponent", n}, {"restitution", 0.5}, {"minimum_speed", 0.01}})});
     }
+    laws.push_back(
+        {"kelvin_voigt", k, 1, make_contact_law("kelvin_voigt", {{"stiffness", k}, {"damping", 300}})});
+    laws.push_back(
+        {"jankowski", k, 1.5,
+         make_contact_law("jankowski", {{"stiffness", k}, {"restitution", 0.5}, {"effective_mass", 0.05}})});
+    laws.push_back(
+        {"stereomechanical", k, 1,
+         make_contact_law(
+             "stereomechanical",
+             {{"restitution", 0.5}, {"resting_speed", 0.01}, {"stiffness", k}, {"damping", 300}})});
   }
   return laws;
 }
 
 const double kPenetrations[] = {1e-9, 1e-7, 3e-6, 1e-5, 1e-4, 1e-3};
+const double kImpactSpeeds[] = {0, 1e-3, 0.1, 10};  // none, below the smallest that counts, two above
 
 TEST(ContactLaws, TheTestCoversTheRegistry) {
   std::set<std::string> registered, tested;
@@ -51,39 +76,99 @@ TEST(ContactLaws, ElasticPartIsStiffnessTimesPower) {
   for (const NamedLaw& law : all_laws())
     for (double d : kPenetrations) {
       const double expected = law.stiffness * std::pow(d, law.exponent);
-      EXPECT_NEAR(law.law->force(d, 0), expected, 1e-14 * expected) << law.name;  // a few roundings
+      EXPECT_NEAR(law.law->force(d, 0, 0), expected, 1e-14 * expected) << law.name;  // a few roundings
     }
 }
 
 TEST(ContactLaws, DampingIsThatOfTheEquations) {
   const Law linear = make_contact_law("linear", {{"stiffness", 2e6}, {"damping", 40}});
-  EXPECT_DOUBLE_EQ(linear->force(1e-5, 0.03), 20 + 1.2);
-  EXPECT_DOUBLE_EQ(linear->force(1e-5, -0.03), 20 - 1.2);
+  EXPECT_DOUBLE_EQ(linear->force(1e-5, 0.03, 0), 20 + 1.2);
+  EXPECT_DOUBLE_EQ(linear->force(1e-5, -0.03, 0), 20 - 1.2);
   const Law hunt_crossley =
       make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0.5}});
   // 1e8 * (1e-4)^1.5 = 100 N at rest; 3/2 * 0.5 s/m * 0.2 m/s = 0.15
-  EXPECT_NEAR(hunt_crossley->force(1e-4, 0.2), 115, 1e-12);
-  EXPECT_NEAR(hunt_crossley->force(1e-4, -0.2), 85, 1e-12);
+  EXPECT_NEAR(hunt_crossley->force(1e-4, 0.2, 0), 115, 1e-12);
+  EXPECT_NEAR(hunt_crossley->force(1e-4, -0.2, 0), 85, 1e-12);
 }
 
-TEST(ContactLaws, NeverPull) {
+TEST(ContactLaws, NoneButKelvinVoigtPulls) {
   for (const NamedLaw& law : all_laws())
     for (double d : kPenetrations)
-      for (double rate = -1e4; rate < -1e-6; rate /= 3) {
-        EXPECT_GE(law.law->force(d, rate), 0) << law.name << " at " << d << " m, " << rate << " m/s";
-        EXPECT_LE(law.law->force(d, rate), law.law->force(d, 0)) << law.name;
-        EXPECT_GE(law.law->force(d, -rate), law.law->force(d, 0)) << law.name;
-      }
+      for (double rate = -1e4; rate < -1e-6; rate /= 3)
+        for (double v : kImpactSpeeds) {
+          const double at_rest = law.law->force(d, 0, v);
+          if (law.name != "kelvin_voigt") {
+            EXPECT_GE(law.law->force(d, rate, v), 0) << law.name << " at " << d << " m, " << rate << " m/s";
+          }
+          EXPECT_LE(law.law->force(d, rate, v), at_rest) << law.name;
+          EXPECT_GE(law.law->force(d, -rate, v), at_rest) << law.name;
+        }
+}
+
+TEST(ContactLaws, KelvinVoigtJumpsAtTouchAndPullsAtTheEnd) {
+  const Law law = make_contact_law("kelvin_voigt", {{"stiffness", 2e6}, {"damping", 40}});
+  EXPECT_NEAR(law->force(1e-15, 0.3, 0), 12, 1e-8);  // c v, Yumrukcal (2013), Eq. 2.14; K d = 2e-9 N
+  EXPECT_NEAR(law->force(1e-15, -0.3, 0), -12, 1e-8);
+  EXPECT_DOUBLE_EQ(law->force(1e-5, -0.5, 0), 0);  // K d = c d' = 20 N: where the tension begins
+  EXPECT_DOUBLE_EQ(law->force(1e-5, -0.6, 0), -4);
+}
+
+// Two forces at the same d and d' tell D / v; from the published equations by hand.
+TEST(ContactLaws, DampingFollowsTheImpactSpeed) {
+  const ParameterValues falling = {
+      {"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0.5}, {"beta", 0.25}, {"minimum_speed", 0.01}};
+  const auto damping = [](const Law& law, double v) {  // 1e8 (1e-4)^1.5 = 100 N at rest
+    const double slower = std::max(v, 0.01);
+    return (law->force(1e-4, 0.1 * slower, v) / law->force(1e-4, 0, v) - 1) / 0.1;
+  };
+  const Law exact = make_contact_law("herbert_mcwhannell", falling),
+            yang_sun = make_contact_law("yang_sun", falling);
+  EXPECT_NEAR(damping(yang_sun, 0.0256), 6 * 0.2 / (0.36 + 3), 1e-12);  // e = 1 - 0.5 * 0.4 = 0.8
+  EXPECT_NEAR(damping(exact, 0.0256), 0.3731, 5e-5);                    // e = 0.8, REFERENCE 1.3
+  EXPECT_NEAR(damping(exact, 1), 1.4328, 5e-5);                         // e = 0.5
+  EXPECT_NEAR(damping(exact, 6.5536), 4.9192, 5e-5);                    // e = 0.2
+  EXPECT_EQ(damping(exact, 1000), damping(exact, 2000));                // e = 0.05 held
+  EXPECT_LT(damping(exact, 1000), 20);                                  // and no singularity: D < 1 / e
+  const Law constant = make_contact_law(
+      "lankarani_nikravesh",
+      {{"stiffness", 1e8}, {"exponent", 1.5}, {"restitution", 0.6}, {"minimum_speed", 0.01}});
+  for (double v : {0.02, 0.5, 3.0}) EXPECT_NEAR(damping(constant, v), 0.75 * 0.64, 1e-12);
+  for (const Law& law : {exact, yang_sun, constant})
+    for (double slow : {0.0, 1e-6, 9e-3})
+      EXPECT_EQ(law->force(1e-4, 0.02, slow), law->force(1e-4, 0.02, 0.01));
+}
+
+TEST(ContactLaws, JankowskiDampsOnApproachOnly) {
+  const Law law =
+      make_contact_law("jankowski", {{"stiffness", 1e8}, {"restitution", 0.6}, {"effective_mass", 0.04}});
+  const double xi = 4.5 * std::sqrt(5) * 0.64 / (0.6 * (0.6 * (9 * M_PI - 16) + 16));
+  // 2 sqrt(1e8 * 0.04 * sqrt(1e-4)) = 2 sqrt(4e4) = 400
+  EXPECT_NEAR(law->force(1e-4, 0.2, 0), 100 + 400 * xi * 0.2, 1e-10);
+  EXPECT_NEAR(law->force(1e-4, -0.2, 0), 100, 1e-12);
+}
+
+TEST(ContactLaws, OnlyThoseThatRememberNeedTheImpactSpeed) {
+  const std::set<std::string> remember = {"herbert_mcwhannell", "yang_sun", "lankarani_nikravesh",
+                                          "stereomechanical"};
+  for (const NamedLaw& law : all_laws()) {
+    EXPECT_EQ(law.law->needs_impact_speed(), remember.count(law.name) == 1) << law.name;
+    EXPECT_EQ(law.law->jump_restitution(0.02),
+              law.name == "stereomechanical" ? std::optional(0.5) : std::nullopt);
+    EXPECT_EQ(law.law->jump_restitution(0.01), std::nullopt);  // resting_speed
+    if (!law.law->needs_impact_speed()) {
+      EXPECT_EQ(law.law->force(1e-5, 0.1, 0), law.law->force(1e-5, 0.1, 3)) << law.name;
+    }
+  }
 }
 
 TEST(ContactLaws, ClampBeginsWhereTheEquationTurnsNegative) {
   const Law linear = make_contact_law("linear", {{"stiffness", 1e6}, {"damping", 100}});
-  EXPECT_EQ(linear->force(1e-5, -0.1001), 0);  // K d = 10 N, c d' = -10.01 N
-  EXPECT_NEAR(linear->force(1e-5, -0.0999), 0.01, 1e-12);
+  EXPECT_EQ(linear->force(1e-5, -0.1001, 0), 0);  // K d = 10 N, c d' = -10.01 N
+  EXPECT_NEAR(linear->force(1e-5, -0.0999, 0), 0.01, 1e-12);
   const Law hunt_crossley =
       make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0.5}});
-  EXPECT_EQ(hunt_crossley->force(1e-4, -1.3334), 0);  // -2 / (3 alpha) = -1.33333 m/s
-  EXPECT_GT(hunt_crossley->force(1e-4, -1.3333), 0);
+  EXPECT_EQ(hunt_crossley->force(1e-4, -1.3334, 0), 0);  // -2 / (3 alpha) = -1.33333 m/s
+  EXPECT_GT(hunt_crossley->force(1e-4, -1.3333, 0), 0);
 }
 
 TEST(ContactLaws, DerivativeOfElasticEnergyIsTheForceAtRest) {
@@ -92,7 +177,7 @@ TEST(ContactLaws, DerivativeOfElasticEnergyIsTheForceAtRest) {
     for (double d : kPenetrations) {
       const double h = 1e-4 * d;
       const double slope = (law.law->elastic_energy(d + h) - law.law->elastic_energy(d - h)) / (2 * h);
-      const double force = law.law->force(d, 0);
+      const double force = law.law->force(d, 0, 0);
       // central difference: (h/d)^2 n (n-1) / 6 < 2e-9 truncation, eps d / h = 2e-12 rounding
       EXPECT_NEAR(slope, force, 5e-9 * force) << law.name << " n = " << law.exponent;
     }
@@ -104,7 +189,7 @@ TEST(ContactLaws, StaticPenetrationIsTheInverseOfTheForceAtRest) {
     EXPECT_EQ(law.law->static_penetration(0), 0);
     for (double force = 1e-4; force < 1e5; force *= 7) {
       const double d = law.law->static_penetration(force);
-      EXPECT_NEAR(law.law->force(d, 0), force, 1e-13 * force) << law.name;  // pow() there and back
+      EXPECT_NEAR(law.law->force(d, 0, 0), force, 1e-13 * force) << law.name;  // pow() there and back
     }
   }
 }
@@ -115,7 +200,7 @@ TEST(ContactLaws, LossDoesNotChangeEnergyAndPenetrationAtRest) {
       make_contact_law("hunt_crossley", {{"stiffness", 1e7}, {"exponent", 1.3}, {"alpha", 0.9}});
   for (double d : kPenetrations) {
     EXPECT_DOUBLE_EQ(elastic->elastic_energy(d), lossy->elastic_energy(d));
-    EXPECT_DOUBLE_EQ(elastic->force(d, 0), lossy->force(d, 0));
+    EXPECT_DOUBLE_EQ(elastic->force(d, 0, 0), lossy->force(d, 0, 0));
   }
   EXPECT_DOUBLE_EQ(elastic->static_penetration(12), lossy->static_penetration(12));
 }
@@ -145,6 +230,25 @@ TEST(ContactLaws, RefusalNamesParameterValueAndLimit) {
       {"hunt_crossley",
        {{"stiffness", 1}, {"exponent", 1.5}, {"alpha", -0.1}},
        "contact.alpha = -0.1: must be >= 0 s/m"},
+      {"kelvin_voigt", {{"stiffness", 1}, {"damping", -2}}, "contact.damping = -2: must be >= 0 N s/m"},
+      {"herbert_mcwhannell",
+       {{"stiffness", 1}, {"exponent", 1}, {"alpha", 0.1}, {"beta", 0}, {"minimum_speed", 0.01}},
+       "contact.beta = 0: must be > 0 1"},
+      {"yang_sun",
+       {{"stiffness", 1}, {"exponent", 1}, {"alpha", 0.1}, {"beta", 0.25}, {"minimum_speed", 0}},
+       "contact.minimum_speed = 0: must be > 0 m/s"},
+      {"lankarani_nikravesh",
+       {{"stiffness", 1}, {"exponent", 1}, {"restitution", 1.1}, {"minimum_speed", 0.01}},
+       "contact.restitution = 1.1: must be >= 0 and <= 1 1"},
+      {"jankowski",
+       {{"stiffness", 1}, {"restitution", 0}, {"effective_mass", 1}},
+       "contact.restitution = 0: must be > 0 and <= 1 1"},
+      {"jankowski",
+       {{"stiffness", 1}, {"restitution", 0.5}, {"effective_mass", 0}},
+       "contact.effective_mass = 0: must be > 0 kg"},
+      {"stereomechanical",
+       {{"restitution", 0.5}, {"resting_speed", 0}, {"stiffness", 1}, {"damping", 0}},
+       "contact.resting_speed = 0: must be > 0 m/s"},
   };
   for (const BadLaw& bad : cases) {
     try {
@@ -159,7 +263,7 @@ TEST(ContactLaws, RefusalNamesParameterValueAndLimit) {
 TEST(ContactLaws, ReadFromYaml) {
   const YamlReader yaml =
       YamlReader::from_text("{law: hunt_crossley, stiffness: 1e8, exponent: 1.5, alpha: 0.5}", "t");
-  EXPECT_NEAR(read_contact_law(yaml)->force(1e-4, 0.2), 115, 1e-12);
+  EXPECT_NEAR(read_contact_law(yaml)->force(1e-4, 0.2, 0), 115, 1e-12);
   EXPECT_NO_THROW(yaml.finish());
 }
 

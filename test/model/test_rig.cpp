@@ -63,7 +63,7 @@ TEST(Rig, ReadsEveryValue) {
   EXPECT_EQ(rig.mesh.base_radius, 0.02);
   EXPECT_EQ(rig.mesh.lever(), 0.02);
   EXPECT_EQ(rig.mesh.backlash, 6e-5);
-  EXPECT_NEAR(rig.mesh.contact->force(1e-4, 0), 100, 1e-12);
+  EXPECT_NEAR(rig.mesh.contact->force(1e-4, 0, 0), 100, 1e-12);
   EXPECT_EQ(rig.gear.inertia, 5e-5);
   EXPECT_EQ(rig.gear.viscous_damping, 0.001);
   EXPECT_FALSE(rig.output_coupling.rigid);

@@ -6,6 +6,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
@@ -288,6 +289,56 @@ TEST(Integrator, ExceptionsOfTheDerivativeComeThrough) {
     y = 1;
     integrator.restart(0, &y, kNever);
     integrator.integrate_to(1, &y);
+    EXPECT_NEAR(y, std::exp(-1.0), 1e-4) << method;
+  }
+}
+
+/// The oscillator's cosine rises through -0.5, its sine falls through 0 and rises, each once per turn.
+void crossings(double, const double* y, double* values) {
+  values[0] = y[0] + 0.5;
+  values[1] = y[1];
+}
+
+TEST(Integrator, EventsAreTheRisesThroughZeroAndNothingElse) {
+  for (const std::string& method : integrator_methods()) {
+    for (bool restarts : {false, true}) {
+      Integrator integrator(oscillator, {1e-11, 1e-11}, with(method, 1e-10), crossings, 2);
+      double y[2] = {1, 0};  // y[1] = -sin t: exactly zero at the start, and falling
+      integrator.restart(0, y, kNever);
+      double latest = 0;
+      for (int turn = 0; turn < 5; ++turn) {
+        // y[1] rises through zero at pi; y[0] through -0.5 at 4/3 pi
+        for (const auto& [event, time] : {std::pair(1, M_PI), std::pair(0, 4 * M_PI / 3)}) {
+          const double expected = time + 2 * M_PI * turn;
+          ASSERT_EQ(integrator.integrate_to(expected - 1e-3, y), Integrator::kNoEvent) << method;
+          ASSERT_EQ(integrator.integrate_to(100, y), event) << method << " near " << expected;
+          // phase error of 1e-10 per step over some thousand steps; the interpolation adds less
+          EXPECT_NEAR(integrator.time(), expected, 1e-7) << method;
+          EXPECT_GT(integrator.time(), latest);
+          latest = integrator.time();
+          EXPECT_NEAR(event == 0 ? y[0] + 0.5 : y[1], 0, 1e-11) << method;
+          if (restarts) integrator.restart(latest, y, kNever);
+        }
+      }
+    }
+  }
+}
+
+TEST(Integrator, ExceptionsOfEventsComeThrough) {
+  for (const std::string& method : integrator_methods()) {
+    bool broken = true;
+    const auto events = [&](double t, const double*, double* values) {
+      if (broken && t > 0.5) throw std::domain_error("no such angle");
+      values[0] = -1;
+    };
+    Integrator integrator(decay, {1e-9}, with(method), events, 1);
+    double y = 1;
+    integrator.restart(0, &y, kNever);
+    EXPECT_THROW(integrator.integrate_to(1, &y), std::domain_error) << method;
+    broken = false;
+    y = 1;
+    integrator.restart(0, &y, kNever);
+    EXPECT_EQ(integrator.integrate_to(1, &y), Integrator::kNoEvent);
     EXPECT_NEAR(y, std::exp(-1.0), 1e-4) << method;
   }
 }

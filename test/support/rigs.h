@@ -28,6 +28,14 @@ inline Rig wall_rig(double mass, double half_gap, std::shared_ptr<const ContactL
   return rig;
 }
 
+/// Two masses [kg] free to move along the line of action, `half_gap` [m] apart either way.
+inline Rig two_body_rig(double first, double second, double half_gap, std::shared_ptr<const ContactLaw> law) {
+  Rig rig = wall_rig(first, half_gap, std::move(law));
+  rig.link_locked = false;
+  rig.link.inertia = second * 0.02 * 0.02;
+  return rig;
+}
+
 inline ExcitationSettings square(double amplitude, double frequency) {
   ExcitationSettings settings;
   settings.type = "square";

@@ -112,15 +112,14 @@ TEST(BuildCurve, IsDeterministicOnAnyNumberOfProcessors) {
   }
 }
 
-// A point does not depend on its neighbours or on the order in which the points are worked on.
+// The mean at a point does not depend on its neighbours or on the order in which the points are worked on (its
+// scatter does: neighbours share theirs).
 TEST(BuildCurve, PointsAreIndependent) {
   const MonitoringCurve three = build_curve(default_rig_file(), quick(3)),
                         two = build_curve(default_rig_file(), quick(2));
   for (const auto& [i, k] : {std::pair{0, 0}, std::pair{2, 1}})
-    for (std::size_t level = 0; level < three.noise_levels.size(); ++level) {
+    for (std::size_t level = 0; level < three.noise_levels.size(); ++level)
       EXPECT_EQ(three.points[i].cells[level].mean, two.points[k].cells[level].mean);
-      EXPECT_EQ(three.points[i].cells[level].within, two.points[k].cells[level].within);
-    }
 }
 
 TEST(BuildCurve, MoreSeedsKeepTheFirstAndChangeTheRest) {

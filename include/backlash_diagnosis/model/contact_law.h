@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,13 +19,22 @@ class ContactLaw {
  public:
   virtual ~ContactLaw() = default;
 
-  /// Force at penetration d > 0; callers handle d <= 0 (no contact, no force).
-  virtual double force(double penetration, double rate) const = 0;
+  /// Force at penetration d > 0; callers handle d <= 0 (no contact, no force). `impact_speed` [m/s] is the
+  /// approach speed d' > 0 at the touch that began this contact, 0 if none did (the flanks overlapped from
+  /// the start); only a law that says so below reads it.
+  virtual double force(double penetration, double rate, double impact_speed) const = 0;
+
+  /// Whether touches must be found and their speed kept.
+  virtual bool needs_impact_speed() const { return false; }
+
+  /// Coefficient of restitution by which the speeds jump at a touch; none where the force alone acts. A law
+  /// that jumps needs the impact speed.
+  virtual std::optional<double> jump_restitution(double /*impact_speed*/) const { return std::nullopt; }
 
   /// Elastic energy at penetration d >= 0: the integral of the force at rest [J].
   virtual double elastic_energy(double penetration) const = 0;
 
-  /// Penetration at rest under a force >= 0: the inverse of force(d, 0) [m].
+  /// Penetration at rest under a force >= 0: the inverse of force(d, 0, 0) [m].
   virtual double static_penetration(double force) const = 0;
 };
 

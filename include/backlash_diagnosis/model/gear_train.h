@@ -53,13 +53,36 @@ class GearTrain {
   void set_backlash(double backlash);
   double backlash() const { return 2 * half_gap_; }
 
+  /// For a contact law that depends on how a contact began (see ContactLaw::needs_impact_speed) whoever moves
+  /// the train tells it of touches. Between them the teeth have no force at all, so that motion is smooth up
+  /// to the touch: begin_contact() where a state did not come about by motion, then update_contact() wherever
+  /// one of the kContactEvents values rises through 0. Without these calls every contact counts as begun at
+  /// speed 0.
+  bool needs_touches() const { return contact_->needs_impact_speed(); }
+  static constexpr int kContactEvents = 4;
+  void contact_events(const double* state, double* values) const;
+  /// Forgets the last touch. A flank that is closed to within rounding and approaches is a touch; one that is
+  /// inside is a contact that no touch began.
+  void begin_contact(double* state);
+  /// A touch keeps the approach speed, and where the law says so the speeds in `state` jump. True where
+  /// integration must start again, because derivative or state have changed.
+  bool update_contact(double* state);
+  double impact_speed() const { return impact_speed_; }  // m/s at the last touch, 0 if there was none
+
  private:
   enum Slot { kMotor, kPinion, kGear, kLink, kSlots };
   struct Slots {
     double q[kSlots], w[kSlots];
   };
 
+  /// A flank pair: +1 touches where the pinion drives forward, -1 where it drives back.
+  enum Flank { kReverse = -1, kApart = 0, kForward = 1 };
+
   Slots unpack(const double* state) const;
+  double penetration(const Slots& s, Flank flank) const;
+  double approach(const Slots& s, Flank flank) const;
+  void enter(Flank flank);
+  void touch(Flank flank, double* state);
   double contact_force(const Slots& s) const;
   void join(const Rig& rig);
 
@@ -70,6 +93,9 @@ class GearTrain {
   std::array<double, kSlots> damping_;  // per part, N m s/rad
   Coupling input_, output_;  // referred to the load side
   double half_gap_, lever_;
+  double impact_speed_ = 0;  // m/s, approach speed at the last touch
+  double acting_gap_;        // where the force begins: half_gap_, or infinite between touches
+  Flank flank_ = kApart;     // in contact, for a law that needs touches
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;

@@ -34,9 +34,14 @@ struct IntegratorStatistics {
 class Integrator {
  public:
   using Derivative = std::function<void(double t, const double* state, double* rate)>;
+  /// Writes `event_count` values; a rise of one of them through zero is an event.
+  using Events = std::function<void(double t, const double* state, double* values)>;
+  static constexpr int kNoEvent = -1;
 
-  /// `absolute_tolerances` has one entry per state. Throws InvalidParameter for an unknown method or a tolerance <= 0.
-  Integrator(Derivative derivative, std::vector<double> absolute_tolerances, const SolverSettings& settings);
+  /// `absolute_tolerances` has one entry per state. Without events nothing is spent on finding them. Throws
+  /// InvalidParameter for an unknown method or a tolerance <= 0.
+  Integrator(Derivative derivative, std::vector<double> absolute_tolerances, const SolverSettings& settings,
+             Events events = nullptr, int event_count = 0);
   ~Integrator();
   Integrator(Integrator&&) noexcept;
   Integrator& operator=(Integrator&&) noexcept;
@@ -45,10 +50,16 @@ class Integrator {
   /// is not evaluated (infinite: none): the next jump of the right-hand side.
   void restart(double t, const double* state, double stop);
 
-  /// State at `t`: not before the last returned time, not beyond the stop time (both to within rounding). Throws
-  /// IntegrationError, also where more than 10^7 steps would be needed; passes on what the derivative throws. After
-  /// either only restart() helps.
-  void integrate_to(double t, double* state);
+  /// State at `t`, or at the first event on the way: then time() is that of the event (to some 100 roundings
+  /// of t and of the step; the value has risen to 0 or above) and its index is returned, kNoEvent otherwise.
+  /// A value that is exactly zero at a restart gives no event before it has been negative. `t` lies not
+  /// before the last returned time, not beyond the stop time (both to within rounding). Throws
+  /// IntegrationError, also where more than 10^7 steps would be needed; passes on what the derivative throws.
+  /// After either only restart() helps.
+  int integrate_to(double t, double* state);
+
+  /// Last returned time [s].
+  double time() const;
 
   IntegratorStatistics statistics() const;
 

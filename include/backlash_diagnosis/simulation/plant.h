@@ -10,6 +10,8 @@
 
 namespace backlash {
 
+/// Where the contact law depends on how a contact began, each touch of a flank is found, told to the gear
+/// train and started from; other laws are simply integrated through.
 class Plant {
  public:
   using State = std::array<double, GearTrain::kMaxStates>;
@@ -21,12 +23,15 @@ class Plant {
   /// Back to time 0 at rest in the middle of the gap, no external torque.
   void reset();
 
-  /// Integrates up to t [s], t >= time(). Stops and starts again at every switch of the excitation on the way; at a
-  /// switch (to within rounding) the torque is that after it, and time() the switch. Throws InvalidParameter for
-  /// another t, and IntegrationError, after which only reset() helps.
+  /// Integrates up to t [s], t >= time(). Stops and starts again at every switch of the excitation on the
+  /// way; at a switch (to within rounding) the torque is that after it, and time() the switch. Throws
+  /// InvalidParameter for another t, and IntegrationError (also for more than 10^5 touches and partings),
+  /// after which only reset() helps.
   void advance_to(double t);
 
-  /// Changes that act from time() on; the integrator starts again there.
+  /// Changes that act from time() on; the integrator starts again there. A new backlash or state makes the
+  /// contact law forget the last touch; a flank that then just closes is a touch at time(), with its jump if
+  /// the law has one.
   void set_backlash(double backlash);  // m (angular mesh: rad), total free play
   bool set_torque(double torque);      // N m; false unless the excitation is `topic`
   void set_state(const State& state);
@@ -41,6 +46,8 @@ class Plant {
 
  private:
   void restart();
+  void begin_contact();
+  void integrate_to(double t);
 
   GearTrain gear_train_;
   ExcitationSettings excitation_settings_;

@@ -1,8 +1,9 @@
 // Elastic contact with damping proportional to the elastic force, clamped so that it never pulls:
 //   F = max(0, K d^n (1 + 3/2 alpha d'))        K [N/m^n] > 0, 1 <= n <= 1.5, alpha [s/m] >= 0
-// The restitution of an impact at approach speed v is e = 1 - alpha v to first order in alpha v (Hunt and Crossley
-// 1975; Sarkar, Ellis and Moore 1997, Eqs. 10 to 12). Exactly, with D = 3/2 alpha v: D (1+e) = ln((1+D)/(1-e D)).
-// Valid for alpha v well below 1. The clamp acts only at d' < -2/(3 alpha), faster than any free rebound.
+// The restitution of an impact at approach speed v is e = 1 - alpha v to first order in alpha v (Hunt and
+// Crossley 1975; Sarkar, Ellis and Moore 1997, Eqs. 10 to 12). Exactly, with D = 3/2 alpha v: D (1+e) =
+// ln((1+D)/(1-e D)). Valid for alpha v well below 1. The clamp acts only at d' < -2/(3 alpha), faster than
+// any free rebound.
 #include <algorithm>
 
 #include "laws.h"
@@ -11,26 +12,24 @@
 namespace backlash {
 namespace {
 
-class HuntCrossley : public ContactLaw {
+class HuntCrossley : public PowerElastic {
  public:
   HuntCrossley(double stiffness, double exponent, double alpha)
-      : stiffness_(stiffness), exponent_(exponent), loss_(1.5 * alpha) {}
-  double force(double d, double rate) const override {
-    return stiffness_ * contact_power(d, exponent_) * std::max(0.0, 1 + loss_ * rate);
+      : PowerElastic(stiffness, exponent), loss_(1.5 * alpha) {}
+  double force(double d, double rate, double) const override {
+    return spring(d) * std::max(0.0, 1 + loss_ * rate);
   }
-  double elastic_energy(double d) const override { return d * force(d, 0) / (exponent_ + 1); }
-  double static_penetration(double force) const override { return std::pow(force / stiffness_, 1 / exponent_); }
 
  private:
-  double stiffness_, exponent_, loss_;
+  double loss_;
 };
 
 }  // namespace
 
 ContactLawType hunt_crossley_contact() {
   return {"hunt_crossley",
-          {{"stiffness", "N/m^n", Range::positive(), "K"},
-           {"exponent", "1", Range::between(1, 1.5), "n"},
+          {power_stiffness(),
+           power_exponent(),
            {"alpha", "s/m", Range::not_negative(), "restitution loss per approach speed"}},
           [](const ParameterValues& p) -> std::unique_ptr<ContactLaw> {
             return std::make_unique<HuntCrossley>(p.at("stiffness"), p.at("exponent"), p.at("alpha"));

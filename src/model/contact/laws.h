@@ -8,5 +8,11 @@ namespace backlash {
 ContactLawType linear_contact();
 ContactLawType power_law_contact();
 ContactLawType hunt_crossley_contact();
+ContactLawType kelvin_voigt_contact();
+ContactLawType herbert_mcwhannell_contact();
+ContactLawType yang_sun_contact();
+ContactLawType lankarani_nikravesh_contact();
+ContactLawType jankowski_contact();
+ContactLawType stereomechanical_contact();
 
 }  // namespace backlash

@@ -2,7 +2,7 @@
 //   F = max(0, K d + c d')        K [N/m] > 0, c [N s/m] >= 0
 // With c = 0 it is the line contact of Sarkar, Ellis and Moore (1997), Eq. 9. With c > 0 the force jumps by c
 // d' at first touch, the known objection to the Kelvin-Voigt element (Hunt and Crossley 1975); the tension at
-// the end of the loop is clamped to zero.
+// the end of the loop is clamped to zero (`kelvin_voigt` keeps it).
 #include <algorithm>
 
 #include "laws.h"
@@ -13,7 +13,7 @@ namespace {
 class Linear : public ContactLaw {
  public:
   Linear(double stiffness, double damping) : stiffness_(stiffness), damping_(damping) {}
-  double force(double d, double rate) const override {
+  double force(double d, double rate, double) const override {
     return std::max(0.0, stiffness_ * d + damping_ * rate);
   }
   double elastic_energy(double d) const override { return 0.5 * stiffness_ * d * d; }

@@ -8,22 +8,17 @@
 namespace backlash {
 namespace {
 
-class PowerLaw : public ContactLaw {
+class PowerLaw : public PowerElastic {
  public:
-  PowerLaw(double stiffness, double exponent) : stiffness_(stiffness), exponent_(exponent) {}
-  double force(double d, double) const override { return stiffness_ * contact_power(d, exponent_); }
-  double elastic_energy(double d) const override { return d * force(d, 0) / (exponent_ + 1); }
-  double static_penetration(double force) const override { return std::pow(force / stiffness_, 1 / exponent_); }
-
- private:
-  double stiffness_, exponent_;
+  using PowerElastic::PowerElastic;
+  double force(double d, double, double) const override { return spring(d); }
 };
 
 }  // namespace
 
 ContactLawType power_law_contact() {
   return {"power_law",
-          {{"stiffness", "N/m^n", Range::positive(), "K"}, {"exponent", "1", Range::between(1, 1.5), "n"}},
+          {power_stiffness(), power_exponent()},
           [](const ParameterValues& p) -> std::unique_ptr<ContactLaw> {
             return std::make_unique<PowerLaw>(p.at("stiffness"), p.at("exponent"));
           }};
