@@ -23,6 +23,8 @@ struct Observation {
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
   double load_position, load_velocity;
   double load_torque;     // N m, spring torque of the output coupling; NaN if rigid
+  double motor_current;   // A, motor_torque / torque constant: an ideal current control; NaN without the constant
+  double acceleration;    // rad/s^2, of the gear; of the pinion (as motor_position) where the gear cannot move
 };
 
 class GearTrain {
@@ -37,7 +39,8 @@ class GearTrain {
   /// dstate/dt at time t [s] for a motor torque in the units of the rig's records [N m].
   void derivative(double t, const double* state, double motor_torque, double* rate) const;
 
-  Observation observe(const double* state, double motor_torque) const;
+  /// `t` [s] matters only to terms that depend on time.
+  Observation observe(const double* state, double motor_torque, double t = 0) const;
 
   /// Kinetic plus elastic energy (couplings, contact) [J], without terms.
   double energy(const double* state) const;
@@ -70,6 +73,7 @@ class GearTrain {
   std::array<double, kSlots> damping_;  // per part, N m s/rad
   Coupling input_, output_;  // referred to the load side
   double half_gap_, lever_;
+  double torque_constant_;  // N m/A, NaN if unknown
   std::shared_ptr<const ContactLaw> contact_;
   std::vector<std::shared_ptr<const Term>> terms_;
   static constexpr int kFixed = -1;
