@@ -21,6 +21,13 @@ def read_columns(path, names):
     return [[float(row[name]) for row in rows] if name in rows[0] else [] for name in names]
 
 
+def unit(signal):
+    for ending, name in (("torque", "N m"), ("position", "rad"), ("velocity", "rad/s"), ("current", "A")):
+        if signal.endswith(ending):
+            return name
+    return "rad/s²"
+
+
 def draw_torque(axes, record, apd):
     signal = apd["signal"]
     time, torque, motor = read_columns(record, ["time", signal, "motor_torque"])
@@ -28,12 +35,12 @@ def draw_torque(axes, record, apd):
     start = end - 2 * apd["period"]
     shown = [i for i, t in enumerate(time) if t >= start]
     ms = [1e3 * (time[i] - start) for i in shown]
-    if motor:
+    if motor and unit(signal) == "N m":
         axes.plot(ms, [motor[i] for i in shown], color="0.6", lw=1, label="motor_torque (excitation)")
     axes.plot(ms, [torque[i] for i in shown], color="tab:blue", lw=0.8, label=signal)
     axes.set_xlabel("time [ms]")
-    axes.set_ylabel("torque [N m]")
-    axes.set_title("Torque over two periods")
+    axes.set_ylabel("%s [%s]" % (signal.split("_")[-1], unit(signal)))
+    axes.set_title("Signal over two periods")
     axes.legend(loc="upper right", fontsize=8)
 
 
@@ -44,7 +51,7 @@ def draw_apd(axes, apd):
     used = [c for c, p in zip(centres, apd["percentages"]) if p > 0]
     margin = 4 * width
     axes.set_xlim(min(used) - margin, max(used) + margin)
-    axes.set_xlabel("amplitude [N m]")
+    axes.set_xlabel("amplitude [%s]" % unit(apd["signal"]))
     axes.set_ylabel("share of time [%]")
     axes.set_title("APD of %d periods, skewness %.3f" % (apd["periods"], apd["skewness"]))
 

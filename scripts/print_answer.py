@@ -19,7 +19,11 @@ def main():
             print("%-19s  %s: %s" % (e["method"], e["status_name"], e["message"]))
         else:
             print("%-19s  %6.1f um   95 %% interval %.1f to %.1f um" % (e["method"], 1e6 * value, 1e6 * low, 1e6 * high))
-    print("verdict              %s" % answer["verdict"]["message"])
+    v = answer["verdict"]
+    if len(v["members"]) > 1:
+        print("together             %6.1f um   95 %% interval %.1f to %.1f um"
+              % tuple(1e6 * float(v[key]) for key in ("backlash", "lower", "upper")))
+    print("verdict              %s" % v["message"])
     return 0 if answer["success"] else 1
 
 

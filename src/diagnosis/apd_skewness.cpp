@@ -83,8 +83,9 @@ std::pair<double, double> signal_levels(const MonitoringCurve& curve) {
 std::string level_mismatch(const Record& record, const ApdSettings& settings, const MonitoringCurve& curve) {
   const auto [low, high] = signal_levels(curve);
   const double level = median_magnitude(record.column(settings.signal));
-  if (level < 0.88 * low) return mismatch("signal level (median magnitude)", level, low, "N m");
-  if (level > 1.12 * high) return mismatch("signal level (median magnitude)", level, high, "N m");
+  const char* unit = channel_unit(settings.signal);
+  if (level < 0.88 * low) return mismatch("signal level (median magnitude)", level, low, unit);
+  if (level > 1.12 * high) return mismatch("signal level (median magnitude)", level, high, unit);
   return {};
 }
 
@@ -182,8 +183,9 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
   if (apd.noise > kNoiseExcess * curve.noise_levels.back()) {
     std::ostringstream text;
     text.precision(4);
-    text << "sensor noise is " << apd.noise << " N m (standard deviation), the curve covers noise up to "
-         << curve.noise_levels.back() << " N m";
+    text << "sensor noise is " << apd.noise << ' ' << channel_unit(settings.signal)
+         << " (standard deviation), the curve covers noise up to " << curve.noise_levels.back() << ' '
+         << channel_unit(settings.signal);
     return text.str();
   }
   return motion_mismatch(record, curve);

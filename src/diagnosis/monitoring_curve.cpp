@@ -170,6 +170,17 @@ const SkewnessCell& MonitoringCurve::nominal(const CurvePoint& point) const {
   return point.cells[level == noise_levels.end() ? noise_levels.size() - 1 : level - noise_levels.begin()];
 }
 
+bool MonitoringCurve::flat() const {
+  double lowest = kInfinity, highest = -kInfinity;  // upper end of the lowest band, lower end of the highest
+  for (const CurvePoint& point : points) {
+    const SkewnessCell& cell = nominal(point);
+    const double scatter = std::max(kFloor, coverage_factor * deviation(cell, conditions.periods));
+    lowest = std::min(lowest, cell.mean + scatter);
+    highest = std::max(highest, cell.mean - scatter);
+  }
+  return highest <= lowest;
+}
+
 void MonitoringCurve::finish(const std::vector<std::vector<SkewnessCell>>& middle) {
   std::vector<std::vector<SkewnessCell>> finished(points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
@@ -192,11 +203,18 @@ Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange&
   Estimate estimate;
   estimate.method = "apd_skewness";
   estimate.skewness = skewness;
-  const NoiseRange noise = within(range, noise_levels);
-  const Accepted found = accept(*this, skewness, periods, noise);
   std::ostringstream text;
   text.precision(4);
   text << "skewness " << skewness << " over " << periods << " period(s)";
+  if (flat()) {
+    estimate.status = Status::ambiguous;
+    text << "; on the curve the skewness of " << conditions.signal << " does not depend on backlash";
+    estimate.lower = points.front().backlash;
+    estimate.message = text.str();
+    return with_angle(estimate, *this);
+  }
+  const NoiseRange noise = within(range, noise_levels);
+  const Accepted found = accept(*this, skewness, periods, noise);
   if (found.pieces == 0) {
     const double first = at(points.front().backlash, noise.lower).mean,
                  last = at(points.back().backlash, noise.upper).mean;

@@ -31,6 +31,7 @@ GearTrain::GearTrain(const Rig& rig)
       input_(referred(rig.input_coupling, ratio_ * ratio_)),
       output_(rig.output_coupling),
       lever_(rig.mesh.lever()),
+      torque_constant_(rig.torque_constant),
       contact_(rig.mesh.contact),
       variation_(rig.mesh.variation),
       terms_(rig.terms) {
@@ -119,7 +120,7 @@ void GearTrain::derivative(double t, const double* state, double motor_torque, d
   }
 }
 
-Observation GearTrain::observe(const double* state, double motor_torque) const {
+Observation GearTrain::observe(const double* state, double motor_torque, double t) const {
   const Slots s = unpack(state);
   const double none = std::nan("");
   Observation o;
@@ -133,6 +134,11 @@ Observation GearTrain::observe(const double* state, double motor_torque) const {
   o.load_position = s.q[kLink];
   o.load_velocity = s.w[kLink];
   o.load_torque = output_.rigid ? none : spring(output_, s.q[kGear] - s.q[kLink]);
+  o.motor_current = motor_torque / torque_constant_;
+  double rate[kMaxStates];
+  derivative(t, state, motor_torque, rate);
+  const bool gear_moves = node_[kGear] != kFixed;
+  o.acceleration = gear_moves ? rate[dof_ + node_[kGear]] : rate[dof_ + node_[kPinion]] * ratio_;
   return o;
 }
 

@@ -47,7 +47,9 @@ Mesh read_mesh(const YamlReader& yaml) {
 void read_gear_train(const YamlReader& yaml, Rig& rig) {
   rig.reduction_ratio = yaml.number("reduction_ratio", Range::positive());
   rig.motor_side = yaml.boolean_or("motor_side", false);
-  rig.motor = read_body(yaml.map("motor"));
+  const YamlReader motor = yaml.map("motor");
+  rig.motor = read_body(motor);
+  if (motor.has("torque_constant")) rig.torque_constant = motor.number("torque_constant", Range::positive());
   rig.input_coupling = read_coupling(yaml, "input_coupling");
   if (rig.input_coupling.rigid && !yaml.has("pinion"))
     rig.pinion = Body{};  // lumped with the motor

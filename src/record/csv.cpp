@@ -18,18 +18,16 @@ namespace {
 
 const std::string kTimeColumn = "time";
 constexpr char kSeparator = ',';
-constexpr std::array<Channel, 4> kRequiredOneOf = {Channel::motor_torque, Channel::sensor_torque,
-                                                   Channel::motor_position, Channel::load_position};
 
 std::vector<std::string> required_names() {
   std::vector<std::string> names;
-  for (const Channel channel : kRequiredOneOf) names.push_back(channel_name(channel));
+  for (const Channel channel : kTellingChannels) names.push_back(channel_name(channel));
   return names;
 }
 
 bool has_required_channel(const std::vector<Channel>& channels) {
   return std::any_of(channels.begin(), channels.end(), [](Channel channel) {
-    return std::find(kRequiredOneOf.begin(), kRequiredOneOf.end(), channel) != kRequiredOneOf.end();
+    return std::find(kTellingChannels.begin(), kTellingChannels.end(), channel) != kTellingChannels.end();
   });
 }
 
@@ -130,7 +128,7 @@ class Reader {
     for (const std::string_view field : fields_) add_column(std::string(field));
     if (time_column_ == kNone) lines_.fail("no column 'time'; there are: " + joined(names_));
     if (!has_required_channel(channels_)) {
-      lines_.fail("no torque or position: needs at least one of " + joined(required_names()) +
+      lines_.fail("no torque, position, current or acceleration: needs at least one of " + joined(required_names()) +
                   "; there are: " + joined(names_));
     }
   }

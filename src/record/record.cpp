@@ -12,19 +12,44 @@ namespace {
 // In the order of the enumerators.
 const std::array<std::string, kChannelCount>& channel_names() {
   static const std::array<std::string, kChannelCount> names = {
-      "motor_torque",  "motor_position", "motor_velocity",    "load_position",
-      "load_velocity", "sensor_torque",  "reference_position"};
+      "motor_torque",  "motor_position",     "motor_velocity", "load_position", "load_velocity",
+      "sensor_torque", "reference_position", "motor_current",  "acceleration"};
   return names;
 }
 
 }  // namespace
 
 const std::array<Channel, kChannelCount> kChannels = {
-    Channel::motor_torque,  Channel::motor_position, Channel::motor_velocity,    Channel::load_position,
-    Channel::load_velocity, Channel::sensor_torque,  Channel::reference_position};
+    Channel::motor_torque,       Channel::motor_position, Channel::motor_velocity,
+    Channel::load_position,      Channel::load_velocity,  Channel::sensor_torque,
+    Channel::reference_position, Channel::motor_current,  Channel::acceleration};
+
+const std::array<Channel, 6> kTellingChannels = {Channel::motor_torque,   Channel::sensor_torque,
+                                                 Channel::motor_position, Channel::load_position,
+                                                 Channel::motor_current,  Channel::acceleration};
 
 const std::string& channel_name(Channel channel) {
   return channel_names()[static_cast<std::size_t>(channel)];
+}
+
+const char* channel_unit(Channel channel) {
+  switch (channel) {
+    case Channel::motor_torque:
+    case Channel::sensor_torque:
+      return "N m";
+    case Channel::motor_position:
+    case Channel::load_position:
+    case Channel::reference_position:
+      return "rad";
+    case Channel::motor_velocity:
+    case Channel::load_velocity:
+      return "rad/s";
+    case Channel::motor_current:
+      return "A";
+    case Channel::acceleration:
+      break;
+  }
+  return "rad/s^2";
 }
 
 Channel channel_from_name(const std::string& name) {
@@ -32,6 +57,11 @@ Channel channel_from_name(const std::string& name) {
     if (channel_name(channel) == name) return channel;
   }
   throw InvalidParameter("channel", printable(name), "must be one of " + joined(channel_names()));
+}
+
+bool Record::tells() const {
+  return std::any_of(kTellingChannels.begin(), kTellingChannels.end(),
+                     [this](Channel channel) { return has(channel); });
 }
 
 double Record::sampling_interval() const {

@@ -52,7 +52,7 @@ bool topic_matches(const std::string& topic, const std::string& wanted) {
 
 /// The prefix of a name that belongs to a geared joint.
 std::optional<std::string> joint_of(const std::string& name) {
-  for (const std::string suffix : {"_motor", "_sensor", "_load"})
+  for (const std::string suffix : {"_motor", "_sensor", "_load", "_current", "_accelerometer"})
     if (name.size() > suffix.size() &&
         name.compare(name.size() - suffix.size(), std::string::npos, suffix) == 0)
       return name.substr(0, name.size() - suffix.size());
@@ -258,10 +258,9 @@ class Reader {
       if (!column.empty() && std::isnan(column.front())) column.clear();
       if (!column.empty()) present.push_back(channel_name(channel));
     }
-    if (!record_.has(Channel::motor_torque) && !record_.has(Channel::sensor_torque) &&
-        !record_.has(Channel::motor_position) && !record_.has(Channel::load_position))
+    if (!record_.tells())
       fail("joint '" + printable(joint_) + "' on " + printable(topic_) +
-           " has no torque or position; it has: " + (present.empty() ? "nothing" : joined(present)));
+           " has no torque, position, current or acceleration; it has: " + (present.empty() ? "nothing" : joined(present)));
   }
 
   const std::string path_;

@@ -1,11 +1,13 @@
 #include "backlash_diagnosis/ros/diagnoser_node.h"
 
 #include <cmath>
+#include <filesystem>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/ros/messages.h"
 #include "backlash_diagnosis/ros/parameters.h"
+#include "backlash_diagnosis/workflow/healthy_machine.h"
 
 namespace backlash {
 namespace {
@@ -21,15 +23,6 @@ unsigned char level(Grade grade) {
     case Grade::cannot_tell: break;
   }
   return DiagnosticStatus::WARN;
-}
-
-Baseline baseline_of(const Diagnosis& diagnosis) {
-  Baseline baseline;
-  const Estimate& best = diagnosis.estimates.at(diagnosis.verdict.estimate);
-  baseline.backlash = best.backlash;
-  baseline.backlash_angle = best.backlash_angle;
-  if (diagnosis.apd) baseline.skewness = diagnosis.apd->skewness;
-  return baseline;
 }
 
 }  // namespace
@@ -111,8 +104,7 @@ JointMonitor* DiagnoserNode::find(const std::string& joint, std::string& why) {
 
 bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
                                 backlash_diagnosis::Diagnose::Response& response) {
-  response.verdict.estimate = -1;
-  response.verdict.grade = to_string(Grade::cannot_tell);
+  response.verdict = to_message(Verdict(), {});
   JointMonitor* monitor = find(request.joint, response.message);
   if (!monitor) return true;
   if (!(request.timeout >= 0) || request.timeout > 1e6) {
@@ -122,7 +114,7 @@ bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
   std::string note;
   ros::Time stamp;
   const Diagnosis diagnosis = monitor->diagnose(request.periods, request.timeout, note, stamp);
-  response.verdict = to_message(diagnosis.verdict);
+  response.verdict = to_message(diagnosis.verdict, diagnosis.estimates);
   for (const Estimate& estimate : diagnosis.estimates) {
     response.estimates.push_back(to_message(estimate));
     response.estimates.back().header.stamp = stamp;
@@ -133,6 +125,7 @@ bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
   response.distribution.joint = monitor->joint();
   response.success = diagnosis.verdict.estimate >= 0 && note.empty();
   response.message = note.empty() ? diagnosis.verdict.message : note + "; " + diagnosis.verdict.message;
+  for (const std::string& warning : monitor->state().warnings) response.message += "; warning: " + warning;
   return true;
 }
 
@@ -141,27 +134,45 @@ bool DiagnoserNode::on_set_baseline(backlash_diagnosis::SetBaseline::Request& re
   response.backlash = response.backlash_angle = response.skewness = kNaN;
   JointMonitor* monitor = find(request.joint, response.message);
   if (!monitor) return true;
-  if (request.clear) {
-    monitor->set_baseline(std::nullopt);
-    response.success = true;
-    response.message = "baseline forgotten";
-    return true;
+  try {
+    if (request.clear)
+      clear_baseline(*monitor, response);
+    else
+      set_baseline(*monitor, response);
+  } catch (const Error& error) {
+    response.message = error.what();
   }
+  return true;
+}
+
+void DiagnoserNode::clear_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response) {
+  const std::string& path = monitor.baseline_path();
+  std::error_code error;
+  if (!path.empty()) std::filesystem::remove(path, error);
+  if (error) throw CannotWrite(path + ": cannot be removed: " + error.message());
+  monitor.set_baseline(std::nullopt);
+  response.success = true;
+  response.message = "baseline forgotten";
+}
+
+void DiagnoserNode::set_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response) {
   std::string note;
   ros::Time stamp;
-  const Diagnosis diagnosis = monitor->diagnose(0, 0, note, stamp);
-  if (diagnosis.verdict.estimate < 0 || !note.empty()) {
-    response.message = "no baseline set: " + (note.empty() ? diagnosis.verdict.message : note);
-    return true;
+  const Diagnosis diagnosis = monitor.diagnose(0, 0, note, stamp);
+  if (!note.empty()) {
+    response.message = "no baseline set: " + note;
+    return;
   }
-  const Baseline baseline = baseline_of(diagnosis);
-  monitor->set_baseline(baseline);
+  const RigFile& rig = monitor.rig();
+  const Baseline baseline = baseline_of(diagnosis, rig.rig.name, rig.digest);
+  const std::string& path = monitor.baseline_path();
+  if (!path.empty()) write_baseline(baseline, path);  // first: what is not kept is not used either
+  monitor.set_baseline(baseline);
   response.success = true;
-  response.message = "baseline by " + diagnosis.estimates[diagnosis.verdict.estimate].method;
+  response.message = "baseline by " + joined(baseline.methods) + (path.empty() ? "" : ", kept in " + path);
   response.backlash = baseline.backlash;
   response.backlash_angle = baseline.backlash_angle;
   response.skewness = baseline.skewness;
-  return true;
 }
 
 bool DiagnoserNode::on_get_curve(backlash_diagnosis::GetCurve::Request& request,
@@ -170,7 +181,9 @@ bool DiagnoserNode::on_get_curve(backlash_diagnosis::GetCurve::Request& request,
   if (!monitor) return true;
   const auto curve = monitor->curve();
   response.success = curve != nullptr;
-  response.message = monitor->state().curve_state;
+  const MonitorState state = monitor->state();
+  response.message = state.curve_state;
+  for (const std::string& warning : state.warnings) response.message += "; warning: " + warning;
   if (curve) response.curve = to_message(*curve);
   return true;
 }
@@ -225,6 +238,7 @@ void DiagnoserNode::add_diagnostics() {
 void DiagnoserNode::report_backlash(JointMonitor& monitor, diagnostic_updater::DiagnosticStatusWrapper& status) const {
   const MonitorState state = monitor.state();
   status.add("Monitoring curve", state.curve_state);
+  for (const std::string& warning : state.warnings) status.add("Warning", warning);
   status.add("Whole periods kept", state.periods);
   status.add("Excitation period (s)", state.period);
   if (!state.latest) {

@@ -1,4 +1,6 @@
 // Parameters of the node `diagnoser`.
+#include <filesystem>
+
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/ros/diagnoser_node.h"
 #include "backlash_diagnosis/ros/parameters.h"
@@ -7,6 +9,25 @@ namespace backlash {
 namespace {
 
 RigFile rig_from(const std::string& path) { return path.empty() ? default_rig_file() : load_rig_file(path); }
+
+void use_limits(MonitorSettings& monitor, const std::string& path) {
+  if (path.empty()) return;
+  const Limits limits = read_limits_file(path);
+  check_limits(limits, monitor.rig.rig.mesh.angular(), path);
+  monitor.rig.diagnosis.limits = limits;
+}
+
+/// A file that is not there yet is one to be written.
+void use_baseline(MonitorSettings& monitor, const std::string& path) {
+  monitor.baseline_path = path;
+  if (path.empty()) return;
+  const auto folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    throw InvalidParameter("~baseline", path, "is in a folder that does not exist");
+  if (!std::filesystem::exists(path)) return;
+  monitor.baseline = read_baseline(path);
+  check_baseline(*monitor.baseline, monitor.rig.rig.name, monitor.rig.digest, path);
+}
 
 }  // namespace
 
@@ -19,14 +40,19 @@ parameters (private)
   rig       path of the rig file; default: the built-in rig of Sarkar et al. (1997)
   curve     path of a monitoring curve; default: built from the rig at the rate of the messages
   joints    list of joint names; default: the joint of the rig file
-  JOINT/rig, JOINT/curve   the same for one of several joints
+  limits    path of a file with limits to grade by (schema_version and the map of diagnosis.limits in a
+            rig file); default: the rig file's
+  baseline  path of the baseline of the healthy machine: read at the start where it exists, written by
+            ~set_baseline, removed where that clears it; default: a baseline lasts as long as the node
+  JOINT/rig, JOINT/curve, JOINT/limits, JOINT/baseline   the same for one of several joints
   window    whole periods that the published estimates look back; default 5
   keep      s of samples kept for the service; default 60
   queue     messages waiting at most; default 20000
   stale     s of wall time without a message before /diagnostics says so; default 2
 
 subscribes
-  joint_states             sensor_msgs/JointState: JOINT_motor, JOINT_sensor, JOINT_load
+  joint_states             sensor_msgs/JointState: JOINT_motor, JOINT_sensor, JOINT_load,
+                           JOINT_current and JOINT_accelerometer (A and rad/s^2 as effort)
 publishes
   amplitude_distribution   backlash_diagnosis/AmplitudeDistribution, each whole period
   backlash_estimate        backlash_diagnosis/BacklashEstimate, one per method each period
@@ -50,7 +76,12 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   settings.queue = static_cast<int>(parameters.integer("queue", 20000, 1, 10'000'000));
   settings.stale = parameters.number("stale", 2, Range::positive());
   parameters.allow("diagnostic_period");  // of diagnostic_updater
-  for (const std::string& joint : parameters.texts("joints", {common.rig.joint})) {
+  const std::string limits = parameters.text("limits", "");
+  const std::string baseline = parameters.text("baseline", "");
+  const auto joints = parameters.texts("joints", {common.rig.joint});
+  if (joints.size() > 1 && !baseline.empty())
+    throw InvalidParameter("~baseline", baseline, "is one file for several joints; give each its JOINT/baseline");
+  for (const std::string& joint : joints) {
     for (const MonitorSettings& other : settings.joints)
       if (other.joint == joint) throw InvalidParameter("~joints", joint, "is named twice");
     MonitorSettings monitor = defaults;
@@ -59,6 +90,8 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
     const std::string own_curve = parameters.text(joint + "/curve", curve);
     monitor.rig = own_rig.empty() ? common : load_rig_file(own_rig);
     if (!own_curve.empty()) monitor.curve = read_curve(own_curve);
+    use_limits(monitor, parameters.text(joint + "/limits", limits));
+    use_baseline(monitor, parameters.text(joint + "/baseline", baseline));
     settings.joints.push_back(std::move(monitor));
   }
   parameters.finish();

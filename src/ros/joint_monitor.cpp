@@ -24,7 +24,11 @@ JointMonitor::JointMonitor(MonitorSettings settings)
       diagnosis_settings_(without_settling(settings_.rig.diagnosis)),
       names_(settings_.joint),
       stream_(stream_settings(settings_)) {
+  if (settings_.baseline) set_baseline(settings_.baseline);
   if (settings_.curve) {
+    if (settings_.curve->conditions.rig_digest != settings_.rig.digest)
+      curve_warning_ = "the curve was made from another version of the rig file; build it again";
+    if (!curve_warning_.empty()) ROS_WARN("%s: %s", settings_.joint.c_str(), curve_warning_.c_str());
     curve_ = std::make_shared<MonitoringCurve>(*settings_.curve);
     curve_state_ = "loaded";
   } else if (!settings_.rig.diagnosis.apd) {
@@ -138,12 +142,17 @@ void JointMonitor::build(double rate) {
 void JointMonitor::set_baseline(const std::optional<Baseline>& baseline) {
   const std::lock_guard<std::mutex> lock(mutex_);
   baseline_ = baseline;
+  baseline_warning_.clear();
+  if (!baseline) return;
+  baseline_warning_ = check_baseline(*baseline, settings_.rig.rig.name, settings_.rig.digest, settings_.baseline_path);
+  if (!baseline_warning_.empty()) ROS_WARN("%s: %s", settings_.joint.c_str(), baseline_warning_.c_str());
 }
 
 void JointMonitor::set_curve(MonitoringCurve curve) {
   const std::lock_guard<std::mutex> lock(mutex_);
   curve_ = std::make_shared<MonitoringCurve>(std::move(curve));
   curve_state_ = "built";
+  curve_warning_.clear();
   changed_.notify_all();
 }
 
@@ -159,6 +168,8 @@ MonitorState JointMonitor::state() const {
   state.bad_messages = bad_messages_;
   state.last_problem = last_problem_;
   state.curve_state = curve_state_;
+  for (const std::string& warning : {curve_warning_, baseline_warning_})
+    if (!warning.empty()) state.warnings.push_back(warning);
   const double interval = stream_.kept().sampling_interval();
   state.rate = interval > 0 ? 1 / interval : 0;
   state.period = stream_.period();

@@ -43,7 +43,8 @@ void empty_if_absent(std::vector<double>& array) {
 }  // namespace
 
 JointNames::JointNames(const std::string& joint)
-    : motor(joint + "_motor"), sensor(joint + "_sensor"), load(joint + "_load"), reference(joint + "_reference") {}
+    : motor(joint + "_motor"), sensor(joint + "_sensor"), load(joint + "_load"), reference(joint + "_reference"),
+      current(joint + "_current"), accelerometer(joint + "_accelerometer") {}
 
 double StampClock::seconds(const ros::Time& stamp) {
   if (!started_) {
@@ -60,7 +61,9 @@ double StampClock::seconds(const ros::Time& stamp) {
 
 bool mentions(const sensor_msgs::JointState& message, const JointNames& names) {
   for (const std::string& name : message.name)
-    if (name == names.motor || name == names.sensor || name == names.load) return true;
+    if (name == names.motor || name == names.sensor || name == names.load || name == names.current ||
+        name == names.accelerometer)
+      return true;
   return false;
 }
 
@@ -70,10 +73,11 @@ ChannelValues read_joint_state(const sensor_msgs::JointState& m, const JointName
   check_size(m.effort, "effort", m.name.size(), topic);
   ChannelValues values;
   values.fill(kAbsent);
-  const std::string* seen[4] = {};
+  const std::string* seen[6] = {};
   for (std::size_t i = 0; i < m.name.size(); ++i) {
     const std::string& name = m.name[i];
-    const std::string* const known[] = {&names.motor, &names.sensor, &names.load, &names.reference};
+    const std::string* const known[] = {&names.motor,     &names.sensor,  &names.load,
+                                        &names.reference, &names.current, &names.accelerometer};
     const auto which = std::find_if(std::begin(known), std::end(known), [&](auto* k) { return *k == name; });
     if (which == std::end(known)) continue;
     const std::size_t slot = which - std::begin(known);
@@ -91,8 +95,10 @@ ChannelValues read_joint_state(const sensor_msgs::JointState& m, const JointName
     } else if (slot == 2) {
       at(values, Channel::load_position) = position;
       at(values, Channel::load_velocity) = velocity;
-    } else {
+    } else if (slot == 3) {
       at(values, Channel::reference_position) = position;
+    } else {
+      at(values, slot == 4 ? Channel::motor_current : Channel::acceleration) = effort;
     }
   }
   return values;
@@ -103,6 +109,8 @@ sensor_msgs::JointState make_joint_state(const Observation& o, const JointNames&
   add(m, names.motor, o.motor_position, o.motor_velocity, o.motor_torque);
   add(m, names.sensor, o.sensor_twist, o.sensor_twist_rate, o.sensor_torque);
   add(m, names.load, o.load_position, o.load_velocity, o.load_torque);
+  add(m, names.current, kAbsent, kAbsent, o.motor_current);
+  add(m, names.accelerometer, kAbsent, kAbsent, o.acceleration);
   return m;
 }
 
@@ -113,6 +121,8 @@ sensor_msgs::JointState make_joint_state(const Record& record, std::size_t i, co
   add(m, names.sensor, kAbsent, kAbsent, get(Channel::sensor_torque));
   add(m, names.load, get(Channel::load_position), get(Channel::load_velocity), kAbsent);
   add(m, names.reference, get(Channel::reference_position), kAbsent, kAbsent);
+  add(m, names.current, kAbsent, kAbsent, get(Channel::motor_current));
+  add(m, names.accelerometer, kAbsent, kAbsent, get(Channel::acceleration));
   empty_if_absent(m.position);
   empty_if_absent(m.velocity);
   empty_if_absent(m.effort);

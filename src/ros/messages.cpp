@@ -82,12 +82,22 @@ backlash_diagnosis::BacklashEstimate to_message(const Estimate& e) {
   return m;
 }
 
-backlash_diagnosis::Verdict to_message(const Verdict& verdict) {
+backlash_diagnosis::Verdict to_message(const Verdict& verdict, const std::vector<Estimate>& estimates) {
   backlash_diagnosis::Verdict m;
   m.grade = to_string(verdict.grade);
   m.estimate = verdict.estimate;
   m.agreement = verdict.agreement;
+  for (const int i : verdict.members) m.members.push_back(estimates[i].method);
+  for (const int i : verdict.dissenters) m.dissenters.push_back(estimates[i].method);
+  m.backlash = verdict.backlash;
+  m.lower = verdict.lower;
+  m.upper = verdict.upper;
+  m.backlash_angle = verdict.backlash_angle;
+  m.angle_lower = verdict.angle_lower;
+  m.angle_upper = verdict.angle_upper;
   m.growth = verdict.growth;
+  m.growth_lower = verdict.growth_lower;
+  m.growth_upper = verdict.growth_upper;
   m.message = verdict.message;
   return m;
 }

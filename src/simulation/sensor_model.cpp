@@ -8,6 +8,7 @@ namespace {
 
 SensorSettings read_sensor(const YamlReader& yaml) {
   SensorSettings sensor;
+  sensor.declared = true;
   sensor.noise = yaml.number_or("noise", 0, Range::not_negative());
   sensor.resolution = yaml.number_or("resolution", 0, Range::not_negative());
   sensor.offset = yaml.number_or("offset", 0, Range::any());
@@ -55,6 +56,11 @@ Observation SensorModel::measure(const Observation& exact) {
   measured.sensor_torque = measure(Channel::sensor_torque, exact.sensor_torque);
   measured.load_position = measure(Channel::load_position, exact.load_position);
   measured.load_velocity = measure(Channel::load_velocity, exact.load_velocity);
+  const auto if_declared = [this](Channel channel, double value) {
+    return settings_.of(channel).declared ? measure(channel, value) : std::nan("");
+  };
+  measured.motor_current = if_declared(Channel::motor_current, exact.motor_current);
+  measured.acceleration = if_declared(Channel::acceleration, exact.acceleration);
   return measured;
 }
 

@@ -50,6 +50,8 @@ Record simulate_record(const Rig& rig, const SimulationSettings& settings, doubl
     record.column(Channel::load_position).push_back(o.load_position);
     record.column(Channel::load_velocity).push_back(o.load_velocity);
     if (!std::isnan(o.sensor_torque)) record.column(Channel::sensor_torque).push_back(o.sensor_torque);
+    if (!std::isnan(o.motor_current)) record.column(Channel::motor_current).push_back(o.motor_current);
+    if (!std::isnan(o.acceleration)) record.column(Channel::acceleration).push_back(o.acceleration);
   }
   if (progress) progress(1, "simulating");
   return record;

@@ -68,6 +68,11 @@ void tell(const MonitoringCurve& curve, const std::string& out) {
             << shown(first.backlash) << unit << " to " << shown(curve.nominal(last).mean) << " at "
             << shown(last.backlash) << unit << ", " << curve.points.size() << " points, "
             << shown(curve.conditions.sampling_rate) << " Hz\n";
+  if (curve.flat()) {
+    std::cerr << "build_curve: the skewness of " << curve.conditions.signal
+              << " does not depend on backlash: no backlash can be told from it (flat curve)\n";
+    return;
+  }
   std::vector<std::string> rising;
   for (const CurvePoint& point : curve.points)
     if (!point.monotonic) rising.push_back(shown(point.backlash));

@@ -20,7 +20,8 @@ Command command() {
   c.options = {
       {"rig", "RIG.yaml", "rig file whose joint the bag has"},
       {"joint", "NAME",
-       "joint in the bag, its names are NAME_motor, NAME_sensor and NAME_load; default: the rig's, "
+       "joint in the bag, its names are NAME_motor, NAME_sensor, NAME_load, NAME_current and "
+       "NAME_accelerometer; default: the rig's, "
        "else the only one (reading) or 'joint' (writing)"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
   };

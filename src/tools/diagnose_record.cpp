@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/workflow/curve_builder.h"
+#include "backlash_diagnosis/workflow/healthy_machine.h"
 #include "tools/common/command_line.h"
 #include "tools/common/diagnosis_report.h"
 #include "tools/common/exit_codes.h"
@@ -30,6 +31,11 @@ Command command() {
       {"curve", "CURVE.yaml",
        "monitoring curve (see build_curve); without it one is built from the rig file at the "
        "record's sampling rate"},
+      {"limits", "LIMITS.yaml",
+       "limits to grade by, instead of the rig file's: schema_version and the same map as its "
+       "diagnosis.limits"},
+      {"baseline", "BASELINE.yaml", "the healthy machine: the limits then hold for the growth since"},
+      {"save-baseline", "BASELINE.yaml", "keep this diagnosis as that of the healthy machine"},
       {"method", "NAME", "only this method: " + joined(diagnosis_methods())},
       {"joint", "NAME", "joint in a bag; default: the rig file's, else the only one"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
@@ -41,12 +47,14 @@ Command command() {
       "the axis "
       "of motor_position [rad]; intervals hold with 95 %.";
   c.examples = {"diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json",
-                "diagnose_record run.bag --joint elbow --curve curve.yaml --json -"};
+                "diagnose_record run.bag --joint elbow --curve curve.yaml --json -",
+                "diagnose_record new.csv --rig rig.yaml --save-baseline healthy.yaml --json new.json",
+                "diagnose_record old.csv --rig rig.yaml --baseline healthy.yaml --json old.json"};
   c.exit_codes =
       "  0   healthy\n"
       "  1   watch\n"
       "  2   fault found: service or stop\n"
-      "  3   inconclusive: the estimates cannot tell\n";
+      "  3   inconclusive: the estimates cannot tell, or not well enough for --save-baseline\n";
   return c;
 }
 
@@ -74,6 +82,12 @@ struct Inputs {
   std::string no_curve;  // why the rig file gives none
   Record record;
   DiagnosisSettings settings;
+  std::optional<Baseline> baseline;
+  std::vector<std::string> warnings;  // of the files, not of the record
+
+  bool angular() const { return rig ? rig->rig.mesh.angular() : curve && curve->conditions.angular; }
+  std::string rig_name() const { return rig ? rig->rig.name : curve ? curve->conditions.rig : ""; }
+  std::string rig_digest() const { return rig ? rig->digest : curve ? curve->conditions.rig_digest : ""; }
 };
 
 ApdSettings settings_of(const MonitoringCurve& curve) {
@@ -122,6 +136,22 @@ void build_own_curve(Inputs& in) {
   }
 }
 
+/// Limits and baseline of their own files. The rig or the curve says which machine they must be of.
+void read_machine_files(Inputs& in, const Arguments& arguments) {
+  if (arguments.has("limits")) {
+    const std::string path = arguments.text("limits");
+    in.settings.limits = read_limits_file(path);
+    check_limits(*in.settings.limits, in.angular(), path);
+  }
+  if (arguments.has("baseline")) {
+    const std::string path = arguments.text("baseline");
+    if (!in.rig && !in.curve) throw UsageError("--baseline needs --rig or --curve");
+    in.baseline = read_baseline(path);
+    const std::string warning = check_baseline(*in.baseline, in.rig_name(), in.rig_digest(), path);
+    if (!warning.empty()) in.warnings.push_back(warning);
+  }
+}
+
 Inputs read_inputs(const Arguments& arguments) {
   Inputs in;
   in.method = arguments.text("method");
@@ -143,6 +173,7 @@ Inputs read_inputs(const Arguments& arguments) {
     in.curve = read_curve(in.curve_source);
     if (!in.rig) in.settings.apd = settings_of(*in.curve);
   }
+  read_machine_files(in, arguments);
   in.record = read_record(arguments.positional(0), place);
   if (arguments.has("periods")) keep_last_periods(in, periods);
   return in;
@@ -156,22 +187,42 @@ void explain(Diagnosis& diagnosis, const Inputs& in) {
     if (!in.rig && e.method != kApd) e.message = "needs --rig";
     if (e.method == kApd && !in.no_curve.empty()) e.message = "no monitoring curve: " + in.no_curve;
   }
-  diagnosis.verdict = combine(diagnosis.estimates, in.settings.limits, std::nullopt);
+  diagnosis.verdict = combine(diagnosis.estimates, in.settings.limits, in.baseline);
+}
+
+void check_outputs(const Arguments& arguments) {
+  std::vector<std::string> inputs = {arguments.positional(0)};
+  for (const char* option : {"rig", "curve", "limits"})
+    if (arguments.has(option)) inputs.push_back(arguments.text(option));
+  const std::string out = arguments.text("json"), saved = arguments.text("save-baseline");
+  if (!saved.empty()) check_output(saved, inputs);  // a baseline may be renewed
+  if (!saved.empty() && saved == out) throw UsageError("--json and --save-baseline name the same file");
+  if (arguments.has("baseline")) inputs.push_back(arguments.text("baseline"));
+  if (out != kStandardOutput) check_output(out, inputs);
+}
+
+/// False where this diagnosis is no baseline, which is told.
+bool save_baseline(const Diagnosis& diagnosis, const Inputs& in, const std::string& path) {
+  Baseline baseline;
+  try {
+    baseline = baseline_of(diagnosis, in.rig_name(), in.rig_digest());
+  } catch (const BadData& error) {
+    std::cerr << "diagnose_record: " << path << " not written: " << error.what() << '\n';
+    return false;
+  }
+  write_text(path, to_yaml(baseline));
+  return true;
 }
 
 int diagnose_record(const Arguments& arguments) {
   Inputs in = read_inputs(arguments);
+  check_outputs(arguments);
   const std::string out = arguments.text("json");
-  if (out != kStandardOutput) {
-    std::vector<std::string> inputs = {arguments.positional(0)};
-    for (const char* option : {"rig", "curve"})
-      if (arguments.has(option)) inputs.push_back(arguments.text(option));
-    check_output(out, inputs);
-  }
   if (in.rig && !in.curve) build_own_curve(in);
   DiagnosisReport report;
   report.record = &in.record;
   report.warnings = in.record.warnings;
+  report.warnings.insert(report.warnings.end(), in.warnings.begin(), in.warnings.end());
   report.apd_settings = in.settings.apd;
   if (in.rig) report.rig = in.rig->rig.name;
   if (in.curve) {
@@ -180,7 +231,7 @@ int diagnose_record(const Arguments& arguments) {
     if (in.rig && in.curve->conditions.rig_digest != in.rig->digest)
       report.warnings.push_back("the curve was made from another version of the rig file; build it again");
   }
-  report.diagnosis = diagnose(in.record, in.settings, report.curve, std::nullopt, in.method);
+  report.diagnosis = diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);
   const std::string json =
       to_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
@@ -190,6 +241,9 @@ int diagnose_record(const Arguments& arguments) {
     write_text(out, json);
     print_summary(report, std::cout);
   }
+  if (arguments.has("save-baseline") &&
+      !save_baseline(report.diagnosis, in, arguments.text("save-baseline")))
+    return kInconclusive;
   return exit_code(report.diagnosis.verdict.grade);
 }
 

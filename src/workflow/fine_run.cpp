@@ -9,7 +9,7 @@
 namespace backlash {
 namespace {
 
-constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the excitation level
+constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the signal's scale
 constexpr double kFinestSampling = 1e5;                                      // Hz
 constexpr int kMostPhases = 16;
 constexpr double kFewestPerPeriod = 16;  // samples
@@ -29,6 +29,10 @@ double signal_of(const Observation& o, Channel channel) {
       return o.load_velocity;
     case Channel::sensor_torque:
       return o.sensor_torque;
+    case Channel::motor_current:
+      return o.motor_current;
+    case Channel::acceleration:
+      return o.acceleration;
     case Channel::reference_position:
       break;
   }
@@ -56,6 +60,29 @@ double largest_torque(const ExcitationSettings& excitation) {
   return largest;
 }
 
+void check_signal(const RigFile& file, Channel signal) {
+  if (file.rig.input_coupling.rigid && signal == Channel::sensor_torque)
+    throw InvalidParameter("diagnosis.apd.signal", "sensor_torque",
+                           "the rig's input coupling is rigid: no sensor");
+  if (std::isnan(file.rig.torque_constant) && signal == Channel::motor_current)
+    throw InvalidParameter("diagnosis.apd.signal", "motor_current",
+                           "needs gear_train.motor.torque_constant (N m/A)");
+}
+
+/// What noise is counted by, in the unit of the signal: for a torque the largest that the motor applies, for
+/// another signal its own rms value at the largest backlash.
+double signal_scale(CurvePlan plan) {
+  if (std::string(channel_unit(plan.apd.signal)) == channel_unit(Channel::motor_torque))
+    return largest_torque(plan.file.simulation.excitation);
+  plan.request.periods = 1;
+  const Progress nobody;
+  Ticker quiet(nobody, 1, "");
+  double squares = 0;
+  const FineRun run = run_fine(plan, plan.request.max_backlash, quiet, plan.file.rig);
+  for (const double value : run.signal) squares += value * value;
+  return std::sqrt(squares / static_cast<double>(run.signal.size()));
+}
+
 }  // namespace
 
 CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
@@ -69,9 +96,7 @@ CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
     throw InvalidParameter("excitation.type", file.simulation.excitation.type,
                            "a curve needs a periodic excitation");
   if (!(plan.apd.period > 0)) plan.apd.period = period;
-  if (file.rig.input_coupling.rigid && plan.apd.signal == Channel::sensor_torque)
-    throw InvalidParameter("diagnosis.apd.signal", "sensor_torque",
-                           "the rig's input coupling is rigid: no sensor");
+  check_signal(file, plan.apd.signal);
   if (!(request.sampling_rate * plan.apd.period >= kFewestPerPeriod))
     throw InvalidParameter("sample_rate", request.sampling_rate,
                            "must give at least 16 samples per period of " + to_text(plan.apd.period) + " s");
@@ -79,8 +104,8 @@ CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
   if (!(fine_samples(plan) <= kMostSamples))
     throw InvalidParameter("periods", request.periods, "too many samples at this sampling rate");
   const double declared = file.simulation.sensors.of(plan.apd.signal).noise;
-  for (const double share : kRelativeNoise)
-    plan.noise_levels.push_back(share * largest_torque(file.simulation.excitation));
+  const double scale = signal_scale(plan);
+  for (const double share : kRelativeNoise) plan.noise_levels.push_back(share * scale);
   plan.noise_levels.push_back(declared);
   std::sort(plan.noise_levels.begin(), plan.noise_levels.end());
   plan.noise_levels.erase(std::unique(plan.noise_levels.begin(), plan.noise_levels.end()),

@@ -1,5 +1,6 @@
 #include "backlash_diagnosis/workflow/rig_file.h"
 
+#include <cmath>
 #include <iterator>
 #include <memory>
 
@@ -31,6 +32,8 @@ RigFile parse(const std::string& text, const std::string& source) {
   yaml.finish();
   if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())
     yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");
+  if (file.simulation.sensors.of(Channel::motor_current).declared && std::isnan(file.rig.torque_constant))
+    yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
   const auto train = std::make_shared<GearTrain>(file.rig);  // refuses what cannot move
   if (file.diagnosis.lost_motion) {
     LostMotionSettings& lost_motion = *file.diagnosis.lost_motion;

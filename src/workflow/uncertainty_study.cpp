@@ -93,17 +93,23 @@ Record signal_alone(const Record& record, Channel signal) {
   return alone;
 }
 
-Estimate combined(const Diagnosis& diagnosis) {
+/// The verdict as one more estimate; where its members contradict each other nobody should rely on it.
+Estimate combined(const Verdict& verdict) {
   Estimate estimate;
-  if (diagnosis.verdict.estimate >= 0) estimate = diagnosis.estimates[diagnosis.verdict.estimate];
   estimate.method = "combined";
+  estimate.backlash = verdict.backlash;
+  estimate.lower = verdict.lower;
+  estimate.upper = verdict.upper;
+  estimate.message = verdict.message;
+  const bool sound = verdict.grade != Grade::cannot_tell && std::isfinite(verdict.backlash);
+  estimate.status = sound ? Status::ok : Status::ambiguous;
   return estimate;
 }
 
 std::vector<Estimate> estimates_of(const Record& record, const RigFile& file, const MonitoringCurve& curve) {
   const Diagnosis diagnosis = diagnose(record, file.diagnosis, &curve);
   std::vector<Estimate> all = diagnosis.estimates;
-  all.push_back(combined(diagnosis));
+  all.push_back(combined(diagnosis.verdict));
   return all;
 }
 

@@ -141,8 +141,15 @@ TEST(MonitoringCurve, AFlatCurveIsAmbiguous) {
   EXPECT_TRUE(std::isnan(e.backlash));
   EXPECT_EQ(e.lower, 0);
   EXPECT_TRUE(std::isnan(e.upper));
-  EXPECT_EQ(curve_through({3, 3, 3, 3, 3}, 0.1).invert(3.5, 1, 0).status, Status::below_range);
-  EXPECT_EQ(curve_through({3, 3, 3, 3, 3}, 0.1).invert(2.5, 1, 0).status, Status::above_range);
+  // Also off the curve: a bound would claim to know something.
+  for (const double off : {3.5, 2.5}) {
+    const Estimate far = curve_through({3, 3, 3, 3, 3}, 0.1).invert(off, 1, 0);
+    EXPECT_EQ(far.status, Status::ambiguous);
+    EXPECT_NE(far.message.find("does not depend on backlash"), std::string::npos) << far.message;
+  }
+  // 2 * 1.96 * 0.1 = 0.392 is what scatter hides.
+  EXPECT_TRUE(curve_through({3.19, 3.1, 3, 2.9, 2.81}, 0.1).flat());
+  EXPECT_FALSE(curve_through({3.2, 3.1, 3, 2.9, 2.8}, 0.1).flat());
 }
 
 TEST(MonitoringCurve, ARisingStretchIsFlaggedAndAllBranchesCovered) {

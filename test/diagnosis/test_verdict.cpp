@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -54,15 +55,82 @@ Verdict combined(const std::vector<Estimate>& estimates, const std::optional<Lim
   return combine(estimates, limits, baseline);
 }
 
-TEST(Verdict, StandsOnTheNarrowestSoundEstimate) {
+bool mentions(const Verdict& v, const std::string& words) {
+  return v.message.find(words) != std::string::npos;
+}
+
+TEST(Verdict, CombinesWhatAgreesSharpestFirst) {
   const Verdict v = combined({ok("wide", 9e-5, 3e-5), unable("off", Status::out_of_domain, "x"),
                               ok("narrow", 8e-5, 1e-6), ok("middle", 8e-5, 1e-5)});
   EXPECT_EQ(v.estimate, 2);
   EXPECT_EQ(v.agreement, "agree");
   EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_NE(v.message.find("narrow"), std::string::npos) << v.message;
-  EXPECT_NE(v.message.find("8e-05 m"), std::string::npos) << v.message;
+  EXPECT_EQ(v.members, (std::vector<int>{2, 3, 0}));
+  EXPECT_TRUE(v.dissenters.empty());
+  EXPECT_TRUE(mentions(v, "by narrow, middle, wide")) << v.message;
+  EXPECT_TRUE(mentions(v, "8.001e-05 m (95 %: 7.889e-05 to 8.113e-05)")) << v.message;
   EXPECT_TRUE(std::isnan(v.growth));
+  // By hand: weights 1, 1/100, 1/900 to (9e-5, 8e-5, 8e-5) and to the half widths (1e-6, 1e-5, 3e-5).
+  const double weights = 1 + 0.01 + 1 / 900.0, value = (8e-5 * 1.01 + 9e-5 / 900) / weights;
+  const double half = (1e-6 + 1e-5 / 100 + 3e-5 / 900) / weights;
+  EXPECT_NEAR(v.backlash, value, 1e-18);  // rounding
+  EXPECT_NEAR(v.lower, value - half, 1e-18);
+  EXPECT_NEAR(v.upper, value + half, 1e-18);
+  EXPECT_NEAR(v.backlash_angle, kToAngle * v.backlash, 1e-16);
+  EXPECT_NEAR(v.angle_lower, kToAngle * v.lower, 1e-16);
+  EXPECT_NEAR(v.angle_upper, kToAngle * v.upper, 1e-16);
+}
+
+// Errors of two estimators with standard deviations 1 and 2 um, uncorrelated, and fully correlated: the worst case.
+TEST(Verdict, TheIntervalHoldsItsPromiseForAnyCorrelation) {
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  constexpr int kRuns = 20000;
+  for (const double correlation : {0.0, 0.7, 1.0}) {
+    int hits = 0, agreed = 0;
+    double squares = 0;
+    for (int i = 0; i < kRuns; ++i) {
+      const double common = normal(random), own = normal(random);
+      const double a = 1e-6 * common;
+      const double b = 2e-6 * (correlation * common + std::sqrt(1 - correlation * correlation) * own);
+      const Verdict v = combined({ok("a", 5e-5 + a, 1.96e-6), ok("b", 5e-5 + b, 3.92e-6)});
+      if (v.agreement != "agree") continue;
+      ++agreed;
+      EXPECT_GE(v.upper - v.lower, 2 * 1.96e-6 * (1 - 1e-9));  // never narrower than the best member
+      hits += v.lower <= 5e-5 && 5e-5 <= v.upper;
+      squares += std::pow(v.backlash - 5e-5, 2);
+    }
+    // A binomial share of 20000 scatters by 0.15 %: three of them below 95 %.
+    EXPECT_GE(hits, 0.9455 * agreed) << correlation;
+    // Uncorrelated: sqrt(0.8^2 + (0.2 * 2)^2) = 0.894 um; 2 % is four standard deviations of that estimate.
+    if (correlation == 0) {
+      EXPECT_NEAR(std::sqrt(squares / agreed), 0.894e-6, 0.02e-6);
+    }
+  }
+}
+
+TEST(Verdict, AnExactEstimateNeedsNoOther) {
+  const Verdict v = combined({ok("a", 5e-5, 1e-5), ok("exact", 5.5e-5, 0), ok("b", 5e-5, 2e-5)});
+  EXPECT_EQ(v.backlash, 5.5e-5);
+  EXPECT_EQ(v.lower, 5.5e-5);
+  EXPECT_EQ(v.members.size(), 3u);
+}
+
+TEST(Verdict, AMemberThatKnowsNoLengthSaysNothingOfLengths) {
+  const Verdict v = combined({ok("a", 5e-5, 1e-6), angles_only(ok("b", 5.1e-5, 1e-6))});
+  EXPECT_EQ(v.agreement, "agree");
+  EXPECT_EQ(v.backlash, 5e-5);
+  EXPECT_NEAR(v.backlash_angle, kToAngle * 5.05e-5, 1e-16);
+  EXPECT_EQ(v.grade, Grade::good);
+}
+
+TEST(Verdict, SaysWhatTheIntervalDoesNotExclude) {
+  EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.05e-4)}), "good: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.2e-4)}), "good, but watch cannot be excluded: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.7e-4)}), "good, but service cannot be excluded: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 1.6e-4, 0.5e-4)}), "service, but stop cannot be excluded: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 3e-4, 1e-4)}), "stop: "));
+  EXPECT_TRUE(mentions(combined({at_least("m", 1.2e-4)}), "watch, but stop cannot be excluded: "));
 }
 
 TEST(Verdict, GradesAtTheLimits) {
@@ -87,9 +155,44 @@ TEST(Verdict, DisagreementIsToldWithTheNames) {
   EXPECT_EQ(v.estimate, 0);
   EXPECT_EQ(v.agreement, "disagree: c, d");
   EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_NE(v.message.find("disagree: c, d"), std::string::npos) << v.message;
+  EXPECT_EQ(v.members, (std::vector<int>{0, 1}));
+  EXPECT_EQ(v.dissenters, (std::vector<int>{2, 3}));
+  EXPECT_LT(v.upper, 6e-5);  // outvoted: their values are named, but not held by the interval
+  EXPECT_TRUE(mentions(v, "disagree: c 9e-05 m (95 %: 8.8e-05 to 9.2e-05), d 2e-05 m")) << v.message;
+  EXPECT_FALSE(mentions(v, "by itself")) << v.message;
+  v = combined({ok("a", 5e-5, 1e-6), ok("b", 5.1e-5, 1e-6), ok("c", 1.6e-4, 1e-6)});
+  EXPECT_EQ(v.grade, Grade::good);
+  EXPECT_TRUE(mentions(v, "c 0.00016 m (95 %: 0.000159 to 0.000161), service by itself")) << v.message;
   v = combined({ok("a", 5e-5, 1e-5), ok("b", 7e-5, 1e-5 + 1e-12)});  // the intervals just touch
   EXPECT_EQ(v.agreement, "agree");
+}
+
+TEST(Verdict, WithoutArbiterTheLargerIsGraded) {
+  const std::vector<Estimate> two = {ok("sharp", 5e-5, 1e-6), ok("b", 1.6e-4, 1e-5)};
+  Verdict v = combined(two);
+  EXPECT_EQ(v.grade, Grade::service);
+  EXPECT_EQ(v.estimate, 1);
+  EXPECT_EQ(v.agreement, "disagree: sharp");
+  EXPECT_EQ(v.backlash, 1.6e-4);
+  EXPECT_EQ(v.lower, 5e-5 - 1e-6);  // holds what the other says, too
+  EXPECT_EQ(v.upper, 1.6e-4 + 1e-5);
+  EXPECT_NEAR(v.angle_lower, kToAngle * v.lower, 1e-15);
+  EXPECT_TRUE(mentions(v, "sharp 5e-05 m")) << v.message;
+  EXPECT_TRUE(mentions(v, "nothing tells who is right, graded by the larger")) << v.message;
+  EXPECT_EQ(combined(two, std::nullopt).grade, Grade::cannot_tell);  // nothing to grade the larger by
+  // A wide one that agrees with both arbitrates nothing ...
+  v = combined({two[0], ok("wide", 1e-4, 6e-5), two[1]});
+  EXPECT_EQ(v.grade, Grade::service);
+  EXPECT_EQ(v.members, (std::vector<int>{2, 1}));
+  // ... but the sharpest, where it lies between two others, does.
+  v = combined({ok("low", 4e-5, 1e-5), ok("sharp", 5e-5, 1e-6), ok("high", 6.1e-5, 1.05e-5)});
+  EXPECT_EQ(v.estimate, 1);
+  EXPECT_EQ(v.members, (std::vector<int>{1, 0}));
+  EXPECT_EQ(v.agreement, "disagree: high");
+  EXPECT_FALSE(mentions(v, "nothing tells")) << v.message;
+  // The order of the estimates does not matter.
+  std::vector<Estimate> reversed(two.rbegin(), two.rend());
+  EXPECT_EQ(combined(reversed).message, combined(two).message);
 }
 
 TEST(Verdict, ALowerBoundAlone) {
@@ -104,9 +207,18 @@ TEST(Verdict, ALowerBoundAlone) {
 
 TEST(Verdict, ALowerBoundBesideASoundEstimate) {
   Verdict v = combined({at_least("apd", 2e-4), ok("lost", 5e-5, 1e-6)});
-  EXPECT_EQ(v.estimate, 1);
+  EXPECT_EQ(v.estimate, 0);
+  EXPECT_EQ(v.grade, Grade::stop);
+  EXPECT_EQ(v.agreement, "disagree: lost");
+  EXPECT_TRUE(std::isnan(v.backlash) && std::isnan(v.upper));
+  EXPECT_EQ(v.lower, 5e-5 - 1e-6);
+  v = combined({at_least("apd", 2e-4), ok("lost", 5e-5, 1e-6), ok("two", 5e-5, 1e-5)});  // outvoted
   EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_EQ(v.agreement, "disagree: apd");
+  EXPECT_TRUE(mentions(v, "disagree: apd at least 0.0002 m, stop by itself")) << v.message;
+  v = combined({at_least("low", 1e-4), at_least("high", 2e-4)});
+  EXPECT_EQ(v.estimate, 1);
+  EXPECT_EQ(v.lower, 2e-4);
+  EXPECT_EQ(v.grade, Grade::stop);
   v = combined({at_least("apd", 2e-4), ok("lost", 2.1e-4, 1e-6)});
   EXPECT_EQ(v.agreement, "agree");
   EXPECT_EQ(v.grade, Grade::stop);
@@ -140,6 +252,29 @@ TEST(Verdict, BaselineLimitsTheGrowth) {
   v = combined({ok("m", 1.6e-4, 1e-6)}, kLimits, Baseline());
   EXPECT_TRUE(std::isnan(v.growth));
   EXPECT_EQ(v.grade, Grade::service);
+}
+
+TEST(Verdict, GrowthHasTheUncertaintyOfNowAndThen) {
+  Baseline baseline;
+  baseline.methods = {"m"};
+  baseline.backlash = 5e-5;
+  baseline.lower = 5e-5 - 3e-6;
+  baseline.upper = 5e-5 + 12e-6;
+  Verdict v = combined({ok("m", 1.4e-4, 5e-6)}, kLimits, baseline);
+  EXPECT_NEAR(v.growth, 9e-5, 1e-18);
+  EXPECT_NEAR(v.growth_lower, 9e-5 - 13e-6, 1e-18);              // hypot(5, 12)
+  EXPECT_NEAR(v.growth_upper, 9e-5 + std::sqrt(34) * 1e-6, 1e-18);  // hypot(5, 3)
+  EXPECT_TRUE(mentions(v, "grown by 9e-05 m (95 %: 7.7e-05 to 9.583e-05) since the baseline")) << v.message;
+  EXPECT_EQ(v.message.find("good: "), 0u) << v.message;
+  v = combined({ok("m", 1.4e-4, 15e-6)}, kLimits, baseline);
+  EXPECT_TRUE(mentions(v, "good, but watch cannot be excluded")) << v.message;
+  EXPECT_FALSE(mentions(v, "other methods"));
+  v = combined({ok("b", 1.4e-4, 5e-6)}, kLimits, baseline);
+  EXPECT_TRUE(mentions(v, "(by other methods: m)")) << v.message;
+  v = combined({at_least("m", 2.62e-4)}, kLimits, baseline);
+  EXPECT_NEAR(v.growth, 2e-4, 1e-18);  // above the upper end of the baseline
+  EXPECT_TRUE(std::isnan(v.growth_upper));
+  EXPECT_EQ(v.grade, Grade::stop);
 }
 
 TEST(Verdict, Angles) {

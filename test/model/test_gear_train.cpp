@@ -216,6 +216,33 @@ TEST(GearTrain, PowerBalanceHoldsInEveryConfiguration) {
   }
 }
 
+// 10 N in the mesh and a spring torque of 6000 N m/rad times the twist of the output coupling on the gear.
+TEST(GearTrain, AccelerationIsThatOfTheGear) {
+  Rig rig = full_rig();
+  State s{};
+  s[1] = (3e-5 + 1e-6) / 0.02;  // pinion 1 um into the forward flank
+  s[3] = -2e-5;                 // the link behind the gear
+  const double torque = 0.02 * 10 - 6000 * 2e-5;
+  // 1 um is the difference of angles near 1.5 mrad: nine digits of it are left
+  EXPECT_NEAR(GearTrain(rig).observe(s.data(), 0).acceleration, torque / (5e-5 + 3e-6), 1e-6);
+  EXPECT_TRUE(std::isnan(GearTrain(rig).observe(s.data(), 0).motor_current));
+}
+
+TEST(GearTrain, AccelerationIsThatOfThePinionWhereTheGearIsFixed) {
+  Rig rig = full_rig();
+  rig.input_coupling = rig.output_coupling = Coupling{};
+  rig.link_locked = true;
+  rig.reduction_ratio = 50;
+  rig.torque_constant = 0.04;
+  State s{};  // in the middle of the gap: the motor torque alone acts
+  for (const bool motor_side : {false, true}) {
+    rig.motor_side = motor_side;
+    const Observation o = GearTrain(rig).observe(s.data(), 0.02);
+    EXPECT_DOUBLE_EQ(o.acceleration, 0.02 / (2e-5 + 3e-5)) << motor_side;  // on the axis of motor_position
+    EXPECT_DOUBLE_EQ(o.motor_current, 0.5);
+  }
+}
+
 // A motor-side rig and the same machine written from the load side.
 TEST(GearTrain, MotorSideRigIsTheSameMachine) {
   const double n = 50;

@@ -57,10 +57,10 @@ class CsvFileTest : public ::testing::Test {
 TEST(Csv, ReadsColumnsInAnyOrder) {
   const Record record = parse(
       "sensor_torque,time,motor_torque,motor_position,motor_velocity,load_position,load_velocity,"
-      "reference_position\n"
-      "1,0,2,3,4,5,6,7\n"
-      "-1e-3,0.5,+2.5,.5,5.,0,-0,1E2\n"
-      "1,1,2,3,4,5,6,7\n");
+      "reference_position,acceleration,motor_current\n"
+      "1,0,2,3,4,5,6,7,8,9\n"
+      "-1e-3,0.5,+2.5,.5,5.,0,-0,1E2,-8,0.9\n"
+      "1,1,2,3,4,5,6,7,8,9\n");
   EXPECT_EQ(record.name, "run.csv");
   EXPECT_EQ(record.time, (std::vector<double>{0, 0.5, 1}));
   EXPECT_EQ(record.column(Channel::sensor_torque), (std::vector<double>{1, -1e-3, 1}));
@@ -70,6 +70,8 @@ TEST(Csv, ReadsColumnsInAnyOrder) {
   EXPECT_EQ(record.column(Channel::load_position), (std::vector<double>{5, 0, 5}));
   EXPECT_EQ(record.column(Channel::load_velocity), (std::vector<double>{6, 0, 6}));
   EXPECT_EQ(record.column(Channel::reference_position), (std::vector<double>{7, 100, 7}));
+  EXPECT_EQ(record.column(Channel::acceleration), (std::vector<double>{8, -8, 8}));
+  EXPECT_EQ(record.column(Channel::motor_current), (std::vector<double>{9, 0.9, 9}));
   EXPECT_TRUE(record.warnings.empty());
 }
 
@@ -86,8 +88,9 @@ TEST(Csv, HarmlessVariationsReadTheSame) {
   }
 }
 
-TEST(Csv, OneSampleAndAnyOfTheFourChannelsIsEnough) {
-  for (const char* channel : {"motor_torque", "sensor_torque", "motor_position", "load_position"}) {
+TEST(Csv, OneSampleAndAnyTellingChannelIsEnough) {
+  for (const char* channel : {"motor_torque", "sensor_torque", "motor_position", "load_position",
+                              "motor_current", "acceleration"}) {
     EXPECT_EQ(parse("time," + std::string(channel) + "\n0,1\n").column(channel_from_name(channel)).size(),
               1u);
   }
@@ -103,10 +106,10 @@ TEST(Csv, MalformedHeadersAreRefusedWithPlaceAndReason) {
   const std::string known =
       "known are time, motor_torque, motor_position, motor_velocity, load_position, load_velocity, "
       "sensor_torque, "
-      "reference_position";
+      "reference_position, motor_current, acceleration";
   const std::string needed =
-      "no torque or position: needs at least one of motor_torque, sensor_torque, motor_position, "
-      "load_position; "
+      "no torque, position, current or acceleration: needs at least one of motor_torque, sensor_torque, "
+      "motor_position, load_position, motor_current, acceleration; "
       "there are: ";
   const Malformed cases[] = {
       {"", "run.csv:1: empty, expected column names"},
@@ -294,8 +297,7 @@ TEST_F(CsvFileTest, WhatCouldNotBeReadBackIsNotWritten) {
               r.column(Channel::sensor_torque).clear();
             }),
             "noise: a record needs at least one of motor_torque, sensor_torque, motor_position, "
-            "load_position to be "
-            "written");
+            "load_position, motor_current, acceleration to be written");
   EXPECT_EQ(broken([](Record& r) { r.column(Channel::motor_torque).pop_back(); }),
             "noise: motor_torque has 2 values, time has 3");
   EXPECT_EQ(broken([](Record& r) { r.column(Channel::sensor_torque)[1] = std::nan(""); }),

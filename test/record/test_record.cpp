@@ -28,12 +28,35 @@ TEST(Record, ChannelNamesAreTheColumnNamesAndInvertible) {
   EXPECT_EQ(channel_name(Channel::load_velocity), "load_velocity");
   EXPECT_EQ(channel_name(Channel::sensor_torque), "sensor_torque");
   EXPECT_EQ(channel_name(Channel::reference_position), "reference_position");
+  EXPECT_EQ(channel_name(Channel::motor_current), "motor_current");
+  EXPECT_EQ(channel_name(Channel::acceleration), "acceleration");
   std::set<std::string> names;
   for (const Channel channel : kChannels) {
     EXPECT_EQ(channel_from_name(channel_name(channel)), channel);
     names.insert(channel_name(channel));
   }
   EXPECT_EQ(names.size(), kChannelCount);
+}
+
+TEST(Record, ChannelsHaveTheUnitsOfARotaryAxis) {
+  EXPECT_STREQ(channel_unit(Channel::motor_torque), "N m");
+  EXPECT_STREQ(channel_unit(Channel::sensor_torque), "N m");
+  EXPECT_STREQ(channel_unit(Channel::load_position), "rad");
+  EXPECT_STREQ(channel_unit(Channel::motor_velocity), "rad/s");
+  EXPECT_STREQ(channel_unit(Channel::motor_current), "A");
+  EXPECT_STREQ(channel_unit(Channel::acceleration), "rad/s^2");
+}
+
+TEST(Record, TellsByAnyTorquePositionCurrentOrAcceleration) {
+  for (const Channel channel : kChannels) {
+    Record record;
+    record.time = {0};
+    record.column(channel) = {1};
+    const bool rate_or_reference = channel == Channel::motor_velocity || channel == Channel::load_velocity ||
+                                   channel == Channel::reference_position;
+    EXPECT_EQ(record.tells(), !rate_or_reference) << channel_name(channel);
+  }
+  EXPECT_FALSE(Record().tells());
 }
 
 TEST(Record, UnknownChannelIsNamedWithTheKnownOnes) {

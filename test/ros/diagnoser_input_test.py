@@ -3,29 +3,16 @@
 import copy
 import shutil
 import tempfile
-import threading
 import unittest
 
 import rospy
 import rostest
-from diagnoser_support import Diagnoser, Diagnostics, build_curve, level, simulated_messages
+from diagnoser_support import START, Connected, Diagnoser, Diagnostics, build_curve, level, send, simulated_messages
 from sensor_msgs.msg import JointState
 from simulator_support import TIMEOUT
 
 HALF_GAP = 4e-5  # m
-START = 1_000_000_000  # s, stamp of the first sample
 NAN, INF = float("nan"), float("inf")
-
-
-class Connected(rospy.SubscribeListener, threading.Event):
-    """Set as soon as a publisher has a subscriber."""
-
-    def __init__(self):
-        rospy.SubscribeListener.__init__(self)
-        threading.Event.__init__(self)
-
-    def peer_subscribe(self, *unused):
-        self.set()
 
 
 class DiagnoserInputTest(unittest.TestCase):
@@ -49,10 +36,7 @@ class DiagnoserInputTest(unittest.TestCase):
         self.assertTrue(connected.wait(TIMEOUT), "the diagnoser does not subscribe")
 
     def send(self, message, time):
-        message = copy.deepcopy(message)
-        seconds = int(time)
-        message.header.stamp = rospy.Time(START + seconds, int(round((time - seconds) * 1e9)))
-        self.publisher.publish(message)
+        send(self.publisher, message, time)
 
     def send_run(self, offset=0.0, until=1.2):
         for time, message in zip(self.times, self.messages):

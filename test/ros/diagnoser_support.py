@@ -1,8 +1,10 @@
 """What the tests of the diagnoser node share: the node as a process, a coarse curve, records to publish."""
+import copy
 import csv
 import os
 import subprocess
 import tempfile
+import threading
 
 import roslib.packages
 import rospy
@@ -11,6 +13,9 @@ from backlash_diagnosis.srv import Diagnose, GetCurve, SetBaseline
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from simulator_support import PACKAGE, TIMEOUT, Inbox, package_folder
+
+
+START = 1_000_000_000  # s, stamp of the first sample
 
 
 def rig_path(name="sarkar_1997"):
@@ -82,6 +87,10 @@ class Diagnoser:
     def alive(self):
         return self._process.poll() is None
 
+    def output(self):
+        """What it has printed so far; its descriptor is shared, so its place is left alone."""
+        return os.pread(self._log.fileno(), 1 << 20, 0).decode()
+
     def wait(self):
         code = self._process.wait(TIMEOUT)
         self._log.seek(0)
@@ -99,6 +108,25 @@ class Diagnoser:
                 self._process.kill()
                 self._process.wait()
         self._log.close()
+
+
+class Connected(rospy.SubscribeListener, threading.Event):
+    """Set as soon as a publisher has a subscriber."""
+
+    def __init__(self):
+        rospy.SubscribeListener.__init__(self)
+        threading.Event.__init__(self)
+
+    def peer_subscribe(self, *unused):
+        self.set()
+
+
+def send(publisher, message, time, start=START):
+    """Publishes a copy of the message, stamped `start` [s] + time [s]."""
+    message = copy.deepcopy(message)
+    seconds = int(time)
+    message.header.stamp = rospy.Time(start + seconds, int(round((time - seconds) * 1e9)))
+    publisher.publish(message)
 
 
 class Diagnostics:

@@ -159,7 +159,7 @@ TEST(SensorModel, OffsetAndNoiseComeBeforeSaturationAndThatBeforeQuantisation) {
 
 TEST(SensorModel, AMissingSensorStaysMissingAndDisturbsNobody) {
   SensorsSettings settings;
-  for (Channel channel : kChannels) settings.of(channel) = {0.1, 0.01, 1, 5};
+  for (Channel channel : kChannels) settings.of(channel) = {0.1, 0.01, 1, 5, false};
   SensorModel a(settings), b(settings);
   Observation there{}, missing{};
   missing.sensor_torque = std::nan("");
@@ -176,7 +176,7 @@ TEST(SensorModel, EachValueOfAnObservationHasItsOwnSensor) {
   for (std::size_t i = 0; i < kChannelCount; ++i) settings.channels[i].offset = 10.0 * (1 << i);
   SensorModel model(settings);
   const auto offset = [&](Channel channel) { return settings.of(channel).offset; };
-  Observation exact{1, 2, 3, 4, 5, 6, 7, 8, 9};
+  Observation exact{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
   const Observation measured = model.measure(exact);
   EXPECT_EQ(measured.motor_torque, 1 + offset(Channel::motor_torque));
   EXPECT_EQ(measured.motor_position, 2 + offset(Channel::motor_position));
@@ -187,6 +187,19 @@ TEST(SensorModel, EachValueOfAnObservationHasItsOwnSensor) {
   EXPECT_EQ(measured.sensor_twist, 5);  // no sensor of their own
   EXPECT_EQ(measured.sensor_twist_rate, 6);
   EXPECT_EQ(measured.load_torque, 9);
+}
+
+TEST(SensorModel, CurrentAndAccelerationAreMeasuredWhereTheRigDeclaresThem) {
+  Observation exact{};
+  exact.motor_current = 2;
+  exact.acceleration = 300;
+  const SensorsSettings none = read_sensors(YamlReader::from_text("{sampling_rate: 1, seed: 1}", "rig.yaml"));
+  EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).motor_current));
+  EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).acceleration));
+  const SensorsSettings both = read_sensors(YamlReader::from_text(
+      "{sampling_rate: 1, seed: 1, motor_current: {offset: 0.5}, acceleration: {resolution: 7}}", "rig.yaml"));
+  EXPECT_EQ(SensorModel(both).measure(exact).motor_current, 2.5);
+  EXPECT_EQ(SensorModel(both).measure(exact).acceleration, 301);
 }
 
 SensorsSettings read(const std::string& text) {

@@ -159,6 +159,7 @@ TEST(RigFile, MalformedFilesAreRefusedWithFileAndKey) {
       {"law: linear", "law: cubic", "gear_train.mesh.contact.law"},
       {"type: sine", "type: saw", "excitation.type"},
       {"sampling_rate: 500", "sampling_rate: 0", "sensors.sampling_rate"},
+      {"seed: 3", "seed: 3, motor_current: {noise: 0}", "torque_constant"},
       {"seed: 3", "seed: -3", "sensors.seed"},
       {"lost_motion: {torque: 0.5,", "lost_motion: {torque: -0.5,", "diagnosis.lost_motion.torque"},
       {"watch: 1, service: 2", "watch: 3, service: 2", "diagnosis.limits.backlash.service"},

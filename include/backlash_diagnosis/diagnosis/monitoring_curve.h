@@ -71,6 +71,10 @@ class MonitoringCurve {
   /// Standard deviation of the mean skewness over `periods` periods.
   static double deviation(const SkewnessCell& cell, int periods);
 
+  /// Whether skewness does not depend on backlash: at the declared noise no two points differ by more than the 95 %
+  /// scatter of their runs. True of a signal that is commanded, like the current of an ideally controlled motor.
+  bool flat() const;
+
   /// At the declared noise: what a plot of the curve shows.
   const SkewnessCell& nominal(const CurvePoint& point) const;
 
@@ -80,7 +84,8 @@ class MonitoringCurve {
   ///   below_range  skewness is higher than at the smallest backlash: no interval
   ///   above_range  the largest backlash of the curve explains it, so may an even larger one; or it is lower
   ///                than anywhere on the curve: a lower bound only
-  ///   ambiguous    the interval is longer than half of the curve; no upper bound where it reaches the end
+  ///   ambiguous    the interval is longer than half of the curve; no upper bound where it reaches the end; or the
+  ///                curve is flat
   Estimate invert(double skewness, int periods, const NoiseRange& noise) const;
   Estimate invert(double skewness, int periods, double noise) const {
     return invert(skewness, periods, {noise, noise});

@@ -1,45 +1,52 @@
-// One answer from several estimates: which one it stands on, which agree with it, and what to do.
+// One answer from several estimates: those that agree combined, those that do not named, and what to do.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/diagnosis/estimate.h"
+#include "backlash_diagnosis/diagnosis/limits.h"
 
 namespace backlash {
 
 enum class Grade { good, watch, service, stop, cannot_tell };
 const char* to_string(Grade grade);
 
-/// Backlash from which a grade begins, by experience with the machine: in m (`backlash`) or rad
-/// (`backlash_angle`). With a baseline they limit the growth since then.
-struct Limits {
-  bool angular = false;
-  double watch = 0, service = 0, stop = 0;  // increasing
-};
-
-Limits read_limits(const YamlReader& yaml);
-
-/// The healthy machine, to compare with.
-struct Baseline {
-  double backlash = kNaN;        // m
-  double backlash_angle = kNaN;  // rad, axis of motor_position
-  double skewness = kNaN;
-};
-
 struct Verdict {
   Grade grade = Grade::cannot_tell;
-  int estimate = -1;      // index of the estimate that the verdict stands on; -1: none
-  std::string agreement;  // "none", "single", "agree", or "disagree: ..." with the names
-  double growth = kNaN;   // since the baseline, in the unit of the limits
+  int estimate = -1;         // index of the sharpest estimate of those that the verdict stands on; -1: none
+  std::string agreement;     // "none", "single", "agree", or "disagree: ..." with the names
+  std::vector<int> members;  // indices of the estimates that the verdict stands on
+  std::vector<int> dissenters;                         // of the sound ones that contradict them
+  double backlash = kNaN, lower = kNaN, upper = kNaN;  // m, 95 % interval; NaN end: open
+  double backlash_angle = kNaN, angle_lower = kNaN, angle_upper = kNaN;  // rad, axis of motor_position
+  double growth = kNaN, growth_lower = kNaN, growth_upper = kNaN;  // since the baseline, unit of the limits
   std::string message;
 };
 
-/// Stands on the estimate with status ok and the narrowest interval. Others with status ok, or above_range
-/// with its lower bound, agree where the intervals overlap. Without limits a sound estimate is graded good.
-/// An above_range estimate alone is graded by its lower bound.
+/// Sound are estimates with status ok, and with above_range where they give a lower bound. They agree where
+/// their intervals have a point in common. The verdict stands on the largest set of those that agree; of
+/// several the one with the sharpest member.
+///
+/// Combination: the weighted mean of the members' values, of their lower and of their upper ends, weight
+/// 1 / width^2 (inverse variance; lower bounds and estimates without interval have weight 0). The members
+/// come from one record and share its noise, sampling and model, so their errors are correlated by an unknown
+/// amount. The standard deviation of a weighted mean is at most the weighted mean of the standard deviations,
+/// with equality for full correlation: the interval promises its 95 % whatever the correlation is, and is
+/// never narrower than the best member's. (Covariance intersection of scalars, after Julier and Uhlmann 1997,
+/// is the best member alone; it is as honest but takes nothing from the others.)
+///
+/// Contradiction: a larger set outvotes the others, which are named with their values and, where they would
+/// grade worse, with that grade. Where another set is as large, none can arbitrate: the verdict stands on the
+/// set with more backlash, as a needless inspection costs less than a broken tooth, and its interval is
+/// widened to hold the others. Without limits such a contradiction is cannot_tell.
+///
+/// Grade: of the combined value by the limits, or with a baseline of its growth since then; without limits a
+/// sound estimate is good. Where the interval reaches into a worse grade the message says so. Lower bounds
+/// alone are graded by the highest of them, or cannot_tell below `watch`. The interval of the growth adds the
+/// uncertainties of now and then as independent ones: different records; what they share cancels.
 Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limits>& limits,
                 const std::optional<Baseline>& baseline);
 

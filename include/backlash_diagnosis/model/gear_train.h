@@ -23,6 +23,8 @@ struct Observation {
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
   double load_position, load_velocity;
   double load_torque;     // N m, spring torque of the output coupling; NaN if rigid
+  double motor_current;   // A, motor_torque / torque constant: an ideal current control; NaN without the constant
+  double acceleration;    // rad/s^2, of the gear; of the pinion (as motor_position) where the gear cannot move
 };
 
 class GearTrain {
@@ -37,7 +39,8 @@ class GearTrain {
   /// dstate/dt at time t [s] for a motor torque in the units of the rig's records [N m].
   void derivative(double t, const double* state, double motor_torque, double* rate) const;
 
-  Observation observe(const double* state, double motor_torque) const;
+  /// `t` [s] matters only to terms that depend on time.
+  Observation observe(const double* state, double motor_torque, double t = 0) const;
 
   /// Kinetic plus elastic energy (couplings, contact) [J], without terms.
   double energy(const double* state) const;
@@ -96,6 +99,7 @@ class GearTrain {
   double impact_speed_ = 0;  // m/s, approach speed at the last touch
   double acting_gap_;        // where the force begins: half_gap_, or infinite between touches
   Flank flank_ = kApart;     // in contact, for a law that needs touches
+  double torque_constant_;  // N m/A, NaN if unknown
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;

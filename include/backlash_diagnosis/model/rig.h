@@ -52,6 +52,7 @@ struct Rig {
   double reduction_ratio = 1;  // motor turns per load turn, > 0
   bool motor_side = false;
   Body motor, pinion, gear, link;
+  double torque_constant = std::numeric_limits<double>::quiet_NaN();  // motor_torque per motor_current, N m/A; NaN: unknown
   Coupling input_coupling, output_coupling;
   bool link_locked = false;
   Mesh mesh;

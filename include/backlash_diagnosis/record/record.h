@@ -19,15 +19,23 @@ enum class Channel {
   load_velocity,       // rad/s
   sensor_torque,       // N m, torque in the input coupling
   reference_position,  // rad
+  motor_current,       // A, of the motor
+  acceleration,        // rad/s^2 (linear axis: m/s^2), of the load gear or whatever part carries the accelerometer
 };
-constexpr std::size_t kChannelCount = 7;
+constexpr std::size_t kChannelCount = 9;
 extern const std::array<Channel, kChannelCount> kChannels;
 
 /// Column name of a channel in a CSV, the same as its enumerator.
 const std::string& channel_name(Channel channel);
 
+/// Unit of a channel on a rotary axis, for messages.
+const char* channel_unit(Channel channel);
+
 /// Inverse of channel_name; throws InvalidParameter for a name that is no channel.
 Channel channel_from_name(const std::string& name);
+
+/// The channels that can tell of backlash: a record needs at least one of them.
+extern const std::array<Channel, 6> kTellingChannels;
 
 /// One sample of all channels; NaN where there is none.
 using ChannelValues = std::array<double, kChannelCount>;
@@ -45,6 +53,9 @@ class Record {
   /// Values of a channel; empty when the record does not have it.
   const std::vector<double>& column(Channel channel) const { return columns_[static_cast<std::size_t>(channel)]; }
   std::vector<double>& column(Channel channel) { return columns_[static_cast<std::size_t>(channel)]; }
+
+  /// Whether it has one of kTellingChannels.
+  bool tells() const;
 
   /// Median distance between samples [s]; 0 with fewer than two samples.
   double sampling_interval() const;

@@ -47,6 +47,9 @@ class DiagnoserNode {
   bool on_diagnose(backlash_diagnosis::Diagnose::Request& request, backlash_diagnosis::Diagnose::Response& response);
   bool on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
                        backlash_diagnosis::SetBaseline::Response& response);
+  /// Takes the diagnosis of all that is kept as baseline, or forgets it; and the same in its file.
+  void set_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response);
+  void clear_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response);
   bool on_get_curve(backlash_diagnosis::GetCurve::Request& request, backlash_diagnosis::GetCurve::Response& response);
   void on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal);
   void advertise();

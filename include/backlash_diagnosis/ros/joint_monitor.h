@@ -21,6 +21,8 @@ namespace backlash {
 struct MonitorSettings {
   std::string joint;
   RigFile rig;
+  std::optional<Baseline> baseline;
+  std::string baseline_path;             // where a new baseline is kept; empty: nowhere
   std::optional<MonitoringCurve> curve;  // absent: built from the rig at the sampling rate of the messages
   int window = 5;                        // periods that the running estimates look back
   double keep = 60;                      // s of samples kept
@@ -39,6 +41,7 @@ struct MonitorState {
   long bad_messages = 0;          // wrong array sizes, infinite values, names twice
   std::string last_problem;
   std::string curve_state;        // "loaded", "building, 40 %", "built", "none: ..."
+  std::vector<std::string> warnings;  // about curve and baseline: of another version of the rig file
   double rate = 0;                // Hz, of the samples kept
   double period = 0;              // s
   long periods = 0;               // whole settled ones at hand
@@ -54,6 +57,7 @@ class JointMonitor {
 
   const std::string& joint() const { return settings_.joint; }
   const RigFile& rig() const { return settings_.rig; }
+  const std::string& baseline_path() const { return settings_.baseline_path; }
 
   /// Takes a message that mentions the joint; a report when it completes a period. Never throws for bad content: that is
   /// counted and told by state().
@@ -86,6 +90,7 @@ class JointMonitor {
   std::optional<Baseline> baseline_;
   std::optional<Diagnosis> latest_;
   std::string curve_state_, last_problem_;
+  std::string curve_warning_, baseline_warning_;
   long bad_messages_ = 0;
   ros::WallTime last_arrival_;
   bool building_ = false, build_tried_ = false, stop_ = false;

@@ -4,6 +4,10 @@
 //   <joint>_sensor      position = twist of the input coupling (not recorded)    effort = sensor_torque
 //   <joint>_load        position = load_position     velocity = load_velocity
 //   <joint>_reference   position = reference_position
+//   <joint>_current         effort = motor_current [A]
+//   <joint>_accelerometer   effort = acceleration [rad/s^2]
+//
+// sensor_msgs/JointState has no field for a current or an acceleration; these two are put where a torque would be.
 //
 // A joint whose name is absent has none of its channels; a NaN, or an empty position, velocity or effort array, means
 // "this joint does not have that quantity".
@@ -22,7 +26,7 @@ namespace backlash {
 
 struct JointNames {
   explicit JointNames(const std::string& joint);
-  std::string motor, sensor, load, reference;
+  std::string motor, sensor, load, reference, current, accelerometer;
 };
 
 /// Stamps to seconds since the first one, exact to the nanosecond.

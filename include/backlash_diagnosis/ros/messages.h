@@ -16,7 +16,8 @@ backlash_diagnosis::AmplitudeDistribution to_message(const PeriodResult& period,
 /// All periods of an analysis together; skewness is the mean over the periods.
 backlash_diagnosis::AmplitudeDistribution to_message(const ApdResult& apd, const ApdSettings& settings);
 backlash_diagnosis::BacklashEstimate to_message(const Estimate& estimate);
-backlash_diagnosis::Verdict to_message(const Verdict& verdict);
+/// The estimates that the verdict is about give its members their names.
+backlash_diagnosis::Verdict to_message(const Verdict& verdict, const std::vector<Estimate>& estimates);
 backlash_diagnosis::MonitoringCurve to_message(const MonitoringCurve& curve);
 
 }  // namespace backlash

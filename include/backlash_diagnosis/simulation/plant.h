@@ -41,7 +41,7 @@ class Plant {
   const GearTrain& gear_train() const { return gear_train_; }
   double excitation_period() const { return excitation_->period(); }
   double motor_torque() const { return excitation_->torque(time_, segment_); }
-  Observation observe() const { return gear_train_.observe(state_.data(), motor_torque()); }
+  Observation observe() const { return gear_train_.observe(state_.data(), motor_torque(), time_); }
   IntegratorStatistics statistics() const { return integrator_.statistics(); }
 
  private:

@@ -20,6 +20,7 @@ struct SensorSettings {
   double resolution = 0;  // width of a step; 0: none
   double offset = 0;
   double limit = std::numeric_limits<double>::infinity();  // saturation at +-limit
+  bool declared = false;  // in the rig file; motor_current and acceleration are recorded only then
 };
 
 /// All sensors of a rig, and how they sample.

@@ -45,11 +45,25 @@ Json estimate_json(const Estimate& e) {
   return json;
 }
 
-Json verdict_json(const Verdict& verdict) {
+Json methods_json(const std::vector<Estimate>& estimates, const std::vector<int>& chosen) {
+  Json names = Json::array();
+  for (const int i : chosen) names.push_back(estimates[i].method);
+  return names;
+}
+
+Json verdict_json(const Verdict& verdict, const std::vector<Estimate>& estimates) {
   Json json;
   json["grade"] = to_string(verdict.grade);
   json["estimate"] = verdict.estimate < 0 ? Json(nullptr) : Json(verdict.estimate);
   json["agreement"] = verdict.agreement;
+  json["members"] = methods_json(estimates, verdict.members);
+  json["dissenters"] = methods_json(estimates, verdict.dissenters);
+  json["backlash"] = number(verdict.backlash);
+  json["interval"] = interval(verdict.lower, verdict.upper);
+  json["backlash_angle"] = number(verdict.backlash_angle);
+  json["angle_interval"] = interval(verdict.angle_lower, verdict.angle_upper);
+  json["growth"] = number(verdict.growth);
+  json["growth_interval"] = interval(verdict.growth_lower, verdict.growth_upper);
   json["message"] = verdict.message;
   return json;
 }
@@ -135,7 +149,7 @@ Json to_json(const DiagnosisReport& report) {
   json["record"] = report.record->name;
   json["estimates"] = Json::array();
   for (const Estimate& e : report.diagnosis.estimates) json["estimates"].push_back(estimate_json(e));
-  json["verdict"] = verdict_json(report.diagnosis.verdict);
+  json["verdict"] = verdict_json(report.diagnosis.verdict, report.diagnosis.estimates);
   const bool has_apd = report.diagnosis.apd && report.apd_settings;
   json["apd"] = has_apd ? apd_json(*report.diagnosis.apd, *report.apd_settings) : Json(nullptr);
   json["warnings"] = report.warnings;

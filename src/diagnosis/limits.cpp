@@ -1,0 +1,32 @@
+#include "backlash_diagnosis/diagnosis/limits.h"
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+
+Limits read_limits(const YamlReader& yaml) {
+  Limits limits;
+  limits.angular = yaml.has("backlash_angle");
+  const YamlReader values = yaml.map(limits.angular ? "backlash_angle" : "backlash");
+  limits.watch = values.number("watch", Range::positive());
+  limits.service = values.number("service", Range::positive());
+  limits.stop = values.number("stop", Range::positive());
+  if (!(limits.watch <= limits.service && limits.service <= limits.stop))
+    values.fail("service", "limits must not decrease from watch over service to stop");
+  return limits;
+}
+
+Limits read_limits_file(const std::string& path) {
+  const YamlReader yaml = YamlReader::from_file(path);
+  yaml.integer("schema_version", 1, 1);
+  const Limits limits = read_limits(yaml);
+  yaml.finish();
+  return limits;
+}
+
+void check_limits(const Limits& limits, bool angular_machine, const std::string& source) {
+  if (angular_machine && !limits.angular)
+    throw BadData(source, "a rig without base_radius needs limits of backlash_angle");
+}
+
+}  // namespace backlash
