@@ -112,7 +112,7 @@ Json work_json(const WorkPrecision& work) {
 
 Json study_json(const IntegratorStudy& study, const IntegratorStudySettings& settings, const RigFile& rig) {
   Json json = {
-      {"schema_version", 1},           {"version", BACKLASH_DIAGNOSIS_VERSION}, {"rig", rig.rig.name},
+      {"schema_version", 1},           {"version", version()}, {"rig", rig.rig.name},
       {"half_gap", settings.half_gap}, {"rig_duration", settings.rig_duration}, {"starts", settings.starts},
       {"right_share", kRight}};
   for (std::size_t i = 0; i < settings.teeth.size(); ++i)

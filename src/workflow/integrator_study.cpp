@@ -161,11 +161,11 @@ double IntegratorStudy::right_from(const std::string& tooth, const std::string& 
 }
 
 void study_tooth(const Tooth& tooth, const IntegratorStudySettings& settings, IntegratorStudy& study,
-                 const std::function<void()>& tick) {
+                 const std::function<void()>& tick, const std::vector<std::string>& methods) {
   ToothReference reference;
   const Starts starts = make_starts(tooth, settings, reference);
   study.references.push_back(reference);
-  for (const std::string& method : integrator_methods()) {
+  for (const std::string& method : methods) {
     for (const AbsoluteTolerance absolute : kKinds)
       for (int decade = kLoosest; decade <= kTightest; ++decade)
         study.rows.push_back(make_row(starts, method, absolute, std::pow(10, -decade), settings.samples));
@@ -190,7 +190,7 @@ WorkPrecision impact_work(const Tooth& tooth, int starts, const std::function<vo
 }
 
 WorkPrecision rig_work(const RigFile& file, double half_gap, double duration, WorkPoint& declared,
-                       const std::function<void()>& tick) {
+                       const std::function<void()>& tick, const std::vector<std::string>& methods) {
   Rig rig = file.rig;
   rig.mesh.backlash = 2 * half_gap;
   const SolverSettings& own = file.simulation.solver;
@@ -210,7 +210,7 @@ WorkPrecision rig_work(const RigFile& file, double half_gap, double duration, Wo
     accumulate(statistics, plant.statistics());
     return signal;
   };
-  const WorkPrecision work("rig", solve, tick);
+  const WorkPrecision work("rig", solve, tick, methods);
   declared = work.measure(solve, own.method, own.relative_tolerance);
   return work;
 }

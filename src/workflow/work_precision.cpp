@@ -22,12 +22,13 @@ double cost_of(const WorkPoint& point, Cost kind) {
 
 }  // namespace
 
-WorkPrecision::WorkPrecision(std::string problem, const Solve& solve, const std::function<void()>& tick)
+WorkPrecision::WorkPrecision(std::string problem, const Solve& solve, const std::function<void()>& tick,
+                             const std::vector<std::string>& methods)
     : problem_(std::move(problem)) {
   IntegratorStatistics ignored;
   reference_ = solve("verner", kReferenceTolerance, ignored);
   agreement_ = error_of(solve("dormand_prince", kReferenceTolerance, ignored));
-  for (const std::string& method : integrator_methods()) {
+  for (const std::string& method : methods) {
     for (int half = kLoosest; half <= kTightest; ++half)
       points_.push_back(measure(solve, method, std::pow(10, -0.5 * half)));
     if (tick) tick();

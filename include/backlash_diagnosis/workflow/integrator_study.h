@@ -78,10 +78,11 @@ struct IntegratorStudy {
                     double share) const;
 };
 
-/// All starts of all methods at 1e-1 ... 1e-10 on one tooth. Throws InvalidParameter where the right motion
+/// All starts of each method at 1e-1 ... 1e-10 on one tooth. Throws InvalidParameter where the right motion
 /// comes back to the other flank; Cancelled.
 void study_tooth(const Tooth& tooth, const IntegratorStudySettings& settings, IntegratorStudy& study,
-                 const std::function<void()>& tick = nullptr);
+                 const std::function<void()>& tick = nullptr,
+                 const std::vector<std::string>& methods = integrator_methods());
 
 /// End states of the impacts from all starts.
 WorkPrecision impact_work(const Tooth& tooth, int starts, const std::function<void()>& tick = nullptr);
@@ -89,7 +90,8 @@ WorkPrecision impact_work(const Tooth& tooth, int starts, const std::function<vo
 /// Signal of the input coupling (rigid: motor position) at the rig's sampling rate, from rest in the middle
 /// of the gap. The absolute tolerances keep their proportion to the relative one.
 WorkPrecision rig_work(const RigFile& file, double half_gap, double duration, WorkPoint& declared,
-                       const std::function<void()>& tick = nullptr);
+                       const std::function<void()>& tick = nullptr,
+                       const std::vector<std::string>& methods = integrator_methods());
 
 /// All of it. Deterministic but for the CPU times. Throws IntegrationError, InvalidParameter, Cancelled.
 IntegratorStudy study_integrators(const RigFile& file, const IntegratorStudySettings& settings,

@@ -27,10 +27,11 @@ enum class Cost { evaluations, cpu_time };
 
 class WorkPrecision {
  public:
-  /// Solves at each half decade of tolerance from 1e-3 to 1e-11 with each method and takes norm(y -
+  /// Solves at each half decade of tolerance from 1e-3 to 1e-11 with each of `methods` and takes norm(y -
   /// reference) / norm(reference) for the error. The reference is verner at 1e-13, agreement() its error
   /// against dormand_prince at 1e-13. `tick` is called after each method. Throws what `solve` throws.
-  WorkPrecision(std::string problem, const Solve& solve, const std::function<void()>& tick);
+  WorkPrecision(std::string problem, const Solve& solve, const std::function<void()>& tick,
+                const std::vector<std::string>& methods = integrator_methods());
 
   /// One more point with the same reference.
   WorkPoint measure(const Solve& solve, const std::string& method, double relative_tolerance) const;
