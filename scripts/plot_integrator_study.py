@@ -60,7 +60,7 @@ def draw_motion(axes, tooth, drawn):
     axes.axhspan(-10 * gap, -gap, color="0.85", linewidth=0)
     axes.plot(time, [1e6 * v for v in drawn["penetration"]], color=COLOURS[drawn["method"]], linewidth=1.2)
     axes.set_xlim(0, time[-1])
-    axes.set_ylim(-1.25 * gap, 0.6 * gap if gap > 100 else 0.25 * gap)
+    axes.set_ylim(-1.5 * gap, 0.75 * gap)
     axes.set_xlabel("time [ms]")
     axes.set_ylabel("tooth '%s' [um]" % tooth["name"])
 
@@ -99,6 +99,11 @@ def draw_work(study, plt):
                 axes.plot(scale * own[key], own["error"], "o", markersize=11, markerfacecolor="none",
                           markeredgecolor="black", label="the rig file's solver")
             axes.set_ylim(1e-12, 1)
+            lost = [m for m in COLOURS if all(p["error"] is None or p["error"] > 1 for p in work["points"]
+                                              if p["method"] == m)]
+            if lost:
+                axes.text(0.97, 0.96, "error > 1 at all tolerances: " + ", ".join(lost), transform=axes.transAxes,
+                          ha="right", va="top", fontsize=8)
             axes.set_xlabel(label)
             axes.set_ylabel("relative error, %s" % work["problem"])
             axes.grid(True, which="major", alpha=0.3)
@@ -114,7 +119,7 @@ def save(figure, path):
     try:
         handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path) or ".", suffix=".png")
         os.close(handle)
-        figure.savefig(temporary, dpi=90)
+        figure.savefig(temporary, dpi=75)
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)
