@@ -111,10 +111,13 @@ Json work_json(const WorkPrecision& work) {
 }
 
 Json study_json(const IntegratorStudy& study, const IntegratorStudySettings& settings, const RigFile& rig) {
-  Json json = {
-      {"schema_version", 1},           {"version", version()}, {"rig", rig.rig.name},
-      {"half_gap", settings.half_gap}, {"rig_duration", settings.rig_duration}, {"starts", settings.starts},
-      {"right_share", kRight}};
+  Json json = {{"schema_version", 1},
+               {"version", version()},
+               {"rig", rig.rig.name},
+               {"half_gap", settings.half_gap},
+               {"rig_duration", settings.rig_duration},
+               {"starts", settings.starts},
+               {"right_share", kRight}};
   for (std::size_t i = 0; i < settings.teeth.size(); ++i)
     json["teeth"].push_back(tooth_json(settings.teeth[i], study.references[i], study));
   for (const WorkPrecision& work : study.work) json["work"].push_back(work_json(work));

@@ -40,8 +40,7 @@ void draw(const std::string& name, const std::string& out, const std::string& da
   const fs::path script = fs::read_symlink("/proc/self/exe", error).parent_path() / name;
   if (error || !fs::exists(script)) throw Error("cannot plot: " + script.string() + " is missing");
   const int code = run({kPython, script.string(), "--out", out, "--", data});
-  if (code == kCannotWrite)
-    throw CannotWrite(out + ": cannot be written; " + what + " itself is in " + data);
+  if (code == kCannotWrite) throw CannotWrite(out + ": cannot be written; " + what + " itself is in " + data);
   if (code != kHealthy)
     throw Error(name + " failed (exit code " + std::to_string(code) + "); " + what + " itself is in " + data);
 }
