@@ -51,6 +51,7 @@ struct Rig {
   bool motor_side = false;
   Body motor, pinion, gear, link;
   Coupling input_coupling, output_coupling;
+  bool sensor_with_damper = false;  // sensor_torque is spring plus damper of the input coupling, not the spring alone
   bool link_locked = false;
   Mesh mesh;
   std::vector<std::shared_ptr<const Term>> terms;
