@@ -33,7 +33,9 @@ Command command() {
       {"budget", "N", "rigs to try; default: the search file's"},
       {"seed", "N", "of the search; default: the search file's"},
       {"set", "KEY=VALUE,...",
-       "values of the rig file that are not searched, e.g. gear_train.motor.inertia=2.24e-4"},
+       "changes parameters of the search: a value that is not searched (gear_train.motor.inertia=2.24e-4), "
+       "or bounds "
+       "(gear_train.input_coupling.damping=1e-5..0.1, log scale)"},
       {"check", "RIG.yaml", "do not search: judge this rig by the targets of the search file, in seconds"},
   };
   c.notes =
@@ -99,7 +101,7 @@ void set_values(SearchFile& search, const std::string& list) {
     const std::size_t equals = item.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == item.size())
       throw UsageError("--set " + list + ": '" + item + "' is not KEY=VALUE");
-    fix_parameter(search, item.substr(0, equals), item.substr(equals + 1));
+    set_parameter(search, item.substr(0, equals), item.substr(equals + 1));
   }
 }
 

@@ -267,16 +267,24 @@ SearchFile load_search_file(const std::string& path) {
   return search;
 }
 
-void fix_parameter(SearchFile& search, const std::string& key, const std::string& value) {
+void set_parameter(SearchFile& search, const std::string& key, const std::string& value) {
   auto place = std::find_if(search.parameters.begin(), search.parameters.end(),
                             [&](const FreeParameter& p) { return p.key == key; });
-  if (place == search.parameters.end()) {
-    search.parameters.emplace_back();
-    place = search.parameters.end() - 1;
-    place->key = key;
-    place->comment = "set";
+  if (place == search.parameters.end())
+    place = search.parameters.insert(place, FreeParameter{key, "set", 0, 0, false, {}});
+  const std::size_t dots = value.find("..");
+  place->choices.clear();
+  if (dots == std::string::npos) {
+    place->choices = {value};
+    return;
   }
-  place->choices = {value};
+  const ParsedNumber lower = parse_number(value.substr(0, dots)),
+                     upper = parse_number(value.substr(dots + 2));
+  if (!lower || !upper || !(lower.value > 0 && lower.value < upper.value))
+    throw InvalidParameter(key, value, "must be a value or LOWER..UPPER with 0 < LOWER < UPPER");
+  place->lower = lower.value;
+  place->upper = upper.value;
+  place->logarithmic = true;
 }
 
 CurveFit fit_of(const RigFile& file, const CurveTarget& target) {

@@ -109,6 +109,22 @@ TEST(SearchFile, IsReadStrictly) {
                MissingInput);
 }
 
+TEST(SearchFile, ParametersCanBeSet) {
+  const Folder folder;
+  SearchFile search = load_search_file(folder.write(kSearch));
+  set_parameter(search, "gear_train.input_coupling.damping", "0.053");
+  EXPECT_TRUE(search.parameters[1].fixed());
+  EXPECT_EQ(search.parameters[1].value(0.5), "0.053");
+  set_parameter(search, "gear_train.mesh.contact.alpha", "0.01..1");
+  EXPECT_FALSE(search.parameters[2].fixed());
+  EXPECT_EQ(search.parameters[2].value(0.5), "0.1");
+  set_parameter(search, "gear_train.motor.inertia", "2.24e-4");
+  ASSERT_EQ(search.parameters.size(), 4u);
+  EXPECT_EQ(search.parameters[3].key, "gear_train.motor.inertia");
+  for (const char* wrong : {"0..1", "2..1", "a..b", "1.."})
+    EXPECT_THROW(set_parameter(search, "k", wrong), InvalidParameter) << wrong;
+}
+
 TEST(ParameterSearch, RefusesAParameterThatTheRigDoesNotKnow) {
   const Folder folder;
   const std::string wrong = replaced(kSearch, "contact.alpha", "contact.alfa");
@@ -159,6 +175,38 @@ TEST(ParameterSearch, ReadsTheSkewnessThatWideClassesMustGive) {
   EXPECT_NEAR(fit.published[0].skewness, 36 / std::sqrt(76), 0.1);
   EXPECT_NEAR(fit.rms, std::fabs(fit.published[0].skewness - 1), 1e-12);
   EXPECT_NEAR(fit.published[0].highest_class, 50, 10);
+}
+
+// The rig of the package that claims to meet the five published values (Sarkar, Ellis and Moore 1997, Fig.
+// 10) with rms 0.065 and to fall all the way. 0.08 leaves room for another compiler's rounding: sampling
+// phases alone move the values by some hundredths.
+TEST(ParameterSearch, TheFittedRigMeetsThePublishedValuesAndItsCurveNeverRises) {
+  CurveTarget target;
+  target.backlash = {0, 5e-5, 1e-4, 1.5e-4, 2e-4};
+  target.skewness = {4.6346, 3.7013, 2.9010, 2.2009, 1.5762};
+  target.max_backlash = 2e-4;
+  target.points = 21;
+  target.phases = 4;
+  const RigFile file = load_rig_file(test::package_file("config/sarkar_1997_fitted.yaml"));
+  const CurveFit fit = fit_of(file, target);
+  EXPECT_LE(fit.rms, 0.08);
+  EXPECT_EQ(fit.rise, 0);
+  for (std::size_t i = 1; i < fit.curve.size(); ++i)
+    EXPECT_LT(fit.curve[i].skewness, fit.curve[i - 1].skewness) << fit.curve[i].backlash;
+  // What the paper prints is kept (Table 2), and what it shows is met: Fig. 10 has axes of 30 % and +-0.2 N
+  // m.
+  EXPECT_EQ(file.rig.motor.inertia, 2.24e-5);
+  EXPECT_EQ(file.rig.motor.viscous_damping, 0.0048);
+  EXPECT_EQ(file.rig.input_coupling.stiffness, 28.71);
+  EXPECT_EQ(file.rig.input_coupling.damping, 0.053);
+  EXPECT_EQ(file.rig.pinion.inertia, 2.1e-5);
+  EXPECT_EQ(file.rig.gear.inertia, 2.1e-5);
+  EXPECT_EQ(file.simulation.excitation.amplitude, 0.05);
+  EXPECT_EQ(file.simulation.excitation.frequency, 10);
+  for (const CurveFit::Point& point : fit.published) {
+    EXPECT_LT(point.highest_class, 30);
+    EXPECT_LT(point.largest_torque, 0.2);
+  }
 }
 
 }  // namespace

@@ -58,8 +58,9 @@ struct SearchFile {
 /// Reads a search file; the path of its rig is relative to it. Throws MissingInput, BadData.
 SearchFile load_search_file(const std::string& path);
 
-/// Takes a value of the rig file out of the search, or sets one that the search file does not name.
-void fix_parameter(SearchFile& search, const std::string& key, const std::string& value);
+/// Changes a parameter of the search, or adds one: "0.053" sets a value that is not searched, "1e-5..0.1"
+/// searches between bounds > 0 on a log scale. Throws InvalidParameter for other bounds.
+void set_parameter(SearchFile& search, const std::string& key, const std::string& value);
 
 /// How well a rig meets a target.
 struct CurveFit {
