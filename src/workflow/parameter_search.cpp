@@ -164,7 +164,7 @@ std::vector<std::string> values_at(const SearchFile& search, const std::vector<d
 }
 
 std::string comment_of(const FreeParameter& p) {
-  const std::string how = p.fixed() ? "set by the search file"
+  const std::string how = p.fixed() ? "set"
                           : p.choices.empty()
                               ? "searched between " + to_text(p.lower) + " and " + to_text(p.upper)
                               : "searched among " + joined(p.choices);
@@ -271,7 +271,8 @@ void set_parameter(SearchFile& search, const std::string& key, const std::string
   auto place = std::find_if(search.parameters.begin(), search.parameters.end(),
                             [&](const FreeParameter& p) { return p.key == key; });
   if (place == search.parameters.end())
-    place = search.parameters.insert(place, FreeParameter{key, "set", 0, 0, false, {}});
+    place = search.parameters.insert(place, FreeParameter{key, "", 0, 0, false, {}});
+  place->comment = "not as in the search file";
   const std::size_t dots = value.find("..");
   place->choices.clear();
   if (dots == std::string::npos) {
