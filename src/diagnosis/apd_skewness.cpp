@@ -258,6 +258,12 @@ Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, co
   Estimate estimate =
       match.refused ? *match.refused
                     : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), apd.noise_range);
+  // Beyond the curve skewness comes back to values that it has on the curve; the whole distribution notices.
+  if (estimate.status == Status::ok && match.family && match.family->touches_end) {
+    estimate.status = Status::ambiguous;
+    estimate.backlash = estimate.backlash_angle = kNaN;
+    estimate.message += "; but the distribution also fits the end of the curve, backlash may be larger";
+  }
   estimate.method = "apd_skewness";
   estimate.skewness = apd.skewness;
   return estimate;

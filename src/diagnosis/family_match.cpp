@@ -29,23 +29,30 @@ double interpolated(const std::vector<double>& values, const std::vector<double>
   return values[above - 1] + share * (values[above] - values[above - 1]);
 }
 
-/// A point of the curve's backlash axis: segment + share.
+/// A point of the curve's backlash axis, segment + share; the end of the curve for all beyond it.
 double backlash_at(const MonitoringCurve& curve, std::size_t segment, double share) {
+  if (segment + 1 >= curve.points.size()) return curve.points.back().backlash;
   const double from = curve.points[segment].backlash;
   return from + share * (curve.points[segment + 1].backlash - from);
+}
+
+/// What was learnt about a segment; beyond the curve that of the last one.
+const FamilySegment& segment_of(const MonitoringCurve& curve, std::size_t segment) {
+  const auto& segments = curve.family->segments;
+  return segments[std::min(segment, segments.size() - 1)];
 }
 
 /// Widens the interval by all that is accepted at one noise; `smallest` is the record's distance.
 void accept(const MonitoringCurve& curve, const FamilyDistance& fit, double noise, double smallest,
             FamilyMatch& match) {
-  const auto& segments = curve.family->segments;
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    const double threshold = interpolated(segments[i].threshold, curve.noise_levels, noise);
-    const double limit = smallest + threshold * std::max(smallest, segments[i].floor);
-    for (const auto& [begin, end] : fit.within(i, limit)) {
+  const std::size_t on_curve = curve.family->segments.size();
+  for (std::size_t i = 0; i + 1 < curve.family->members.size(); ++i) {
+    const FamilySegment& segment = segment_of(curve, i);
+    const double threshold = interpolated(segment.threshold, curve.noise_levels, noise);
+    for (const auto& [begin, end] : fit.within(i, smallest + threshold * std::max(smallest, segment.floor))) {
       match.lower = std::fmin(match.lower, backlash_at(curve, i, begin));
       match.upper = std::fmax(match.upper, backlash_at(curve, i, end));
-      match.touches_end |= i + 1 == segments.size() && end == 1;
+      match.touches_end |= i >= on_curve || (i + 1 == on_curve && end == 1);
     }
   }
 }
@@ -64,7 +71,7 @@ FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> sampl
     if (!(best.distance < smallest)) continue;
     smallest = best.distance;
     match.backlash = backlash_at(curve, best.segment, best.share);
-    match.usual_misfit = interpolated(curve.family->segments[best.segment].misfit, curve.noise_levels, sigma);
+    match.usual_misfit = interpolated(segment_of(curve, best.segment).misfit, curve.noise_levels, sigma);
   }
   match.misfit = std::sqrt(smallest);
   for (const auto& [sigma, fit] : fits) accept(curve, fit, sigma, smallest, match);

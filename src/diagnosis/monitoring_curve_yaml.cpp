@@ -161,7 +161,7 @@ ApdFamily read_family(const YamlReader& yaml, std::size_t points, std::size_t le
     if (family.members.back().size() != family.members.front().size())
       member.fail("quantiles", "every member needs the same number of phases");
   }
-  if (family.members.size() != points) yaml.fail("members", "needs one member per point of the curve");
+  if (family.members.size() < points) yaml.fail("members", "needs one member per point of the curve, or more");
   if (family.segments.size() + 1 != points) yaml.fail("segments", "needs one segment between two points");
   return family;
 }

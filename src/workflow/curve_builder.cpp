@@ -108,7 +108,14 @@ struct Middle {
 struct Cells {
   std::vector<Cell> points;
   Middle middle;
+  std::vector<std::vector<Quantiles>> beyond;  // members of the family beyond the end of the curve
 };
+
+constexpr double kBeyond = 0.5;  // of the curve's length
+
+int count_beyond(const CurvePlan& plan) {
+  return static_cast<int>(std::ceil(kBeyond * (plan.request.points - 1)));
+}
 
 Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   const int count = plan.request.points;
@@ -118,7 +125,13 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   all.middle.cells.resize(count - 1);
   all.middle.means.resize(count - 1);
   all.middle.runs.resize(count - 1);
-  for_each_in_parallel(2 * count - 1, ticker, [&](int i) {
+  all.beyond.resize(count_beyond(plan));
+  for_each_in_parallel(2 * count - 1 + count_beyond(plan), ticker, [&](int i) {
+    if (const int k = i - (2 * count - 1); k >= 0) {
+      const double backlash = plan.request.max_backlash * (count + k) / (count - 1);
+      all.beyond[k] = family_members(plan, run_fine(plan, backlash, ticker, plan.file.rig));
+      return;
+    }
     const double backlash = 0.5 * plan.request.max_backlash * i / (count - 1);
     if (i % 2 == 0) {
       all.points[i / 2] = make_cell(plan, backlash, ticker);
@@ -184,7 +197,7 @@ double nominal_sampling_rate(double interval) {
 
 MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, const Progress& progress) {
   const CurvePlan plan = plan_curve(file, request);
-  const long runs = 2L * plan.request.points - 1;
+  const long runs = 2L * plan.request.points - 1 + count_beyond(plan);
   const long calibration = (plan.request.points - 1L) * static_cast<long>(plan.noise_levels.size() + 1);
   Ticker ticker(progress, runs * plan.run_periods() + calibration, "building the curve");
   Cells all = make_cells(plan, ticker);
@@ -201,6 +214,7 @@ MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, co
     curve.points.push_back(std::move(cell.point));
     curve.family->members.push_back(std::move(cell.members));
   }
+  for (auto& members : all.beyond) curve.family->members.push_back(std::move(members));
   curve.finish(all.middle.cells);
   curve.coverage_factor = calibrated_factor(curve, all.middle);
   calibrate_family(plan, all.middle.runs, ticker, *curve.family);

@@ -188,10 +188,9 @@ std::vector<Variant> variants_of(const RigFile& file) {
           {"above the range", [](RigFile&) {}, 1.1}};
 }
 
-Record simulate_variant(const RigFile& file, const Variant& variant, Draw d, double max_backlash, int settling) {
+Record simulate_variant(const RigFile& file, const Variant& variant, const Draw& d, int settling) {
   RigFile machine = file;
   variant.change(machine);
-  if (variant.shortest > 0) d.backlash = max_backlash * variant.shortest + d.backlash;
   Record record = simulate_draw(machine, d, file.diagnosis.apd->signal, settling);
   if (variant.duration != 0)
     record = record.slice(0, (settling + variant.duration) * file.diagnosis.apd->period);
@@ -210,8 +209,8 @@ std::vector<StudyTrial> run_study(const RigFile& rig_file, const MonitoringCurve
   for_each_in_parallel(request.records, ticker, [&](int i) {
     const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(i));
     const Record record = simulate_draw(file, d, apd.signal, apd.settling_periods);
-    trials[2 * i] = {d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
-    trials[2 * i + 1] = {d.backlash, d.noise, d.periods, false,
+    trials[2 * i] = {"", d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
+    trials[2 * i + 1] = {"", d.backlash, d.noise, d.periods, false,
                          estimates_of(signal_alone(record, apd.signal), file, curve)};
     ticker.tick();
   });
@@ -251,7 +250,7 @@ std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, boo
   return rows;
 }
 
-std::vector<VariantRow> run_variants(const RigFile& rig_file, const MonitoringCurve& curve,
+std::vector<StudyTrial> run_variants(const RigFile& rig_file, const MonitoringCurve& curve,
                                      const StudyRequest& request, int records, const Progress& progress) {
   check(rig_file, request);
   const RigFile file = at_rate(rig_file, request.sampling_rate);
@@ -261,28 +260,33 @@ std::vector<VariantRow> run_variants(const RigFile& rig_file, const MonitoringCu
   std::vector<StudyTrial> trials(2 * static_cast<std::size_t>(count));
   Ticker ticker(progress, count, "records under other conditions");
   for_each_in_parallel(count, ticker, [&](int i) {
-    const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records + i));
-    const Record record =
-        simulate_variant(file, variants[i / records], d, request.max_backlash, apd.settling_periods);
-    const double truth = variants[i / records].shortest * request.max_backlash + d.backlash;
-    trials[2 * i] = {truth, d.noise, d.periods, true, estimates_of(record, file, curve)};
-    trials[2 * i + 1] = {truth, d.noise, d.periods, false,
+    const Variant& variant = variants[i / records];
+    Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records + i));
+    d.backlash += variant.shortest * request.max_backlash;
+    const Record record = simulate_variant(file, variant, d, apd.settling_periods);
+    trials[2 * i] = {variant.name, d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
+    trials[2 * i + 1] = {variant.name, d.backlash, d.noise, d.periods, false,
                          estimates_of(signal_alone(record, apd.signal), file, curve)};
     ticker.tick();
   });
+  return trials;
+}
+
+std::vector<VariantRow> summarise_variants(const std::vector<StudyTrial>& trials) {
   std::vector<VariantRow> rows;
-  for (std::size_t v = 0; v < variants.size(); ++v)
-    for (const bool position : {true, false})
-      for (std::size_t m = 0; m < trials.front().estimates.size(); ++m) {
-        VariantRow row{variants[v].name, trials.front().estimates[m].method, position};
-        for (int i = 0; i < records; ++i) {
-          const StudyTrial& trial = trials[2 * (v * records + i) + (position ? 0 : 1)];
-          const Estimate& e = trial.estimates[m];
-          const bool near = std::fabs(e.backlash - trial.backlash) <= width(e);
-          ++(e.status != Status::ok ? row.recognised : near ? row.right : row.wrong);
-        }
-        rows.push_back(row);
-      }
+  const auto row_of = [&rows](const StudyTrial& trial, const std::string& method) -> VariantRow& {
+    for (VariantRow& row : rows)
+      if (row.variant == trial.variant && row.method == method && row.position == trial.position) return row;
+    rows.push_back({trial.variant, method, trial.position});
+    return rows.back();
+  };
+  for (const StudyTrial& trial : trials)
+    for (const Estimate& e : trial.estimates) {
+      VariantRow& row = row_of(trial, e.method);
+      const double below = e.lower - trial.backlash, above = trial.backlash - e.upper;
+      const bool near = std::max(below, above) <= width(e);
+      ++(e.status != Status::ok ? row.recognised : near ? row.right : row.wrong);
+    }
   return rows;
 }
 

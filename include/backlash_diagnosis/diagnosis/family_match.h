@@ -6,9 +6,9 @@
 namespace backlash {
 
 struct FamilyMatch {
-  double backlash = kNaN;              // m (angular mesh: rad), of the nearest distribution
-  double lower = kNaN, upper = kNaN;   // 95 % interval, see apd_family.h
-  bool touches_end = false;            // the largest backlash of the curve lies in the interval
+  double backlash = kNaN;             // m (angular mesh: rad), of the nearest distribution on the curve
+  double lower = kNaN, upper = kNaN;  // 95 % interval, see apd_family.h; at most the end of the curve
+  bool touches_end = false;           // the end of the curve or more lies in the interval
   double misfit = kNaN;                // rms distance from the nearest distribution, unit of the signal
   double usual_misfit = kNaN;          // the largest among the simulated records there
 

@@ -26,6 +26,7 @@ struct StudyRequest {
 
 /// One record and what was said about it. The last estimate, "combined", is that of the verdict.
 struct StudyTrial {
+  std::string variant;   // what was done to the conditions; empty in the study itself
   double backlash = 0;   // m, true
   double noise = 0;      // of the signal's rms
   int periods = 0;
@@ -54,19 +55,19 @@ struct StudyRow {
 std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, bool position,
                                       double max_half_gap, double noise = kNaN);
 
-/// Records that were not taken under the conditions of the curve: per variant and method, how often it was
-/// recognised (a status other than ok), answered rightly (ok, interval holds the truth to its own width) or
-/// answered wrongly.
+/// Records that were not taken under the conditions of the curve: amplitude, frequency, sampling, saturation,
+/// free output, constant torque, too short, above the range; `records` of each, with random backlash.
+std::vector<StudyTrial> run_variants(const RigFile& file, const MonitoringCurve& curve,
+                                     const StudyRequest& request, int records,
+                                     const Progress& progress = nullptr);
+
+/// What a method made of a variant: recognised (a status other than ok), answered rightly (ok, and the truth
+/// within the interval or one width of it: some variants do no harm) or wrongly.
 struct VariantRow {
   std::string variant, method;
   bool position = true;
   int recognised = 0, right = 0, wrong = 0;
 };
-
-/// Amplitude, frequency, sampling, saturation, free output, constant torque, too short, above the range; each
-/// with `records` random backlash values.
-std::vector<VariantRow> run_variants(const RigFile& file, const MonitoringCurve& curve,
-                                     const StudyRequest& request, int records,
-                                     const Progress& progress = nullptr);
+std::vector<VariantRow> summarise_variants(const std::vector<StudyTrial>& trials);
 
 }  // namespace backlash
