@@ -16,8 +16,8 @@ constexpr double kLargestDecay = 0.7;
 // What ringing and settling leave unknown, as shares of the rms at one wall and of the settling extrapolation;
 // they hold 95 % of the errors in simulations of a ringing rig. Without extrapolation the rms counts twice at
 // each of the two walls.
-constexpr double kSwitchedRinging = 0.3;
-constexpr double kSettling = 0.5;
+constexpr double kSwitchedRinging = 0.25;
+constexpr double kSettling = 0.3;
 constexpr double kRampedRinging = 4.0;
 
 // The smallest change between two samples [rad].

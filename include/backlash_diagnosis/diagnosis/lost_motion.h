@@ -18,8 +18,8 @@
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t (n - 3 degrees of freedom, n walls) times 1.25 s sqrt(2/n),
-// - ringing: 0.3 times its rms at one wall where torque is switched, four times that where it is ramped,
-// - settling: half of the extrapolation,
+// - ringing: a quarter of its rms at one wall where torque is switched, four times that where it is ramped,
+// - settling: 0.3 times the extrapolation,
 // - resolution: one step of the position,
 // - elastic deflection, where subtracted: its uncertainty, and for ramps what friction on the flanks carries.
 // The shares of ringing and settling hold 95 % of the errors in simulations of a ringing rig (half gap 0 to 150 um,

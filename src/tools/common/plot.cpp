@@ -61,4 +61,8 @@ void plot_integrator_study(const std::string& json_path, const std::string& pref
   draw("plot_integrator_study.py", prefix, json_path, "the study");
 }
 
+void plot_uncertainty_study(const std::string& json_path, const std::string& picture_path) {
+  draw("plot_uncertainty_study.py", picture_path, json_path, "the study");
+}
+
 }  // namespace backlash::tools

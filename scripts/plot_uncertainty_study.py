@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+"""Draws an uncertainty study: estimates against the truth, and coverage and error by sensor noise.
+
+Exit codes: 0 done, 64 usage, 65 not a study, 66 study missing, 70 matplotlib missing, 73 cannot write.
+"""
+import argparse
+import json
+import os
+import sys
+import tempfile
+
+COLOURS = {"apd_skewness": "tab:orange", "apd_shape": "tab:blue", "lost_motion": "tab:green",
+           "position_difference": "tab:purple", "momentum_transfer": "tab:brown", "combined": "black"}
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        self.exit(64, "%s: %s; see --help\n" % (self.prog, message))
+
+
+def fail(code, message):
+    sys.stderr.write("plot_uncertainty_study.py: %s\n" % message)
+    sys.exit(code)
+
+
+def load(path):
+    try:
+        with open(path) as stream:
+            study = json.load(stream)
+        if study["schema_version"] != 1:
+            raise ValueError("schema_version is not 1")
+        study["trials"], study["tables"]
+        return study
+    except OSError as error:
+        fail(66, error)
+    except (KeyError, TypeError, ValueError) as error:
+        fail(65, "%s: not an uncertainty study: %r" % (path, error))
+
+
+def answers(study, method, position):
+    """Truth, estimate, lower and upper end [um] of the records with an answer."""
+    rows = []
+    for trial in study["trials"]:
+        estimate = trial["estimates"][method]
+        if trial["position"] == position and estimate["status"] == "ok":
+            rows.append([1e6 * v for v in [trial["backlash"], estimate["backlash"]] + estimate["interval"]])
+    return rows
+
+
+def draw_errors(axes, study, position):
+    methods = [m for m in study["trials"][0]["estimates"] if m != "combined" and answers(study, m, position)]
+    for method in methods:
+        rows = answers(study, method, position)
+        truth, error = [r[0] for r in rows], [r[1] - r[0] for r in rows]
+        axes.errorbar(truth, error, yerr=[[max(0, r[1] - r[2]) for r in rows], [max(0, r[3] - r[1]) for r in rows]],
+                      fmt="o", markersize=2.5, linewidth=0.5, alpha=0.7, color=COLOURS.get(method), label=method,
+                      zorder={"apd_skewness": 1, "apd_shape": 2}.get(method, 3))
+    axes.axhline(0, color="black", linewidth=0.6)
+    axes.set_yscale("symlog", linthresh=2)
+    axes.set_ylim(-100, 100)
+    ticks = [-50, -20, -10, -5, -2, 0, 2, 5, 10, 20, 50]
+    axes.set_yticks(ticks, [str(t) for t in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("true backlash [um]")
+    axes.set_ylabel("estimate - truth [um], 95 % intervals")
+    axes.set_title("all channels" if position else "torque sensor alone")
+    axes.legend(loc="lower left", ncol=2)
+
+
+def draw_by_noise(axes, study, key, scale, position):
+    levels = sorted({t["noise"] for t in study["tables"] if t["noise"] is not None})
+    widest = max(t["half_gap"] for t in study["tables"])
+    for method in study["trials"][0]["estimates"]:
+        values = []
+        for level in levels:
+            table = next(t for t in study["tables"]
+                         if t["position"] == position and t["noise"] == level and t["half_gap"] == widest)
+            row = next(r for r in table["rows"] if r["method"] == method)
+            values.append(row[key] * scale if row[key] is not None else float("nan"))
+        if any(v == v for v in values):
+            axes.plot([100 * level for level in levels], values, "o-", markersize=4, color=COLOURS.get(method),
+                      linestyle="-" if position else "--",
+                      label=method + (", all channels" if position else ", torque alone"))
+    axes.set_xscale("log")
+    axes.set_xticks([100 * level for level in levels], ["%g" % (100 * level) for level in levels])
+    axes.minorticks_off()
+    axes.set_xlabel("sensor noise [% of the torque's rms]")
+
+
+def draw(study):
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    figure, axes = plt.subplots(2, 2, figsize=(13, 9), constrained_layout=True)
+    draw_errors(axes[0][0], study, True)
+    draw_errors(axes[0][1], study, False)
+    for position in (True, False):
+        draw_by_noise(axes[1][0], study, "coverage", 100, position)
+        draw_by_noise(axes[1][1], study, "median_error", 1e6, position)
+    axes[1][0].axhspan(93, 97, color="tab:gray", alpha=0.2, linewidth=0)
+    axes[1][0].set_ylabel("coverage of the 95 % interval [%]")
+    axes[1][0].set_ylim(80, 101)
+    axes[1][0].legend(fontsize=7, ncol=2, loc="lower left")
+    axes[1][1].set_yscale("log")
+    axes[1][1].set_ylabel("median error [um], half gaps to %g um" % (5e5 * study["max_backlash"]))
+    figure.suptitle("%s: %d records of random backlash, seed %d" % (os.path.basename(study["rig"]), study["records"],
+                                                                  study["seed"]))
+    return figure
+
+
+def save(figure, path):
+    """Whole or not at all."""
+    folder = os.path.dirname(os.path.abspath(path))
+    handle, temporary = None, None
+    try:
+        handle, temporary = tempfile.mkstemp(dir=folder, suffix=os.path.splitext(path)[1])
+        os.close(handle)
+        figure.savefig(temporary, dpi=110)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary and os.path.exists(temporary):
+            os.unlink(temporary)
+        fail(73, error)
+
+
+def main():
+    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("study", metavar="STUDY.json", help="written by uncertainty_study")
+    parser.add_argument("--out", required=True, metavar="OUT.png", help="picture to write (.png, .svg, .pdf)")
+    arguments = parser.parse_args()
+    study = load(arguments.study)
+    try:
+        figure = draw(study)
+    except ImportError as error:
+        fail(70, error)
+    save(figure, arguments.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,199 @@
+// What the estimates are worth: a seeded study over random backlash, noise and length of record.
+#include "backlash_diagnosis/workflow/uncertainty_study.h"
+
+#include <cmath>
+#include <iomanip>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/workflow/curve_builder.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/plot.h"
+#include "tools/common/progress_bar.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kHalfGap = 70e-6;  // m, of the table that looks at moderate backlash
+constexpr double kNoise = 0.02;     // of the signal's rms, of the table at one noise
+
+Command command() {
+  Command c;
+  c.name = "uncertainty_study";
+  c.summary =
+      "Simulates records with random backlash, sensor noise and length on machines whose stiffness is not "
+      "exactly the rig file's, diagnoses each with all channels and from the signal alone, and counts: error, "
+      "coverage of the 95 % interval, share of 'cannot tell'. Then the same under wrong conditions.";
+  c.positional = {"RIG.yaml"};
+  c.options = {
+      {"json", "OUT.json", "all tables and every single record", true},
+      {"curve", "CURVE.yaml", "monitoring curve; default: built first"},
+      {"records", "N", "random records; default: 600"},
+      {"variants", "N", "records of each wrong condition; default: 40"},
+      {"sample-rate", "HZ", "default: the rig file's"},
+      {"seed", "N", "of all random numbers; default: 1"},
+      {"plot", "OUT.png", "also draw errors and coverage"},
+  };
+  c.notes =
+      "'combined' is the verdict. A confident miss is an answer that is more than two of its interval's widths "
+      "from the truth. Under wrong conditions an answer within one width counts as right.";
+  c.examples = {"uncertainty_study config/sarkar_1997.yaml --json study.json --plot study.png"};
+  c.exit_codes = "  0   done\n  1   there were confident misses, or wrong answers under wrong conditions\n";
+  return c;
+}
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json row_json(const StudyRow& row) {
+  return {{"method", row.method},
+          {"records", row.trials},
+          {"told", row.told},
+          {"median_error", number(row.median_error)},
+          {"p95_error", number(row.p95_error)},
+          {"median_width", number(row.median_width)},
+          {"coverage", number(row.coverage)},
+          {"cannot_tell", number(row.cannot_tell)},
+          {"confident_misses", row.confident_misses}};
+}
+
+struct Table {
+  bool position;
+  double half_gap, noise;  // m, of the signal's rms (NaN: any)
+  std::vector<StudyRow> rows;
+};
+
+std::vector<Table> tables_of(const std::vector<StudyTrial>& trials, const StudyRequest& request) {
+  std::vector<Table> tables;
+  const double all = 0.5 * request.max_backlash;
+  for (const bool position : {true, false}) {
+    std::vector<std::pair<double, double>> groups = {{all, kNaN}, {kHalfGap, kNaN}, {kHalfGap, kNoise}};
+    for (const double level : request.noise) groups.emplace_back(all, level);
+    for (const auto& [half_gap, noise] : groups)
+      tables.push_back({position, half_gap, noise, summarise_study(trials, position, half_gap, noise)});
+  }
+  return tables;
+}
+
+void print(const Table& table) {
+  std::cout << (table.position ? "\nall channels" : "\nthe signal alone") << ", half gaps to "
+            << 1e6 * table.half_gap << " um, ";
+  if (std::isnan(table.noise))
+    std::cout << "all noise levels\n";
+  else
+    std::cout << "noise " << 100 * table.noise << " % of rms\n";
+  std::cout << "  method               records  error [um] median   95 %   width   coverage  cannot tell  misses\n";
+  for (const StudyRow& row : table.rows) {
+    std::cout << "  " << std::left << std::setw(22) << row.method << std::right << std::setw(6) << row.trials;
+    if (row.told == 0) {
+      std::cout << "    -\n";
+      continue;
+    }
+    std::cout << std::fixed << std::setprecision(2) << std::setw(19) << 1e6 * row.median_error << std::setw(7)
+              << 1e6 * row.p95_error << std::setw(8) << 1e6 * row.median_width << std::setprecision(1)
+              << std::setw(9) << 100 * row.coverage << " %" << std::setw(10) << 100 * row.cannot_tell << " %"
+              << std::setw(8) << row.confident_misses << '\n'
+              << std::defaultfloat << std::setprecision(6);
+  }
+}
+
+void print(const std::vector<VariantRow>& rows) {
+  std::cout << "\nwrong conditions: recognised / right although wrong / wrong\n";
+  std::string last;
+  for (const VariantRow& row : rows) {
+    const std::string title = row.variant + (row.position ? ", all channels" : ", the signal alone");
+    if (title != last) std::cout << (last.empty() ? "" : "\n") << "  " << std::left << std::setw(42) << title;
+    last = title;
+    std::cout << "  " << row.method << ' ' << row.recognised << '/' << row.right << '/' << row.wrong;
+  }
+  std::cout << '\n';
+}
+
+Json trials_json(const std::vector<StudyTrial>& trials) {
+  Json all = Json::array();
+  for (const StudyTrial& trial : trials) {
+    Json json = {{"variant", trial.variant}, {"backlash", trial.backlash}, {"noise", trial.noise},
+                 {"periods", trial.periods}, {"position", trial.position}};
+    for (const Estimate& e : trial.estimates)
+      json["estimates"][e.method] = {{"status", to_string(e.status)},
+                                     {"backlash", number(e.backlash)},
+                                     {"interval", {number(e.lower), number(e.upper)}}};
+    all.push_back(std::move(json));
+  }
+  return all;
+}
+
+/// Answers that nobody should have got.
+int misses(const std::vector<Table>& tables, const std::vector<VariantRow>& variants) {
+  int count = 0;
+  for (const Table& table : tables)
+    for (const StudyRow& row : table.rows) count += row.confident_misses;
+  for (const VariantRow& row : variants) count += row.wrong;
+  return count;
+}
+
+MonitoringCurve curve_for(const Arguments& arguments, const RigFile& file, const StudyRequest& request,
+                          const Progress& progress) {
+  if (arguments.has("curve")) return read_curve(arguments.text("curve"));
+  CurveRequest wanted;
+  wanted.max_backlash = request.max_backlash;
+  wanted.sampling_rate = request.sampling_rate;
+  return build_curve(file, wanted, progress);
+}
+
+int study(const Arguments& arguments) {
+  const std::string rig = arguments.positional(0), out = arguments.text("json"), plot = arguments.text("plot");
+  StudyRequest request;
+  request.records = static_cast<int>(arguments.integer("records", request.records, 1, 1'000'000));
+  request.seed = arguments.integer("seed", request.seed, 0, std::uint64_t{1} << 53);
+  request.sampling_rate = arguments.number("sample-rate", request.sampling_rate, Range::positive());
+  const int variants = static_cast<int>(arguments.integer("variants", 40, 1, 1'000'000));
+  const RigFile file = load_rig_file(rig);
+  check_output(out, {rig});
+  if (!plot.empty()) {
+    check_plot_path(plot);
+    check_output(plot, {rig});
+  }
+  std::vector<StudyTrial> trials, wrong;
+  {
+    ProgressBar bar;
+    const MonitoringCurve curve = curve_for(arguments, file, request, bar.progress());
+    request.max_backlash = curve.points.back().backlash;
+    trials = run_study(file, curve, request, bar.progress());
+    wrong = run_variants(file, curve, request, variants, bar.progress());
+  }
+  const std::vector<Table> tables = tables_of(trials, request);
+  const std::vector<VariantRow> rows = summarise_variants(wrong);
+  Json json = {{"schema_version", 1}, {"version", version()}, {"rig", rig}, {"seed", request.seed},
+               {"records", request.records}, {"max_backlash", request.max_backlash}};
+  for (const Table& table : tables) {
+    Json entry = {{"position", table.position}, {"half_gap", table.half_gap}, {"noise", number(table.noise)}};
+    for (const StudyRow& row : table.rows) entry["rows"].push_back(row_json(row));
+    json["tables"].push_back(std::move(entry));
+    print(table);
+  }
+  for (const VariantRow& row : rows)
+    json["variants"].push_back({{"variant", row.variant}, {"method", row.method}, {"position", row.position},
+                                {"recognised", row.recognised}, {"right", row.right}, {"wrong", row.wrong}});
+  print(rows);
+  json["trials"] = trials_json(trials);
+  json["variant_trials"] = trials_json(wrong);
+  write_text(out, json.dump(1) + "\n");
+  std::cout.flush();
+  if (!plot.empty()) plot_uncertainty_study(out, plot);
+  return misses(tables, rows) > 0 ? kWatch : kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, study);
+}
