@@ -23,7 +23,7 @@ def load(path):
     import yaml
     try:
         with open(path) as stream:
-            curve = yaml.safe_load(stream)
+            curve = yaml.load(stream, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
         if curve["schema_version"] != 1:
             raise ValueError("schema_version is not 1")
         columns = [[point[key] for point in curve["points"]] for key in ("backlash", "skewness", "scatter", "monotonic")]

@@ -93,7 +93,7 @@ def main():
     with open(arguments.diagnosis) as stream:
         diagnosis = json.load(stream)
     with open(arguments.curve) as stream:
-        curve = yaml.safe_load(stream)
+        curve = yaml.load(stream, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     if not diagnosis.get("apd"):
         sys.exit("plot_diagnosis.py: %s holds no APD" % arguments.diagnosis)
     figure, axes = plt.subplots(1, 3, figsize=(16, 4.8), constrained_layout=True)
