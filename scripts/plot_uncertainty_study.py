@@ -78,7 +78,7 @@ def draw_by_noise(axes, study, key, scale, position):
             row = next(r for r in table["rows"] if r["method"] == method)
             values.append(row[key] * scale if row[key] is not None else float("nan"))
         if any(v == v for v in values):
-            axes.plot([100 * level for level in levels], values, "o-", markersize=4, color=COLOURS.get(method),
+            axes.plot([100 * level for level in levels], values, marker="o", markersize=4, color=COLOURS.get(method),
                       linestyle="-" if position else "--",
                       label=method + (", all channels" if position else ", torque alone"))
     axes.set_xscale("log")

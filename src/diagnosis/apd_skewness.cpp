@@ -241,8 +241,10 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
                        const MonitoringCurve* curve) {
   CurveMatch match;
   match.refused = refusal(record, apd, settings, curve);
+  std::vector<double> samples = samples_of(record, apd, settings.signal);
+  match.noise = with_standard_error(apd.noise_range, samples.size());
   if (match.refused || !curve->family) return match;
-  match.family = match_family(*curve, samples_of(record, apd, settings.signal), apd.noise_range);
+  match.family = match_family(*curve, std::move(samples), match.noise);
   if (match.family->alien()) {
     std::ostringstream text;
     text.precision(3);
@@ -257,7 +259,7 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
 Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, const MonitoringCurve* curve) {
   Estimate estimate =
       match.refused ? *match.refused
-                    : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), apd.noise_range);
+                    : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), match.noise);
   // Beyond the curve skewness comes back to values that it has on the curve; the whole distribution notices.
   if (estimate.status == Status::ok && match.family && match.family->touches_end) {
     estimate.status = Status::ambiguous;

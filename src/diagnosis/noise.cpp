@@ -110,4 +110,10 @@ NoiseRange estimate_noise(const std::vector<double>& signal, double samples_per_
   return {std::min(between->lower, within), std::min(between->upper, within)};
 }
 
+NoiseRange with_standard_error(const NoiseRange& range, std::size_t samples) {
+  const double stretches = std::max(1.0, static_cast<double>(samples) / 10);
+  const double relative = std::min(1.0, 2 * 0.52 / std::sqrt(stretches));
+  return {range.lower * (1 - relative), range.upper * (1 + relative)};
+}
+
 }  // namespace backlash

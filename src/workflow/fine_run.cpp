@@ -9,7 +9,7 @@
 namespace backlash {
 namespace {
 
-constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the signal's scale
+constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3};  // of the signal's scale
 constexpr double kFinestSampling = 1e5;                                      // Hz
 constexpr int kMostPhases = 16;
 constexpr double kFewestPerPeriod = 16;  // samples

@@ -116,5 +116,19 @@ TEST(EstimateNoise, LeavesOutValuesThatAreNotFinite) {
   EXPECT_NEAR(estimate_noise(signal.value, 200).upper / 0.1, 1, five_errors(59 * 20));
 }
 
+TEST(Noise, StandardErrorHoldsTheTruth) {
+  int held = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 0.01);
+    std::vector<double> signal;
+    for (int i = 0; i < 500; ++i) signal.push_back(std::sin(2 * M_PI * i / 100.0) + normal(random));
+    const NoiseRange range = with_standard_error(estimate_noise(signal, 100), signal.size());
+    held += range.lower <= 0.01 && 0.01 <= range.upper;
+  }
+  // Two standard errors hold 95 %, 190 of 200 +- 3; four of these.
+  EXPECT_GE(held, 178);
+}
+
 }  // namespace
 }  // namespace backlash

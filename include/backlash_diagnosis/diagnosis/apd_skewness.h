@@ -66,6 +66,7 @@ std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdS
 
 /// What a curve says about a record before an estimator inverts it.
 struct CurveMatch {
+  NoiseRange noise;                   // of the record, with the error of its estimate
   std::optional<Estimate> refused;    // why no estimate can be made: status and reason
   std::optional<FamilyMatch> family;  // where none was refused and the curve has a family
 };

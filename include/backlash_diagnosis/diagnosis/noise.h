@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <cstddef>
 #include <vector>
 
 namespace backlash {
@@ -21,5 +22,9 @@ struct NoiseRange {
 /// `samples_per_period` is rounded. With fewer than two periods, or fewer than 10 samples in one, only the
 /// second.
 NoiseRange estimate_noise(const std::vector<double>& signal, double samples_per_period);
+
+/// The range widened by two standard errors of an estimate from `samples` samples: each stretch of 10 tells
+/// the standard deviation to about one half, see test_noise.cpp.
+NoiseRange with_standard_error(const NoiseRange& range, std::size_t samples);
 
 }  // namespace backlash
