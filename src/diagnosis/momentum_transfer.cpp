@@ -24,7 +24,7 @@ constexpr double kTiming = 0.5;           // samples, when the impact began
 // peak: exact for an impact much shorter than the averages (closed form); for a longer one between 0 (a step)
 // and that, the value from simulated Hunt-Crossley impacts.
 constexpr double kLateShort = 0.5, kLateLong = 0.22;
-constexpr double kElasticShare = 0.19;  // of the elastic deflections in the interval
+constexpr double kElasticShare = 0.14;  // of the elastic deflections in the interval
 
 struct Refusal {
   Status status;

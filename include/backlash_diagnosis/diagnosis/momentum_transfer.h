@@ -27,7 +27,7 @@
 //
 // Interval, 95 %, root of the sum of squares of: scatter of the median over the crossings (Student t), the
 // travel of the pinion within half a sample at the impact (a sample by tachometer on a rigid flank, where
-// speed jumps), and a fifth of the elastic deflections. 97 % coverage in simulations, see
+// speed jumps), and a seventh of the elastic deflections. About 94 % coverage in simulations, see
 // test_rig_estimators.cpp.
 #pragma once
 
