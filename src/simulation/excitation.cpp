@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
@@ -10,6 +11,7 @@
 namespace backlash {
 namespace {
 
+constexpr int kFewestLines = 16, kMostLines = 10'000;  // of random torque
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 void require(const char* name, double value, const Range& range) {
@@ -83,6 +85,12 @@ class MultiSine : public Excitation {
   double bias_;
 };
 
+class Random : public MultiSine {
+ public:
+  using MultiSine::MultiSine;
+  double period() const override { return 0; }
+};
+
 class Chirp : public Excitation {
  public:
   Chirp(double amplitude, double start, double end, double duration, double bias)
@@ -140,6 +148,26 @@ std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, d
   return std::make_unique<MultiSine>(std::move(lines), bias);
 }
 
+std::unique_ptr<Excitation> random_excitation(double rms, double lower, double upper, int lines,
+                                              std::uint64_t seed, double bias) {
+  require("rms", rms, Range::not_negative());
+  require("lower_frequency", lower, Range::positive());
+  require("upper_frequency", upper, Range::positive());
+  require("lines", lines, Range::between(kFewestLines, kMostLines));
+  require("bias", bias, Range::any());
+  if (!(upper > lower))
+    throw InvalidParameter("excitation.upper_frequency", upper, "must be > lower_frequency");
+  std::mt19937_64 generator(seed);
+  // The same numbers on every platform, which std::uniform_real_distribution does not promise.
+  const auto uniform = [&generator] { return static_cast<double>(generator() >> 11) * 0x1p-53; };
+  std::vector<SineLine> sines;
+  for (int k = 0; k < lines; ++k) {
+    const double frequency = lower + (upper - lower) * (k + uniform()) / lines;
+    sines.push_back({rms * std::sqrt(2.0 / lines), frequency, 2 * M_PI * uniform()});
+  }
+  return std::make_unique<Random>(std::move(sines), bias);
+}
+
 std::unique_ptr<Excitation> external_excitation() {
   return std::make_unique<External>();
 }
@@ -149,15 +177,18 @@ std::unique_ptr<Excitation> ExcitationSettings::create() const {
   if (type == "sine") return sine_excitation(amplitude, frequency, bias);
   if (type == "chirp") return chirp_excitation(amplitude, start_frequency, end_frequency, duration, bias);
   if (type == "multi_sine") return multi_sine_excitation(lines, bias);
+  if (type == "random")
+    return random_excitation(amplitude, start_frequency, end_frequency, line_count, seed, bias);
   if (type == "constant") return constant_excitation(amplitude);
   if (type == "topic") return external_excitation();
   throw InvalidParameter("excitation.type", type,
-                         "must be square, sine, chirp, multi_sine, constant or topic");
+                         "must be square, sine, chirp, multi_sine, random, constant or topic");
 }
 
 ExcitationSettings read_excitation(const YamlReader& yaml) {
   ExcitationSettings settings;
-  settings.type = yaml.choice("type", {"square", "sine", "chirp", "multi_sine", "constant", "topic"});
+  settings.type =
+      yaml.choice("type", {"square", "sine", "chirp", "multi_sine", "random", "constant", "topic"});
   const std::string& type = settings.type;
   if (type == "constant") settings.amplitude = yaml.number("torque", Range::any());
   if (type == "square" || type == "sine" || type == "chirp") {
@@ -169,6 +200,16 @@ ExcitationSettings read_excitation(const YamlReader& yaml) {
     settings.start_frequency = yaml.number("start_frequency", Range::positive());
     settings.end_frequency = yaml.number("end_frequency", Range::positive());
     settings.duration = yaml.number("duration", Range::positive());
+  }
+  if (type == "random") {
+    settings.amplitude = yaml.number("rms", Range::not_negative());
+    settings.bias = yaml.number_or("bias", 0, Range::any());
+    settings.start_frequency = yaml.number("lower_frequency", Range::positive());
+    settings.end_frequency = yaml.number("upper_frequency", Range::positive());
+    if (!(settings.end_frequency > settings.start_frequency))
+      yaml.fail("upper_frequency", "must be > lower_frequency");
+    settings.line_count = static_cast<int>(yaml.integer("lines", kFewestLines, kMostLines));
+    settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
   }
   if (type == "multi_sine") {
     settings.bias = yaml.number_or("bias", 0, Range::any());

@@ -202,6 +202,10 @@ TEST(ExcitationSettings, EveryTypeIsReadAndCreated) {
   EXPECT_EQ(created("{type: sine, amplitude: 1, frequency: 2}")->period(), 0.5);
   EXPECT_EQ(created("{type: constant, torque: -3}")->torque(0, 0), -3);
   EXPECT_TRUE(created("type: topic")->set_torque(1));
+  EXPECT_EQ(
+      created("{type: random, rms: 2, lower_frequency: 1, upper_frequency: 9, lines: 20, seed: 5, bias: 1}")
+          ->torque(0.2, 0),
+      random_excitation(2, 1, 9, 20, 5, 1)->torque(0.2, 0));
   const auto chirp =
       created("{type: chirp, amplitude: 1, start_frequency: 8, end_frequency: 2, duration: 4, bias: 1}");
   EXPECT_EQ(chirp->period(), 4);
@@ -210,6 +214,49 @@ TEST(ExcitationSettings, EveryTypeIsReadAndCreated) {
       "{type: multi_sine, bias: 2, lines: [{amplitude: 1, frequency: 2, phase: 0.5}, "
       "{amplitude: 3, frequency: 5}]}");
   EXPECT_DOUBLE_EQ(sum->torque(0, 0), 2 + std::sin(0.5));
+}
+
+TEST(RandomExcitation, HasTheRmsAndTheBandAndNeverRepeats) {
+  const auto torque = random_excitation(0.05, 20, 60, 64, 7, 0.1);
+  EXPECT_EQ(torque->period(), 0);
+  EXPECT_EQ(torque->segment_end(0), std::numeric_limits<double>::infinity());
+  const int count = 20000;
+  double sum = 0, squares = 0, fourth = 0, outside = 0, inside = 0;
+  for (int i = 0; i < count; ++i) {
+    const double x = torque->torque(i * 7e-3, 0) - 0.1;
+    sum += x / count;
+    squares += x * x / count;
+    fourth += x * x * x * x / count;
+  }
+  // Over 140 s the lines, 0.6 Hz apart in the mean, are nearly orthogonal.
+  EXPECT_NEAR(sum, 0, 1e-4);
+  EXPECT_NEAR(std::sqrt(squares), 0.05, 0.0005);
+  // Sines of equal amplitude A: kurtosis 3 - 1.5 / lines.
+  EXPECT_NEAR(fourth / (squares * squares), 3 - 1.5 / 64, 0.1);
+  std::vector<double> x;
+  for (int i = 0; i < 4000; ++i)
+    x.push_back((1 - std::cos(2 * M_PI * i / 4000)) * (torque->torque(i * 1e-3, 0) - 0.1));
+  for (double f = 2; f < 100; f += 0.25) {
+    double re = 0, im = 0;
+    for (int i = 0; i < 4000; ++i) {
+      re += x[i] * std::cos(2 * M_PI * f * i * 1e-3);
+      im += x[i] * std::sin(2 * M_PI * f * i * 1e-3);
+    }
+    if (f > 20 && f < 60) inside += re * re + im * im;
+    if (f < 18 || f > 62) outside += re * re + im * im;
+  }
+  EXPECT_LT(outside, 1e-4 * inside);
+}
+
+TEST(RandomExcitation, FollowsItsSeed) {
+  const auto a = random_excitation(1, 1, 10, 16, 1), same = random_excitation(1, 1, 10, 16, 1),
+             other = random_excitation(1, 1, 10, 16, 2);
+  EXPECT_EQ(a->torque(0.3, 0), same->torque(0.3, 0));
+  EXPECT_NE(a->torque(0.3, 0), other->torque(0.3, 0));
+  EXPECT_THROW(random_excitation(-1, 1, 10, 16, 1), InvalidParameter);
+  EXPECT_THROW(random_excitation(1, 0, 10, 16, 1), InvalidParameter);
+  EXPECT_THROW(random_excitation(1, 10, 10, 16, 1), InvalidParameter);
+  EXPECT_THROW(random_excitation(1, 1, 10, 15, 1), InvalidParameter);
 }
 
 TEST(ExcitationSettings, CopiesAreIndependent) {
@@ -226,9 +273,11 @@ TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
     const char* message;
   } cases[] = {
       {"amplitude: 1\n",
-       "rig.yaml:1: type: is missing, expected one of square, sine, chirp, multi_sine, constant, topic"},
+       "rig.yaml:1: type: is missing, expected one of square, sine, chirp, multi_sine, random, constant, "
+       "topic"},
       {"type: triangle\n",
-       "rig.yaml:1: type = triangle: must be one of square, sine, chirp, multi_sine, constant, topic"},
+       "rig.yaml:1: type = triangle: must be one of square, sine, chirp, multi_sine, random, constant, "
+       "topic"},
       {"type: square\nfrequency: 10\n", "rig.yaml:1: amplitude: is missing"},
       {"type: square\namplitude: -1\nfrequency: 10\n", "rig.yaml:2: amplitude = -1: must be >= 0"},
       {"type: square\namplitude: 1\nfrequency: 0\n", "rig.yaml:3: frequency = 0: must be > 0"},
@@ -245,6 +294,12 @@ TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
       {"type: multi_sine\nlines: [{amplitude: 1, frequency: -1}]\n",
        "rig.yaml:2: lines[0].frequency = -1: must be > 0"},
       {"type: multi_sine\nlines: 3\n", "rig.yaml:2: lines = 3: must be a list of maps"},
+      {"type: random\nrms: 1\nlower_frequency: 1\nupper_frequency: 9\nlines: 16\n",
+       "rig.yaml:1: seed: is missing"},
+      {"type: random\nrms: 1\nlower_frequency: 9\nupper_frequency: 9\nlines: 16\nseed: 1\n",
+       "rig.yaml:4: upper_frequency = 9: must be > lower_frequency"},
+      {"type: random\nrms: 1\nlower_frequency: 1\nupper_frequency: 9\nlines: 3\nseed: 1\n",
+       "rig.yaml:5: lines = 3: must be"},
   };
   for (const auto& bad : cases) {
     try {

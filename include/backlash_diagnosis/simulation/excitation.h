@@ -4,6 +4,7 @@
 // switching time both neighbours are defined, so an integrator that stops there never sees the wrong side of a jump.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -48,17 +49,23 @@ std::unique_ptr<Excitation> chirp_excitation(double amplitude, double start, dou
 /// Sum of sines; its period is the inverse of the greatest common divisor of the frequencies (to 1e-6 Hz), 0 where that
 /// is below 1 mHz.
 std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, double bias = 0);
+/// Random torque of the given rms [N m] in a band [Hz], as a sum of `lines` (>= 16) sines of equal amplitude: one per
+/// equal part of the band, at a frequency and with a phase drawn from `seed`. Nearly Gaussian; never repeats.
+std::unique_ptr<Excitation> random_excitation(double rms, double lower, double upper, int lines, std::uint64_t seed,
+                                              double bias = 0);
 /// Zero until set_torque() is called.
 std::unique_ptr<Excitation> external_excitation();
 
 /// What a rig file says under `excitation`; a recipe, so that copies of it can run side by side.
 struct ExcitationSettings {
-  std::string type = "square";  // square, sine, chirp, multi_sine, constant, topic
-  double amplitude = 0;         // N m; the torque itself for `constant`
+  std::string type = "square";  // square, sine, chirp, multi_sine, random, constant, topic
+  double amplitude = 0;         // N m; the torque itself for `constant`, its rms for `random`
   double frequency = 0;         // Hz, square and sine
   double bias = 0;              // N m
   double start_frequency = 0, end_frequency = 0, duration = 0;  // Hz, Hz, s: chirp
   std::vector<SineLine> lines;                                  // multi_sine
+  int line_count = 0;                                           // random, with start_ and end_frequency as the band
+  std::uint64_t seed = 0;                                       // random
 
   std::unique_ptr<Excitation> create() const;
 };

@@ -1,0 +1,62 @@
+// Two parallel flanks in the plane of deflection and torque, fitted to a record with two encoders.
+//
+//   phi = f(q_L) + side * b / 2 + g e(T) + c (w_M - w_L),    T = tau - J a_M - d w_M - C sign(w_M)
+//
+// phi = q_M - q_L is the difference of the encoders [rad], e the declared elastic deflection [rad] of one
+// side under a torque [N m], positive torque pressing the positive flank. f is what both flanks have in
+// common: offset and scale of the encoders, eccentricity, transmission error, and torques that depend on
+// position (gravity, cogging) over the stiffness. b is the free play.
+//
+// All of it is averaged over short windows with triangular weights, for which acceleration is exactly a
+// second difference of positions: nothing is differentiated by sample.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+namespace backlash {
+
+/// Samples at equal distances `interval` [s], all columns of the same length, finite. `unbroken[i]` is false
+/// where samples i - 1 and i are not neighbours in time.
+struct TwoEncoders {
+  double interval = 0;
+  std::vector<double> torque, motor, load;  // N m, rad, rad
+  std::vector<char> unbroken;
+};
+
+/// Averages over 2 * half - 1 samples, one window every `half` samples.
+struct FlankWindows {
+  std::vector<std::size_t> centre;                                          // sample
+  std::vector<double> torque, deflection, load, speed, slip, acceleration;  // slip: motor minus load speed
+  std::size_t size() const { return centre.size(); }
+};
+FlankWindows average_windows(const TwoEncoders& motion, std::size_t half);
+
+struct FlankModel {
+  std::function<double(double)> elastic;
+  double inertia = 0;            // kg m^2, J to start from
+  double elastic_deviation = 0;  // standard deviation of g about 1 where the record does not hold g
+  bool moving = false;           // the load travels: f and b may depend on its position, friction has a sign
+};
+
+struct FlankFit {
+  bool found = false;
+  double gap = 0, standard_error = 0;     // rad
+  double least_gap = 0, largest_gap = 0;  // rad, over the travel, where `varies`
+  bool varies = false;                    // the gap depends on the position of the load
+  bool compliance_from_record = false;    // else declared
+  double compliance_factor = 1;           // g
+  double scale_error = 0;                 // slope of f over q_L
+  double residual = 0;                    // rad, rms
+  std::size_t used[2] = {0, 0};           // windows on the negative and the positive flank
+  std::size_t stays = 0;                  // uninterrupted stays on a flank
+};
+
+/// Windows count in which the flank is loaded for certain: deflection and predicted elastic deflection both
+/// beyond three residuals on the same side. Found by iteration from the outermost deflections. The standard
+/// error holds for residuals that are correlated within a stay on a flank (sandwich estimator over stays;
+/// White 1980, Liang and Zeger 1986).
+FlankFit fit_flanks(const FlankWindows& windows, const FlankModel& model);
+
+}  // namespace backlash

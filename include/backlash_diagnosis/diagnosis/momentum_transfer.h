@@ -1,0 +1,64 @@
+// Play from the momentum that the motor side gathers while it crosses the gap and loses at the impact, from
+// the speed of the motor and its torque alone (idea: Stein and Wang, cited by Sarkar, Ellis and Moore 1997,
+// Section 2; their formula is not available here, this one follows from the momentum balance).
+//
+// Motor inertia J [kg m^2], damping c [N m s/rad] and torque tau [N m]; a pinion of inertia Jp hangs on it
+// through a torsion spring k [N m/rad] (rigid: k infinite, J the inertia of both, Jp = 0):
+//
+//   T  = tau - c w - J w'            torque that the motor hands on
+//   qp = q - T / k                   where the pinion is
+//   F  = T - Jp qp''  (rigid: F = T) torque on the flank, positive on the positive flank
+//
+// F is averaged with triangular weights, for which qp'' is a second difference: that is momentum handed over
+// per time. Free flight is F = 0. From rest under a constant torque without damping and spring it would give
+// the closed form w_impact^2 = 2 tau b / J; the estimate uses the travel of the pinion between release and
+// impact instead,
+//
+//   b = |qp(impact) - qp(release)| - e(F at release) - e(F at impact),    e: elastic deflection of the flank,
+//
+// which holds for any torque and initial speed. Release: |F| falls below half of its median. Impact: F passes
+// half of its first peak, corrected for the averaging; how much depends on the duration of the contact, which
+// the elastic deflection of the flank tells (short contacts: closed form; long ones: from simulated
+// Hunt-Crossley impacts).
+//
+// Needs motor_torque and motor_velocity (or motor_position, differentiated); the motor side must change
+// flanks (square-wave or alternating torque), and the load must be locked, or load_position recorded and
+// subtracted. Sampling must resolve the oscillation of motor against pinion: at least ten samples per cycle.
+//
+// Interval, 95 %, root of the sum of squares of: scatter of the median over the crossings (Student t), the
+// travel of the pinion within half a sample at the impact (a sample by tachometer on a rigid flank, where
+// speed jumps), and a seventh of the elastic deflections. About 94 % coverage in simulations, see
+// test_rig_estimators.cpp.
+#pragma once
+
+#include <functional>
+#include <limits>
+
+#include "backlash_diagnosis/diagnosis/estimate.h"
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash {
+
+/// All at the motor_position axis.
+struct MomentumTransferSettings {
+  double motor_inertia = kNaN;  ///< kg m^2, > 0; with a rigid coupling of all that moves freely in the gap
+  double motor_damping = 0;     ///< N m s/rad, >= 0
+  double pinion_inertia = 0;    ///< kg m^2, >= 0, beyond the coupling; > 0 where coupling_stiffness is finite
+  double coupling_stiffness = std::numeric_limits<double>::infinity();  ///< N m/rad, > 0; infinite: rigid
+  /// rad: elastic deflection of mesh and load side, without the coupling, under a torque [N m]; empty: none.
+  std::function<double(double torque)> flank_deflection;
+  double load_ratio = 1;       ///< angle at the motor_position axis per angle of load_position, > 0
+  bool output_locked = false;  ///< else load_position is needed
+  double base_radius = kNaN;   ///< m, > 0; NaN where the rig gives none, then Estimate::backlash is NaN
+};
+
+/// Throws InvalidParameter for settings outside the ranges above. Answers by status:
+///   insufficient_data  a channel is missing, or fewer than four crossings of the gap
+///   out_of_domain      sampling too slow for the coupling; impacts cannot be told from noise; flanks never
+///                      change; no free flight between them: torque is left that inertia and damping do not
+///                      explain (friction, another machine); less travel than elastic deflection
+///   below_range        the interval, which is given, holds 0: contact is not lost for longer than the
+///                      averaging resolves
+Estimate estimate_momentum_transfer(const Record& record, const MomentumTransferSettings& settings);
+
+}  // namespace backlash

@@ -1,0 +1,58 @@
+// Play from two encoders: what motor_position and load_position differ by when torque presses one flank and
+// the other, less the elastic deflection. Model and fit: see flank_fit.h. The load may be locked or move.
+//
+// Common to both flanks, and therefore without effect on the play: offset of the encoders, a scale error up
+// to 1 %, eccentricity, transmission error, gravity, cogging; where the load moves each may follow its
+// position.
+//
+// Elastic deflection: where the load moves, the record itself tells how deflection follows torque; where it
+// is locked, or the record does not hold it to 10 %, the declared function counts.
+//
+// Interval, 95 %, root of the sum of squares of
+// - scatter: Student t times the standard error, stays on a flank counted as independent,
+// - the declared elastic deflection, where used: its uncertainty,
+// - windows: the difference to the same fit with windows twice as long,
+// - what the model does not hold: three times the rms residual with a locked output, where all windows lie at
+//   nearly one torque and a pinion that keeps bouncing shifts all of them alike; 0.15 times it where the load
+//   moves.
+// The shares are set by simulation, see test_rig_estimators.cpp.
+//
+// Where the play depends on the position of the load, the interval is widened to the least and the largest
+// play over the travel; backlash_angle is then the mean over the windows.
+#pragma once
+
+#include <functional>
+
+#include "backlash_diagnosis/diagnosis/estimate.h"
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash {
+
+struct PositionDifferenceSettings {
+  /// rad at the motor_position axis, odd: elastic deflection of one side under a torque [N m]. Needed; where
+  /// the load moves a value within a factor of three is enough.
+  std::function<double(double torque)> elastic_deflection;
+
+  /// Relative 95 % uncertainty of elastic_deflection, > 0.
+  double elastic_uncertainty = 0.02;
+
+  /// kg m^2, >= 0: what motor_torque accelerates before it reaches the flank, at the motor_position axis. A
+  /// value to start from, taken as certain to +-50 % (one standard deviation).
+  double motor_inertia = 0;
+
+  /// Angle at the motor_position axis per angle of load_position, > 0: Rig::motor_axis_ratio().
+  double load_ratio = 1;
+
+  /// m, > 0; NaN where the rig gives none, then Estimate::backlash is NaN.
+  double base_radius = kNaN;
+};
+
+/// Estimates play as above, in time linear in the samples. Throws InvalidParameter for settings outside the
+/// ranges above. Everything that lies in the record is answered by the status:
+///   insufficient_data  no motor_position, no load_position, no torque, too few samples or changes of flank
+///   out_of_domain      torque does not press both flanks; the deflection does not follow the torque; the
+///                      encoders differ by more than 1 % in scale; the play is negative beyond the interval
+/// Torque is motor_torque where present, else sensor_torque.
+Estimate estimate_position_difference(const Record& record, const PositionDifferenceSettings& settings);
+
+}  // namespace backlash

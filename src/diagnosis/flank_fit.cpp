@@ -1,0 +1,358 @@
+#include "backlash_diagnosis/diagnosis/flank_fit.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "backlash_diagnosis/diagnosis/robust.h"
+
+namespace backlash {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kCommonKnots = 48;    // of f over the travel
+constexpr int kGapKnots = 9;        // of b over the travel
+constexpr double kOutermost = 0.4;  // share of the windows that the iteration starts from
+constexpr double kClear = 3;        // residuals beyond which a flank is surely loaded
+constexpr double kOutlier = 5;      // residuals beyond which a window is left out
+constexpr double kSlow = 0.03;      // of the rms speed, below which friction has no certain sign
+constexpr double kHeld =
+    0.1;  // relative error of g up to which the record holds it better than a declaration
+constexpr double kVaries = 1.25;           // ratio of residuals, constant over varying gap
+constexpr double kInertiaDeviation = 0.5;  // relative, of the declared inertia
+constexpr int kIterations = 40;
+constexpr std::size_t kFewest = 12;  // windows per flank
+
+double scaled(double n, double count) {
+  return std::max(1.0, std::floor(n / count));
+}
+
+/// Piecewise linear functions of q, one per column.
+MatrixXd hats(const std::vector<double>& q, int knots) {
+  MatrixXd h = MatrixXd::Zero(static_cast<Eigen::Index>(q.size()), knots);
+  const auto [low, high] = std::minmax_element(q.begin(), q.end());
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    if (knots == 1) {
+      h(i, 0) = 1;
+      continue;
+    }
+    const double x = (knots - 1) * (q[i] - *low) / (*high - *low);
+    const int k = std::clamp(static_cast<int>(x), 0, knots - 2);
+    h(i, k) = 1 - (x - k);
+    h(i, k + 1) = x - k;
+  }
+  return h;
+}
+
+double rms(const std::vector<double>& x) {
+  return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
+}
+
+/// One fit in the making.
+class Fitter {
+ public:
+  Fitter(const FlankWindows& windows, const FlankModel& model)
+      : w_(windows), model_(model), n_(windows.size()) {
+    const int common = model.moving ? static_cast<int>(std::min<double>(kCommonKnots, scaled(n_, 40))) : 1;
+    const int gaps = model.moving ? static_cast<int>(std::min<double>(kGapKnots, scaled(n_, 200))) : 1;
+    common_ = hats(w_.load, common);
+    gap_ = hats(w_.load, gaps);
+    phi_ = Eigen::Map<const VectorXd>(w_.deflection.data(), n_);
+    inertia_ = model.inertia;
+    slow_ = model.moving ? kSlow * rms(w_.speed) : -1;
+    slip_scale_ = std::max(rms(w_.slip), 1e-300);
+    torque_step_ = 0.05 * std::max(rms(w_.torque), 1e-300);
+  }
+
+  FlankFit fit();
+
+ private:
+  void choose_outermost();
+  void iterate(bool by_position, int iterations);
+  MatrixXd design(const MatrixXd& gap) const;
+  void solve(const MatrixXd& gap, double elastic_deviation);
+  void take_over();
+  bool choose_loaded();
+  FlankFit result(const MatrixXd& gap) const;
+  double sum_of_stays(const VectorXd& score, std::size_t& stays) const;
+
+  const FlankWindows& w_;
+  const FlankModel& model_;
+  Eigen::Index n_;
+  MatrixXd common_, gap_, f_basis_;
+  VectorXd phi_, side_, offset_;  // offset: of the linearisation
+  std::vector<char> use_;
+  double slow_, slip_scale_, torque_step_;
+  double factor_ = 1, inertia_, viscous_ = 0, coulomb_ = 0;  // g, J, d, C
+  // of the last solution
+  MatrixXd a_, inverse_;
+  VectorXd p_, residual_;
+  double sigma_ = 0, prior_g_ = 0;
+  Eigen::Index gap_at_ = 0, elastic_at_ = 0;
+};
+
+/// Without what follows the load in proportion, the deflections farthest out are on a flank.
+void Fitter::choose_outermost() {
+  VectorXd x = phi_;
+  if (model_.moving) {
+    MatrixXd line(n_, 2);
+    line.col(0).setOnes();
+    line.col(1) = Eigen::Map<const VectorXd>(w_.load.data(), n_);
+    x -= line * line.colPivHouseholderQr().solve(phi_);
+  }
+  const std::vector<double> values(x.data(), x.data() + n_);
+  const double middle = 0.5 * (quantile(values, 0.1) + quantile(values, 0.9));
+  std::vector<double> away;
+  for (const double v : values) away.push_back(std::abs(v - middle));
+  const double least = quantile(away, 1 - kOutermost);
+  use_.assign(n_, 0);
+  side_.resize(n_);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    side_[i] = x[i] > middle ? 1 : -1;
+    use_[i] = away[i] >= least && std::abs(w_.speed[i]) > slow_;
+  }
+}
+
+/// Columns: f, side b / 2, g, J, (d, C,) c. Nonlinear e is linearised at the present J, d, C.
+MatrixXd Fitter::design(const MatrixXd& gap) const {
+  const Eigen::Index friction = model_.moving ? 2 : 0;
+  MatrixXd a(n_, f_basis_.cols() + gap.cols() + 3 + friction);
+  a.leftCols(f_basis_.cols()) = f_basis_;
+  a.middleCols(f_basis_.cols(), gap.cols()) = (0.5 * side_).asDiagonal() * gap;
+  const Eigen::Index at = f_basis_.cols() + gap.cols();
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double sign = w_.speed[i] > 0 ? 1 : -1;
+    const double torque = w_.torque[i] - inertia_ * w_.acceleration[i] - viscous_ * w_.speed[i] -
+                          coulomb_ * sign * (friction > 0);
+    const double slope = factor_ *
+                         (model_.elastic(torque + torque_step_) - model_.elastic(torque - torque_step_)) /
+                         (2 * torque_step_);
+    a(i, at) = model_.elastic(torque);
+    a(i, at + 1) = -slope * w_.acceleration[i];
+    if (friction > 0) {
+      a(i, at + 2) = -slope * w_.speed[i];
+      a(i, at + 3) = -slope * sign;
+    }
+    a(i, at + 2 + friction) = w_.slip[i];
+  }
+  return a;
+}
+
+/// Least squares on the windows in use. elastic_deviation > 0: with g = 1 +- elastic_deviation as one more
+/// observation. Parameters are J, d, C minus their present values.
+void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
+  gap_at_ = f_basis_.cols();
+  elastic_at_ = gap_at_ + gap.cols();
+  a_ = design(gap);
+  MatrixXd normal = MatrixXd::Zero(a_.cols(), a_.cols());
+  VectorXd right = VectorXd::Zero(a_.cols());
+  double count = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    if (!use_[i]) continue;
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(a_.row(i).transpose());
+    right += a_.row(i).transpose() * phi_[i];
+    ++count;
+  }
+  normal = normal.selfadjointView<Eigen::Lower>();
+  const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
+  // A declaration is worth one window per its own variance times what a correlated record repeats itself.
+  const double weight = noise * noise * std::max(1.0, count / 50);
+  if (inertia_ > 0 && model_.inertia > 0) {
+    const double precision = noise * noise / std::pow(kInertiaDeviation * model_.inertia, 2);
+    normal(elastic_at_ + 1, elastic_at_ + 1) += precision;
+    right[elastic_at_ + 1] += precision * (model_.inertia - inertia_);
+  }
+  prior_g_ = elastic_deviation > 0 ? weight / (elastic_deviation * elastic_deviation) : 0;
+  normal(elastic_at_, elastic_at_) += prior_g_;
+  right[elastic_at_] += prior_g_;
+  // A column without any window (a knot that none lies near) gets a zero.
+  for (Eigen::Index k = 0; k < normal.cols(); ++k)
+    normal(k, k) = normal(k, k) > 0 ? (1 + 1e-12) * normal(k, k) : 1;
+  // Scaled to unit diagonal: the columns are of different units.
+  const VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
+  const MatrixXd equal = unit.asDiagonal() * normal * unit.asDiagonal();
+  inverse_ =
+      unit.asDiagonal() * equal.ldlt().solve(MatrixXd::Identity(a_.cols(), a_.cols())) * unit.asDiagonal();
+  p_ = inverse_ * right;
+  residual_ = phi_ - a_ * p_;
+  std::vector<double> sizes;
+  for (Eigen::Index i = 0; i < n_; ++i)
+    if (use_[i]) sizes.push_back(std::abs(residual_[i]));
+  sigma_ = 1.4826 * median(sizes);
+}
+
+/// J, d, C for the next linearisation.
+void Fitter::take_over() {
+  factor_ = std::clamp(p_[elastic_at_], 0.1, 10.0);
+  inertia_ = std::max(0.0, inertia_ + p_[elastic_at_ + 1]);
+  if (!model_.moving) return;
+  viscous_ += p_[elastic_at_ + 2];
+  coulomb_ += p_[elastic_at_ + 3];
+}
+
+/// Windows that surely lie on a flank by the present solution; false when nothing changes any more.
+bool Fitter::choose_loaded() {
+  const VectorXd common = a_.leftCols(gap_at_) * p_.head(gap_at_);
+  const Eigen::Index knots = elastic_at_ - gap_at_;
+  // The free play without its sign, wherever side_ pointed.
+  const VectorXd half = side_.asDiagonal() * (a_.middleCols(gap_at_, knots) * p_.segment(gap_at_, knots));
+  const VectorXd elastic = a_.rightCols(a_.cols() - elastic_at_) * p_.tail(p_.size() - elastic_at_);
+  const double clear = kClear * sigma_;
+  std::vector<double> loaded(n_ + 2, 0.0);  // side, 0 where not for certain; shifted by one
+  VectorXd residual(n_);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double deflection = phi_[i] - common[i];
+    const double side = deflection > 0 ? 1 : -1;
+    residual[i] = deflection - side * half[i] - elastic[i];
+    if (side * deflection - half[i] > clear && side * elastic[i] > clear) loaded[i + 1] = side;
+  }
+  // A window beside one that is not loaded may hold the impact itself.
+  std::size_t changes = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double side = loaded[i + 1];
+    const bool inside = side != 0 && loaded[i] == side && loaded[i + 2] == side;
+    const char use = inside && std::abs(residual[i]) < kOutlier * sigma_ && std::abs(w_.speed[i]) > slow_;
+    changes += use != use_[i] || (use && side != side_[i]);
+    use_[i] = use;
+    side_[i] = phi_[i] > common[i] ? 1 : -1;
+  }
+  return changes > 2;
+}
+
+void Fitter::iterate(bool by_position, int iterations) {
+  f_basis_ = common_;
+  if (!by_position && model_.moving) {  // offset and scale only
+    f_basis_.resize(n_, 2);
+    f_basis_.col(0).setOnes();
+    f_basis_.col(1) = Eigen::Map<const VectorXd>(w_.load.data(), n_);
+  }
+  const MatrixXd gap = by_position ? gap_ : MatrixXd::Ones(n_, 1);
+  for (int k = 0; k < iterations; ++k) {
+    const auto used = std::count(use_.begin(), use_.end(), 1);
+    if (used < 2 * static_cast<long>(kFewest)) return;
+    solve(gap, k == 0 || !model_.moving ? model_.elastic_deviation : 0);
+    take_over();
+    if (!choose_loaded() && k > 2) return;
+  }
+}
+
+/// Sum of the squares of the scores of each stay on a flank.
+double Fitter::sum_of_stays(const VectorXd& score, std::size_t& stays) const {
+  double squares = 0, sum = 0;
+  double side = 0;
+  stays = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    if (!use_[i]) continue;
+    if (side_[i] != side) {
+      squares += sum * sum;
+      sum = 0;
+      side = side_[i];
+      ++stays;
+    }
+    sum += score[i] * residual_[i];
+  }
+  return squares + sum * sum;
+}
+
+FlankFit Fitter::result(const MatrixXd& gap) const {
+  FlankFit fit;
+  VectorXd mean = VectorXd::Zero(p_.size());
+  double count = 0, squares = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    if (!use_[i]) continue;
+    ++fit.used[side_[i] > 0];
+    mean.segment(gap_at_, gap.cols()) += gap.row(i).transpose();
+    squares += residual_[i] * residual_[i];
+    ++count;
+  }
+  mean /= count;
+  fit.gap = mean.dot(p_);
+  fit.residual = std::sqrt(squares / count);
+  const VectorXd row = inverse_ * mean;
+  double variance = sum_of_stays(a_ * row, fit.stays);
+  const double stays = static_cast<double>(fit.stays);
+  variance *=
+      stays / std::max(1.0, stays - 1) * count / std::max(1.0, count - static_cast<double>(p_.size()));
+  if (prior_g_ > 0) variance += std::pow(row[elastic_at_] * prior_g_ * model_.elastic_deviation, 2);
+  fit.standard_error = std::sqrt(variance);
+  fit.compliance_factor = p_[elastic_at_];
+  fit.found = std::min(fit.used[0], fit.used[1]) >= kFewest;
+  return fit;
+}
+
+FlankFit Fitter::fit() {
+  if (n_ < 4 * static_cast<Eigen::Index>(kFewest)) return {};
+  choose_outermost();
+  iterate(false, 4);
+  iterate(true, kIterations);
+  if (std::count(use_.begin(), use_.end(), 1) < 2 * static_cast<long>(kFewest)) return {};
+  // Does the record hold the compliance? Then the declaration is not needed, and may be wrong.
+  solve(gap_, 0);
+  const double free = p_[elastic_at_];
+  std::size_t stays = 0;
+  const double error = std::sqrt(sum_of_stays(a_ * inverse_.col(elastic_at_), stays));
+  const bool held = model_.moving && free > 0 && error < kHeld * free;
+  const double deviation = held ? 0 : model_.elastic_deviation;
+  solve(gap_, deviation);
+  FlankFit varying = result(gap_);
+  const VectorXd knots = p_.segment(gap_at_, gap_.cols());
+  solve(MatrixXd::Ones(n_, 1), deviation);
+  FlankFit fit = result(MatrixXd::Ones(n_, 1));
+  if (gap_.cols() > 1 && fit.residual > kVaries * varying.residual) {
+    fit = varying;
+    fit.varies = true;
+    fit.least_gap = knots.minCoeff();
+    fit.largest_gap = knots.maxCoeff();
+  }
+  fit.compliance_from_record = held;
+  if (model_.moving && common_.cols() > 1) {
+    const auto [low, high] = std::minmax_element(w_.load.begin(), w_.load.end());
+    fit.scale_error = (p_[common_.cols() - 1] - p_[0]) / (*high - *low);
+  }
+  return fit;
+}
+
+}  // namespace
+
+FlankWindows average_windows(const TwoEncoders& motion, std::size_t half) {
+  FlankWindows out;
+  const std::size_t n = motion.motor.size();
+  const double h = static_cast<double>(half), span = h * motion.interval;
+  for (std::size_t c = half; c + half < n; c += half) {
+    bool whole = true;
+    double torque = 0, motor = 0, load = 0;
+    for (std::size_t i = c - half; i <= c + half; ++i) {
+      const double weight = (h - std::abs(static_cast<double>(i) - static_cast<double>(c))) / (h * h);
+      torque += weight * motion.torque[i];
+      motor += weight * motion.motor[i];
+      load += weight * motion.load[i];
+      whole = whole && (i == c - half || motion.unbroken[i]);
+    }
+    if (!whole) continue;
+    // Mean speed over the triangle: difference of the means over its two halves (trapezoids).
+    const auto speed = [&](const std::vector<double>& q) {
+      double sum = 0;
+      for (std::size_t i = 0; i < half; ++i)
+        sum += 0.5 * (q[c + i] + q[c + i + 1] - q[c - half + i] - q[c - half + i + 1]);
+      return sum / (h * span);
+    };
+    out.centre.push_back(c);
+    out.torque.push_back(torque);
+    out.deflection.push_back(motor - load);
+    out.load.push_back(load);
+    out.speed.push_back(speed(motion.motor));
+    out.slip.push_back(out.speed.back() - speed(motion.load));
+    out.acceleration.push_back((motion.motor[c + half] - 2 * motion.motor[c] + motion.motor[c - half]) /
+                               (span * span));
+  }
+  return out;
+}
+
+FlankFit fit_flanks(const FlankWindows& windows, const FlankModel& model) {
+  return Fitter(windows, model).fit();
+}
+
+}  // namespace backlash

@@ -1,0 +1,202 @@
+#include "backlash_diagnosis/diagnosis/position_difference.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/flank_fit.h"
+#include "backlash_diagnosis/diagnosis/robust.h"
+
+namespace backlash {
+namespace {
+
+constexpr std::size_t kShortestWindow = 4, kLongestWindow = 64;  // samples, half a window
+// Residuals fall by 2^2.5 per doubling of the window where second differences of noise dominate, by 2^0.5
+// where white torque noise does; only the former is worth a longer window.
+constexpr double kNoiseFalls = 2.0;
+// Share of the rms residual in the interval, of a locked rig and of a moving load.
+constexpr double kLockedResidual = 3, kMovingResidual = 0.15;
+constexpr double kLargestScaleError = 0.01;
+constexpr double kLargestFactor = 5;     // of the compliance against the declared one
+constexpr std::size_t kFewestStays = 6;  // on a flank
+constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
+
+struct Refusal {
+  Status status;
+  std::string reason;
+};
+
+std::string text(double value) {
+  std::ostringstream stream;
+  stream.precision(4);
+  stream << value;
+  return stream.str();
+}
+
+void require(bool valid, const char* name, double value, const char* limit) {
+  if (!valid) throw InvalidParameter(std::string("position_difference.") + name, value, limit);
+}
+
+void check(const PositionDifferenceSettings& s) {
+  if (!s.elastic_deflection)
+    throw InvalidParameter("position_difference.elastic_deflection", "empty", "needed");
+  require(s.elastic_uncertainty > 0 && std::isfinite(s.elastic_uncertainty), "elastic_uncertainty",
+          s.elastic_uncertainty, "must be > 0");
+  require(s.motor_inertia >= 0 && std::isfinite(s.motor_inertia), "motor_inertia", s.motor_inertia,
+          "must be >= 0");
+  require(s.load_ratio > 0 && std::isfinite(s.load_ratio), "load_ratio", s.load_ratio, "must be > 0");
+  require(!(s.base_radius <= 0), "base_radius", s.base_radius, "must be > 0");
+}
+
+TwoEncoders collect(const Record& record, const PositionDifferenceSettings& settings) {
+  for (const Channel channel : {Channel::motor_position, Channel::load_position})
+    if (!record.has(channel))
+      throw Refusal{Status::insufficient_data, "the record has no " + channel_name(channel)};
+  const bool motor = record.has(Channel::motor_torque);
+  const auto& torque = record.column(motor ? Channel::motor_torque : Channel::sensor_torque);
+  if (torque.empty())
+    throw Refusal{Status::insufficient_data,
+                  "the record has neither motor_torque nor sensor_torque to tell the flanks apart"};
+  const auto &q_motor = record.column(Channel::motor_position),
+             &q_load = record.column(Channel::load_position);
+  TwoEncoders motion;
+  motion.interval = record.sampling_interval();
+  double last = -INFINITY;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    if (!std::isfinite(torque[i]) || !std::isfinite(q_motor[i]) || !std::isfinite(q_load[i])) continue;
+    motion.unbroken.push_back(record.time[i] - last < kBroken * motion.interval);
+    last = record.time[i];
+    motion.torque.push_back(torque[i]);
+    motion.motor.push_back(q_motor[i]);
+    motion.load.push_back(settings.load_ratio * q_load[i]);
+  }
+  if (motion.motor.size() < 16 * kShortestWindow)
+    throw Refusal{Status::insufficient_data,
+                  "the record has only " + std::to_string(motion.motor.size()) + " usable samples"};
+  return motion;
+}
+
+double travel(const std::vector<double>& values) {
+  return quantile(values, 0.99) - quantile(values, 0.01);
+}
+
+double resolution(const std::vector<double>& position) {
+  double smallest = 0;
+  for (std::size_t i = 1; i < position.size(); ++i) {
+    const double step = std::abs(position[i] - position[i - 1]);
+    if (step > 0 && (smallest == 0 || step < smallest)) smallest = step;
+  }
+  return smallest;
+}
+
+/// A load that travels farther than the deflection varies shows friction with both signs of its speed.
+bool load_moves(const TwoEncoders& motion) {
+  std::vector<double> deflection(motion.motor.size());
+  for (std::size_t i = 0; i < deflection.size(); ++i) deflection[i] = motion.motor[i] - motion.load[i];
+  const double moved = travel(motion.load);
+  return moved > 0.5 * travel(deflection) && moved > 20 * resolution(motion.load);
+}
+
+struct Fits {
+  FlankFit fit, longer;
+};
+
+/// The shortest window that noise does not spoil, and the next.
+Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
+  std::size_t half = kShortestWindow;
+  FlankFit fit = fit_flanks(average_windows(motion, half), model);
+  for (;;) {
+    half *= 2;
+    FlankFit longer = fit_flanks(average_windows(motion, half), model);
+    const bool noisy = longer.found && (!fit.found || fit.residual > kNoiseFalls * longer.residual);
+    if (!noisy && (fit.found || half >= kLongestWindow)) return {fit, longer};
+    if (2 * half > kLongestWindow) return {noisy ? longer : fit, longer};
+    fit = std::move(longer);
+  }
+}
+
+void require_sound(const FlankFit& fit) {
+  if (!fit.found)
+    throw Refusal{Status::out_of_domain,
+                  "torque does not press both flanks: no two groups of deflections that follow the torque"};
+  if (fit.stays < kFewestStays)
+    throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
+                                                 " times, needed are " + std::to_string(kFewestStays)};
+  const double factor = fit.compliance_factor;
+  if (!(factor > 1 / kLargestFactor && factor < kLargestFactor))
+    throw Refusal{Status::out_of_domain, "the deflection does not follow the torque as declared: " +
+                                             text(factor) + " times the elastic deflection of the rig"};
+  if (std::abs(fit.scale_error) > kLargestScaleError)
+    throw Refusal{Status::out_of_domain,
+                  "motor_position and load_position differ by " + text(100 * fit.scale_error) +
+                      " % in scale: the reduction ratio or an encoder is not as declared"};
+}
+
+std::string describe(const FlankFit& fit, bool moves) {
+  std::string message = std::to_string(fit.used[0]) + " and " + std::to_string(fit.used[1]) +
+                        " windows on the two flanks, " + std::to_string(fit.stays) + " stays; ";
+  message += fit.compliance_from_record ? "elastic deflection from the record, " +
+                                              text(fit.compliance_factor) + " times the declared"
+                                        : std::string("elastic deflection as declared");
+  if (moves && std::abs(fit.scale_error) > 1e-4)
+    message +=
+        "; the difference of the encoders drifts by " + text(100 * fit.scale_error) + " % of the travel";
+  if (fit.varies)
+    message += "; the play depends on the position of the load, from " + text(fit.least_gap) + " to " +
+               text(fit.largest_gap) + " rad: the interval holds it all";
+  return message;
+}
+
+void fill(const Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
+  const TwoEncoders motion = collect(record, settings);
+  FlankModel model;
+  model.elastic = settings.elastic_deflection;
+  model.inertia = settings.motor_inertia;
+  model.elastic_deviation = settings.elastic_uncertainty / 1.96;
+  model.moving = load_moves(motion);
+  const auto [fit, longer] = fit_record(motion, model);
+  require_sound(fit);
+
+  const double scatter = student_t_975(fit.stays / 2 - 1) * fit.standard_error;
+  const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
+  const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
+  const double half = std::sqrt(scatter * scatter + windows * windows + unexplained * unexplained);
+  double lower = fit.gap - half, upper = fit.gap + half;
+  if (fit.varies) {
+    lower = std::min(lower, fit.least_gap - half);
+    upper = std::max(upper, fit.largest_gap + half);
+  }
+  if (upper < 0)
+    throw Refusal{Status::out_of_domain,
+                  "the flanks are " + text(-fit.gap) +
+                      " rad closer than the declared elastic deflection allows: the rig "
+                      "is not this machine"};
+  estimate.status = Status::ok;
+  estimate.backlash_angle = std::max(0.0, fit.gap);
+  estimate.angle_lower = std::max(0.0, lower);
+  estimate.angle_upper = upper;
+  estimate.backlash = settings.base_radius * estimate.backlash_angle;
+  estimate.lower = settings.base_radius * estimate.angle_lower;
+  estimate.upper = settings.base_radius * estimate.angle_upper;
+  estimate.message = describe(fit, model.moving);
+}
+
+}  // namespace
+
+Estimate estimate_position_difference(const Record& record, const PositionDifferenceSettings& settings) {
+  check(settings);
+  Estimate estimate;
+  estimate.method = "position_difference";
+  try {
+    fill(record, settings, estimate);
+  } catch (const Refusal& refusal) {
+    estimate.status = refusal.status;
+    estimate.message = refusal.reason;
+  }
+  return estimate;
+}
+
+}  // namespace backlash

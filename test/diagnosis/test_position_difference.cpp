@@ -1,0 +1,205 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/position_difference.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kStiffness = 4e5;                       // N m/rad
+constexpr double kMotorInertia = 6, kLoadInertia = 100;  // kg m^2
+constexpr double kGap = 5e-4;                            // rad
+
+PositionDifferenceSettings settings() {
+  PositionDifferenceSettings s;
+  s.elastic_deflection = [](double torque) { return torque / kStiffness; };
+  s.motor_inertia = kMotorInertia;
+  return s;
+}
+
+/// A servo whose load is led along a sum of sines; everything else follows in closed form. The gap is crossed
+/// while the torque between the gears is within +-2 N m.
+struct Servo {
+  double gap = kGap, gap_wave = 0;  // rad, relative amplitude over the position
+  double stiffness = kStiffness;
+  double motor_inertia = kMotorInertia;
+  double motor_coulomb = 50, load_coulomb = 10;  // N m
+  double offset = 0, scale = 1;                  // of the load encoder
+  double eccentricity = 0;                       // rad, once per 0.5 rad of the load
+  double torque_noise = 1, motor_step = 8.7e-7, load_step = 7e-6;
+  double duration = 20;
+
+  static double load(double t) {
+    return 0.6 * std::sin(2 * M_PI * 0.11 * t) + 0.05 * std::sin(2 * M_PI * 1.3 * t + 1);
+  }
+  double transmitted(double t) const {
+    const double h = 1e-4, speed = (load(t + h) - load(t - h)) / (2 * h);
+    const double acceleration = (load(t + h) - 2 * load(t) + load(t - h)) / (h * h);
+    return kLoadInertia * acceleration + load_coulomb * std::tanh(speed / 1e-3);
+  }
+  double motor(double t) const {
+    const double torque = transmitted(t), q = load(t);
+    return q + torque / stiffness + eccentricity * std::sin(2 * M_PI * q / 0.5) +
+           0.5 * gap * (1 + gap_wave * std::sin(3 * q)) * std::erf(torque / 1.0);
+  }
+  Record record(double rate = 1000) const {
+    Record r;
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    const auto rounded = [](double x, double step) { return step > 0 ? step * std::round(x / step) : x; };
+    for (int i = 0; i < duration * rate; ++i) {
+      const double t = i / rate, h = 1e-4;
+      const double acceleration = (motor(t + h) - 2 * motor(t) + motor(t - h)) / (h * h);
+      const double speed = (motor(t + h) - motor(t - h)) / (2 * h);
+      r.time.push_back(t);
+      r.column(Channel::motor_torque)
+          .push_back(transmitted(t) + motor_inertia * acceleration + motor_coulomb * std::tanh(speed / 1e-3) +
+                     torque_noise * normal(random));
+      r.column(Channel::motor_position).push_back(rounded(motor(t), motor_step));
+      r.column(Channel::load_position).push_back(offset + rounded(scale * load(t), load_step));
+    }
+    return r;
+  }
+};
+
+// 1 urad, an eighth of the step of the load encoder: errors of the rounding average out over thousands of
+// windows.
+constexpr double kNear = 1e-6;
+
+TEST(PositionDifference, FreePlayOfAServoWhoseLoadMoves) {
+  for (const double gap : {0.0, 1e-4, 5e-4, 2e-3}) {
+    Servo servo;
+    servo.gap = gap;
+    const Estimate e = estimate_position_difference(servo.record(), settings());
+    ASSERT_EQ(e.status, Status::ok) << e.message;
+    EXPECT_NEAR(e.backlash_angle, gap, kNear);
+    EXPECT_LE(e.angle_lower, gap);
+    EXPECT_GE(e.angle_upper, gap);
+    EXPECT_LT(e.angle_upper - e.angle_lower, 10 * kNear);
+    EXPECT_TRUE(std::isnan(e.backlash));
+    EXPECT_EQ(e.method, "position_difference");
+  }
+}
+
+TEST(PositionDifference, TheRecordKnowsComplianceInertiaAndFrictionBetterThanTheRigFile) {
+  Servo servo;
+  servo.stiffness = 0.6 * kStiffness;
+  servo.motor_inertia = 1.4 * kMotorInertia;
+  servo.motor_coulomb = 90;
+  const Estimate e = estimate_position_difference(servo.record(), settings());
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_NEAR(e.backlash_angle, kGap, kNear);
+  EXPECT_NE(e.message.find("from the record, 1."), std::string::npos) << e.message;
+}
+
+TEST(PositionDifference, WhatBothFlanksShareIsNoPlay) {
+  Servo offset, scale, eccentric;
+  offset.offset = 0.3;
+  scale.scale = 1.005;
+  eccentric.eccentricity = 1e-4;
+  for (const Servo& servo : {offset, scale, eccentric}) {
+    const Estimate e = estimate_position_difference(servo.record(), settings());
+    ASSERT_EQ(e.status, Status::ok) << e.message;
+    EXPECT_NEAR(e.backlash_angle, kGap, 2 * kNear) << e.message;
+  }
+  scale.scale = 1.02;
+  const Estimate e = estimate_position_difference(scale.record(), settings());
+  EXPECT_EQ(e.status, Status::out_of_domain);
+  EXPECT_NE(e.message.find("in scale"), std::string::npos) << e.message;
+}
+
+TEST(PositionDifference, AGapThatVariesWithPositionWidensTheInterval) {
+  Servo servo;
+  servo.gap_wave = 0.3;
+  const Estimate e = estimate_position_difference(servo.record(), settings());
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  // sin(3 q) reaches 0.98 over the travel of +-0.65 rad; knots of straight lines cut the tops by a few per
+  // cent.
+  EXPECT_NEAR(e.angle_lower, kGap * 0.71, 0.05 * kGap);
+  EXPECT_NEAR(e.angle_upper, kGap * 1.29, 0.05 * kGap);
+  EXPECT_NE(e.message.find("depends on the position"), std::string::npos) << e.message;
+}
+
+/// Locked output, torque in slow triangles, elastic deflection with a power law.
+Record locked(double gap, double compliance_error = 1) {
+  Record r;
+  for (int i = 0; i < 4000; ++i) {
+    const double t = i / 1000.0, phase = std::fmod(t, 0.5) / 0.5;
+    const double torque = 2 * (std::abs(4 * phase - 2) - 1);  // +-2 N m
+    const double elastic = compliance_error * std::copysign(1e-3 * std::pow(std::abs(torque), 0.8), torque);
+    r.time.push_back(t);
+    r.column(Channel::motor_torque).push_back(torque);
+    r.column(Channel::motor_position).push_back(elastic + 0.5 * gap * std::erf(torque / 0.01));
+    r.column(Channel::load_position).push_back(0);
+  }
+  return r;
+}
+
+PositionDifferenceSettings locked_settings() {
+  PositionDifferenceSettings s;
+  s.elastic_deflection = [](double torque) {
+    return std::copysign(1e-3 * std::pow(std::abs(torque), 0.8), torque);
+  };
+  s.base_radius = 0.02;
+  return s;
+}
+
+TEST(PositionDifference, LockedOutputWithDeclaredElasticDeflection) {
+  for (const double gap : {0.0, 1e-3, 5e-3}) {
+    const Estimate e = estimate_position_difference(locked(gap), locked_settings());
+    ASSERT_EQ(e.status, Status::ok) << e.message;
+    // Averages over windows of a curved law: 1e-5 of 1.7e-3 rad of elastic deflection.
+    EXPECT_NEAR(e.backlash_angle, gap, 2e-5);
+    EXPECT_NEAR(e.backlash, 0.02 * e.backlash_angle, 1e-15);
+    EXPECT_LE(e.angle_lower, gap);
+    EXPECT_GE(e.angle_upper, gap);
+  }
+  // 2 % of the deflection on either side at the torque of the windows is what the declaration leaves open.
+  const Estimate e = estimate_position_difference(locked(1e-3, 1.01), locked_settings());
+  EXPECT_LE(e.angle_lower, 1e-3);
+  EXPECT_GE(e.angle_upper, 1e-3);
+}
+
+TEST(PositionDifference, WhatTheRecordLacksBecomesAStatus) {
+  const Record full = Servo().record();
+  const auto status_without = [&full](Channel channel) {
+    Record r = full;
+    r.column(channel).clear();
+    const Estimate e = estimate_position_difference(r, settings());
+    EXPECT_TRUE(std::isnan(e.backlash_angle));
+    EXPECT_FALSE(e.message.empty());
+    return e.status;
+  };
+  EXPECT_EQ(status_without(Channel::motor_position), Status::insufficient_data);
+  EXPECT_EQ(status_without(Channel::load_position), Status::insufficient_data);
+  EXPECT_EQ(status_without(Channel::motor_torque), Status::insufficient_data);
+  EXPECT_EQ(estimate_position_difference(full.slice(0, 0.05), settings()).status, Status::insufficient_data);
+  Record one_sided = locked(1e-3);
+  for (std::size_t i = 0; i < one_sided.size(); ++i) {
+    one_sided.column(Channel::motor_torque)[i] = 1 + 0.1 * std::sin(20 * one_sided.time[i]);
+    one_sided.column(Channel::motor_position)[i] = 1e-3 + 1e-6 * std::sin(20 * one_sided.time[i]);
+  }
+  EXPECT_EQ(estimate_position_difference(one_sided, locked_settings()).status, Status::out_of_domain);
+  Record negative = locked(-2e-3);  // the declared machine would have to overlap
+  EXPECT_NE(estimate_position_difference(negative, locked_settings()).status, Status::ok);
+}
+
+TEST(PositionDifference, RefusesSettingsOutOfRange) {
+  const Record r = locked(1e-3);
+  const auto refused = [&r](void (*spoil)(PositionDifferenceSettings&)) {
+    PositionDifferenceSettings s = locked_settings();
+    spoil(s);
+    EXPECT_THROW(estimate_position_difference(r, s), InvalidParameter);
+  };
+  refused([](auto& s) { s.elastic_deflection = nullptr; });
+  refused([](auto& s) { s.elastic_uncertainty = 0; });
+  refused([](auto& s) { s.motor_inertia = -1; });
+  refused([](auto& s) { s.load_ratio = 0; });
+  refused([](auto& s) { s.base_radius = 0; });
+}
+
+}  // namespace
+}  // namespace backlash
