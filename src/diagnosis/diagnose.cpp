@@ -45,6 +45,30 @@ Estimate by_lost_motion(const DiagnosisInput& in) {
   return estimate_lost_motion(in.record, *in.settings.lost_motion);
 }
 
+Estimate by_position_difference(const DiagnosisInput& in) {
+  if (!in.settings.position_difference) return not_served("the rig has no elastic deflection to go by");
+  return estimate_position_difference(in.record, *in.settings.position_difference);
+}
+
+Estimate by_momentum_transfer(const DiagnosisInput& in) {
+  if (!in.settings.momentum_transfer) return not_served("the rig tells no inertia to go by");
+  return estimate_momentum_transfer(in.record, *in.settings.momentum_transfer);
+}
+
+CoherenceSettings read_coherence(const YamlReader& yaml) {
+  CoherenceSettings coherence;
+  coherence.segment = yaml.number("segment", Range::positive());
+  coherence.response = channel_from_name(
+      yaml.choice("response", {"motor_velocity", "motor_position", "load_velocity", "load_position", "acceleration"}));
+  coherence.lower = yaml.number_or("lower", kNaN, Range::positive());
+  coherence.upper = yaml.number_or("upper", kNaN, Range::positive());
+  if (const auto healthy = yaml.optional_map("baseline"))
+    coherence.baseline = CoherenceBaseline{
+        healthy->number("loss", Range::between(0, 1)), healthy->number("deviation", Range::not_negative()),
+        healthy->number("lower", Range::positive()), healthy->number("upper", Range::positive())};
+  return coherence;
+}
+
 }  // namespace
 
 DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
@@ -54,6 +78,7 @@ DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
   if (const auto lost_motion = yaml.optional_map("lost_motion"))
     settings.lost_motion = read_lost_motion(*lost_motion);
   if (settings.lost_motion) settings.lost_motion->elastic_uncertainty = 2 * settings.stiffness_uncertainty;
+  if (const auto coherence = yaml.optional_map("coherence")) settings.coherence = read_coherence(*coherence);
   if (const auto limits = yaml.optional_map("limits")) settings.limits = read_limits(*limits);
   return settings;
 }
@@ -68,6 +93,9 @@ const std::vector<DiagnosisMethod>& diagnosis_method_table() {
       {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", by_apd<estimate_apd_skewness>},
       {"apd_shape", "the signal of diagnosis.apd and a monitoring curve", by_apd<estimate_apd_shape>},
       {"lost_motion", "motor_position, and motor_torque or sensor_torque; output locked", by_lost_motion},
+      {"position_difference", "motor_position, load_position, and motor_torque or sensor_torque",
+       by_position_difference},
+      {"momentum_transfer", "motor_torque, and motor_velocity or motor_position", by_momentum_transfer},
   };
   return methods;
 }
@@ -108,6 +136,7 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
                                       : each.estimate(input));
     diagnosis.estimates.back().method = each.name;
   }
+  if (settings.coherence) diagnosis.coherence = detect_nonlinearity(record, *settings.coherence);
   diagnosis.verdict = combine(diagnosis.estimates, settings.limits, baseline);
   return diagnosis;
 }

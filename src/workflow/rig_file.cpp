@@ -19,6 +19,39 @@ std::string digest_of(const std::string& text) {
   return digest;
 }
 
+/// What the estimators need to know of the rig.
+void fill_from_rig(const Rig& rig, DiagnosisSettings& settings) {
+  const auto train = std::make_shared<GearTrain>(rig);  // refuses what cannot move
+  const auto deflection = [train](double torque) { return train->elastic_deflection(torque); };
+  const double base_radius = rig.mesh.angular() ? kNaN : 1 / rig.backlash_angle(1);
+  if (settings.lost_motion) {
+    settings.lost_motion->elastic_deflection = deflection;
+    settings.lost_motion->base_radius = base_radius;
+  }
+  const Coupling& coupling = rig.input_coupling;
+  const double motor = rig.motor.inertia + 0.5 * coupling.inertia;
+  const double pinion = rig.pinion.inertia + 0.5 * coupling.inertia;
+  PositionDifferenceSettings& difference = settings.position_difference.emplace();
+  difference.elastic_deflection = deflection;
+  if (settings.stiffness_uncertainty > 0) difference.elastic_uncertainty = 2 * settings.stiffness_uncertainty;
+  difference.motor_inertia = coupling.rigid ? motor + pinion : motor;
+  MomentumTransferSettings& momentum = settings.momentum_transfer.emplace();
+  momentum.motor_inertia = difference.motor_inertia;
+  momentum.motor_damping = rig.motor.viscous_damping;
+  momentum.output_locked = rig.link_locked;
+  momentum.flank_deflection = deflection;
+  if (!coupling.rigid) {
+    const double stiffness = coupling.stiffness;
+    momentum.pinion_inertia = pinion;
+    momentum.coupling_stiffness = stiffness;
+    momentum.flank_deflection = [train, stiffness](double torque) {
+      return train->elastic_deflection(torque) - torque / stiffness;
+    };
+  }
+  difference.load_ratio = momentum.load_ratio = rig.motor_axis_ratio();
+  difference.base_radius = momentum.base_radius = base_radius;
+}
+
 }  // namespace
 
 RigFile rig_file_from_text(const std::string& text, const std::string& source) {
@@ -36,12 +69,7 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
     yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");
   if (file.simulation.sensors.of(Channel::motor_current).declared && std::isnan(file.rig.torque_constant))
     yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
-  const auto train = std::make_shared<GearTrain>(file.rig);  // refuses what cannot move
-  if (file.diagnosis.lost_motion) {
-    LostMotionSettings& lost_motion = *file.diagnosis.lost_motion;
-    lost_motion.elastic_deflection = [train](double torque) { return train->elastic_deflection(torque); };
-    if (!file.rig.mesh.angular()) lost_motion.base_radius = 1 / file.rig.backlash_angle(1);
-  }
+  fill_from_rig(file.rig, file.diagnosis);
   return file;
 }
 

@@ -88,7 +88,8 @@ TEST(Diagnose, WhatCannotBeServedIsListedWithItsReason) {
   ASSERT_EQ(d.estimates.size(), diagnosis_methods().size());
   for (const Estimate& e : d.estimates) {
     EXPECT_EQ(e.status, Status::insufficient_data);
-    EXPECT_NE(e.message.find("declares no diagnosis."), std::string::npos) << e.message;
+    const bool of_the_file = e.method != "position_difference" && e.method != "momentum_transfer";
+    EXPECT_NE(e.message.find(of_the_file ? "declares no diagnosis." : "the rig"), std::string::npos) << e.message;
   }
   EXPECT_EQ(d.verdict.grade, Grade::cannot_tell);
   EXPECT_FALSE(d.apd);

@@ -450,6 +450,7 @@ TEST(LostMotionMeasured, RigWithKnownHalfGapWithinThreeMicrometres) {
   LostMotionSettings settings = at(0.05);
   settings.subtract_elastic_deflection = true;
   settings.base_radius = radius;
+  settings.elastic_uncertainty = 0.02;  // as config/sarkar_1997.yaml
   settings.elastic_deflection = [radius](double torque) {
     return torque / 28.71 + std::pow(torque / radius / 2.28e8, 2.0 / 3) / radius + torque / 6310;
   };

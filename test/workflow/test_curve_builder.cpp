@@ -74,7 +74,7 @@ TEST(BuildCurve, KnowsItsConditions) {
   EXPECT_TRUE(std::is_sorted(curve.noise_levels.begin(), curve.noise_levels.end()));
   EXPECT_EQ(std::count(curve.noise_levels.begin(), curve.noise_levels.end(), 0.0007), 1);
   EXPECT_EQ(curve.noise_levels.front(), 0);
-  EXPECT_DOUBLE_EQ(curve.noise_levels.back(), 0.2 * 0.05);
+  EXPECT_DOUBLE_EQ(curve.noise_levels.back(), 0.3 * 0.05);
   for (const CurvePoint& point : curve.points) {
     EXPECT_EQ(point.cells.size(), curve.noise_levels.size());
     EXPECT_NEAR(point.signal_level, 0.05, 0.005);  // the sensor settles at the torque; ringing is about that
@@ -88,7 +88,7 @@ TEST(BuildCurve, NoiseLevelsOfAMultiSineFollowItsLargestTorque) {
   file.simulation.excitation.type = "multi_sine";
   file.simulation.excitation.amplitude = 0;
   file.simulation.excitation.lines = {{0.03, 10, 0}, {0.01, 30, 1}};
-  EXPECT_DOUBLE_EQ(build_curve(file, quick(2)).noise_levels.back(), 0.2 * 0.04);
+  EXPECT_DOUBLE_EQ(build_curve(file, quick(2)).noise_levels.back(), 0.3 * 0.04);
 }
 
 TEST(BuildCurve, IsReadBackAsWritten) {

@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/workflow/curve_builder.h"
 #include "support/data.h"
+#include "support/estimates.h"
 #include "support/records.h"
 
 namespace backlash {
@@ -220,7 +221,8 @@ TEST(RigDiagnosis, RecordsTooShortAndOutputsThatMove) {
   for (std::size_t i = 0; i < record.size(); ++i)
     record.column(Channel::load_position)[i] = 1e-3 * std::sin(2 * M_PI * 3 * record.time[i]);
   const Diagnosis d = diagnosed(record);
-  for (const Estimate& e : d.estimates) {
+  for (const char* method : {"apd_skewness", "apd_shape", "lost_motion"}) {  // the others allow it
+    const Estimate& e = test::by(method, d.estimates);
     EXPECT_EQ(e.status, Status::out_of_domain) << e.message;
     EXPECT_NE(e.message.find("output"), std::string::npos) << e.message;
   }

@@ -5,17 +5,24 @@
 #include <vector>
 
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
+#include "backlash_diagnosis/diagnosis/coherence.h"
 #include "backlash_diagnosis/diagnosis/lost_motion.h"
+#include "backlash_diagnosis/diagnosis/momentum_transfer.h"
+#include "backlash_diagnosis/diagnosis/position_difference.h"
 #include "backlash_diagnosis/diagnosis/verdict.h"
 
 namespace backlash {
 
-/// What a rig file says under `diagnosis`. An absent part means that its estimator cannot be served.
+/// What a rig file says under `diagnosis`, and what its estimators need of the rig (position_difference,
+/// momentum_transfer). An absent part means that its estimator cannot be served.
 struct DiagnosisSettings {
   /// How well the rig file knows the machine: relative standard deviation of the stiffness of its couplings.
   double stiffness_uncertainty = 0;
   std::optional<ApdSettings> apd;
   std::optional<LostMotionSettings> lost_motion;
+  std::optional<PositionDifferenceSettings> position_difference;
+  std::optional<MomentumTransferSettings> momentum_transfer;
+  std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
 };
 
@@ -25,6 +32,7 @@ struct Diagnosis {
   std::vector<Estimate>
       estimates;  // one per method of diagnosis_methods(), in that order, or the one asked for
   std::optional<ApdResult> apd;
+  std::optional<CoherenceDetection> coherence;  // where the settings ask for it
   Verdict verdict;
 };
 

@@ -51,6 +51,20 @@ Json methods_json(const std::vector<Estimate>& estimates, const std::vector<int>
   return names;
 }
 
+Json coherence_json(const CoherenceDetection& d) {
+  Json json;
+  json["detector"] = "coherence";
+  json["status"] = to_string(d.status);
+  json["nonlinear"] = d.nonlinear ? Json(*d.nonlinear) : Json(nullptr);
+  json["loss"] = number(d.loss);
+  json["deviation"] = number(d.deviation);
+  json["index"] = number(d.index);
+  json["index_interval"] = interval(d.index_lower, d.index_upper);
+  json["band"] = interval(d.lower, d.upper);
+  json["message"] = d.message;
+  return json;
+}
+
 Json verdict_json(const Verdict& verdict, const std::vector<Estimate>& estimates) {
   Json json;
   json["grade"] = to_string(verdict.grade);
@@ -149,6 +163,7 @@ Json to_json(const DiagnosisReport& report) {
   json["record"] = report.record->name;
   json["estimates"] = Json::array();
   for (const Estimate& e : report.diagnosis.estimates) json["estimates"].push_back(estimate_json(e));
+  if (report.diagnosis.coherence) json["detectors"] = Json::array({coherence_json(*report.diagnosis.coherence)});
   json["verdict"] = verdict_json(report.diagnosis.verdict, report.diagnosis.estimates);
   const bool has_apd = report.diagnosis.apd && report.apd_settings;
   json["apd"] = has_apd ? apd_json(*report.diagnosis.apd, *report.apd_settings) : Json(nullptr);
