@@ -12,6 +12,7 @@
 namespace backlash {
 namespace {
 
+constexpr double kLockedTravel = 0.05;  // of the motor's travel
 constexpr std::size_t kFewestSamples = 64;
 constexpr std::size_t kFewestCrossings = 4;
 constexpr double kSamplesPerCycle = 10;   // of motor against pinion
@@ -144,6 +145,13 @@ Motor collect(const Record& record, const MomentumTransferSettings& settings) {
   Motor motor = motor_side(record.column(Channel::motor_torque),
                            record.column(tachometer ? Channel::motor_velocity : Channel::motor_position),
                            tachometer, interval);
+  if (settings.output_locked && record.has(Channel::load_position)) {
+    const auto travel = [](const std::vector<double>& x) { return quantile(x, 0.99) - quantile(x, 0.01); };
+    const double moved = settings.load_ratio * travel(record.column(Channel::load_position));
+    if (moved > kLockedTravel * travel(motor.position))
+      throw Refusal{Status::out_of_domain,
+                    "the output moves by " + text(moved) + " rad although the rig says that it is locked"};
+  }
   motor.load.assign(record.size(), 0.0);
   if (!settings.output_locked)
     for (std::size_t i = 0; i < record.size(); ++i)

@@ -18,6 +18,9 @@ constexpr std::size_t kShortestWindow = 4, kLongestWindow = 64;  // samples, hal
 // where white torque noise does; only the former is worth a longer window.
 constexpr double kNoiseFalls = 2.0;
 // Share of the rms residual in the interval, of a locked rig and of a moving load.
+// Of the play, with a locked output: bouncing takes longer the larger the gap, until it fills the half period.
+constexpr double kBounce = 0.04;
+constexpr double kLockedTravel = 0.05;  // of the motor's travel
 constexpr double kLockedResidual = 3, kMovingResidual = 0.15;
 constexpr double kLargestScaleError = 0.01;
 constexpr double kLargestFactor = 5;     // of the compliance against the declared one
@@ -152,6 +155,9 @@ std::string describe(const FlankFit& fit, bool moves) {
 
 void fill(const Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
   const TwoEncoders motion = collect(record, settings);
+  if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
+    throw Refusal{Status::out_of_domain, "the output moves by " + text(travel(motion.load)) +
+                                             " rad although the rig says that it is locked"};
   FlankModel model;
   model.elastic = settings.elastic_deflection;
   model.inertia = settings.motor_inertia;
@@ -163,7 +169,8 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
   const double scatter = student_t_975(fit.stays / 2 - 1) * fit.standard_error;
   const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
   const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
-  const double half = std::sqrt(scatter * scatter + windows * windows + unexplained * unexplained);
+  const double bounce = model.moving ? 0 : kBounce * fit.gap;
+  const double half = std::hypot(std::hypot(scatter, windows), std::hypot(unexplained, bounce));
   double lower = fit.gap - half, upper = fit.gap + half;
   if (fit.varies) {
     lower = std::min(lower, fit.least_gap - half);

@@ -38,7 +38,7 @@ void fill_from_rig(const Rig& rig, DiagnosisSettings& settings) {
   MomentumTransferSettings& momentum = settings.momentum_transfer.emplace();
   momentum.motor_inertia = difference.motor_inertia;
   momentum.motor_damping = rig.motor.viscous_damping;
-  momentum.output_locked = rig.link_locked;
+  difference.output_locked = momentum.output_locked = rig.link_locked;
   momentum.flank_deflection = deflection;
   if (!coupling.rigid) {
     const double stiffness = coupling.stiffness;
