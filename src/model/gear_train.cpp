@@ -30,6 +30,7 @@ GearTrain::GearTrain(const Rig& rig)
                rig.gear.viscous_damping, rig.link.viscous_damping},
       input_(referred(rig.input_coupling, ratio_ * ratio_)),
       output_(rig.output_coupling),
+      sensed_damping_(rig.sensor_with_damper ? input_.damping : 0),
       lever_(rig.mesh.lever()),
       torque_constant_(rig.torque_constant),
       contact_(rig.mesh.contact),
@@ -127,10 +128,10 @@ Observation GearTrain::observe(const double* state, double motor_torque, double 
   o.motor_torque = motor_torque;
   o.motor_position = s.q[kMotor] * ratio_;
   o.motor_velocity = s.w[kMotor] * ratio_;
-  const double twist = s.q[kMotor] - s.q[kPinion];
-  o.sensor_torque = input_.rigid ? none : spring(input_, twist) / ratio_;
+  const double twist = s.q[kMotor] - s.q[kPinion], twist_rate = s.w[kMotor] - s.w[kPinion];
+  o.sensor_torque = input_.rigid ? none : (spring(input_, twist) + sensed_damping_ * twist_rate) / ratio_;
   o.sensor_twist = input_.rigid ? none : twist * ratio_;
-  o.sensor_twist_rate = input_.rigid ? none : (s.w[kMotor] - s.w[kPinion]) * ratio_;
+  o.sensor_twist_rate = input_.rigid ? none : twist_rate * ratio_;
   o.load_position = s.q[kLink];
   o.load_velocity = s.w[kLink];
   o.load_torque = output_.rigid ? none : spring(output_, s.q[kGear] - s.q[kLink]);

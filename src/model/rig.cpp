@@ -24,6 +24,13 @@ Coupling read_coupling(const YamlReader& parent, const std::string& key) {
   return coupling;
 }
 
+/// What the torque sensor shows: absent, the spring (an ideal strain gauge).
+bool read_sensor_output(const YamlReader& parent) {
+  if (parent.is_text("input_coupling")) return false;
+  const YamlReader yaml = parent.map("input_coupling");
+  return yaml.has("output") && yaml.choice("output", {"spring", "spring_and_damper"}) == "spring_and_damper";
+}
+
 Mesh read_mesh(const YamlReader& yaml) {
   Mesh mesh;
   if (yaml.has("base_radius")) mesh.base_radius = yaml.number("base_radius", Range::positive());
@@ -51,6 +58,7 @@ void read_gear_train(const YamlReader& yaml, Rig& rig) {
   rig.motor = read_body(motor);
   if (motor.has("torque_constant")) rig.torque_constant = motor.number("torque_constant", Range::positive());
   rig.input_coupling = read_coupling(yaml, "input_coupling");
+  rig.sensor_with_damper = read_sensor_output(yaml);
   if (rig.input_coupling.rigid && !yaml.has("pinion"))
     rig.pinion = Body{};  // lumped with the motor
   else

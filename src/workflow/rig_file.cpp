@@ -19,7 +19,9 @@ std::string digest_of(const std::string& text) {
   return digest;
 }
 
-RigFile parse(const std::string& text, const std::string& source) {
+}  // namespace
+
+RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   const YamlReader yaml = YamlReader::from_text(text, source);
   RigFile file;
   file.source = source;
@@ -43,16 +45,14 @@ RigFile parse(const std::string& text, const std::string& source) {
   return file;
 }
 
-}  // namespace
-
 RigFile load_rig_file(const std::string& path) {
   std::ifstream in = open_input(path);
   const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  return parse(text, path);
+  return rig_file_from_text(text, path);
 }
 
 RigFile default_rig_file() {
-  return parse(kDefaultRig, "built-in sarkar_1997");
+  return rig_file_from_text(kDefaultRig, "built-in sarkar_1997");
 }
 
 }  // namespace backlash

@@ -76,6 +76,18 @@ TEST(GearTrain, FollowsTheEquationsOnBothFlanksAndInTheGap) {
   EXPECT_GT(free, 100);
 }
 
+TEST(GearTrain, SensorShowsTheSpringOrSpringAndDamper) {
+  Rig rig = full_rig();
+  State s{};
+  s[0] = 0.002, s[1] = 0.0005;      // twist 0.0015 rad
+  s[4] = 0.3, s[5] = -0.1;          // 0.4 rad/s
+  const double spring = rig.input_coupling.stiffness * 0.0015, damper = rig.input_coupling.damping * 0.4;
+  ASSERT_GT(damper, 0);
+  EXPECT_NEAR(GearTrain(rig).observe(s.data(), 0).sensor_torque, spring, 1e-14);
+  rig.sensor_with_damper = true;
+  EXPECT_NEAR(GearTrain(rig).observe(s.data(), 0).sensor_torque, spring + damper, 1e-14);
+}
+
 // Acceleration of the first part under 1 N m, at rest in the middle of the gap: tells the inertia that it
 // moves.
 double felt_inertia(const Rig& rig) {

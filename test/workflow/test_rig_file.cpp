@@ -68,7 +68,9 @@ TEST(RigFile, EveryRigOfThePackageLoads) {
   int count = 0;
   for (const auto& entry : fs::directory_iterator(test::package_file("config"))) {
     if (entry.path().extension() != ".yaml") continue;
+    if (entry.path().stem().string().find("_search") != std::string::npos) continue;  // of search_parameters
     const std::string path = entry.path().string();
+    if (!YamlReader::from_file(path).has("gear_train")) continue;  // not a rig
     SCOPED_TRACE(path);
     RigFile file;
     ASSERT_NO_THROW(file = load_rig_file(path));

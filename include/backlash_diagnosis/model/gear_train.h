@@ -19,7 +19,9 @@ namespace backlash {
 /// What can be seen of a gear train at one moment, in the units of its records (see Rig::motor_side).
 struct Observation {
   double motor_torque, motor_position, motor_velocity;
-  double sensor_torque;   // N m, spring torque of the input coupling (an ideal strain gauge); NaN if rigid
+  // N m, of the input coupling: its spring (an ideal strain gauge), or spring and damper (T_I) where the rig says so;
+  // NaN if rigid
+  double sensor_torque;
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
   double load_position, load_velocity;
   double load_torque;     // N m, spring torque of the output coupling; NaN if rigid
@@ -95,6 +97,7 @@ class GearTrain {
   std::array<double, kSlots> inertia_{};  // per degree of freedom, kg m^2
   std::array<double, kSlots> damping_;  // per part, N m s/rad
   Coupling input_, output_;  // referred to the load side
+  double sensed_damping_;    // N m s/rad, the part of the sensor's damper that sensor_torque shows
   double half_gap_, lever_;
   double impact_speed_ = 0;  // m/s, approach speed at the last touch
   double acting_gap_;        // where the force begins: half_gap_, or infinite between touches

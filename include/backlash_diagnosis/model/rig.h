@@ -54,6 +54,7 @@ struct Rig {
   Body motor, pinion, gear, link;
   double torque_constant = std::numeric_limits<double>::quiet_NaN();  // motor_torque per motor_current, N m/A; NaN: unknown
   Coupling input_coupling, output_coupling;
+  bool sensor_with_damper = false;  // sensor_torque is spring plus damper of the input coupling, not the spring alone
   bool link_locked = false;
   Mesh mesh;
   std::vector<std::shared_ptr<const Term>> terms;

@@ -1,8 +1,9 @@
 // Initial value problems by SUNDIALS, whose types stay inside the .cpp.
 //
-// Explicit Runge-Kutta (ARKODE) is the default: a geared joint with play is a sequence of short impacts, which an
-// explicit pair with error control follows with fewer evaluations than a multistep method, whose history each impact
-// makes worthless. Sarkar, Ellis and Moore (1997, Section 6.3) found BDF wrong for the contact and Verner's pair right.
+// Explicit Runge-Kutta (ARKODE) is the default: a geared joint with play is a sequence of short impacts, each of which
+// makes the history of a multistep method worthless. Multistep methods need fewer evaluations, but these are cheap here
+// and their own work is not (doc/integrators.md). Sarkar, Ellis and Moore (1997, Section 6.3) found BDF wrong for the
+// contact and Verner's pair right; so it is at tolerances that are loose against the penetration.
 #pragma once
 
 #include <functional>

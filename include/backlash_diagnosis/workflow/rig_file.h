@@ -21,6 +21,9 @@ struct RigFile {
 /// Throws MissingInput, BadData (file, line, key, value, limit), InvalidParameter.
 RigFile load_rig_file(const std::string& path);
 
+/// The same from text; `source` stands for the path in messages.
+RigFile rig_file_from_text(const std::string& text, const std::string& source);
+
 /// config/sarkar_1997.yaml as it was when the library was built: what nodes use without a rig file.
 RigFile default_rig_file();
 

@@ -34,6 +34,17 @@ int run(std::vector<std::string> words) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
+/// Runs `name --out OUT -- DATA`; `what` is in the data file, whatever happens to the picture.
+void draw(const std::string& name, const std::string& out, const std::string& data, const std::string& what) {
+  std::error_code error;
+  const fs::path script = fs::read_symlink("/proc/self/exe", error).parent_path() / name;
+  if (error || !fs::exists(script)) throw Error("cannot plot: " + script.string() + " is missing");
+  const int code = run({kPython, script.string(), "--out", out, "--", data});
+  if (code == kCannotWrite) throw CannotWrite(out + ": cannot be written; " + what + " itself is in " + data);
+  if (code != kHealthy)
+    throw Error(name + " failed (exit code " + std::to_string(code) + "); " + what + " itself is in " + data);
+}
+
 }  // namespace
 
 void check_plot_path(const std::string& path) {
@@ -43,15 +54,11 @@ void check_plot_path(const std::string& path) {
 }
 
 void plot_curve(const std::string& curve_path, const std::string& picture_path) {
-  std::error_code error;
-  const fs::path script = fs::read_symlink("/proc/self/exe", error).parent_path() / "plot_curve.py";
-  if (error || !fs::exists(script)) throw Error("cannot plot: " + script.string() + " is missing");
-  const int code = run({kPython, script.string(), "--out", picture_path, "--", curve_path});
-  if (code == kCannotWrite)
-    throw CannotWrite(picture_path + ": cannot be written; the curve itself is in " + curve_path);
-  if (code != kHealthy)
-    throw Error("plot_curve.py failed (exit code " + std::to_string(code) + "); the curve itself is in " +
-                curve_path);
+  draw("plot_curve.py", picture_path, curve_path, "the curve");
+}
+
+void plot_integrator_study(const std::string& json_path, const std::string& prefix) {
+  draw("plot_integrator_study.py", prefix, json_path, "the study");
 }
 
 }  // namespace backlash::tools

@@ -12,4 +12,7 @@ void check_plot_path(const std::string& path);
 /// Python is missing or fails.
 void plot_curve(const std::string& curve_path, const std::string& picture_path);
 
+/// Draws the pictures PREFIX_loops.png and PREFIX_work.png of a study's JSON file. Throws as plot_curve.
+void plot_integrator_study(const std::string& json_path, const std::string& prefix);
+
 }  // namespace backlash::tools
