@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "machine.h"
 
@@ -42,6 +41,10 @@ double duration_of(const RigFile& file, const Draw& d) {
 }
 
 }  // namespace
+
+double uniform(std::mt19937_64& random) {
+  return static_cast<double>(random() >> 11) * 0x1p-53;
+}
 
 Record simulate_fine(RigFile file, const Draw& d, double duration) {
   Rig rig = machine_of(file, d.seed);

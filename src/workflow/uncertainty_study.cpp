@@ -15,11 +15,6 @@ namespace {
 
 constexpr double kMisses = 2;    // widths of an interval beyond which a miss was confident
 
-/// Independent of std::uniform_*_distribution, whose results depend on the library.
-double uniform(std::mt19937_64& random) {
-  return static_cast<double>(random() >> 11) * 0x1p-53;
-}
-
 Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
   std::seed_seq sequence{static_cast<std::uint32_t>(request.seed), static_cast<std::uint32_t>(request.seed >> 32),
                          static_cast<std::uint32_t>(index)};

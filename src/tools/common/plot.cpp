@@ -61,4 +61,8 @@ void plot_integrator_study(const std::string& json_path, const std::string& pref
   draw("plot_integrator_study.py", prefix, json_path, "the study");
 }
 
+void plot_separability_map(const std::string& json_path, const std::string& picture_path) {
+  draw("plot_separability_map.py", picture_path, json_path, "the map");
+}
+
 }  // namespace backlash::tools

@@ -15,4 +15,7 @@ void plot_curve(const std::string& curve_path, const std::string& picture_path);
 /// Draws the pictures PREFIX_loops.png and PREFIX_work.png of a study's JSON file. Throws as plot_curve.
 void plot_integrator_study(const std::string& json_path, const std::string& prefix);
 
+/// Draws the JSON of separability_map. Throws as plot_curve.
+void plot_separability_map(const std::string& json_path, const std::string& picture_path);
+
 }  // namespace backlash::tools
