@@ -110,7 +110,8 @@ def draw(data, plt, numpy):
         "the level; bold level: no disturbance\n"
         "Bare skewness: its change over the slope of the curve, dot: more than 95 %% of its scatter.  Methods: white is "
         "right, dot: the interval misses the truth, hatched: refused (%s)" %
-        (data["rig"], data["records"], data["periods"], data["sampling_rate"], data["noise"], MEANINGS), fontsize=9.5)
+        (data["rig"], data["records"], data["periods"], data["sampling_rate"], data["noise"], MEANINGS),
+        fontsize=9.5, linespacing=1.6)
     return figure
 
 
