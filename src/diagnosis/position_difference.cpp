@@ -19,9 +19,9 @@ constexpr std::size_t kShortestWindow = 4, kLongestWindow = 64;  // samples, hal
 constexpr double kNoiseFalls = 2.0;
 // Share of the rms residual in the interval, of a locked rig and of a moving load.
 // Of the play, with a locked output: bouncing takes longer the larger the gap, until it fills the half period.
-constexpr double kBounce = 0.04;
+constexpr double kBounce = 0.03;
 constexpr double kLockedTravel = 0.05;  // of the motor's travel
-constexpr double kLockedResidual = 3, kMovingResidual = 0.15;
+constexpr double kLockedResidual = 2, kMovingResidual = 0.15;
 constexpr double kLargestScaleError = 0.01;
 constexpr double kLargestFactor = 5;     // of the compliance against the declared one
 constexpr std::size_t kFewestStays = 6;  // on a flank

@@ -7,26 +7,13 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
-#include "machine.h"
+#include "drawn_record.h"
 #include "parallel.h"
 
 namespace backlash {
 namespace {
 
-constexpr int kPhases = 16;      // starts of a record between two samples
 constexpr double kMisses = 2;    // widths of an interval beyond which a miss was confident
-
-/// A record of the study before it is simulated.
-struct Draw {
-  double backlash, noise, start;  // m, of the signal's rms, s
-  int periods;
-  std::uint64_t seed;  // of the noise
-};
-
-/// Independent of std::uniform_*_distribution, whose results depend on the library.
-double uniform(std::mt19937_64& random) {
-  return static_cast<double>(random() >> 11) * 0x1p-53;
-}
 
 Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
   std::seed_seq sequence{static_cast<std::uint32_t>(request.seed), static_cast<std::uint32_t>(request.seed >> 32),
@@ -42,48 +29,7 @@ Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
   return d;
 }
 
-/// Every kPhases-th sample of a record from `start` [s] on, as a recorder that begins there gives them.
-Record thinned(const Record& fine, double start, double rate, std::size_t count) {
-  Record record;
-  record.name = "study";
-  const auto first = static_cast<std::size_t>(start * rate * kPhases);
-  for (std::size_t k = 0; k < count && first + k * kPhases < fine.size(); ++k) {
-    record.time.push_back(static_cast<double>(k) / rate);
-    for (const Channel channel : kChannels)
-      if (fine.has(channel)) record.column(channel).push_back(fine.column(channel)[first + k * kPhases]);
-  }
-  return record;
-}
-
-void add_noise(Record& record, Channel signal, double relative, double limit, std::uint64_t seed) {
-  std::vector<double>& values = record.column(signal);
-  double square = 0;
-  for (const double v : values) square += v * v / static_cast<double>(values.size());
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, relative * std::sqrt(square));
-  for (double& v : values) v = std::clamp(v + normal(random), -limit, limit);
-  if (signal == Channel::motor_torque) return;
-  for (double& v : record.column(Channel::motor_torque)) v += normal(random);
-}
-
 using Change = std::function<void(RigFile&)>;
-
-/// What the rig's sensors give for a draw, on a machine that was changed.
-Record simulate_draw(RigFile machine, const Draw& d, const Channel signal, int settling) {
-  Rig rig = machine_of(machine, d.seed);
-  SimulationSettings& simulation = machine.simulation;
-  rig.mesh.backlash = d.backlash;
-  const double rate = simulation.sensors.sampling_rate;
-  simulation.sensors.sampling_rate = rate * kPhases;
-  const double limit = simulation.sensors.of(signal).limit;
-  for (const Channel channel : {signal, Channel::motor_torque}) simulation.sensors.of(channel) = {};
-  const double period = machine.diagnosis.apd->period;
-  const double duration = (settling + d.periods) * period;
-  const Record fine = simulate_record(rig, simulation, duration + d.start + 2 / rate);
-  Record record = thinned(fine, d.start, rate, static_cast<std::size_t>(std::lround(duration * rate)));
-  add_noise(record, signal, d.noise, limit, d.seed);
-  return record;
-}
 
 Record signal_alone(const Record& record, Channel signal) {
   Record alone;
@@ -191,7 +137,7 @@ std::vector<Variant> variants_of(const RigFile& file) {
 Record simulate_variant(const RigFile& file, const Variant& variant, const Draw& d, int settling) {
   RigFile machine = file;
   variant.change(machine);
-  Record record = simulate_draw(machine, d, file.diagnosis.apd->signal, settling);
+  Record record = simulate_draw(machine, d);
   if (variant.duration != 0)
     record = record.slice(0, (settling + variant.duration) * file.diagnosis.apd->period);
   return record;
@@ -208,7 +154,7 @@ std::vector<StudyTrial> run_study(const RigFile& rig_file, const MonitoringCurve
   Ticker ticker(progress, request.records, "simulating and diagnosing records");
   for_each_in_parallel(request.records, ticker, [&](int i) {
     const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(i));
-    const Record record = simulate_draw(file, d, apd.signal, apd.settling_periods);
+    const Record record = simulate_draw(file, d);
     trials[2 * i] = {"", d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
     trials[2 * i + 1] = {"", d.backlash, d.noise, d.periods, false,
                          estimates_of(signal_alone(record, apd.signal), file, curve)};

@@ -12,10 +12,10 @@
 // - scatter: Student t times the standard error, stays on a flank counted as independent,
 // - the declared elastic deflection, where used: its uncertainty,
 // - windows: the difference to the same fit with windows twice as long,
-// - what the model does not hold: three times the rms residual with a locked output, where all windows lie at
+// - what the model does not hold: twice the rms residual with a locked output, where all windows lie at
 //   nearly one torque and a pinion that keeps bouncing shifts all of them alike; 0.15 times it where the load
 //   moves,
-// - with a locked output 4 % of the play, for the bouncing that the residual does not show.
+// - with a locked output 3 % of the play, for the bouncing that the residual does not show.
 // The shares are set by simulation, see test_rig_estimators.cpp.
 //
 // Where the play depends on the position of the load, the interval is widened to the least and the largest
