@@ -62,6 +62,9 @@ class DiagnoserTest(unittest.TestCase):
             self.assertEqual(best.method, "lost_motion")
             self.assertAlmostEqual(best.backlash, backlash, delta=POSITION_TOLERANCE)
             for estimate in answer.estimates:
+                if estimate.method == "momentum_transfer":  # needs faster sampling
+                    self.assertEqual(estimate.status_name, "out_of_domain", estimate.message)
+                    continue
                 self.assertIn(estimate.status_name, ("ok", "ambiguous", "above_range"), estimate.message)
                 self.assertLessEqual(estimate.lower, backlash, estimate.method)
                 open_end = math.isnan(estimate.upper)  # a lower bound only, which no sound estimate may be
