@@ -49,12 +49,14 @@ def answers(study, method, position):
 
 def draw_errors(axes, study, position):
     methods = [m for m in study["trials"][0]["estimates"] if m != "combined" and answers(study, m, position)]
+    missed = []
     for method in methods:
         rows = answers(study, method, position)
-        truth, error = [r[0] for r in rows], [r[1] - r[0] for r in rows]
-        axes.errorbar(truth, error, yerr=[[max(0, r[1] - r[2]) for r in rows], [max(0, r[3] - r[1]) for r in rows]],
-                      fmt="o", markersize=2.5, linewidth=0.5, alpha=0.7, color=COLOURS.get(method), label=method,
-                      zorder={"apd_skewness": 1, "apd_shape": 2}.get(method, 3))
+        axes.plot([r[0] for r in rows], [r[1] - r[0] for r in rows], ".", markersize=4, alpha=0.7,
+                  color=COLOURS.get(method), label=method)
+        missed += [(r[0], r[1] - r[0]) for r in rows if not r[2] <= r[0] <= r[3]]
+    axes.plot([m[0] for m in missed], [m[1] for m in missed], "o", markersize=7, markerfacecolor="none",
+              markeredgecolor="red", markeredgewidth=0.8, label="interval misses the truth")
     axes.axhline(0, color="black", linewidth=0.6)
     axes.set_yscale("symlog", linthresh=2)
     axes.set_ylim(-100, 100)
@@ -62,9 +64,9 @@ def draw_errors(axes, study, position):
     axes.set_yticks(ticks, [str(t) for t in ticks])
     axes.minorticks_off()
     axes.set_xlabel("true backlash [um]")
-    axes.set_ylabel("estimate - truth [um], 95 % intervals")
+    axes.set_ylabel("estimate - truth [um]")
     axes.set_title("all channels" if position else "torque sensor alone")
-    axes.legend(loc="lower left", ncol=2)
+    axes.legend(loc="lower left", ncol=2, fontsize=8)
 
 
 def draw_by_noise(axes, study, key, scale, position):
