@@ -3,35 +3,20 @@
 
 Exit codes: 0 done, 64 usage, 65 not a curve, 66 curve missing, 70 matplotlib missing, 73 cannot write.
 """
-import argparse
 import os
 import sys
-import tempfile
 
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(64, "%s: %s; see --help\n" % (self.prog, message))
-
-
-def fail(code, message):
-    sys.stderr.write("plot_curve.py: %s\n" % message)
-    sys.exit(code)
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
 
 
 def load(path):
-    import yaml
+    curve = plotting.load_yaml(path, "a monitoring curve")
     try:
-        with open(path) as stream:
-            curve = yaml.load(stream, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-        if curve["schema_version"] != 1:
-            raise ValueError("schema_version is not 1")
         columns = [[point[key] for point in curve["points"]] for key in ("backlash", "skewness", "scatter", "monotonic")]
         return curve["conditions"], [[float(v) for v in column] for column in columns]
-    except OSError as error:
-        fail(66, error)
-    except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        fail(65, "%s: not a monitoring curve: %r" % (path, error))
+    except (KeyError, TypeError, ValueError) as error:
+        plotting.fail(65, "%s: not a monitoring curve: %r" % (path, error))
 
 
 def title(conditions):
@@ -44,9 +29,7 @@ def title(conditions):
 
 
 def draw(conditions, columns):
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    plt = plotting.pyplot()
     angular = conditions["angular"]
     backlash, skewness, scatter, monotonic = columns
     x = [1e3 * b if angular else 1e6 * b for b in backlash]
@@ -71,40 +54,17 @@ def draw(conditions, columns):
     return figure
 
 
-def save(figure, path):
-    """Whole or not at all."""
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path) or ".", suffix=os.path.splitext(path)[1])
-        os.close(handle)
-        figure.savefig(temporary, dpi=120)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-        temporary = None
-    except OSError as error:
-        fail(73, "%s: cannot be written: %s" % (path, error))
-    finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
-
-
 def main():
-    parser = Parser(prog="plot_curve.py", description="Draws a monitoring curve.")
+    parser = plotting.Parser("Draws a monitoring curve.")
     parser.add_argument("curve", metavar="CURVE.yaml")
     parser.add_argument("--out", metavar="PICTURE", required=True, help="picture to write: .png, .svg or .pdf")
     arguments = parser.parse_args()
     try:
         conditions, columns = load(arguments.curve)
-        figure = draw(conditions, columns)
     except ImportError as error:
-        fail(70, "%s (Debian: python3-matplotlib, python3-yaml)" % error)
-    save(figure, arguments.out)
+        plotting.fail(70, "%s (Debian: python3-yaml)" % error)
+    plotting.save(draw(conditions, columns), arguments.out, 120)
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except KeyboardInterrupt:
-        sys.exit(130)
+    plotting.run(main)

@@ -3,16 +3,17 @@
 
 usage: plot_diagnosis.py --record RECORD.csv --diagnosis OUT.json --curve CURVE.yaml --out PICTURE [--true METRES]
 """
-import argparse
 import csv
-import json
+import os
 import sys
 
-import matplotlib
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-import yaml
+plt = plotting.pyplot()
+
+
+COLOURS = ("tab:orange", "tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:red")  # of the methods, in their order
 
 
 def read_columns(path, names):
@@ -68,7 +69,7 @@ def draw_curve(axes, curve, estimates, true):
         axes.axvline(1e6 * true, color="k", ls=":", label="true %.1f um" % (1e6 * true))
     # Every estimate is drawn at the height of the measured skewness; only apd_skewness itself comes from the curve.
     height = next((e["skewness"] for e in estimates if e["skewness"] is not None), y[len(y) // 2])
-    for shift, (e, colour) in enumerate(zip(estimates, ("tab:orange", "tab:green", "tab:red", "tab:purple"))):
+    for shift, (e, colour) in enumerate(zip(estimates, COLOURS)):
         if e["status"] != "ok" or not e["interval"]:
             axes.plot([], [], color=colour, label="%s: %s" % (e["method"], e["status"]))
             continue
@@ -83,19 +84,17 @@ def draw_curve(axes, curve, estimates, true):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = plotting.Parser(__doc__.splitlines()[0])
     parser.add_argument("--record", required=True, help="CSV record")
     parser.add_argument("--diagnosis", required=True, help="JSON of diagnose_record")
     parser.add_argument("--curve", required=True, help="YAML of build_curve")
     parser.add_argument("--out", required=True, help="picture to write: .png, .svg or .pdf")
     parser.add_argument("--true", type=float, help="true backlash [m], where it is known")
     arguments = parser.parse_args()
-    with open(arguments.diagnosis) as stream:
-        diagnosis = json.load(stream)
-    with open(arguments.curve) as stream:
-        curve = yaml.load(stream, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    diagnosis = plotting.load_json(arguments.diagnosis, "a diagnosis")
+    curve = plotting.load_yaml(arguments.curve, "a monitoring curve")
     if not diagnosis.get("apd"):
-        sys.exit("plot_diagnosis.py: %s holds no APD" % arguments.diagnosis)
+        plotting.fail(65, "%s: holds no APD" % arguments.diagnosis)
     figure, axes = plt.subplots(1, 3, figsize=(16, 4.8), constrained_layout=True)
     draw_torque(axes[0], arguments.record, diagnosis["apd"])
     draw_apd(axes[1], diagnosis["apd"])
@@ -103,8 +102,8 @@ def main():
     for a in axes:
         a.grid(True, alpha=0.3)
     figure.suptitle(diagnosis["verdict"]["message"], fontsize=10)
-    figure.savefig(arguments.out, dpi=110)
+    plotting.save(figure, arguments.out, 110)
 
 
 if __name__ == "__main__":
-    main()
+    plotting.run(main)

@@ -3,37 +3,14 @@
 
 Exit codes: 0 done, 64 usage, 65 not a study, 66 study missing, 70 matplotlib missing, 73 cannot write.
 """
-import argparse
-import json
 import os
 import sys
-import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
 
 COLOURS = {"bogacki_shampine": "tab:gray", "cash_karp": "tab:olive", "dormand_prince": "tab:blue",
            "fehlberg": "tab:cyan", "verner": "tab:green", "bdf": "tab:red", "adams": "tab:purple"}
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(64, "%s: %s; see --help\n" % (self.prog, message))
-
-
-def fail(code, message):
-    sys.stderr.write("plot_integrator_study.py: %s\n" % message)
-    sys.exit(code)
-
-
-def load(path):
-    try:
-        with open(path) as stream:
-            study = json.load(stream)
-        if study["schema_version"] != 1:
-            raise ValueError("schema_version is not 1")
-        return study
-    except OSError as error:
-        fail(66, error)
-    except (KeyError, TypeError, ValueError) as error:
-        fail(65, "%s: not a study of integrators: %r" % (path, error))
 
 
 def columns_of(tooth):
@@ -113,46 +90,20 @@ def draw_work(study, plt):
     return figure
 
 
-def save(figure, path):
-    """Whole or not at all."""
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path) or ".", suffix=".png")
-        os.close(handle)
-        figure.savefig(temporary, dpi=75)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-        temporary = None
-    except OSError as error:
-        fail(73, "%s: cannot be written: %s" % (path, error))
-    finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
-
-
 def main():
-    parser = Parser(prog="plot_integrator_study.py", description="Draws a study of integrators.")
+    parser = plotting.Parser("Draws a study of integrators.")
     parser.add_argument("study", metavar="STUDY.json")
     parser.add_argument("--out", metavar="PREFIX", required=True, help="writes PREFIX_loops.png and PREFIX_work.png")
     arguments = parser.parse_args()
-    study = load(arguments.study)
+    study = plotting.load_json(arguments.study, "a study of integrators")
     try:
-        import matplotlib
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
+        plt = plotting.pyplot()
         figures = {"loops": draw_teeth(study, plt), "work": draw_work(study, plt)}
-    except ImportError as error:
-        fail(70, "%s (Debian: python3-matplotlib)" % error)
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        fail(65, "%s: not a study of integrators: %r" % (arguments.study, error))
+        plotting.fail(65, "%s: not a study of integrators: %r" % (arguments.study, error))
     for name, figure in figures.items():
-        save(figure, "%s_%s.png" % (arguments.out, name))
+        plotting.save(figure, "%s_%s.png" % (arguments.out, name), 90)
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except KeyboardInterrupt:
-        sys.exit(130)
+    plotting.run(main)

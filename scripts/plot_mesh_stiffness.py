@@ -3,14 +3,13 @@
 
 usage: plot_mesh_stiffness.py GEARS.json --out PICTURE
 """
-import argparse
-import json
+import os
 import sys
 
-import matplotlib
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
+plt = plotting.pyplot()
 
 NAMES = {"step": "step (Hertz contact only)", "lin_parker": "Lin-Parker parabola, kmax of ISO 6336",
          "hertz_bending": "Hertz contact and tooth bending"}
@@ -37,15 +36,14 @@ def draw_laws(axes, mesh, laws, relative):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = plotting.Parser(__doc__.splitlines()[0])
     parser.add_argument("gears", metavar="GEARS.json", help="JSON of gear_geometry")
     parser.add_argument("--out", required=True, help="picture to write: .png, .svg or .pdf")
     arguments = parser.parse_args()
-    with open(arguments.gears) as stream:
-        gears = json.load(stream)
+    gears = plotting.load_json(arguments.gears, "a pair of gears")
     mesh = gears.get("mesh_stiffness")
     if not mesh or not mesh["pairs"]:
-        sys.exit("plot_mesh_stiffness.py: %s holds no regular mesh cycle" % arguments.gears)
+        plotting.fail(65, "%s: holds no regular mesh cycle" % arguments.gears)
     laws = [name for name in NAMES if mesh["laws"][name]["mean"] is not None]
     figure, axes = plt.subplots(3, 1, figsize=(9, 9.5), sharex=True, constrained_layout=True,
                                 gridspec_kw={"height_ratios": [1, 2, 2]})
@@ -65,8 +63,8 @@ def main():
     figure.suptitle("%d / %d teeth, module %.5g mm, centre distance + %.4g um, backlash %.4g um" %
                     (gears["pinion_teeth"], gears["gear_teeth"], 1e3 * gears["module"],
                      1e6 * gears["geometry"]["centre_distance_change"], 1e6 * gears["geometry"]["backlash"]))
-    figure.savefig(arguments.out, dpi=110)
+    plotting.save(figure, arguments.out, 110)
 
 
 if __name__ == "__main__":
-    main()
+    plotting.run(main)

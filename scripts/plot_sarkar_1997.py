@@ -7,7 +7,6 @@ they write. Axes are those of the paper; that of its Fig. 5 says N mm, but only 
 Exit codes: 0 done, 64 usage, 65 not a rig like theirs, 70 a command or matplotlib is missing or failed,
 73 cannot write; those of a command that refuses the rig file are passed on.
 """
-import argparse
 import csv
 import json
 import math
@@ -16,23 +15,15 @@ import subprocess
 import sys
 import tempfile
 
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
+
 PUBLISHED = {0: 4.6346, 25: 3.7013, 50: 2.9010, 75: 2.2009, 100: 1.5762}  # skewness by half gap [um], Fig. 10
 RATE = 10000  # Hz; that of their simulation is not printed
 PERIODS = 10  # per APD, after settling
 SHOWN = 0.12  # s, length of Fig. 5
 GAP = 50      # um, half gap of Figs. 5 and 6
 DIAGNOSED = (0, 1, 2, 3)  # exit codes of diagnose_record: the grades
-NAME = "plot_sarkar_1997.py"
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(64, "%s: %s; see --help\n" % (self.prog, message))
-
-
-def fail(code, message):
-    sys.stderr.write("%s: %s\n" % (NAME, message))
-    sys.exit(code)
 
 
 def default_rig():
@@ -48,10 +39,10 @@ def run(words, codes=(0,)):
     places = [os.path.dirname(os.path.abspath(path)) for path in (sys.argv[0], __file__)]
     command = next((c for c in (os.path.join(place, words[0]) for place in places) if os.access(c, os.X_OK)), None)
     if command is None:
-        fail(70, "cannot find the command %s in %s; start this script with rosrun" % (words[0], places[0]))
+        plotting.fail(70, "cannot find the command %s in %s; start this script with rosrun" % (words[0], places[0]))
     code = subprocess.run([command] + words[1:], stdout=subprocess.DEVNULL).returncode
     if code not in codes:
-        fail(code if code > 0 else 70, "%s failed" % " ".join(words))
+        plotting.fail(code if code > 0 else 70, "%s failed" % " ".join(words))
 
 
 def metres(half_gap):
@@ -176,25 +167,6 @@ def draw_figure_10(plt, rig, apds, points, rms):
     return figure
 
 
-def save(figure, path):
-    """Whole or not at all."""
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path), suffix=".png")
-        os.close(handle)
-        figure.savefig(temporary, dpi=90)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-        temporary = None
-    except OSError as error:
-        fail(73, "%s: cannot be written: %s" % (path, error))
-    finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
-
-
 def reproduce(rig, out, plt):
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "curve.yaml")
@@ -202,38 +174,33 @@ def reproduce(rig, out, plt):
              str(PERIODS), "--out", path])
         conditions, points = read_curve(path)
         if conditions["angular"] or conditions["signal"] != "sensor_torque":
-            fail(65, "%s: needs a base radius and sensor_torque as the signal of its APD" % rig)
+            plotting.fail(65, "%s: needs a base radius and sensor_torque as the signal of its APD" % rig)
         duration = (conditions["settling_periods"] + PERIODS) / float(conditions["frequency"])
         apds = {half_gap: distribution(rig, half_gap, duration, path, folder) for half_gap in PUBLISHED}
         torques = {half_gap: torque(rig, half_gap, folder) for half_gap in (0, GAP)}
     rms = print_table(conditions["rig"], points)
     for name, figure in (("fig5_6.png", draw_torque_and_apd(plt, conditions["rig"], torques, apds)),
                          ("fig10.png", draw_figure_10(plt, conditions["rig"], apds, points, rms))):
-        save(figure, os.path.join(out, name))
+        plotting.save(figure, os.path.join(out, name), 90)
         print(os.path.join(out, name))
 
 
 def main():
-    parser = Parser(prog=NAME, description=__doc__.splitlines()[0])
+    parser = plotting.Parser(__doc__.splitlines()[0])
     parser.add_argument("--rig", metavar="RIG.yaml", default=default_rig(), help="default: the installed %(default)s")
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for fig5_6.png and fig10.png")
     arguments = parser.parse_args()
+    plt = plotting.pyplot()
     try:
-        import matplotlib
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
         import yaml  # noqa: F401, needed later, missed better now
     except ImportError as error:
-        fail(70, "%s (Debian: python3-matplotlib, python3-yaml)" % error)
+        plotting.fail(70, "%s (Debian: python3-yaml)" % error)
     try:
         os.makedirs(arguments.out, exist_ok=True)
     except OSError as error:
-        fail(73, "%s: %s" % (arguments.out, error))
+        plotting.fail(73, "%s: %s" % (arguments.out, error))
     reproduce(arguments.rig, os.path.abspath(arguments.out), plt)
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except KeyboardInterrupt:
-        sys.exit(130)
+    plotting.run(main)

@@ -3,37 +3,14 @@
 
 Exit codes: 0 done, 64 usage, 65 not a map, 66 map missing, 70 matplotlib missing, 73 cannot write.
 """
-import argparse
-import json
 import os
 import sys
-import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
 
 MARKS = {"below_range": "<", "above_range": ">", "out_of_domain": "x", "insufficient_data": "0", "ambiguous": "?"}
 MEANINGS = "x out of domain, > above the curve, < below it, ? ambiguous"
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(64, "%s: %s; see --help\n" % (self.prog, message))
-
-
-def fail(code, message):
-    sys.stderr.write("plot_separability_map.py: %s\n" % message)
-    sys.exit(code)
-
-
-def load(path):
-    try:
-        with open(path) as stream:
-            data = json.load(stream)
-        if data["schema_version"] != 1 or not data["maps"]:
-            raise ValueError("schema_version is not 1, or no maps")
-        return data
-    except OSError as error:
-        fail(66, error)
-    except (KeyError, TypeError, ValueError) as error:
-        fail(65, "%s: not a separability map: %r" % (path, error))
 
 
 def draw_panel(axes, numpy, error, limit):
@@ -115,46 +92,20 @@ def draw(data, plt, numpy):
     return figure
 
 
-def save(figure, path):
-    """Whole or not at all."""
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path) or ".", suffix=os.path.splitext(path)[1])
-        os.close(handle)
-        figure.savefig(temporary, dpi=85)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-        temporary = None
-    except OSError as error:
-        fail(73, "%s: cannot be written: %s" % (path, error))
-    finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
-
-
 def main():
-    parser = Parser(prog="plot_separability_map.py", description="Draws the maps of separability_map.")
+    parser = plotting.Parser("Draws the maps of separability_map.")
     parser.add_argument("map", metavar="MAP.json")
     parser.add_argument("--out", metavar="PICTURE", required=True, help="picture to write: .png, .svg or .pdf")
     arguments = parser.parse_args()
-    data = load(arguments.map)
+    data = plotting.load_json(arguments.map, "a separability map")
     try:
-        import matplotlib
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
+        plt = plotting.pyplot()
         import numpy
         figure = draw(data, plt, numpy)
-    except ImportError as error:
-        fail(70, "%s (Debian: python3-matplotlib)" % error)
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        fail(65, "%s: not a separability map: %r" % (arguments.map, error))
-    save(figure, arguments.out)
+        plotting.fail(65, "%s: not a separability map: %r" % (arguments.map, error))
+    plotting.save(figure, arguments.out, 85)
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except KeyboardInterrupt:
-        sys.exit(130)
+    plotting.run(main)

@@ -3,38 +3,14 @@
 
 Exit codes: 0 done, 64 usage, 65 not a study, 66 study missing, 70 matplotlib missing, 73 cannot write.
 """
-import argparse
-import json
 import os
 import sys
-import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
 
 COLOURS = {"apd_skewness": "tab:orange", "apd_shape": "tab:blue", "lost_motion": "tab:green",
            "position_difference": "tab:purple", "momentum_transfer": "tab:brown", "combined": "black"}
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(64, "%s: %s; see --help\n" % (self.prog, message))
-
-
-def fail(code, message):
-    sys.stderr.write("plot_uncertainty_study.py: %s\n" % message)
-    sys.exit(code)
-
-
-def load(path):
-    try:
-        with open(path) as stream:
-            study = json.load(stream)
-        if study["schema_version"] != 1:
-            raise ValueError("schema_version is not 1")
-        study["trials"], study["tables"]
-        return study
-    except OSError as error:
-        fail(66, error)
-    except (KeyError, TypeError, ValueError) as error:
-        fail(65, "%s: not an uncertainty study: %r" % (path, error))
 
 
 def answers(study, method, position):
@@ -90,9 +66,7 @@ def draw_by_noise(axes, study, key, scale, position):
 
 
 def draw(study):
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    plt = plotting.pyplot()
     figure, axes = plt.subplots(2, 2, figsize=(13, 9), constrained_layout=True)
     draw_errors(axes[0][0], study, True)
     draw_errors(axes[0][1], study, False)
@@ -110,34 +84,18 @@ def draw(study):
     return figure
 
 
-def save(figure, path):
-    """Whole or not at all."""
-    folder = os.path.dirname(os.path.abspath(path))
-    handle, temporary = None, None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=folder, suffix=os.path.splitext(path)[1])
-        os.close(handle)
-        figure.savefig(temporary, dpi=110)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
-        fail(73, error)
-
-
 def main():
-    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = plotting.Parser(__doc__.splitlines()[0])
     parser.add_argument("study", metavar="STUDY.json", help="written by uncertainty_study")
     parser.add_argument("--out", required=True, metavar="OUT.png", help="picture to write (.png, .svg, .pdf)")
     arguments = parser.parse_args()
-    study = load(arguments.study)
+    study = plotting.load_json(arguments.study, "an uncertainty study")
     try:
         figure = draw(study)
-    except ImportError as error:
-        fail(70, error)
-    save(figure, arguments.out)
+    except (KeyError, TypeError, ValueError, StopIteration) as error:
+        plotting.fail(65, "%s: not an uncertainty study: %r" % (arguments.study, error))
+    plotting.save(figure, arguments.out, 110)
 
 
 if __name__ == "__main__":
-    main()
+    plotting.run(main)
