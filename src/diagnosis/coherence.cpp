@@ -4,12 +4,12 @@
 #include <cmath>
 #include <complex>
 #include <numeric>
-#include <sstream>
 #include <unsupported/Eigen/FFT>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
+#include "refusal.h"
 
 namespace backlash {
 namespace {
@@ -23,18 +23,6 @@ constexpr std::size_t kNarrow = 16;                    // lines; a narrower band
 constexpr double kFilled = 0.9;                        // share of the lines of the band that are excited
 constexpr double kKurtosisLow = 2, kKurtosisHigh = 5;  // 3: Gaussian; 1: square wave, 1.5: sine
 constexpr double kNeighbours = 1.94;  // 1 + 2 (4/9 + 1/36): neighbouring lines of a Hann window correlate
-
-struct Refusal {
-  Status status;
-  std::string reason;
-};
-
-std::string text(double value) {
-  std::ostringstream stream;
-  stream.precision(4);
-  stream << value;
-  return stream.str();
-}
 
 Spectrum windowed_spectrum(const std::vector<double>& x, std::size_t begin, const std::vector<double>& window,
                            Eigen::FFT<double>& fft) {

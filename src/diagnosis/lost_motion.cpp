@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "backlash_diagnosis/diagnosis/wall_reading.h"
 #include "backlash_diagnosis/diagnosis/wall_to_wall.h"
+#include "refusal.h"
 
 namespace backlash {
 namespace {
@@ -33,19 +33,6 @@ constexpr std::size_t kFewest = 2;  // excursions per side
 // trusted with this share of deviating passages, or with so many times more excursions than half cycles.
 constexpr double kManyOutliers = 0.15;
 constexpr double kManyExcursions = 1.25;
-
-// A status with its reason, raised where the record turns out unfit.
-struct Refusal {
-  Status status;
-  std::string reason;
-};
-
-std::string text(double value) {
-  std::ostringstream stream;
-  stream.precision(4);
-  stream << value;
-  return stream.str();
-}
 
 void check(const LostMotionSettings& settings) {
   const bool from_record = std::isnan(settings.torque) && settings.subtract_elastic_deflection;
@@ -306,15 +293,7 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
 
 Estimate estimate_lost_motion(const Record& record, const LostMotionSettings& settings) {
   check(settings);
-  Estimate estimate;
-  estimate.method = "lost_motion";
-  try {
-    fill(record, settings, estimate);
-  } catch (const Refusal& refusal) {
-    estimate.status = refusal.status;
-    estimate.message = refusal.reason;
-  }
-  return estimate;
+  return estimate_or_refusal("lost_motion", [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
 }  // namespace backlash

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
+#include "refusal.h"
 
 namespace backlash {
 namespace {
@@ -26,18 +26,6 @@ constexpr double kTiming = 0.5;           // samples, when the impact began
 // and that, the value from simulated Hunt-Crossley impacts.
 constexpr double kLateShort = 0.5, kLateLong = 0.22;
 constexpr double kElasticShare = 0.14;  // of the elastic deflections in the interval
-
-struct Refusal {
-  Status status;
-  std::string reason;
-};
-
-std::string text(double value) {
-  std::ostringstream stream;
-  stream.precision(4);
-  stream << value;
-  return stream.str();
-}
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid) throw InvalidParameter(std::string("momentum_transfer.") + name, value, limit);
@@ -401,15 +389,7 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
 
 Estimate estimate_momentum_transfer(const Record& record, const MomentumTransferSettings& settings) {
   check(settings);
-  Estimate estimate;
-  estimate.method = "momentum_transfer";
-  try {
-    fill(record, settings, estimate);
-  } catch (const Refusal& refusal) {
-    estimate.status = refusal.status;
-    estimate.message = refusal.reason;
-  }
-  return estimate;
+  return estimate_or_refusal("momentum_transfer", [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
 }  // namespace backlash

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
+#include "refusal.h"
 
 namespace backlash {
 namespace {
@@ -17,27 +17,15 @@ constexpr std::size_t kShortestWindow = 4, kLongestWindow = 64;  // samples, hal
 // Residuals fall by 2^2.5 per doubling of the window where second differences of noise dominate, by 2^0.5
 // where white torque noise does; only the former is worth a longer window.
 constexpr double kNoiseFalls = 2.0;
-// Share of the rms residual in the interval, of a locked rig and of a moving load.
 // Of the play, with a locked output: bouncing takes longer the larger the gap, until it fills the half period.
 constexpr double kBounce = 0.03;
 constexpr double kLockedTravel = 0.05;  // of the motor's travel
+// Share of the rms residual in the interval, of a locked rig and of a moving load.
 constexpr double kLockedResidual = 2, kMovingResidual = 0.15;
 constexpr double kLargestScaleError = 0.01;
 constexpr double kLargestFactor = 5;     // of the compliance against the declared one
 constexpr std::size_t kFewestStays = 6;  // on a flank
 constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
-
-struct Refusal {
-  Status status;
-  std::string reason;
-};
-
-std::string text(double value) {
-  std::ostringstream stream;
-  stream.precision(4);
-  stream << value;
-  return stream.str();
-}
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid) throw InvalidParameter(std::string("position_difference.") + name, value, limit);
@@ -195,15 +183,7 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
 
 Estimate estimate_position_difference(const Record& record, const PositionDifferenceSettings& settings) {
   check(settings);
-  Estimate estimate;
-  estimate.method = "position_difference";
-  try {
-    fill(record, settings, estimate);
-  } catch (const Refusal& refusal) {
-    estimate.status = refusal.status;
-    estimate.message = refusal.reason;
-  }
-  return estimate;
+  return estimate_or_refusal("position_difference", [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
 }  // namespace backlash

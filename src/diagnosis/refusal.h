@@ -1,0 +1,38 @@
+// How estimators give up: a status with its reason, thrown where the record turns out unfit.
+#pragma once
+
+#include <sstream>
+#include <string>
+
+#include "backlash_diagnosis/diagnosis/estimate.h"
+
+namespace backlash {
+
+struct Refusal {
+  Status status;
+  std::string reason;
+};
+
+/// A value for a message: four digits tell people enough.
+inline std::string text(double value) {
+  std::ostringstream stream;
+  stream.precision(4);
+  stream << value;
+  return stream.str();
+}
+
+/// The estimate that `fill` makes, or the status and reason with which it gives up.
+template <typename Fill>
+Estimate estimate_or_refusal(const char* method, Fill fill) {
+  Estimate estimate;
+  estimate.method = method;
+  try {
+    fill(estimate);
+  } catch (const Refusal& refusal) {
+    estimate.status = refusal.status;
+    estimate.message = refusal.reason;
+  }
+  return estimate;
+}
+
+}  // namespace backlash
