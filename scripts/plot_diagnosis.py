@@ -80,7 +80,7 @@ def draw_curve(axes, curve, estimates, true):
     axes.set_xlabel("backlash, total free play along the line of action [um]")
     axes.set_ylabel("skewness of the class values [-]")
     axes.set_title("Monitoring curve (%s, %s Hz)" % (curve["conditions"]["rig"], curve["conditions"]["sampling_rate"]))
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="upper right")
 
 
 def main():
