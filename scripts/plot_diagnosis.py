@@ -80,6 +80,8 @@ def draw_curve(axes, curve, estimates, true):
     axes.set_xlabel("backlash, total free play along the line of action [um]")
     axes.set_ylabel("skewness of the class values [-]")
     axes.set_title("Monitoring curve (%s, %s Hz)" % (curve["conditions"]["rig"], curve["conditions"]["sampling_rate"]))
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
     axes.legend(fontsize=8, loc="upper right")
 
 
