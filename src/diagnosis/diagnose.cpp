@@ -90,12 +90,12 @@ DiagnosisSettings without_settling(DiagnosisSettings settings) {
 
 const std::vector<DiagnosisMethod>& diagnosis_method_table() {
   static const std::vector<DiagnosisMethod> methods = {
-      {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", by_apd<estimate_apd_skewness>},
-      {"apd_shape", "the signal of diagnosis.apd and a monitoring curve", by_apd<estimate_apd_shape>},
-      {"lost_motion", "motor_position, and motor_torque or sensor_torque; output locked", by_lost_motion},
-      {"position_difference", "motor_position, load_position, and motor_torque or sensor_torque",
+      {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", true, by_apd<estimate_apd_skewness>},
+      {"apd_shape", "the signal of diagnosis.apd and a monitoring curve", true, by_apd<estimate_apd_shape>},
+      {"lost_motion", "motor_position, and motor_torque or sensor_torque; output locked", false, by_lost_motion},
+      {"position_difference", "motor_position, load_position, and motor_torque or sensor_torque", false,
        by_position_difference},
-      {"momentum_transfer", "motor_torque, and motor_velocity or motor_position", by_momentum_transfer},
+      {"momentum_transfer", "motor_torque, and motor_velocity or motor_position", false, by_momentum_transfer},
   };
   return methods;
 }
@@ -107,6 +107,12 @@ const std::vector<std::string>& diagnosis_methods() {
     return all;
   }();
   return names;
+}
+
+bool needs_curve(const std::string& method) {
+  for (const DiagnosisMethod& each : diagnosis_method_table())
+    if (each.name == method) return each.by_curve;
+  return false;
 }
 
 Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,

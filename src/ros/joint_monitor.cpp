@@ -103,7 +103,7 @@ Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note
   lock.unlock();  // the subscriber goes on while this computes
   Diagnosis diagnosis = diagnose_settled(record, diagnosis_settings_, curve.get(), baseline);
   for (Estimate& estimate : diagnosis.estimates)
-    if (estimate.method == "apd_skewness" && !curve) estimate.message += " (" + curve_state + ")";
+    if (needs_curve(estimate.method) && !curve) estimate.message += " (" + curve_state + ")";
   return diagnosis;
 }
 

@@ -16,8 +16,15 @@
 namespace backlash::tools {
 namespace {
 
-const std::string kApd = "apd_skewness";
 const std::string kStandardOutput = "-";
+
+/// What each method looks at, for the help text.
+std::string needs_of_methods() {
+  std::string text = "Methods and the channels that they need:";
+  for (const DiagnosisMethod& method : diagnosis_method_table())
+    text += (text.back() == ':' ? " " : "; ") + method.name + " - " + method.needs;
+  return text + ".";
+}
 
 Command command() {
   Command c;
@@ -43,9 +50,10 @@ Command command() {
        "use only the last N excitation periods (and those before them that settling discards)"},
   };
   c.notes =
-      "backlash is the total free play along the line of action [m], backlash_angle the same as an angle on "
-      "the axis "
-      "of motor_position [rad]; intervals hold with 95 %.";
+      std::string(
+          "backlash is the total free play along the line of action [m], backlash_angle the same as an angle on "
+          "the axis of motor_position [rad]; intervals hold with 95 %. ") +
+      needs_of_methods();
   c.examples = {"diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json",
                 "diagnose_record run.bag --joint elbow --curve curve.yaml --json -",
                 "diagnose_record new.csv --rig rig.yaml --save-baseline healthy.yaml --json new.json",
@@ -121,7 +129,7 @@ void keep_last_periods(Inputs& in, std::uint64_t count) {
 /// A curve for this very record, where the rig file tells how.
 void build_own_curve(Inputs& in) {
   const double interval = in.record.sampling_interval();
-  if (!in.settings.apd || (!in.method.empty() && in.method != kApd)) return;
+  if (!in.settings.apd || (!in.method.empty() && !needs_curve(in.method))) return;
   if (!in.record.has(in.settings.apd->signal) || !(interval > 0)) return;
   CurveRequest request;
   request.sampling_rate = nominal_sampling_rate(interval);
@@ -183,9 +191,10 @@ Inputs read_inputs(const Arguments& arguments) {
 void explain(Diagnosis& diagnosis, const Inputs& in) {
   for (Estimate& e : diagnosis.estimates) {
     if (e.status != Status::insufficient_data) continue;
-    if (!in.rig && e.method == kApd && !in.curve) e.message = "needs --rig or --curve";
-    if (!in.rig && e.method != kApd) e.message = "needs --rig";
-    if (e.method == kApd && !in.no_curve.empty()) e.message = "no monitoring curve: " + in.no_curve;
+    const bool by_curve = needs_curve(e.method);
+    if (!in.rig && by_curve && !in.curve) e.message = "needs --rig or --curve";
+    if (!in.rig && !by_curve) e.message = "needs --rig";
+    if (by_curve && !in.no_curve.empty()) e.message = "no monitoring curve: " + in.no_curve;
   }
   diagnosis.verdict = combine(diagnosis.estimates, in.settings.limits, in.baseline);
 }

@@ -343,6 +343,20 @@ TEST_F(Commands, RepeatedStampsAreTold) {
   expect_contains(report("a.csv", 3)["warnings"].dump(), "repeated time stamp");
 }
 
+TEST_F(Commands, EachMethodAloneGetsWhatItNeeds) {
+  done("simulate rig.yaml --duration 1 --backlash 6e-5 --out a.csv");
+  for (const std::string& method : diagnosis_methods()) {
+    const Json json = Json::parse(run("diagnose_record a.csv --rig rig.yaml --method " + method + " --json -").out);
+    ASSERT_EQ(json["estimates"].size(), 1u);
+    EXPECT_EQ(json["estimates"][0]["method"], method);
+    const std::string message = json["estimates"][0]["message"];
+    EXPECT_EQ(message.find("no monitoring curve"), std::string::npos) << method << ": " << message;
+  }
+  const Json json = Json::parse(run("diagnose_record a.csv --json -").out);
+  for (const Json& e : json["estimates"])
+    EXPECT_EQ(e["message"], needs_curve(e["method"]) ? "needs --rig or --curve" : "needs --rig");
+}
+
 TEST_F(Commands, CurveIsDrawnWhole) {
   // At 100 kHz there is one sampling phase, and the curve's file is small.
   const std::string start =
@@ -353,7 +367,7 @@ TEST_F(Commands, CurveIsDrawnWhole) {
   std::filesystem::remove(path("c.yaml"));
   std::filesystem::remove(path("c.png"));
   const Outcome outcome =
-      run(start, "trap '' XFSZ; ulimit -f 16;");  // room for the curve, not for the picture
+      run(start, "trap '' XFSZ; ulimit -f 64;");  // room for the curve, not for the picture
   EXPECT_EQ(outcome.code, 73) << outcome.err;
   EXPECT_TRUE(exists("c.yaml"));
   EXPECT_EQ(files(), 2u);

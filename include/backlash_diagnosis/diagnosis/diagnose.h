@@ -49,12 +49,16 @@ struct DiagnosisInput {
 /// order of reports; a new one is a file in this room and a line there.
 struct DiagnosisMethod {
   std::string name, needs;
+  bool by_curve;  // needs a monitoring curve
   Estimate (*estimate)(const DiagnosisInput&);
 };
 const std::vector<DiagnosisMethod>& diagnosis_method_table();
 
 /// Names of all estimators.
 const std::vector<std::string>& diagnosis_methods();
+
+/// Whether an estimator needs a monitoring curve; false for an unknown name.
+bool needs_curve(const std::string& method);
 
 /// Runs the estimators (`method` empty: all) on the whole excitation periods of a record after settling, or
 /// on all of it where the rig declares no APD or the excitation has no period. Throws InvalidParameter for an
