@@ -29,7 +29,8 @@ run() {
 
 rig=config/sarkar_1997.yaml
 fitted=config/sarkar_1997_fitted.yaml
-run gears gear_geometry --centre-distance-change 100e-6 --table 5 --json "${out}/gears.json"
+run gears gear_geometry --centre-distance-change 100e-6 --table 5
+run shim gear_geometry --centre-distance-change 50e-6 --json "${out}/gears.json"
 run mesh_stiffness plot_mesh_stiffness.py "${out}/gears.json" --out "${out}/mesh_stiffness.png"
 run integrators integrator_study "${rig}" --loop config/hysteresis_loop.yaml --json "${out}/integrators.json" \
   --plot "${out}/integrators"
