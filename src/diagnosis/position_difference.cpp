@@ -74,21 +74,12 @@ double travel(const std::vector<double>& values) {
   return quantile(values, 0.99) - quantile(values, 0.01);
 }
 
-double resolution(const std::vector<double>& position) {
-  double smallest = 0;
-  for (std::size_t i = 1; i < position.size(); ++i) {
-    const double step = std::abs(position[i] - position[i - 1]);
-    if (step > 0 && (smallest == 0 || step < smallest)) smallest = step;
-  }
-  return smallest;
-}
-
 /// A load that travels farther than the deflection varies shows friction with both signs of its speed.
 bool load_moves(const TwoEncoders& motion) {
   std::vector<double> deflection(motion.motor.size());
   for (std::size_t i = 0; i < deflection.size(); ++i) deflection[i] = motion.motor[i] - motion.load[i];
   const double moved = travel(motion.load);
-  return moved > 0.5 * travel(deflection) && moved > 20 * resolution(motion.load);
+  return moved > 0.5 * travel(deflection) && moved > 20 * smallest_step(motion.load);
 }
 
 struct Fits {

@@ -24,6 +24,15 @@ double median(std::vector<double> values) {
   return 0.5 * (upper + *std::max_element(values.begin(), middle));
 }
 
+double smallest_step(const std::vector<double>& values) {
+  double smallest = 0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double step = std::abs(values[i] - values[i - 1]);
+    if (step > 0 && (smallest == 0 || step < smallest)) smallest = step;
+  }
+  return smallest;
+}
+
 RobustScale robust_scale(const std::vector<double>& values, double floor) {
   RobustScale scale;
   scale.centre = median(values);

@@ -20,16 +20,6 @@ constexpr double kSwitchedRinging = 0.25;
 constexpr double kSettling = 0.3;
 constexpr double kRampedRinging = 4.0;
 
-// The smallest change between two samples [rad].
-double resolution(const std::vector<double>& position) {
-  double smallest = 0;
-  for (std::size_t i = 1; i < position.size(); ++i) {
-    const double step = std::abs(position[i] - position[i - 1]);
-    if (step > 0 && (smallest == 0 || step < smallest)) smallest = step;
-  }
-  return smallest;
-}
-
 // What the travel still lacks while ringing dies out.
 double settling(const std::vector<WallReading>& readings) {
   const double before = median_of(readings, &WallReading::earlier_spread);
@@ -92,7 +82,7 @@ WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<Wa
     plays.push_back(travels.back() - deflections[i] - deflections[i - 1]);
   }
   WallToWall result;
-  result.step = resolution(motion.position);
+  result.step = smallest_step(motion.position);
   const RobustScale scale = robust_scale(plays, 2 * result.step);  // each wall may be off by one step
   const double extrapolation = switched ? settling(readings) : 0;
   result.value = scale.centre + extrapolation;

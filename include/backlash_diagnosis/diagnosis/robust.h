@@ -12,6 +12,9 @@ double median(std::vector<double> values);
 /// Value below which `fraction` [0, 1] of the values lie (nearest rank). NaN for an empty list.
 double quantile(std::vector<double> values, double fraction);
 
+/// The smallest change between two successive values, the resolution of a sensor; 0 where none changes.
+double smallest_step(const std::vector<double>& values);
+
 /// Location and scale of values of which a minority may be wrong.
 struct RobustScale {
   double centre = 0;     ///< median
