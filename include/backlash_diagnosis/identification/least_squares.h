@@ -1,0 +1,46 @@
+// Least squares with what belongs to it: standard errors, residuals, and answers that a few outliers do not
+// spoil.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+
+#include "backlash_diagnosis/identification/measured.h"
+
+namespace backlash {
+
+struct LeastSquaresFit {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd covariance;  // of the values
+  Eigen::VectorXd residuals;   // measured minus fitted, one per row
+  double deviation = 0;        // standard deviation of the residuals, degrees of freedom considered
+
+  Measured parameter(Eigen::Index i) const;
+};
+
+/// Minimises |b - A x|. Columns are scaled before they are decomposed. Throws CannotIdentify with fewer rows
+/// than columns + 1 or columns that depend on each other (condition beyond 1e10).
+LeastSquaresFit fit_linear(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
+
+/// The same with Huber's weights (1.345 standard deviations, scale from the median absolute residual): up to
+/// a third of the rows may be wrong. Standard errors after Huber (1981, Section 7.6).
+LeastSquaresFit fit_robust(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
+
+/// Residuals of a model at given parameters, each divided by its own standard deviation.
+using ResidualFunction = std::function<Eigen::VectorXd(const Eigen::VectorXd& parameters)>;
+
+struct NonlinearOptions {
+  int iterations = 30;
+  double tolerance =
+      1e-6;            // of the relative decrease of the sum of squares, and of the step in units of `scale`
+  double step = 1e-4;  // of the forward differences, in units of `scale`
+};
+
+/// Levenberg and Marquardt with forward differences. `scale` holds one typical size > 0 per parameter. Values
+/// for which the function throws Error or gives a number that is not finite are taken for too far. Covariance
+/// from the Jacobian and the residuals' own variance. Throws CannotIdentify where the start itself is refused
+/// or a parameter changes nothing.
+LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::VectorXd& start,
+                              const Eigen::VectorXd& scale, const NonlinearOptions& options = {});
+
+}  // namespace backlash

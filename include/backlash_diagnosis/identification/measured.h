@@ -1,0 +1,23 @@
+// A number from data is nothing without its error.
+#pragma once
+
+#include <limits>
+
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash {
+
+/// A value and its standard error, both in the same unit; NaN: not known.
+struct Measured {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  double standard_error = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// What a procedure throws that the record cannot support; the message says why in one sentence and with
+/// figures.
+class CannotIdentify : public Error {
+ public:
+  using Error::Error;
+};
+
+}  // namespace backlash
