@@ -37,10 +37,9 @@ std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, cons
   const ContactLawType* type = find(name);
   if (!type) throw InvalidParameter("contact.law", name, "is not a known contact law");
   for (const ParameterSpec& spec : type->parameters) {
-    const auto value = values.find(spec.name);
-    if (value == values.end()) throw InvalidParameter("contact." + spec.name, "absent", "is required by " + name);
-    if (!spec.range.contains(value->second))
-      throw InvalidParameter("contact." + spec.name, value->second, spec.range.text() + " " + spec.unit);
+    if (!values.has(spec.name)) throw InvalidParameter("contact." + spec.name, "absent", "is required by " + name);
+    if (const double value = values.at(spec.name); !spec.range.contains(value))
+      throw InvalidParameter("contact." + spec.name, value, spec.range.text() + " " + spec.unit);
   }
   return type->create(values);
 }

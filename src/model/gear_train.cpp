@@ -22,6 +22,11 @@ double spring(const Coupling& c, double twist) {
   return c.stiffness * twist;
 }
 
+FrictionLimits directional(const Body& body, double factor) {
+  return {(body.coulomb_friction + body.coulomb_asymmetry) * factor,
+          (body.coulomb_friction - body.coulomb_asymmetry) * factor};
+}
+
 }  // namespace
 
 GearTrain::GearTrain(const Rig& rig)
@@ -32,6 +37,11 @@ GearTrain::GearTrain(const Rig& rig)
       output_(rig.output_coupling),
       sensed_damping_(rig.sensor_with_damper ? input_.damping : 0),
       lever_(rig.mesh.lever()),
+      start_(rig.mesh.start_in_gap),
+      asymmetry_{rig.motor.viscous_asymmetry * ratio_ * ratio_,
+                 rig.pinion.viscous_asymmetry * ratio_ * ratio_, rig.gear.viscous_asymmetry,
+                 rig.link.viscous_asymmetry},
+      coulomb_{directional(rig.motor, ratio_), directional(rig.link, 1)},
       torque_constant_(rig.torque_constant),
       contact_(rig.mesh.contact),
       variation_(rig.mesh.variation),
@@ -39,6 +49,25 @@ GearTrain::GearTrain(const Rig& rig)
   if (!contact_) throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
   set_backlash(rig.mesh.backlash);
   join(rig);
+  bool dry = false;
+  for (const auto& term : terms_) {
+    shaped_ |= term->shapes_flanks();
+    shape_follows_torque_ |= term->shape_follows_torque();
+    dry |= term->has_dry_friction();
+  }
+  const auto rubs = [](const FrictionLimits& f) { return f.forward > 0 || f.backward > 0; };
+  if (dry || rubs(coulomb_.motor)) dry_ends_.push_back({kMotor, {}});
+  if ((dry || rubs(coulomb_.load)) && node_[kLink] != kFixed) dry_ends_.push_back({kLink, {}});
+}
+
+void GearTrain::brake_motor() {
+  braked_ = true;
+  if (dry_ends_.empty() || dry_ends_.front().slot != kMotor)
+    dry_ends_.insert(dry_ends_.begin(), {kMotor, {}});
+}
+
+double GearTrain::load_inertia() const {
+  return node_[kLink] == kFixed ? std::numeric_limits<double>::infinity() : inertia_[node_[kLink]];
 }
 
 /// Gives each part its degree of freedom and sums the inertia that moves with it.
@@ -76,7 +105,7 @@ GearTrain::Slots GearTrain::unpack(const double* state) const {
 }
 
 double GearTrain::contact_force(const Slots& s) const {
-  const double x = lever_ * (s.q[kPinion] - s.q[kGear]);
+  const double x = relative(s);
   const double penetration = std::fabs(x) - acting_gap_;
   if (penetration <= 0) return 0;
   const double side = x > 0 ? 1 : -1;
@@ -85,11 +114,74 @@ double GearTrain::contact_force(const Slots& s) const {
   return variation_ ? force * variation_->factor(lever_ * s.q[kPinion], side) : force;
 }
 
-void GearTrain::derivative(double t, const double* state, double motor_torque, double* rate) const {
+FlankShift GearTrain::shift(const Slots& s, int side, double mesh_torque) const {
+  FlankShift sum;
+  if (!shaped_) return sum;
+  const FlankPoint point{s.q[kPinion], s.q[kGear], half_gap_ / lever_, mesh_torque, side};
+  for (const auto& term : terms_) term->shape(point, sum);
+  return sum;
+}
+
+/// Force >= 0 on the flank of this side [N]. Where its shape follows the torque that it carries both are
+/// found together, by the secant method.
+double GearTrain::shaped_force(const Slots& s, int side, FlankShift& at) const {
+  const double x = side * relative(s) - acting_gap_, w = side * lever_ * (s.w[kPinion] - s.w[kGear]);
+  const auto force = [&](double mesh_torque) {
+    at = shift(s, side, mesh_torque);
+    const double penetration = x - lever_ * at.opening;
+    if (!(penetration > 0)) return 0.0;
+    const double rate = w - lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
+    const double f = contact_->force(penetration, rate, impact_speed_);
+    return variation_ ? f * variation_->factor(lever_ * s.q[kPinion], side) : f;
+  };
+  double f0 = force(0);
+  if (!shape_follows_torque_ || f0 == 0) return f0;
+  double t0 = 0, t1 = side * lever_ * f0, g0 = t1;
+  for (int i = 0; i < 50; ++i) {
+    const double g1 = side * lever_ * force(t1) - t1;
+    if (std::fabs(g1) <= 1e-12 * std::fabs(t1) || g1 == g0) break;
+    const double next = t1 - g1 * (t1 - t0) / (g1 - g0);
+    t0 = t1, g0 = g1, t1 = next;
+  }
+  return std::fabs(t1) / lever_;
+}
+
+/// Adds what both flanks do to pinion and gear and returns the mesh torque. A gap that a term closes
+/// altogether presses both flanks.
+double GearTrain::shaped_torques(const Slots& s, double* torque) const {
+  double mesh_torque = 0;
+  for (const int side : {1, -1}) {
+    FlankShift at;
+    const double t = lever_ * shaped_force(s, side, at);
+    torque[kPinion] -= t * (side - at.motor_slope);
+    torque[kGear] += t * (side + at.load_slope);
+    mesh_torque += side * t;
+  }
+  return mesh_torque;
+}
+
+EndFriction GearTrain::friction(const Motion& motion) const {
+  EndFriction sum = coulomb_;
+  for (const auto& term : terms_) term->add_friction(motion, sum);
+  for (FrictionLimits* limits : {&sum.motor, &sum.load}) {
+    limits->forward = std::max(0.0, limits->forward);
+    limits->backward = std::max(0.0, limits->backward);
+  }
+  if (braked_) sum.motor.forward = sum.motor.backward = std::numeric_limits<double>::infinity();
+  return sum;
+}
+
+const FrictionLimits& GearTrain::limits(const DryEnd& end, const EndFriction& friction) const {
+  return end.slot == kMotor ? friction.motor : friction.load;
+}
+
+GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorque applied) const {
   const Slots s = unpack(state);
   double torque[kSlots];
-  for (int slot = 0; slot < kSlots; ++slot) torque[slot] = -damping_[slot] * s.w[slot];
-  torque[kMotor] += motor_torque * ratio_;
+  for (int slot = 0; slot < kSlots; ++slot)
+    torque[slot] = -damping_[slot] * s.w[slot] - asymmetry_[slot] * std::fabs(s.w[slot]);
+  torque[kMotor] += applied.motor * ratio_;
+  torque[kLink] += applied.load;
   if (!input_.rigid) {
     const double through =
         spring(input_, s.q[kMotor] - s.q[kPinion]) + input_.damping * (s.w[kMotor] - s.w[kPinion]);
@@ -102,30 +194,82 @@ void GearTrain::derivative(double t, const double* state, double motor_torque, d
     torque[kGear] -= through;
     torque[kLink] += through;
   }
-  const double mesh_torque = lever_ * contact_force(s);
-  torque[kPinion] -= mesh_torque;
-  torque[kGear] += mesh_torque;
-  if (!terms_.empty()) {
-    const Motion motion{t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink]};
+  Balance b;
+  if (shaped_) {
+    b.mesh_torque = shaped_torques(s, torque);
+  } else {
+    b.mesh_torque = lever_ * contact_force(s);
+    torque[kPinion] -= b.mesh_torque;
+    torque[kGear] += b.mesh_torque;
+  }
+  if (!terms_.empty() || !dry_ends_.empty()) {
+    const Motion motion{t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink], b.mesh_torque};
     EndTorques ends;
     for (const auto& term : terms_) term->add(motion, ends);
     torque[kMotor] += ends.motor;
     torque[kLink] += ends.load;
+    if (!dry_ends_.empty()) b.friction = friction(motion);
   }
-  double sum[kSlots] = {};
   for (int slot = 0; slot < kSlots; ++slot)
-    if (node_[slot] != kFixed) sum[node_[slot]] += torque[slot];
+    if (node_[slot] != kFixed) b.net[node_[slot]] += torque[slot];
+  return b;
+}
+
+void GearTrain::derivative(double t, const double* state, AppliedTorque applied, double* rate) const {
+  const Balance b = balance(t, state, applied);
   for (int node = 0; node < dof_; ++node) {
     rate[node] = state[dof_ + node];
-    rate[dof_ + node] = sum[node] / inertia_[node];
+    rate[dof_ + node] = b.net[node] / inertia_[node];
+  }
+  for (const DryEnd& end : dry_ends_) {
+    const int node = node_[end.slot];
+    double& acceleration = rate[dof_ + node];
+    if (end.mode.stuck())
+      acceleration = rate[node] = 0;
+    else
+      acceleration += end.mode.torque(limits(end, b.friction)) / inertia_[node];
   }
 }
 
-Observation GearTrain::observe(const double* state, double motor_torque, double t) const {
+GearTrain::EndForces GearTrain::end_forces(double t, const double* state, AppliedTorque applied) const {
+  const Balance b = balance(t, state, applied);
+  const double load = node_[kLink] == kFixed ? 0 : b.net[node_[kLink]];
+  return {b.net[node_[kMotor]], load, b.mesh_torque, b.friction};
+}
+
+void GearTrain::friction_events(double t, const double* state, AppliedTorque applied, double* values) const {
+  const Balance b = balance(t, state, applied);
+  for (const DryEnd& end : dry_ends_) {
+    const int node = node_[end.slot];
+    *values++ = end.mode.event(b.net[node], state[dof_ + node], limits(end, b.friction));
+  }
+}
+
+void GearTrain::begin_friction(double t, double* state, AppliedTorque applied) {
+  if (dry_ends_.empty()) return;
+  const Balance b = balance(t, state, applied);
+  for (DryEnd& end : dry_ends_) {
+    const int node = node_[end.slot];
+    end.mode.begin(b.net[node], state[dof_ + node], limits(end, b.friction));
+  }
+}
+
+bool GearTrain::update_friction(double t, double* state, AppliedTorque applied) {
+  if (dry_ends_.empty()) return false;
+  const Balance b = balance(t, state, applied);
+  bool changed = false;
+  for (DryEnd& end : dry_ends_) {
+    const int node = node_[end.slot];
+    changed |= end.mode.update(b.net[node], state[dof_ + node], limits(end, b.friction));
+  }
+  return changed;
+}
+
+Observation GearTrain::observe(const double* state, AppliedTorque applied, double t) const {
   const Slots s = unpack(state);
   const double none = std::nan("");
   Observation o;
-  o.motor_torque = motor_torque;
+  o.motor_torque = applied.motor;
   o.motor_position = s.q[kMotor] * ratio_;
   o.motor_velocity = s.w[kMotor] * ratio_;
   const double twist = s.q[kMotor] - s.q[kPinion], twist_rate = s.w[kMotor] - s.w[kPinion];
@@ -135,9 +279,9 @@ Observation GearTrain::observe(const double* state, double motor_torque, double 
   o.load_position = s.q[kLink];
   o.load_velocity = s.w[kLink];
   o.load_torque = output_.rigid ? none : spring(output_, s.q[kGear] - s.q[kLink]);
-  o.motor_current = motor_torque / torque_constant_;
+  o.motor_current = applied.motor / torque_constant_;
   double rate[kMaxStates];
-  derivative(t, state, motor_torque, rate);
+  derivative(t, state, applied, rate);
   const bool gear_moves = node_[kGear] != kFixed;
   o.acceleration = gear_moves ? rate[dof_ + node_[kGear]] : rate[dof_ + node_[kPinion]] * ratio_;
   return o;
@@ -150,27 +294,33 @@ double GearTrain::energy(const double* state) const {
     energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
   if (!input_.rigid) energy += 0.5 * input_.stiffness * std::pow(s.q[kMotor] - s.q[kPinion], 2);
   if (!output_.rigid) energy += 0.5 * output_.stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
-  const double x = lever_ * (s.q[kPinion] - s.q[kGear]), penetration = std::fabs(x) - half_gap_;
-  if (penetration > 0)
-    energy += contact_->elastic_energy(penetration) * (variation_ ? variation_->factor(lever_ * s.q[kPinion], x) : 1);
+  for (const int side : {1, -1}) {
+    const double penetration = side * relative(s) - half_gap_ - lever_ * shift(s, side, 0).opening;
+    if (penetration > 0)
+      energy += contact_->elastic_energy(penetration) *
+                (variation_ ? variation_->factor(lever_ * s.q[kPinion], side) : 1);
+  }
   return energy;
 }
 
 double GearTrain::damping_power(const double* state) const {
   const Slots s = unpack(state);
   double power = 0;
-  for (int slot = 0; slot < kSlots; ++slot) power += damping_[slot] * s.w[slot] * s.w[slot];
+  for (int slot = 0; slot < kSlots; ++slot)
+    power += (damping_[slot] * s.w[slot] + asymmetry_[slot] * std::fabs(s.w[slot])) * s.w[slot];
   if (!input_.rigid) power += input_.damping * std::pow(s.w[kMotor] - s.w[kPinion], 2);
   if (!output_.rigid) power += output_.damping * std::pow(s.w[kGear] - s.w[kLink], 2);
   return power;
 }
 
 double GearTrain::penetration(const Slots& s, Flank flank) const {
-  return flank * lever_ * (s.q[kPinion] - s.q[kGear]) - half_gap_;
+  return flank * relative(s) - half_gap_ - lever_ * shift(s, flank, 0).opening;
 }
 
 double GearTrain::approach(const Slots& s, Flank flank) const {
-  return flank * lever_ * (s.w[kPinion] - s.w[kGear]);
+  const FlankShift at = shift(s, flank, 0);
+  return flank * lever_ * (s.w[kPinion] - s.w[kGear]) -
+         lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
 }
 
 void GearTrain::enter(Flank flank) {

@@ -3,10 +3,31 @@
 namespace backlash {
 namespace {
 
+/// A number for both directions, or a map of `forward` and `backward`; as mean and half difference.
+void read_directional(const YamlReader& parent, const std::string& key, double& mean, double& asymmetry) {
+  if (!parent.has(key)) return;
+  if (parent.is_text(key)) {
+    mean = parent.number(key, Range::not_negative());
+    return;
+  }
+  const YamlReader yaml = parent.map(key);
+  const double forward = yaml.number("forward", Range::not_negative());
+  const double backward = yaml.number("backward", Range::not_negative());
+  mean = 0.5 * (forward + backward);
+  asymmetry = 0.5 * (forward - backward);
+}
+
 Body read_body(const YamlReader& yaml) {
   Body body;
   body.inertia = yaml.number("inertia", Range::positive());
-  body.viscous_damping = yaml.number_or("viscous_damping", 0, Range::not_negative());
+  read_directional(yaml, "viscous_damping", body.viscous_damping, body.viscous_asymmetry);
+  return body;
+}
+
+/// Motor and link: the ends of the train may also have dry friction.
+Body read_end(const YamlReader& yaml) {
+  Body body = read_body(yaml);
+  read_directional(yaml, "coulomb_friction", body.coulomb_friction, body.coulomb_asymmetry);
   return body;
 }
 
@@ -45,6 +66,7 @@ Mesh read_mesh(const YamlReader& yaml) {
     yaml.fail(key, "a mesh without base_radius must state backlash_angle (rad)");
   const double factor = key == "half_gap" ? 2 : key == "backlash_angle" ? mesh.lever() : 1;
   mesh.backlash = factor * yaml.number(key, Range::not_negative());
+  mesh.start_in_gap = yaml.number_or("start_in_gap", 0, Range::between(-1, 1));
   mesh.contact = read_contact_law(yaml.map("contact"));
   if (const auto variation = yaml.optional_map("stiffness_variation"))
     mesh.variation = read_stiffness_variation(*variation, mesh.base_radius);
@@ -55,7 +77,7 @@ void read_gear_train(const YamlReader& yaml, Rig& rig) {
   rig.reduction_ratio = yaml.number("reduction_ratio", Range::positive());
   rig.motor_side = yaml.boolean_or("motor_side", false);
   const YamlReader motor = yaml.map("motor");
-  rig.motor = read_body(motor);
+  rig.motor = read_end(motor);
   if (motor.has("torque_constant")) rig.torque_constant = motor.number("torque_constant", Range::positive());
   rig.input_coupling = read_coupling(yaml, "input_coupling");
   rig.sensor_with_damper = read_sensor_output(yaml);
@@ -69,7 +91,7 @@ void read_gear_train(const YamlReader& yaml, Rig& rig) {
     yaml.choice("link", {"locked"});
     rig.link_locked = true;
   } else {
-    rig.link = read_body(yaml.map("link"));
+    rig.link = read_end(yaml.map("link"));
   }
   if (yaml.has("gear"))
     rig.gear = read_body(yaml.map("gear"));

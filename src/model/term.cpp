@@ -5,7 +5,10 @@
 namespace backlash {
 
 const std::vector<TermType>& term_types() {
-  static const std::vector<TermType> types = {gravity_term()};
+  static const std::vector<TermType> types = {
+      backlash_map_term(),           eccentricity_term(),       gravity_term(),
+      radial_compliance_term(),      transmission_error_term(), varying_backlash_term(),
+      varying_reduction_ratio_term()};
   return types;
 }
 

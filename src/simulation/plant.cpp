@@ -15,7 +15,17 @@ std::vector<double> absolute_tolerances(int dof, const SolverSettings& solver) {
   return tolerances;
 }
 
-constexpr long kMaxTouchesPerCall = 100'000;
+constexpr long kMaxChangesPerCall = 100'000;
+
+GearTrain gear_train_of(const Rig& rig, const ExcitationSettings& excitation) {
+  GearTrain train(rig);
+  if (excitation.motor_brake) train.brake_motor();
+  return train;
+}
+
+int event_count(const GearTrain& train) {
+  return (train.needs_touches() ? GearTrain::kContactEvents : 0) + train.friction_event_count();
+}
 
 /// A sample k / rate and a switch n / (2 f) that are meant to coincide may differ by this much.
 double rounding(double t) {
@@ -25,16 +35,14 @@ double rounding(double t) {
 }  // namespace
 
 Plant::Plant(const Rig& rig, const ExcitationSettings& excitation, const SolverSettings& solver)
-    : gear_train_(rig),
+    : gear_train_(gear_train_of(rig, excitation)),
       excitation_settings_(excitation),
       excitation_(excitation.create()),
-      integrator_(
-          [this](double t, const double* state, double* rate) {
-            gear_train_.derivative(t, state, excitation_->torque(t, segment_), rate);
-          },
-          absolute_tolerances(gear_train_.dof(), solver), solver,
-          [this](double, const double* state, double* values) { gear_train_.contact_events(state, values); },
-          gear_train_.needs_touches() ? GearTrain::kContactEvents : 0),
+      integrator_([this](double t, const double* state,
+                         double* rate) { gear_train_.derivative(t, state, applied_torque(t), rate); },
+                  absolute_tolerances(gear_train_.dof(), solver), solver,
+                  [this](double t, const double* state, double* values) { events(t, state, values); },
+                  event_count(gear_train_)),
       initial_backlash_(rig.mesh.backlash) {
   reset();
 }
@@ -45,7 +53,27 @@ void Plant::reset() {
   state_.fill(0);
   time_ = 0;
   segment_ = 0;
-  begin_contact();
+  begin();
+}
+
+AppliedTorque Plant::applied_torque(double t) const {
+  const double torque = excitation_->torque(t, segment_);
+  return excitation_settings_.at_load ? AppliedTorque(0, torque) : AppliedTorque(torque, 0);
+}
+
+void Plant::events(double t, const double* state, double* values) const {
+  if (gear_train_.needs_touches()) {
+    gear_train_.contact_events(state, values);
+    values += GearTrain::kContactEvents;
+  }
+  gear_train_.friction_events(t, state, applied_torque(t), values);
+}
+
+/// True where contact or friction has changed.
+bool Plant::update_modes(int event) {
+  const bool touch = gear_train_.needs_touches() && event < GearTrain::kContactEvents;
+  const bool touched = touch && gear_train_.update_contact(state_.data());
+  return gear_train_.update_friction(time_, state_.data(), applied_torque()) || touched;
 }
 
 void Plant::restart() {
@@ -53,19 +81,22 @@ void Plant::restart() {
 }
 
 /// Starts from a state that did not come about by motion.
-void Plant::begin_contact() {
+void Plant::begin() {
   if (gear_train_.needs_touches()) gear_train_.begin_contact(state_.data());
+  excitation_->begin_segment(segment_, observe());
+  gear_train_.begin_friction(time_, state_.data(), applied_torque());
   restart();
 }
 
-/// Moves on to t, which lies in this segment, from touch to touch.
+/// Moves on to t, which lies in this segment, from event to event.
 void Plant::integrate_to(double t) {
   long changes = 0;
-  while (integrator_.integrate_to(t, state_.data()) != Integrator::kNoEvent) {
+  for (int event; (event = integrator_.integrate_to(t, state_.data())) != Integrator::kNoEvent;) {
     time_ = integrator_.time();
-    if (!gear_train_.update_contact(state_.data())) continue;
-    if (++changes > kMaxTouchesPerCall)
-      throw IntegrationError("the teeth touch without end, now at t = " + std::to_string(time_) + " s");
+    if (!update_modes(event)) continue;
+    if (++changes > kMaxChangesPerCall)
+      throw IntegrationError("the teeth touch or a body sticks and slips without end, now at t = " +
+                             std::to_string(time_) + " s");
     restart();
   }
   time_ = t;
@@ -79,6 +110,8 @@ void Plant::advance_to(double t) {
        end = excitation_->segment_end(segment_)) {
     integrate_to(end);
     ++segment_;
+    excitation_->begin_segment(segment_, observe());
+    gear_train_.update_friction(time_, state_.data(), applied_torque());
     restart();
   }
   integrate_to(std::max(t, time_));
@@ -86,18 +119,19 @@ void Plant::advance_to(double t) {
 
 void Plant::set_backlash(double backlash) {
   gear_train_.set_backlash(backlash);
-  begin_contact();
+  begin();
 }
 
 bool Plant::set_torque(double torque) {
   if (!excitation_->set_torque(torque)) return false;
+  gear_train_.update_friction(time_, state_.data(), applied_torque());
   restart();
   return true;
 }
 
 void Plant::set_state(const State& state) {
   state_ = state;
-  begin_contact();
+  begin();
 }
 
 }  // namespace backlash

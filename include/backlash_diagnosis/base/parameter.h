@@ -1,8 +1,11 @@
-// Named physical parameters: how contact laws and terms declare what they need, so that one loader checks them all.
+// Named physical parameters: how contact laws and terms declare what they need, so that one loader checks
+// them all.
 #pragma once
 
+#include <initializer_list>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/base/yaml_reader.h"
@@ -15,9 +18,25 @@ struct ParameterSpec {
   std::string unit;
   Range range;
   std::string meaning;
+  bool list = false;  // of numbers, each in the range
 };
 
-using ParameterValues = std::map<std::string, double>;
+/// Values by name: a number or a list of numbers.
+class ParameterValues {
+ public:
+  ParameterValues() = default;
+  ParameterValues(std::initializer_list<std::pair<const std::string, double>> numbers) : numbers_(numbers) {}
+
+  bool has(const std::string& name) const { return numbers_.count(name) > 0; }
+  double at(const std::string& name) const { return numbers_.at(name); }
+  double& operator[](const std::string& name) { return numbers_[name]; }
+  const std::vector<double>& list(const std::string& name) const { return lists_.at(name); }
+  void set_list(const std::string& name, std::vector<double> values) { lists_[name] = std::move(values); }
+
+ private:
+  std::map<std::string, double> numbers_;
+  std::map<std::string, std::vector<double>> lists_;
+};
 
 /// Reads exactly the parameters of `specs` from `yaml`; BadData for an absent, wrong or out-of-range value.
 ParameterValues read_parameters(const YamlReader& yaml, const std::vector<ParameterSpec>& specs);

@@ -1,32 +1,43 @@
 // Equations of motion of one gear train, in absolute angles at the load side of the reduction.
 //
-//   J_M a_M = tau_M - c_M w_M - T_I            T_I = k_I (q_M - q_P) + c_I (w_M - w_P)
-//   J_P a_P = T_I - c_P w_P - r F              x   = r (q_P - q_G), contact where |x| > backlash / 2
+//   J_M a_M = tau_M - c_M w_M - F_M - T_I      T_I = k_I (q_M - q_P) + c_I (w_M - w_P)
+//   J_P a_P = T_I - c_P w_P - r F              x   = r (q_P - q_G) + start, contact where |x| > backlash / 2
 //   J_G a_G = r F - c_G w_G - T_O              F   = contact law, sign of x, times variation if any
-//   J_L a_L = T_O - c_L w_L + terms            T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
+//   J_L a_L = T_O - c_L w_L - F_L + terms      T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
 //
-// Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its neighbours one
-// body; a locked link has q_L = 0. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute
-// instead of relative coordinates.
+// Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its
+// neighbours one body; a locked link has q_L = 0. F_M and F_L are dry friction with sticking, see StickSlip;
+// a braked motor sticks whatever the torque. Terms may shift either flank by an opening o(q_M, q_L, torque);
+// then its penetration is side x - backlash / 2 - r o, and the mesh torque acts on both ends through the
+// slopes of o, so that no energy is lost or gained. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and
+// Table 1, with absolute instead of relative coordinates.
 #pragma once
 
 #include <array>
 
 #include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/model/stick_slip.h"
 
 namespace backlash {
+
+/// Torques from outside at one moment [N m]: of the motor in the units of the rig's records, on the load.
+struct AppliedTorque {
+  AppliedTorque(double motor_torque = 0, double load_torque = 0) : motor(motor_torque), load(load_torque) {}
+  double motor, load;
+};
 
 /// What can be seen of a gear train at one moment, in the units of its records (see Rig::motor_side).
 struct Observation {
   double motor_torque, motor_position, motor_velocity;
-  // N m, of the input coupling: its spring (an ideal strain gauge), or spring and damper (T_I) where the rig says so;
-  // NaN if rigid
+  // N m, of the input coupling: its spring (an ideal strain gauge), or spring and damper (T_I) where the rig
+  // says so; NaN if rigid
   double sensor_torque;
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
   double load_position, load_velocity;
-  double load_torque;     // N m, spring torque of the output coupling; NaN if rigid
-  double motor_current;   // A, motor_torque / torque constant: an ideal current control; NaN without the constant
-  double acceleration;    // rad/s^2, of the gear; of the pinion (as motor_position) where the gear cannot move
+  double load_torque;  // N m, spring torque of the output coupling; NaN if rigid
+  double
+      motor_current;  // A, motor_torque / torque constant: an ideal current control; NaN without the constant
+  double acceleration;  // rad/s^2, of the gear; of the pinion (as motor_position) where the gear cannot move
 };
 
 class GearTrain {
@@ -34,15 +45,27 @@ class GearTrain {
   /// Throws InvalidParameter for a massless part, no contact law or a backlash < 0.
   explicit GearTrain(const Rig& rig);
 
-  /// Degrees of freedom, 1 to 4. A state has 2 * dof numbers: first the angles [rad], then the speeds [rad/s].
+  /// Degrees of freedom, 1 to 4. A state has 2 * dof numbers: first the angles [rad], then the speeds
+  /// [rad/s].
   int dof() const { return dof_; }
   static constexpr int kMaxStates = 8;
 
-  /// dstate/dt at time t [s] for a motor torque in the units of the rig's records [N m].
-  void derivative(double t, const double* state, double motor_torque, double* rate) const;
+  /// dstate/dt at time t [s].
+  void derivative(double t, const double* state, AppliedTorque applied, double* rate) const;
 
   /// `t` [s] matters only to terms that depend on time.
-  Observation observe(const double* state, double motor_torque, double t = 0) const;
+  Observation observe(const double* state, AppliedTorque applied, double t = 0) const;
+
+  /// What moves the two ends, without their dry friction: for a load that follows a recorded motor.
+  struct EndForces {
+    double motor, load;  // N m, sum of all other torques
+    double mesh_torque;  // N m, through the teeth, > 0 drives the load forward
+    EndFriction friction;
+  };
+  EndForces end_forces(double t, const double* state, AppliedTorque applied) const;
+  /// kg m^2 of all that moves with the motor and with the link (infinite where it is fixed); load-side.
+  double motor_inertia() const { return inertia_[node_[kMotor]]; }
+  double load_inertia() const;
 
   /// Kinetic plus elastic energy (couplings, contact) [J], without terms.
   double energy(const double* state) const;
@@ -50,8 +73,8 @@ class GearTrain {
   /// Power that the dampers of motor, couplings and link take out [W]; contact damping is not among them.
   double damping_power(const double* state) const;
 
-  /// Twist between motor and link under a static torque in one contact, without the gap. Torque and angle in the
-  /// units of motor_torque and motor_position; odd in torque. With the mean stiffness of the mesh cycle.
+  /// Twist between motor and link under a static torque in one contact, without the gap. Torque and angle in
+  /// the units of motor_torque and motor_position; odd in torque. With the mean stiffness of the mesh cycle.
   double elastic_deflection(double motor_torque) const;
 
   /// Total free play [m] (angular mesh: [rad] at the load side), >= 0; takes effect at the next derivative().
@@ -74,6 +97,16 @@ class GearTrain {
   bool update_contact(double* state);
   double impact_speed() const { return impact_speed_; }  // m/s at the last touch, 0 if there was none
 
+  /// Dry friction: like touches, whoever moves the train tells it where the mode of a body changes.
+  /// begin_friction() where state or torque did not come about by motion; update_friction() wherever one of
+  /// the friction_event_count() values rises through 0. True from the latter: integration must start again.
+  int friction_event_count() const { return static_cast<int>(dry_ends_.size()); }
+  void friction_events(double t, const double* state, AppliedTorque applied, double* values) const;
+  void begin_friction(double t, double* state, AppliedTorque applied);
+  bool update_friction(double t, double* state, AppliedTorque applied);
+  /// Holds the motor from now on; before begin_friction().
+  void brake_motor();
+
  private:
   enum Slot { kMotor, kPinion, kGear, kLink, kSlots };
   struct Slots {
@@ -83,7 +116,25 @@ class GearTrain {
   /// A flank pair: +1 touches where the pinion drives forward, -1 where it drives back.
   enum Flank { kReverse = -1, kApart = 0, kForward = 1 };
 
+  /// All torques of one moment, per degree of freedom, and what they are made of.
+  struct Balance {
+    double net[kSlots] = {};  // N m, without dry friction
+    double mesh_torque = 0;
+    EndFriction friction;
+  };
+  struct DryEnd {
+    Slot slot;
+    StickSlip mode;
+  };
+
   Slots unpack(const double* state) const;
+  Balance balance(double t, const double* state, AppliedTorque applied) const;
+  double relative(const Slots& s) const { return lever_ * (s.q[kPinion] - s.q[kGear]) + start_ * half_gap_; }
+  FlankShift shift(const Slots& s, int side, double mesh_torque) const;
+  double shaped_torques(const Slots& s, double* torque) const;
+  double shaped_force(const Slots& s, int side, FlankShift& at) const;
+  EndFriction friction(const Motion& motion) const;
+  const FrictionLimits& limits(const DryEnd& end, const EndFriction& friction) const;
   double penetration(const Slots& s, Flank flank) const;
   double approach(const Slots& s, Flank flank) const;
   void enter(Flank flank);
@@ -95,14 +146,20 @@ class GearTrain {
   int dof_ = 0;
   std::array<int, kSlots> node_{};        // which degree of freedom a part moves with; kFixed if none
   std::array<double, kSlots> inertia_{};  // per degree of freedom, kg m^2
-  std::array<double, kSlots> damping_;  // per part, N m s/rad
-  Coupling input_, output_;  // referred to the load side
-  double sensed_damping_;    // N m s/rad, the part of the sensor's damper that sensor_torque shows
+  std::array<double, kSlots> damping_;    // per part, N m s/rad
+  Coupling input_, output_;               // referred to the load side
+  double sensed_damping_;  // N m s/rad, the part of the sensor's damper that sensor_torque shows
   double half_gap_, lever_;
+  double start_;                          // -, Mesh::start_in_gap
+  std::array<double, kSlots> asymmetry_;  // per part, N m s/rad
+  EndFriction coulomb_;
+  bool shaped_ = false, shape_follows_torque_ = false;
+  bool braked_ = false;
+  std::vector<DryEnd> dry_ends_;
   double impact_speed_ = 0;  // m/s, approach speed at the last touch
   double acting_gap_;        // where the force begins: half_gap_, or infinite between touches
   Flank flank_ = kApart;     // in contact, for a law that needs touches
-  double torque_constant_;  // N m/A, NaN if unknown
+  double torque_constant_;   // N m/A, NaN if unknown
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;

@@ -17,10 +17,17 @@
 
 namespace backlash {
 
-/// A rotating part.
+/// A rotating part and its friction against the frame:
+///   T = c w + a |w| + F sign(w) + b        c, F: means of both directions; a, b: half differences
+/// Forward c + a and F + b, backward c - a and F - b, none below 0. At rest dry friction takes any value
+/// between
+/// -(F - b) and F + b: the body sticks.
 struct Body {
-  double inertia = 0;          // kg m^2
-  double viscous_damping = 0;  // N m s/rad, against the frame
+  double inertia = 0;            // kg m^2
+  double viscous_damping = 0;    // c, N m s/rad
+  double viscous_asymmetry = 0;  // a, N m s/rad
+  double coulomb_friction = 0;   // F, N m, motor and link only
+  double coulomb_asymmetry = 0;  // b, N m
 };
 
 /// A flexible shaft or torque sensor; half of its inertia moves with either end.
@@ -31,11 +38,13 @@ struct Coupling {
   double inertia = 0;    // kg m^2
 };
 
-/// Tooth contact. `backlash` is the total free play along the line of action [m]; for a rig without base radius it is
-/// the angle at the load side [rad] and the contact law works with angles and torques.
+/// Tooth contact. `backlash` is the total free play along the line of action [m]; for a rig without base
+/// radius it is the angle at the load side [rad] and the contact law works with angles and torques.
 struct Mesh {
   double backlash = 0;
   double base_radius = std::numeric_limits<double>::quiet_NaN();  // m, of the load gear; NaN: angular mesh
+  double start_in_gap =
+      0;  // -, where in the gap both positions are 0: +1 at the flank that drives forward, -1 at the other
   std::shared_ptr<const ContactLaw> contact;
   std::shared_ptr<const StiffnessVariation> variation;  // null: the same stiffness in every position
 
@@ -43,18 +52,20 @@ struct Mesh {
   double lever() const { return angular() ? 1 : base_radius; }  // m (or 1): torque per contact force
 };
 
-/// A validated rig. Motor, input coupling and pinion are given as seen from the load side of the reduction unless
-/// `motor_side` is true; then they, and motor_torque, motor_position and sensor_torque of its records, are those of
-/// the motor shaft.
+/// A validated rig. Motor, input coupling and pinion are given as seen from the load side of the reduction
+/// unless `motor_side` is true; then they, and motor_torque, motor_position and sensor_torque of its records,
+/// are those of the motor shaft.
 struct Rig {
   std::string name;
   std::string joint;           // prefix of its names in sensor_msgs/JointState
   double reduction_ratio = 1;  // motor turns per load turn, > 0
   bool motor_side = false;
   Body motor, pinion, gear, link;
-  double torque_constant = std::numeric_limits<double>::quiet_NaN();  // motor_torque per motor_current, N m/A; NaN: unknown
+  double torque_constant =
+      std::numeric_limits<double>::quiet_NaN();  // motor_torque per motor_current, N m/A; NaN: unknown
   Coupling input_coupling, output_coupling;
-  bool sensor_with_damper = false;  // sensor_torque is spring plus damper of the input coupling, not the spring alone
+  bool sensor_with_damper =
+      false;  // sensor_torque is spring plus damper of the input coupling, not the spring alone
   bool link_locked = false;
   Mesh mesh;
   std::vector<std::shared_ptr<const Term>> terms;
@@ -62,13 +73,13 @@ struct Rig {
   /// Load-side angle (or torque, divided) to the axis of motor_position: reduction ratio or 1.
   double motor_axis_ratio() const { return motor_side ? reduction_ratio : 1; }
 
-  /// Backlash along the line of action [m] (or load-side angle [rad] for an angular mesh) to the angle on the axis of
-  /// motor_position [rad].
+  /// Backlash along the line of action [m] (or load-side angle [rad] for an angular mesh) to the angle on the
+  /// axis of motor_position [rad].
   double backlash_angle(double backlash) const { return backlash / mesh.lever() * motor_axis_ratio(); }
 };
 
-/// Reads the machine's part of a rig file (`name`, `joint`, `gear_train`, `terms`). Throws BadData naming file, line,
-/// key, value and limit.
+/// Reads the machine's part of a rig file (`name`, `joint`, `gear_train`, `terms`). Throws BadData naming
+/// file, line, key, value and limit.
 Rig read_rig(const YamlReader& yaml);
 
 }  // namespace backlash

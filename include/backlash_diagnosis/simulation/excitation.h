@@ -1,7 +1,8 @@
 // Motor torque as a function of time, smooth between switching times that are known exactly.
 //
-// Time is cut into segments 0, 1, 2, ... at the switching times. Inside a segment the torque is a smooth function; at a
-// switching time both neighbours are defined, so an integrator that stops there never sees the wrong side of a jump.
+// Time is cut into segments 0, 1, 2, ... at the switching times. Inside a segment the torque is a smooth
+// function; at a switching time both neighbours are defined, so an integrator that stops there never sees the
+// wrong side of a jump.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/model/gear_train.h"
 
 namespace backlash {
 
@@ -23,11 +25,15 @@ class Excitation {
   /// End of a segment [s]; infinite where the torque never jumps again.
   virtual double segment_end(long segment) const = 0;
 
+  /// Called at the start of each segment, before its torque is asked for, with what can be seen of the
+  /// machine: where a closed loop decides.
+  virtual void begin_segment(long /*segment*/, const Observation& /*machine*/) {}
+
   /// Repetition time [s]; 0 where the torque does not repeat.
   virtual double period() const { return 0; }
 
-  /// Torque set from outside [N m], held until the next call. Refused (false) by all but the `topic` excitation.
-  /// Throws InvalidParameter for a torque that is not finite.
+  /// Torque set from outside [N m], held until the next call. Refused (false) by all but the `topic`
+  /// excitation. Throws InvalidParameter for a torque that is not finite.
   virtual bool set_torque(double) { return false; }
 };
 
@@ -38,7 +44,8 @@ struct SineLine {
   double phase;      // rad
 };
 
-/// All of them throw InvalidParameter for a value that is not finite or a frequency or duration that is not > 0.
+/// All of them throw InvalidParameter for a value that is not finite or a frequency or duration that is not >
+/// 0.
 std::unique_ptr<Excitation> constant_excitation(double torque);
 /// +amplitude for the first half of each period, -amplitude for the second, plus bias.
 std::unique_ptr<Excitation> square_excitation(double amplitude, double frequency, double bias = 0);
@@ -46,13 +53,14 @@ std::unique_ptr<Excitation> sine_excitation(double amplitude, double frequency, 
 /// Sine whose frequency rises linearly from `start` to `end` [Hz] within `duration` [s], then starts again.
 std::unique_ptr<Excitation> chirp_excitation(double amplitude, double start, double end, double duration,
                                              double bias = 0);
-/// Sum of sines; its period is the inverse of the greatest common divisor of the frequencies (to 1e-6 Hz), 0 where that
-/// is below 1 mHz.
+/// Sum of sines; its period is the inverse of the greatest common divisor of the frequencies (to 1e-6 Hz), 0
+/// where that is below 1 mHz.
 std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, double bias = 0);
-/// Random torque of the given rms [N m] in a band [Hz], as a sum of `lines` (>= 16) sines of equal amplitude: one per
-/// equal part of the band, at a frequency and with a phase drawn from `seed`. Nearly Gaussian; never repeats.
-std::unique_ptr<Excitation> random_excitation(double rms, double lower, double upper, int lines, std::uint64_t seed,
-                                              double bias = 0);
+/// Random torque of the given rms [N m] in a band [Hz], as a sum of `lines` (>= 16) sines of equal amplitude:
+/// one per equal part of the band, at a frequency and with a phase drawn from `seed`. Nearly Gaussian; never
+/// repeats.
+std::unique_ptr<Excitation> random_excitation(double rms, double lower, double upper, int lines,
+                                              std::uint64_t seed, double bias = 0);
 /// Zero until set_torque() is called.
 std::unique_ptr<Excitation> external_excitation();
 
@@ -64,8 +72,10 @@ struct ExcitationSettings {
   double bias = 0;              // N m
   double start_frequency = 0, end_frequency = 0, duration = 0;  // Hz, Hz, s: chirp
   std::vector<SineLine> lines;                                  // multi_sine
-  int line_count = 0;                                           // random, with start_ and end_frequency as the band
-  std::uint64_t seed = 0;                                       // random
+  int line_count = 0;        // random, with start_ and end_frequency as the band
+  std::uint64_t seed = 0;    // random
+  bool at_load = false;      // the torque acts on the load, not on the motor
+  bool motor_brake = false;  // the motor is held
 
   std::unique_ptr<Excitation> create() const;
 };

@@ -11,7 +11,8 @@
 namespace backlash {
 
 /// Where the contact law depends on how a contact began, each touch of a flank is found, told to the gear
-/// train and started from; other laws are simply integrated through.
+/// train and started from; other laws are simply integrated through. Dry friction likewise: each standstill
+/// and each break-away is found, so that a body that sticks stays exactly where it is.
 class Plant {
  public:
   using State = std::array<double, GearTrain::kMaxStates>;
@@ -40,13 +41,17 @@ class Plant {
   const State& state() const { return state_; }
   const GearTrain& gear_train() const { return gear_train_; }
   double excitation_period() const { return excitation_->period(); }
-  double motor_torque() const { return excitation_->torque(time_, segment_); }
-  Observation observe() const { return gear_train_.observe(state_.data(), motor_torque(), time_); }
+  AppliedTorque applied_torque() const { return applied_torque(time_); }
+  double motor_torque() const { return applied_torque().motor; }
+  Observation observe() const { return gear_train_.observe(state_.data(), applied_torque(), time_); }
   IntegratorStatistics statistics() const { return integrator_.statistics(); }
 
  private:
+  AppliedTorque applied_torque(double t) const;
+  void events(double t, const double* state, double* values) const;
+  bool update_modes(int event);
   void restart();
-  void begin_contact();
+  void begin();
   void integrate_to(double t);
 
   GearTrain gear_train_;

@@ -5,6 +5,12 @@
 
 namespace backlash {
 
+TermType backlash_map_term();
+TermType eccentricity_term();
 TermType gravity_term();
+TermType radial_compliance_term();
+TermType transmission_error_term();
+TermType varying_backlash_term();
+TermType varying_reduction_ratio_term();
 
 }  // namespace backlash
