@@ -178,7 +178,30 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
   fit.covariance = scale.asDiagonal() * normal.ldlt().solve(Eigen::MatrixXd::Identity(p.size(), p.size())) *
                    scale.asDiagonal() * variance;
   fit.deviation = std::sqrt(variance);
+  fit.jacobian = j * scale.cwiseInverse().asDiagonal();
   return fit;
+}
+
+Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block) {
+  const Eigen::MatrixXd& j = fit.jacobian;
+  const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
+  const Eigen::MatrixXd scaled = j * unit.asDiagonal();
+  Eigen::MatrixXd outer = Eigen::MatrixXd::Zero(j.cols(), j.cols());
+  double blocks = 0;
+  for (Eigen::Index row = 0; row < j.rows(); row += block, ++blocks) {
+    const Eigen::Index rows = std::min(block, j.rows() - row);
+    const Eigen::VectorXd gradient =
+        scaled.middleRows(row, rows).transpose() * fit.residuals.segment(row, rows);
+    outer += gradient * gradient.transpose();
+  }
+  if (blocks <= double(j.cols()))
+    throw CannotIdentify(std::to_string(long(blocks)) +
+                         " stretches of the record cannot tell the errors of " + std::to_string(j.cols()) +
+                         " parameters");
+  const Eigen::MatrixXd inverse =
+      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
+  const double correction = blocks / (blocks - double(j.cols()));
+  return unit.asDiagonal() * (inverse * outer * inverse) * unit.asDiagonal() * correction;
 }
 
 }  // namespace backlash

@@ -28,9 +28,14 @@ const std::vector<ContactLawType>& contact_laws() {
   return laws;
 }
 
-std::shared_ptr<const ContactLaw> read_contact_law(const YamlReader& yaml) {
+ContactSpec read_contact_spec(const YamlReader& yaml) {
   const ContactLawType& type = *find(yaml.choice("law", names()));
-  return type.create(read_parameters(yaml, type.parameters));
+  return {type.name, read_parameters(yaml, type.parameters)};
+}
+
+std::shared_ptr<const ContactLaw> read_contact_law(const YamlReader& yaml) {
+  const ContactSpec spec = read_contact_spec(yaml);
+  return find(spec.law)->create(spec.values);
 }
 
 std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, const ParameterValues& values) {

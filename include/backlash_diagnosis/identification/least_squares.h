@@ -13,6 +13,7 @@ struct LeastSquaresFit {
   Eigen::VectorXd values;
   Eigen::MatrixXd covariance;  // of the values
   Eigen::VectorXd residuals;   // measured minus fitted, one per row
+  Eigen::MatrixXd jacobian;    // of the residuals, fit_nonlinear only
   double deviation = 0;        // standard deviation of the residuals, degrees of freedom considered
 
   Measured parameter(Eigen::Index i) const;
@@ -42,5 +43,10 @@ struct NonlinearOptions {
 /// or a parameter changes nothing.
 LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::VectorXd& start,
                               const Eigen::VectorXd& scale, const NonlinearOptions& options = {});
+
+/// Covariance of the values where neighbouring rows are not independent: the gradients of the sum of squares
+/// are summed over blocks of `block` successive rows, which count as independent (Liang and Zeger 1986).
+/// Needs `jacobian`.
+Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block);
 
 }  // namespace backlash

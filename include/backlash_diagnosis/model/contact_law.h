@@ -12,9 +12,9 @@
 
 namespace backlash {
 
-/// Contact force along the common normal as a function of penetration d [m] and its rate d' [m/s], d > 0 where the
-/// flanks overlap, d' > 0 while they approach. Force > 0 pushes the flanks apart [N].
-/// A rig without base radius uses the same laws with angles: d [rad], d' [rad/s], force [N m].
+/// Contact force along the common normal as a function of penetration d [m] and its rate d' [m/s], d > 0
+/// where the flanks overlap, d' > 0 while they approach. Force > 0 pushes the flanks apart [N]. A rig without
+/// base radius uses the same laws with angles: d [rad], d' [rad/s], force [N m].
 class ContactLaw {
  public:
   virtual ~ContactLaw() = default;
@@ -48,7 +48,14 @@ struct ContactLawType {
 /// All laws, by the name that a rig file uses.
 const std::vector<ContactLawType>& contact_laws();
 
+/// What a rig file says of a law: so that it can be made again with other values.
+struct ContactSpec {
+  std::string law;
+  ParameterValues values;
+};
+
 /// Reads `law: NAME` and that law's parameters.
+ContactSpec read_contact_spec(const YamlReader& yaml);
 std::shared_ptr<const ContactLaw> read_contact_law(const YamlReader& yaml);
 
 /// Creates a law by name; throws InvalidParameter for an unknown name or a value outside its range.

@@ -1,0 +1,29 @@
+// A record of a servo as the identification wants it: evenly sampled, at the load side, with rates.
+#pragma once
+
+#include <vector>
+
+#include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash {
+
+/// All at the load side of the reduction; columns of equal length, empty where the record has no such
+/// channel.
+struct ServoData {
+  double interval = 0;                     // s
+  std::vector<double> torque;              // N m, of the motor
+  std::vector<double> motor, motor_rate;   // rad, rad/s (five-point difference)
+  std::vector<double> motor_acceleration;  // rad/s^2 (second difference)
+  std::vector<double> load, load_rate;     // rad, rad/s (low-passed, see load_rate_cutoff)
+  std::size_t size() const { return motor.size(); }
+};
+
+/// Hz; the speed that feeds back to the simulated load needs no more.
+constexpr double kLoadRateCutoff = 60;
+
+/// Needs motor_torque and motor_position; load_position where the record has it. Throws CannotIdentify
+/// without them, BadData for gaps or values that are not finite (naming channel and time).
+ServoData servo_data(const Record& record, const Rig& rig);
+
+}  // namespace backlash

@@ -1,0 +1,44 @@
+// The load of a gear train whose motor moves as it was recorded.
+//
+//   J_L w' = T_mesh(q_M, w_M, q_L, w_L) - friction + terms + J_L k (w_rec - w)
+//
+// Driven by its torque, a simulated gear train with play soon leaves the recorded one: in the gap the motion
+// is chaotic. Driven by the recorded motor position, with the speed of the simulated load drawn to the
+// recorded one (k [1/s]), it follows, and what remains between simulated and recorded load tells of the
+// model.
+//
+// Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples; where the load
+// comes to rest or breaks away the step is divided there.
+#pragma once
+
+#include <vector>
+
+#include "backlash_diagnosis/model/rig.h"
+
+namespace backlash {
+
+/// Columns of equal length, at the load side.
+struct RecordedMotion {
+  double interval = 0;                              // s
+  const std::vector<double>* motor = nullptr;       // rad
+  const std::vector<double>* motor_rate = nullptr;  // rad/s
+  const std::vector<double>* load_rate = nullptr;   // rad/s, draws the simulated load; null: it runs free
+  double first_load = 0, first_load_rate = 0;       // rad, rad/s: where the load starts
+};
+
+struct DrivenLoad {
+  std::vector<double> load, load_rate;  // rad, rad/s
+  std::vector<double> mesh_torque;      // N m, through the teeth
+  std::vector<double> motor_net;        // N m on the motor, all but its torque, inertia and dry friction
+  std::vector<double> motor_limit;      // N m, its dry friction in the direction of its speed
+};
+
+/// Typical k [1/s].
+constexpr double kLoadFeedback = 50;
+
+/// Throws InvalidParameter for a rig with flexible couplings, a locked link or a contact law that needs
+/// touches; IntegrationError where the load runs away.
+DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion,
+                                double feedback = kLoadFeedback);
+
+}  // namespace backlash

@@ -1,0 +1,221 @@
+#include "backlash_diagnosis/identification/output_error.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/record/zero_phase.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kLargestDelay = 3;  // samples
+constexpr Eigen::Index kRowsPerBlock = 200;
+constexpr double kEnds = 3;           // periods of the cutoff at either end, where the filter has not settled
+constexpr double kStandstill = 0.02;  // of the largest motor speed
+
+std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> d(a.size());
+  for (std::size_t k = 0; k < a.size(); ++k) d[k] = a[k] - b[k];
+  return d;
+}
+
+/// Standard deviation of white noise from third differences, the largest tenth left out: what moves smoothly,
+/// and the few samples where it does not, cancel.
+double white_noise(const std::vector<double>& x) {
+  std::vector<double> d;
+  for (std::size_t k = 3; k < x.size(); ++k)
+    d.push_back(std::pow(x[k] - 3 * x[k - 1] + 3 * x[k - 2] - x[k - 3], 2));
+  const std::size_t kept = d.size() * 9 / 10;
+  if (kept == 0) return 0;
+  std::nth_element(d.begin(), d.begin() + kept, d.end());
+  double sum = 0;
+  for (std::size_t i = 0; i < kept; ++i) sum += d[i];
+  constexpr double kNormalShare = 0.6231;  // of the variance of normal values without the largest tenth
+  return std::sqrt(sum / (double(kept) * kNormalShare * 20));
+}
+
+// A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
+// torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
+// the next, by half and half.
+std::vector<double> over_second_difference(const std::vector<double>& x) {
+  std::vector<double> mean = x;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) mean[k] = (x[k - 1] + 10 * x[k] + x[k + 1]) / 12;
+  return mean;
+}
+
+std::vector<double> held_over_second_difference(const std::vector<double>& x) {
+  std::vector<double> mean = x;
+  for (std::size_t k = 1; k < x.size(); ++k) mean[k] = 0.5 * (x[k - 1] + x[k]);
+  return mean;
+}
+
+/// Motor moves, with a margin as long as the filter remembers.
+std::vector<char> moving(const ServoData& data, double cutoff) {
+  double fastest = 0;
+  for (const double w : data.motor_rate) fastest = std::max(fastest, std::fabs(w));
+  const long n = static_cast<long>(data.size()), margin = std::lround(0.5 / (cutoff * data.interval));
+  const long ends = std::lround(kEnds / (cutoff * data.interval));
+  std::vector<char> counts(n, 1);
+  for (long k = 0; k < n; ++k) {
+    if (k < ends || k >= n - ends) counts[k] = 0;
+    if (std::fabs(data.motor_rate[k]) < kStandstill * fastest)
+      for (long j = std::max(0L, k - margin); j <= std::min(n - 1, k + margin); ++j) counts[j] = 0;
+  }
+  return counts;
+}
+
+/// Over the samples that count (all where `counts` is empty).
+ChannelError relative(const std::vector<double>& measured, const std::vector<double>& predicted,
+                      const std::vector<char>& counts, double floor) {
+  double n = 0, sum = 0, square = 0, residual = 0;
+  for (std::size_t k = 0; k < measured.size(); ++k) {
+    if (!counts.empty() && !counts[k]) continue;
+    ++n;
+    sum += measured[k];
+    square += measured[k] * measured[k];
+    residual += std::pow(measured[k] - predicted[k], 2);
+  }
+  const double spread = std::sqrt(square - sum * sum / n);
+  return {std::sqrt(residual) / spread, floor * std::sqrt(n) / spread};
+}
+
+}  // namespace
+
+ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+                              const Calibration& calibration) {
+  const auto smooth = [&](const std::vector<double>& values) {
+    return low_pass(values, data.interval, settings.cutoff);
+  };
+  ServoPrediction p;
+  const RecordedMotion motion{data.interval,
+                              &data.motor,
+                              &data.motor_rate,
+                              &data.load_rate,
+                              data.load.front() - calibration.encoder_offset,
+                              data.load_rate.front()};
+  p.load = simulate_driven_load(rig, motion, settings.feedback);
+  const double inertia = GearTrain(rig).motor_inertia();
+  std::vector<double> rest(data.size());  // all that is not inertia
+  for (std::size_t k = 0; k < rest.size(); ++k) rest[k] = p.load.motor_limit[k] - p.load.motor_net[k];
+  std::vector<double> torque = over_second_difference(rest);
+  for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += inertia * data.motor_acceleration[k];
+  p.torque = smooth(torque);
+  p.measured_torque = smooth(delayed(held_over_second_difference(data.torque), calibration.torque_delay));
+  p.measured_deflection = smooth(difference(data.motor, data.load));
+  p.deflection = smooth(difference(data.motor, p.load.load));
+  for (double& d : p.deflection) d -= calibration.encoder_offset;
+  p.counts = moving(data, settings.cutoff);
+  p.torque_floor = white_noise(data.torque) * std::sqrt(2 * settings.cutoff * data.interval);
+  p.deflection_floor = white_noise(data.load) * std::sqrt(2 * settings.cutoff * data.interval);
+  p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
+  p.deflection_error = relative(p.measured_deflection, p.deflection, {}, p.deflection_floor);
+  return p;
+}
+
+namespace {
+
+/// Residuals of one record in units of their floors, both channels of a moment side by side, as many rows as
+/// a signal of this bandwidth has independent values.
+void append_residuals(const ServoPrediction& p, const ServoData& data, double cutoff,
+                      std::vector<double>& rows) {
+  const std::size_t stride = std::max(1L, std::lround(0.4 / (cutoff * data.interval)));
+  for (std::size_t k = 0; k < data.size(); k += stride) {
+    rows.push_back(p.counts[k] ? (p.measured_torque[k] - p.torque[k]) / p.torque_floor : 0);
+    rows.push_back((p.measured_deflection[k] - p.deflection[k]) / p.deflection_floor);
+  }
+}
+
+/// The unknowns of a fit: parameters of the rig, then delay and offset of each record.
+class Unknowns {
+ public:
+  Unknowns(const Rig& start, const std::vector<std::string>& names, std::size_t records)
+      : start_(start), records_(records) {
+    for (const std::string& name : names) fitted_.push_back(&servo_parameter(name));
+  }
+  Eigen::Index size() const { return Eigen::Index(fitted_.size() + 2 * records_); }
+
+  Eigen::VectorXd values() const {
+    Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
+    for (std::size_t i = 0; i < fitted_.size(); ++i) p[i] = fitted_[i]->get(start_);
+    return p;
+  }
+  Eigen::VectorXd scale() const {
+    Eigen::VectorXd s = values().cwiseAbs();
+    for (std::size_t i = 0; i < fitted_.size(); ++i)
+      if (!fitted_[i]->positive || s[i] == 0) s[i] = 1;
+    const double gap = start_.mesh.backlash / start_.mesh.lever();
+    for (std::size_t r = 0; r < records_; ++r) {
+      s[fitted_.size() + 2 * r] = 1;
+      s[fitted_.size() + 2 * r + 1] = gap > 0 ? gap : 1e-4;
+    }
+    return s;
+  }
+  Rig rig(const Eigen::VectorXd& p) const {
+    Rig rig = start_;
+    for (std::size_t i = 0; i < fitted_.size(); ++i) {
+      if (fitted_[i]->positive && !(p[i] > 0)) throw InvalidParameter(fitted_[i]->name, p[i], "must be > 0");
+      fitted_[i]->set(rig, p[i]);
+    }
+    return rig;
+  }
+  Calibration calibration(const Eigen::VectorXd& p, std::size_t record) const {
+    const Eigen::Index at = fitted_.size() + 2 * record;
+    if (std::fabs(p[at]) > kLargestDelay) throw InvalidParameter("torque_delay", p[at], "beyond calibration");
+    return {p[at], p[at + 1]};
+  }
+  std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const {
+    std::map<std::string, Measured> all;
+    for (std::size_t i = 0; i < fitted_.size(); ++i) all[fitted_[i]->name] = fit.parameter(i);
+    return all;
+  }
+
+ private:
+  Rig start_;
+  std::vector<const RigParameter*> fitted_;
+  std::size_t records_;
+};
+
+}  // namespace
+
+OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
+                             const OutputErrorSettings& settings) {
+  const Unknowns unknowns(start, settings.parameters, records.size());
+  const auto residuals = [&](const Eigen::VectorXd& p) {
+    const Rig rig = unknowns.rig(p);
+    std::vector<double> rows;
+    for (std::size_t r = 0; r < records.size(); ++r)
+      append_residuals(predict_servo(rig, records[r], settings, unknowns.calibration(p, r)), records[r],
+                       settings.cutoff, rows);
+    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(rows.data(), rows.size()));
+  };
+  NonlinearOptions options;
+  options.iterations = settings.iterations;
+  LeastSquaresFit fit = fit_nonlinear(residuals, unknowns.values(), unknowns.scale(), options);
+  // A block is as long as the slowest oscillation that a servo record shows, and there are enough of them.
+  const Eigen::Index rows = fit.residuals.size();
+  fit.covariance =
+      block_covariance(fit, std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, kRowsPerBlock));
+  OutputError result;
+  result.rig = unknowns.rig(fit.values);
+  result.parameters = unknowns.parameters(fit);
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    result.calibrations.push_back(unknowns.calibration(fit.values, r));
+    const ServoPrediction p = predict_servo(result.rig, records[r], settings, result.calibrations.back());
+    result.torque.push_back(p.torque_error);
+    result.deflection.push_back(p.deflection_error);
+  }
+  return result;
+}
+
+ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+                                   Calibration& calibration) {
+  OutputErrorSettings alone = settings;
+  alone.parameters.clear();
+  calibration = fit_output_error(rig, {data}, alone).calibrations.front();
+  return predict_servo(rig, data, settings, calibration);
+}
+
+}  // namespace backlash
