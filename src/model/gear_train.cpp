@@ -46,7 +46,10 @@ GearTrain::GearTrain(const Rig& rig)
       contact_(rig.mesh.contact),
       variation_(rig.mesh.variation),
       terms_(rig.terms) {
-  if (!contact_) throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
+  if (rig.mesh.rigid)
+    contact_ = nullptr;
+  else if (!contact_)
+    throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
   set_backlash(rig.mesh.backlash);
   join(rig);
   bool dry = false;
@@ -76,7 +79,7 @@ void GearTrain::join(const Rig& rig) {
   node_[kMotor] = dof_++;
   node_[kPinion] = input_.rigid ? node_[kMotor] : dof_++;
   const bool gear_fixed = rig.link_locked && output_.rigid;
-  node_[kGear] = gear_fixed ? kFixed : dof_++;
+  node_[kGear] = gear_fixed ? kFixed : rig.mesh.rigid ? node_[kPinion] : dof_++;
   node_[kLink] = rig.link_locked ? kFixed : output_.rigid ? node_[kGear] : dof_++;
   const double part[kSlots] = {
       rig.motor.inertia * square + 0.5 * input_.inertia, rig.pinion.inertia * square + 0.5 * input_.inertia,
@@ -105,6 +108,7 @@ GearTrain::Slots GearTrain::unpack(const double* state) const {
 }
 
 double GearTrain::contact_force(const Slots& s) const {
+  if (!contact_) return 0;
   const double x = relative(s);
   const double penetration = std::fabs(x) - acting_gap_;
   if (penetration <= 0) return 0;
@@ -195,7 +199,7 @@ GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorq
     torque[kLink] += through;
   }
   Balance b;
-  if (shaped_) {
+  if (shaped_ && contact_) {
     b.mesh_torque = shaped_torques(s, torque);
   } else {
     b.mesh_torque = lever_ * contact_force(s);
@@ -294,6 +298,7 @@ double GearTrain::energy(const double* state) const {
     energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
   if (!input_.rigid) energy += 0.5 * input_.stiffness * std::pow(s.q[kMotor] - s.q[kPinion], 2);
   if (!output_.rigid) energy += 0.5 * output_.stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
+  if (!contact_) return energy;
   for (const int side : {1, -1}) {
     const double penetration = side * relative(s) - half_gap_ - lever_ * shift(s, side, 0).opening;
     if (penetration > 0)
@@ -391,7 +396,7 @@ void GearTrain::touch(Flank flank, double* state) {
 
 double GearTrain::elastic_deflection(double motor_torque) const {
   const double torque = std::fabs(motor_torque) * ratio_;
-  double angle = contact_->static_penetration(torque / lever_) / lever_;
+  double angle = contact_ ? contact_->static_penetration(torque / lever_) / lever_ : 0;
   if (!input_.rigid) angle += torque / input_.stiffness;
   if (!output_.rigid) angle += torque / output_.stiffness;
   return std::copysign(angle * ratio_, motor_torque);

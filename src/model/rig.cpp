@@ -77,6 +77,7 @@ Mesh read_mesh(const YamlReader& yaml) {
 void read_gear_train(const YamlReader& yaml, Rig& rig) {
   rig.reduction_ratio = yaml.number("reduction_ratio", Range::positive());
   rig.motor_side = yaml.boolean_or("motor_side", false);
+  rig.linear = yaml.has("axis") && yaml.choice("axis", {"rotary", "linear"}) == "linear";
   const YamlReader motor = yaml.map("motor");
   rig.motor = read_end(motor);
   if (motor.has("torque_constant")) rig.torque_constant = motor.number("torque_constant", Range::positive());
@@ -86,12 +87,17 @@ void read_gear_train(const YamlReader& yaml, Rig& rig) {
     rig.pinion = Body{};  // lumped with the motor
   else
     rig.pinion = read_body(yaml.map("pinion"));
-  rig.mesh = read_mesh(yaml.map("mesh"));
+  if (yaml.is_text("mesh"))
+    rig.mesh.rigid = yaml.choice("mesh", {"rigid"}) == "rigid";
+  else
+    rig.mesh = read_mesh(yaml.map("mesh"));
   rig.output_coupling = read_coupling(yaml, "output_coupling");
   if (yaml.is_text("link")) {
     yaml.choice("link", {"locked"});
     rig.link_locked = true;
-  } else {
+    if (rig.mesh.rigid && rig.output_coupling.rigid)
+      yaml.fail("link", "a locked link on a rigid mesh moves nothing");
+  } else if (yaml.has("link") || !rig.mesh.rigid || !rig.output_coupling.rigid) {
     rig.link = read_end(yaml.map("link"));
   }
   if (yaml.has("gear"))

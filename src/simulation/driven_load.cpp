@@ -107,6 +107,7 @@ void check(const Rig& rig) {
   if (!rig.input_coupling.rigid || !rig.output_coupling.rigid)
     refuse("coupling", "flexible", "a load that follows the recorded motor needs rigid couplings");
   if (rig.link_locked) refuse("link", "locked", "cannot follow the motor");
+  if (rig.mesh.rigid) refuse("mesh", "rigid", "leaves no motion of the load of its own");
   if (rig.mesh.contact->needs_impact_speed())
     refuse("contact.law", "with touches",
            "a load that follows the recorded motor needs a law without impact speed");

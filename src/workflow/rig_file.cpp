@@ -22,6 +22,7 @@ std::string digest_of(const std::string& text) {
 /// What the estimators need to know of the rig.
 void fill_from_rig(const Rig& rig, DiagnosisSettings& settings) {
   const auto train = std::make_shared<GearTrain>(rig);  // refuses what cannot move
+  if (rig.mesh.rigid) return;                           // nothing that could have play
   const auto deflection = [train](double torque) { return train->elastic_deflection(torque); };
   const double base_radius = rig.mesh.angular() ? kNaN : 1 / rig.backlash_angle(1);
   if (settings.lost_motion) {

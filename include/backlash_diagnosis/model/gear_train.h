@@ -6,7 +6,7 @@
 //   J_L a_L = T_O - c_L w_L - F_L + terms      T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
 //
 // Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its
-// neighbours one body; a locked link has q_L = 0. F_M and F_L are dry friction with sticking, see StickSlip;
+// neighbours one body, so does a rigid mesh; a locked link has q_L = 0. F_M and F_L are dry friction with sticking, see StickSlip;
 // a braked motor sticks whatever the torque. Terms may shift either flank by an opening o(q_M, q_L, torque);
 // then its penetration is side x - backlash / 2 - r o, and the mesh torque acts on both ends through the
 // slopes of o, so that no energy is lost or gained. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and
@@ -86,7 +86,7 @@ class GearTrain {
   /// to the touch: begin_contact() where a state did not come about by motion, then update_contact() wherever
   /// one of the kContactEvents values rises through 0. Without these calls every contact counts as begun at
   /// speed 0.
-  bool needs_touches() const { return contact_->needs_impact_speed(); }
+  bool needs_touches() const { return contact_ && contact_->needs_impact_speed(); }
   static constexpr int kContactEvents = 4;
   void contact_events(const double* state, double* values) const;
   /// Forgets the last touch. A flank that is closed to within rounding and approaches is a touch; one that is

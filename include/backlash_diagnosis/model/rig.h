@@ -41,6 +41,7 @@ struct Coupling {
 /// Tooth contact. `backlash` is the total free play along the line of action [m]; for a rig without base
 /// radius it is the angle at the load side [rad] and the contact law works with angles and torques.
 struct Mesh {
+  bool rigid = false;  // no mesh: the gear moves with the pinion, the rest of this does not count
   double backlash = 0;
   double base_radius = std::numeric_limits<double>::quiet_NaN();  // m, of the load gear; NaN: angular mesh
   double start_in_gap =
@@ -61,6 +62,7 @@ struct Rig {
   std::string joint;           // prefix of its names in sensor_msgs/JointState
   double reduction_ratio = 1;  // motor turns per load turn, > 0
   bool motor_side = false;
+  bool linear = false;  // a linear axis: m, kg, N stand where a rotary one has rad, kg m^2, N m
   Body motor, pinion, gear, link;
   double torque_constant =
       std::numeric_limits<double>::quiet_NaN();  // motor_torque per motor_current, N m/A; NaN: unknown
