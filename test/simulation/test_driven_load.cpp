@@ -1,0 +1,95 @@
+// The load that follows a recorded motor, against the other integrator: the whole train simulated with
+// SUNDIALS.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
+#include "support/rigs.h"
+#include "support/servo.h"
+
+namespace backlash {
+namespace {
+
+using test::other_servo;
+
+RecordedMotion motion_of(const Record& record) {
+  RecordedMotion motion;
+  motion.interval = record.sampling_interval();
+  motion.motor = &record.column(Channel::motor_position);
+  motion.motor_rate = &record.column(Channel::motor_velocity);
+  motion.first_load = record.column(Channel::load_position).front();
+  motion.first_load_rate = record.column(Channel::load_velocity).front();
+  return motion;
+}
+
+double worst(const std::vector<double>& a, const std::vector<double>& b) {
+  double largest = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) largest = std::max(largest, std::fabs(a[k] - b[k]));
+  return largest;
+}
+
+TEST(DrivenLoad, RepeatsTheWholeTrain) {
+  const Rig rig = other_servo();
+  const Record record = simulate_record(rig, test::servo_run(3, false), 5);
+  const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
+  // No feedback here. A sample's step of the fixed integrator is exact to 1e-9 rad in contact; an impact
+  // within it is placed to a fraction of a sample: at 0.1 rad/s between the flanks some 1e-5 rad for a
+  // moment, and friction wears that off. The deflection is 1e-3 rad.
+  EXPECT_LT(worst(driven.load, record.column(Channel::load_position)), 2e-5);
+  EXPECT_LT(worst(driven.load_rate, record.column(Channel::load_velocity)), 5e-3);
+}
+
+TEST(DrivenLoad, FeedbackHoldsALoadThatStartsWrong) {
+  const Rig rig = other_servo();
+  const Record record = simulate_record(rig, test::servo_run(4, false), 3);
+  RecordedMotion motion = motion_of(record);
+  motion.load_rate = &record.column(Channel::load_velocity);
+  motion.first_load_rate = 0.5;
+  const DrivenLoad driven = simulate_driven_load(rig, motion);
+  double late = 0;
+  for (std::size_t k = 1000; k < record.size(); ++k)
+    late = std::max(late, std::fabs(driven.load[k] - record.column(Channel::load_position)[k]));
+  EXPECT_LT(late, 2e-5);
+}
+
+TEST(DrivenLoad, FreeLoadInTheGapStopsAsCoulombSays) {
+  Rig rig = other_servo();
+  rig.mesh.backlash = 1;  // rad: never touched
+  rig.link.viscous_damping = 0;
+  const std::vector<double> still(1000, 0.0);
+  RecordedMotion motion{1e-3, &still, &still, nullptr, 0, 0.05};
+  const DrivenLoad driven = simulate_driven_load(rig, motion);
+  // It slides w^2 / (2 a) with a = F / J = 18/84 rad/s^2 and stands after w / a = 0.2333 s, for good.
+  const double a = 18.0 / 84;
+  EXPECT_NEAR(driven.load.back(), 0.05 * 0.05 / (2 * a), 1e-9);
+  EXPECT_EQ(driven.load_rate[234], 0);
+  EXPECT_EQ(driven.load[400], driven.load.back());
+  EXPECT_NEAR(driven.load_rate[100], 0.05 - a * 0.1, 1e-12);
+}
+
+TEST(DrivenLoad, HeldMotorUnderContactBalances) {
+  Rig rig = other_servo();
+  rig.link.coulomb_friction = 0;
+  const std::vector<double> still(20000, 0.0);
+  RecordedMotion motion{1e-3,    &still, &still,
+                        nullptr, -6e-4,  0};  // pressed into the flank by 2.85e-4 rad, let go
+  const DrivenLoad driven = simulate_driven_load(rig, motion);
+  EXPECT_NEAR(driven.mesh_torque.front(), 400e3 * (6e-4 - 3.15e-4),
+              1e-6);  // spring, motor ahead: drives forward
+  EXPECT_NEAR(driven.motor_net.front(), -driven.mesh_torque.front(), 1e-9);
+  EXPECT_LT(std::fabs(driven.load.back()), 3.15e-4 + 1e-9);  // ends in the gap
+}
+
+TEST(DrivenLoad, RefusesOtherTrains) {
+  const std::vector<double> still(10, 0.0);
+  const RecordedMotion motion{1e-3, &still, &still, nullptr, 0, 0};
+  Rig locked = other_servo();
+  locked.link_locked = true;
+  EXPECT_THROW(simulate_driven_load(locked, motion), InvalidParameter);
+  EXPECT_THROW(simulate_driven_load(test::sarkar_rig(1e-5), motion), InvalidParameter);
+}
+
+}  // namespace
+}  // namespace backlash
