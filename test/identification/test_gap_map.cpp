@@ -94,8 +94,14 @@ TEST(GapMap, CentreLineIsTheMeanOfBothFlanks) {
   const GapMap map = map_of(r);
   double mean = 0;
   for (const GapBin& b : map.bins) mean += (b.centre.value - Recipe::centre(b.position)) / 180;
-  for (const GapBin& b : map.bins)  // 5e-5 rad of order 18.7 leave a slope, 2e-5 times half a turn
-    EXPECT_NEAR(b.centre.value - Recipe::centre(b.position), mean, 6e-5) << b.position;
+  for (const GapBin& b : map.bins)
+    if (b.position >
+        r.start + 0.02) {  // before it lies the end of the turn, where order 18.7 has another phase
+      // It leaves a slope: 4 deviations over half a turn.
+      EXPECT_NEAR(b.centre.value - Recipe::centre(b.position), mean, 4 * map.scale.standard_error * kTurn / 2)
+          << b.position;
+    }
+  EXPECT_LT(map.scale.standard_error, 2e-5);
   EXPECT_GT(map.warnings.size(), 0u);  // no stiffness given
   EXPECT_TRUE(std::isnan(map.mean_gap.value));
 }
@@ -146,29 +152,16 @@ TEST(GapMap, StandardErrorsAreThoseOfTheScatter) {
               0.1);  // 7200 bins leave 1 %; the rest is the line in a bin
 }
 
-TEST(GapMap, SlowPlacesDoNotRuleTheMean) {
+TEST(GapMap, OversampledPlacesDoNotRuleTheMean) {
   Recipe r;
-  r.second = 0;
   r.first = 0.3;
-  r.turns = 1;
-  Record forward = run(r, r.speed), reverse = run(r, -r.speed);
-  // A third of the turn at a sixth of more samples: every sample there twice, half an interval apart.
-  const auto oversample = [&](const Record& record) {
-    Record more;
-    for (std::size_t i = 0; i < record.size(); ++i) {
-      const double q = record.column(Channel::load_position)[i];
-      const int copies = std::sin(3 * q + 0.7) > 0.5 ? 6 : 5;
-      for (int k = 0; k < copies; ++k) {
-        more.time.push_back(1e-3 * double(more.time.size()));
-        for (const Channel c : {Channel::motor_position, Channel::load_position})
-          more.column(c).push_back(record.column(c)[i]);
-      }
-    }
-    return more;
-  };
-  const GapMap map = identify_gap_map(oversample(forward), oversample(reverse));
+  r.second = 0;
+  r.start = -0.7 / 3;  // a sixth of a turn twice, where the gap is wide
+  r.turns = 7.0 / 6;
+  const GapMap map = map_of(r);
   EXPECT_EQ(map.coverage, 1);
-  // By time the mean would be off by 0.3 x 0.83 x (6 / 5 - 1) / 3 = 1.6 %.
+  // By time the mean would be off by 0.3 x 2 / pi / 7 = 2.7 %. Five deviations of 1e-5 rad over 20000
+  // samples.
   EXPECT_NEAR(map.mean_separation.value, r.gap, 0.002 * r.gap);
 }
 
@@ -183,13 +176,13 @@ TEST(GapMap, SimulatedRunsOfTheMachine) {
              5 * speed;
     };
     m.load_position = speed > 0 ? 0 : kTurn + 0.5;
-    return simulate(m, (kTurn + 0.5) / std::fabs(speed) + 1, {}, 2e-5);
+    return simulate(m, (kTurn + 0.5) / std::fabs(speed) + 2, {}, 2e-5).slice(2, 100);  // without the start
   };
   GapMapSettings settings;
   settings.stiffness.value = machine.stiffness;
   settings.friction_forward.value = settings.friction_reverse.value = 15 + 5 * 0.8;
   const GapMap map = identify_gap_map(simulated(0.8), simulated(-0.8), settings);
-  EXPECT_GT(map.coverage, 0.9);
+  EXPECT_EQ(map.coverage, 1);
   // The wind-up of 24 % is told from the gap to 0.5 %.
   EXPECT_NEAR(map.mean_separation.value, 4.4e-4 + 2 * 19 / 355e3, 0.005 * 4.4e-4);
   EXPECT_NEAR(map.mean_gap.value, 4.4e-4, 0.005 * 4.4e-4);

@@ -64,10 +64,11 @@ struct GapMap {
   double gap_at(double position) const;
 };
 
-/// The runs in either order, with the same zeros of the sensors. Of each only samples within 20 % of its
-/// median speed are used. With less than a turn orders below 1 / coverage are not sought. Throws
-/// CannotIdentify without the channels, where both runs go one way or one reverses, or with fewer than 8
-/// common bins; InvalidParameter.
+/// The runs in either order, with the same zeros of the sensors; slice the start off, while the load gains
+/// speed its inertia winds the mesh up as well. Of each only samples within 5 % of its median speed (below 5
+/// Hz) are used. With less than a turn orders below 1 / coverage are not sought. Throws CannotIdentify
+/// without the channels, where both runs go one way, one reverses or is not steady for half of its time, or
+/// with fewer than 8 common bins; InvalidParameter for settings.
 GapMap identify_gap_map(const Record& one_way, const Record& other_way, const GapMapSettings& settings = {});
 
 }  // namespace backlash
