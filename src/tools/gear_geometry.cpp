@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/model/centre_distance.h"
 #include "backlash_diagnosis/model/mesh_stiffness.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -49,8 +51,16 @@ Command command() {
        "shim: from the centre distance at which unthinned teeth mesh without play [m]; default: 0"},
       {"backlash", "M",
        "wanted play along the line of action [m]: gives the shim instead of --centre-distance-change"},
+      {"stop", "M",
+       "setting of the stop of a hinged bracket [m], from no play, instead of the shim; needs the bracket"},
+      {"pivot-to-stop", "M", "of the bracket: pivot to the axis of the stop [m]"},
+      {"pivot-to-pinion", "M", "of the bracket: pivot to the centre of the pinion [m]"},
+      {"mesh-angle-deg", "DEG",
+       "of the bracket: tangent of the mesh to the line from pivot to pinion; default: 0"},
+      {"pinion-step-deg", "DEG",
+       "tells what one step of a position sensor on the pinion's shaft is at the teeth"},
       {"table", "N",
-       "a table of N rows, from 0 to --centre-distance-change or to --backlash, instead of one pair"},
+       "a table of N rows, from 0 to --centre-distance-change, --stop or --backlash, instead of one pair"},
       {"face-width", "M", "[m]" + fallback(kFaceWidth)},
       {"youngs-modulus", "PA", "of both gears [Pa]" + fallback(kYoungsModulus)},
       {"poisson-ratio", "X", "of both gears" + fallback(kPoissonRatio)},
@@ -63,11 +73,15 @@ Command command() {
       "The defaults are the gears of Sarkar, Ellis and Moore (1997), Table 2, with an addendum of one module "
       "and "
       "stainless steel 303. Backlash is the full free play. A hinged bracket moves the centre by d r2/r1 "
-      "cos(psi) for "
-      "a stop setting d (Yumrukcal 2013, Eq. A.1). plot_mesh_stiffness.py draws OUT.json.";
-  c.examples = {"gear_geometry --centre-distance-change 50e-6", "gear_geometry --backlash 50e-6",
-                "gear_geometry --centre-distance-change 100e-6 --table 5",
-                "gear_geometry --teeth1 20 --teeth2 40 --module 2e-3 --face-width 20e-3 --json gears.json"};
+      "cos(psi) for a stop setting d, r1 from pivot to stop, r2 from pivot to pinion (Yumrukcal 2013, Eqs. "
+      "A.1 "
+      "to A.4); with --backlash the stop setting that gives it is told. plot_mesh_stiffness.py draws "
+      "OUT.json.";
+  c.examples = {
+      "gear_geometry --centre-distance-change 50e-6", "gear_geometry --backlash 50e-6",
+      "gear_geometry --centre-distance-change 100e-6 --table 5",
+      "gear_geometry --backlash 50e-6 --pivot-to-stop 0.2 --pivot-to-pinion 0.1 --mesh-angle-deg 15",
+      "gear_geometry --teeth1 20 --teeth2 40 --module 2e-3 --face-width 20e-3 --json gears.json"};
   c.exit_codes =
       "  0   done\n"
       "  2   the pair does not run: contact ratio below 1, interference or pointed teeth\n";
@@ -80,7 +94,30 @@ struct Request {
   bool inverse = false;  // backlash given
   double last = 0;       // m: centre-distance change, or backlash
   int rows = 0;          // 0: one pair
+  std::optional<HingedBracket> bracket;
+  double pinion_step = 0;  // rad, of a position sensor; 0: none
 };
+
+std::optional<HingedBracket> read_bracket(const Arguments& a) {
+  const bool lengths = a.has("pivot-to-stop") && a.has("pivot-to-pinion");
+  if (!lengths) {
+    for (const char* option : {"stop", "pivot-to-stop", "pivot-to-pinion", "mesh-angle-deg"})
+      if (a.has(option))
+        throw UsageError(std::string("--") + option + " needs --pivot-to-stop and --pivot-to-pinion");
+    return std::nullopt;
+  }
+  HingedBracket b;
+  b.pivot_to_stop = a.number("pivot-to-stop", 0, Range::positive());
+  b.pivot_to_pinion = a.number("pivot-to-pinion", 0, Range::positive());
+  b.angle = a.number("mesh-angle-deg", 0, Range::between(-89, 89)) * kDegree;
+  return b;
+}
+
+/// m: the centre-distance change of --stop, or as given.
+double read_change(const Arguments& a, const std::optional<HingedBracket>& bracket) {
+  return a.has("stop") ? centre_distance_change(*bracket, a.number("stop", 0, Range::any()))
+                       : a.number("centre-distance-change", 0, Range::any());
+}
 
 Request read_request(const Arguments& a) {
   Request r;
@@ -98,11 +135,12 @@ Request read_request(const Arguments& a) {
   r.mesh.youngs_modulus = a.number("youngs-modulus", kYoungsModulus, Range::positive());
   r.mesh.poisson_ratio = a.number("poisson-ratio", kPoissonRatio, Range::between(0, 0.5));
   r.mesh.transition = a.number("transition", 0, Range::between(0, 0.5));
+  r.bracket = read_bracket(a);
+  if (a.has("pinion-step-deg")) r.pinion_step = a.number("pinion-step-deg", 0, Range::positive()) * kDegree;
   r.inverse = a.has("backlash");
-  if (r.inverse && a.has("centre-distance-change"))
-    throw UsageError("--backlash and --centre-distance-change exclude each other");
-  r.last = r.inverse ? a.number("backlash", 0, Range::not_negative())
-                     : a.number("centre-distance-change", 0, Range::any());
+  if (a.has("backlash") + a.has("centre-distance-change") + a.has("stop") > 1)
+    throw UsageError("--backlash, --centre-distance-change and --stop exclude each other");
+  r.last = r.inverse ? a.number("backlash", 0, Range::not_negative()) : read_change(a, r.bracket);
   if (a.has("table")) r.rows = static_cast<int>(a.integer("table", 0, 2, 10'000));
   return r;
 }
@@ -114,8 +152,8 @@ GearPair pair_at(const Request& request, double value) {
   return pair;
 }
 
-double small_change_backlash(const GearPair& pair) {
-  return 2 * pair.centre_distance_change * std::sin(pair.pressure_angle) +
+double small_change_play(const GearPair& pair) {
+  return small_change_backlash(pair.centre_distance_change, pair.pressure_angle) +
          (pair.pinion.thinning + pair.gear.thinning) * std::cos(pair.pressure_angle);
 }
 
@@ -128,23 +166,37 @@ Json to_json(const GearCircles& c) {
           {"tip_thickness", c.tip_thickness}};
 }
 
-Json to_json(const GearPair& pair, const GearGeometry& g) {
-  return {{"centre_distance_change", pair.centre_distance_change},
-          {"centre_distance", g.centre_distance},
-          {"operating_pressure_angle", g.operating_pressure_angle},
-          {"base_pitch", g.base_pitch},
-          {"approach", g.approach},
-          {"recess", g.recess},
-          {"length_of_contact", g.length_of_contact},
-          {"contact_ratio", g.contact_ratio},
-          {"backlash", g.backlash},
-          {"small_change_backlash", small_change_backlash(pair)},
-          {"pitch_circle_backlash", g.pitch_circle_backlash},
-          {"backlash_angle", {{"pinion", g.pinion_backlash_angle()}, {"gear", g.gear_backlash_angle()}}},
-          {"pinion", to_json(g.pinion)},
-          {"gear", to_json(g.gear)},
-          {"faults", g.faults},
-          {"remarks", g.remarks}};
+Json to_json(const GearPair& pair, const GearGeometry& g, const std::optional<HingedBracket>& bracket) {
+  Json json = {{"centre_distance_change", pair.centre_distance_change},
+               {"centre_distance", g.centre_distance},
+               {"operating_pressure_angle", g.operating_pressure_angle},
+               {"base_pitch", g.base_pitch},
+               {"approach", g.approach},
+               {"recess", g.recess},
+               {"length_of_contact", g.length_of_contact},
+               {"contact_ratio", g.contact_ratio},
+               {"backlash", g.backlash},
+               {"small_change_backlash", small_change_play(pair)},
+               {"pitch_circle_backlash", g.pitch_circle_backlash},
+               {"backlash_angle", {{"pinion", g.pinion_backlash_angle()}, {"gear", g.gear_backlash_angle()}}},
+               {"pinion", to_json(g.pinion)},
+               {"gear", to_json(g.gear)},
+               {"faults", g.faults},
+               {"remarks", g.remarks}};
+  if (bracket) json["stop"] = stop_setting_for(*bracket, pair.centre_distance_change);
+  return json;
+}
+
+Json to_json(const HingedBracket& b) {
+  return {{"pivot_to_stop", b.pivot_to_stop}, {"pivot_to_pinion", b.pivot_to_pinion}, {"angle", b.angle}};
+}
+
+/// What one step of the sensor on the pinion's shaft is at the teeth, m.
+Json resolution_to_json(const GearPair& pair, double step) {
+  const double pitch_circle = resolution_on_pitch_circle(pair.pinion.teeth, pair.module, step);
+  return {{"pinion_step", step},
+          {"pitch_circle", pitch_circle},
+          {"line_of_action", pitch_circle * std::cos(pair.pressure_angle)}};
 }
 
 /// Mean and course over two mesh cycles of every law; one that the gears do not suit has the reason instead.
@@ -180,6 +232,16 @@ void line(const char* format, Values... values) {
   std::cout << text << '\n';
 }
 
+void print_rig(const Json& json) {
+  const auto one = [](const char* name, double value, int digits) {
+    line("%-34s%12.*f", name, digits, value);
+  };
+  if (json.contains("bracket")) one("stop setting [um]", 1e6 * json["geometry"]["stop"].get<double>(), 2);
+  if (!json.contains("resolution")) return;
+  one("sensor step, pitch circle [um]", 1e6 * json["resolution"]["pitch_circle"].get<double>(), 3);
+  one("  line of action [um]", 1e6 * json["resolution"]["line_of_action"].get<double>(), 3);
+}
+
 void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffness) {
   line("%-34s%12s%12s", "", "pinion", "gear");
   line("%-34s%12d%12d", "teeth", pair.pinion.teeth, pair.gear.teeth);
@@ -202,7 +264,7 @@ void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffne
   one("contact ratio [-]", g.contact_ratio, 3);
   line("");
   one("backlash, line of action [um]", 1e6 * g.backlash, 2);
-  one("  small-change form [um]", 1e6 * small_change_backlash(pair), 2);
+  one("  small-change form [um]", 1e6 * small_change_play(pair), 2);
   one("backlash, pitch circle [um]", 1e6 * g.pitch_circle_backlash, 2);
   const auto angle = [](const char* name, double value) {
     line("%-34s%12.4f%12.4f deg", name, 1e3 * value, value / kDegree);
@@ -230,13 +292,18 @@ Json report(const Request& request, bool print, bool& faults) {
                {"gear_teeth", request.pair.gear.teeth},
                {"module", request.pair.module},
                {"pressure_angle", request.pair.pressure_angle}};
+  if (request.bracket) json["bracket"] = to_json(*request.bracket);
+  if (request.pinion_step > 0) json["resolution"] = resolution_to_json(request.pair, request.pinion_step);
   if (request.rows == 0) {
     const GearPair pair = pair_at(request, request.last);
     const GearGeometry g = gear_geometry(pair);
-    json["geometry"] = to_json(pair, g);
+    json["geometry"] = to_json(pair, g, request.bracket);
     json["mesh_stiffness"] = stiffness_to_json(pair, request.mesh);
     faults = !g.faults.empty();
-    if (print) print_pair(pair, g, json["mesh_stiffness"]);
+    if (print) {
+      print_pair(pair, g, json["mesh_stiffness"]);
+      print_rig(json);
+    }
     warn(g);
     return json;
   }
@@ -247,13 +314,13 @@ Json report(const Request& request, bool print, bool& faults) {
   for (int i = 0; i < request.rows; ++i) {
     const GearPair pair = pair_at(request, request.last * i / (request.rows - 1));
     const GearGeometry g = gear_geometry(pair);
-    json["table"].push_back(to_json(pair, g));
+    json["table"].push_back(to_json(pair, g, request.bracket));
     faults = faults || !g.faults.empty();
     if (print)
       line("%10.2f%13.3f%9.3f%15.2f%19.2f%15.2f%14.4f%s", 1e6 * pair.centre_distance_change,
            g.operating_pressure_angle / kDegree, g.contact_ratio, 1e6 * g.backlash,
-           1e6 * small_change_backlash(pair), 1e6 * g.pitch_circle_backlash,
-           g.pinion_backlash_angle() / kDegree, g.faults.empty() ? "" : "  does not run");
+           1e6 * small_change_play(pair), 1e6 * g.pitch_circle_backlash, g.pinion_backlash_angle() / kDegree,
+           g.faults.empty() ? "" : "  does not run");
   }
   return json;
 }

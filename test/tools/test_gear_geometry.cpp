@@ -54,6 +54,23 @@ TEST_F(GearGeometryCommand, TableHoldsTheFiveRows) {
   for (int i = 0; i < 5; ++i) EXPECT_NEAR(table[i]["contact_ratio"], contact_ratio[i], 0.0005);
 }
 
+TEST_F(GearGeometryCommand, StopOfAHingedBracketAndSensorStep) {
+  const std::string bracket = " --pivot-to-stop 0.2 --pivot-to-pinion 0.1 --mesh-angle-deg 60";
+  // By hand: 200 um 0.1 / 0.2 cos 60 deg = 50 um; 40 teeth of 0.79375 mm: 15.875 mm 1e-3 pi / 180 = 0.27707
+  // um.
+  const Json j = json("--stop 200e-6 --pinion-step-deg 1e-3" + bracket);
+  EXPECT_NEAR(j["geometry"]["centre_distance_change"], 50e-6, 1e-15);  // rounding of the cosine
+  EXPECT_NEAR(j["geometry"]["stop"], 200e-6, 1e-15);
+  EXPECT_NEAR(j["bracket"]["pivot_to_pinion"], 0.1, 0);
+  EXPECT_NEAR(j["resolution"]["pitch_circle"], 0.27707e-6, 5e-12);
+  EXPECT_NEAR(j["resolution"]["line_of_action"], 0.26036e-6, 5e-12);
+  // 50 um of play need a shim of 72.5 um, four times that at the stop.
+  EXPECT_NEAR(json("--backlash 50e-6" + bracket)["geometry"]["stop"], 4 * 72.5e-6, 4 * 0.05e-6);
+  expect_contains(done("gear_geometry --stop 200e-6 --pinion-step-deg 1e-3" + bracket).out, "200.00");
+  EXPECT_FALSE(json("--stop 200e-6" + bracket).contains("resolution"));
+  EXPECT_EQ(json("--table 3 --stop 200e-6" + bracket)["table"].size(), 3u);
+}
+
 TEST_F(GearGeometryCommand, APairThatDoesNotRunIsTold) {
   const Outcome outcome = run("gear_geometry --centre-distance-change 620e-6 --json -");
   EXPECT_EQ(outcome.code, 2);
@@ -66,10 +83,13 @@ TEST_F(GearGeometryCommand, APairThatDoesNotRunIsTold) {
 }
 
 TEST_F(GearGeometryCommand, NonsenseEndsWith64) {
-  for (const char* arguments : {"--teeth1 2", "--module 0", "--pressure-angle-deg 50", "--backlash -1e-6",
-                                "--centre-distance-change -1e-6", "--thinning1 -1e-6",
-                                "--backlash 1e-6 --centre-distance-change 1e-6", "--table 1",
-                                "--poisson-ratio 1", "--centre-distance-change -3e-3", "gears.yaml"}) {
+  for (const char* arguments :
+       {"--teeth1 2", "--module 0", "--pressure-angle-deg 50", "--backlash -1e-6",
+        "--centre-distance-change -1e-6", "--thinning1 -1e-6",
+        "--backlash 1e-6 --centre-distance-change 1e-6", "--table 1", "--stop 1e-6",
+        "--stop 1e-6 --backlash 1e-6 --pivot-to-stop 1 --pivot-to-pinion 1", "--pivot-to-stop 1",
+        "--pivot-to-stop 0 --pivot-to-pinion 1", "--pivot-to-stop 1 --pivot-to-pinion 1 --mesh-angle-deg 90",
+        "--pinion-step-deg 0", "--poisson-ratio 1", "--centre-distance-change -3e-3", "gears.yaml"}) {
     const Outcome outcome = run(std::string("gear_geometry ") + arguments);
     EXPECT_EQ(outcome.code, 64) << arguments << "\n" << outcome.err;
     expect_contains(outcome.err, "see --help");
