@@ -206,6 +206,15 @@ bool YamlReader::has(const std::string& key) const {
   return impl_->find(key) != nullptr;
 }
 
+std::vector<std::string> YamlReader::keys() const {
+  std::vector<std::string> names;
+  for (const auto& [name, entry] : impl_->node->entries) names.push_back(name);
+  const auto line = [this](const std::string& name) { return impl_->node->entries.at(name).line; };
+  std::stable_sort(names.begin(), names.end(),
+                   [&](const std::string& a, const std::string& b) { return line(a) < line(b); });
+  return names;
+}
+
 bool YamlReader::is_text(const std::string& key) const {
   const YamlEntry* const entry = impl_->find(key);
   return entry != nullptr && (entry->value->kind == Kind::plain || entry->value->kind == Kind::quoted);

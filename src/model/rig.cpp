@@ -106,7 +106,19 @@ void read_gear_train(const YamlReader& yaml, Rig& rig) {
     yaml.fail("gear", "is required with a flexible output coupling");
 }
 
+class NoContact : public ContactLaw {
+ public:
+  double force(double, double, double) const override { return 0; }
+  double elastic_energy(double) const override { return 0; }
+  double static_penetration(double) const override { return std::numeric_limits<double>::infinity(); }
+};
+
 }  // namespace
+
+Rig without_load(Rig rig) {
+  rig.mesh.contact = std::make_shared<NoContact>();
+  return rig;
+}
 
 Rig read_rig(const YamlReader& yaml) {
   Rig rig;

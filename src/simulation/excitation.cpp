@@ -1,175 +1,91 @@
 #include "backlash_diagnosis/simulation/excitation.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <random>
-#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+#include "excitation/limits.h"
 
 namespace backlash {
 namespace {
 
-constexpr int kFewestLines = 16, kMostLines = 10'000;  // of random torque
-constexpr double kNever = std::numeric_limits<double>::infinity();
+const std::vector<std::string> kTypes = {"square",   "sine",  "chirp",        "multi_sine",     "random",
+                                         "constant", "topic", "stepped_sine", "constant_speed", "sine_speed"};
 
-void require(const char* name, double value, const Range& range) {
-  if (!range.contains(value)) throw InvalidParameter(std::string("excitation.") + name, value, range.text());
+void read_random(const YamlReader& yaml, ExcitationSettings& settings) {
+  settings.amplitude = yaml.number("rms", Range::not_negative());
+  settings.bias = yaml.number_or("bias", 0, Range::any());
+  settings.start_frequency = yaml.number("lower_frequency", Range::positive());
+  settings.end_frequency = yaml.number("upper_frequency", Range::positive());
+  if (!(settings.end_frequency > settings.start_frequency))
+    yaml.fail("upper_frequency", "must be > lower_frequency");
+  settings.line_count = static_cast<int>(yaml.integer("lines", kFewestLines, kMostLines));
+  settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
 }
 
-/// Greatest common divisor [Hz] by Euclid's algorithm; remainders below 1e-6 Hz count as none.
-double common_divisor(double a, double b) {
-  if (a < b) std::swap(a, b);
-  while (b > 1e-6) a = std::exchange(b, std::fabs(std::remainder(a, b)));
-  return a;
+void read_multi_sine(const YamlReader& yaml, ExcitationSettings& settings) {
+  settings.bias = yaml.number_or("bias", 0, Range::any());
+  for (const YamlReader& line : yaml.maps("lines"))
+    settings.lines.push_back({line.number("amplitude", Range::not_negative()),
+                              line.number("frequency", Range::positive()),
+                              line.number_or("phase", 0, Range::any())});
+  if (settings.lines.empty()) yaml.fail("lines", "needs at least one line");
 }
 
-class Constant : public Excitation {
- public:
-  explicit Constant(double torque) : torque_(torque) {}
-  double torque(double, long) const override { return torque_; }
-  double segment_end(long) const override { return kNever; }
-
- private:
-  double torque_;
-};
-
-class External : public Excitation {
- public:
-  double torque(double, long) const override { return torque_; }
-  double segment_end(long) const override { return kNever; }
-  bool set_torque(double torque) override {
-    require("torque", torque, Range::any());
-    torque_ = torque;
-    return true;
+void read_waves(const YamlReader& yaml, ExcitationSettings& settings) {
+  const std::string& type = settings.type;
+  settings.amplitude = yaml.number("amplitude", Range::not_negative());
+  settings.bias = yaml.number_or("bias", 0, Range::any());
+  if (type == "square" || type == "sine") {
+    settings.frequency = yaml.number("frequency", Range::positive());
+    return;
   }
-
- private:
-  double torque_ = 0;
-};
-
-class Square : public Excitation {
- public:
-  Square(double amplitude, double frequency, double bias)
-      : amplitude_(amplitude), frequency_(frequency), bias_(bias) {}
-  double torque(double, long segment) const override {
-    return bias_ + (segment % 2 == 0 ? amplitude_ : -amplitude_);
+  settings.start_frequency = yaml.number("start_frequency", Range::positive());
+  settings.end_frequency = yaml.number("end_frequency", Range::positive());
+  if (type == "chirp") {
+    settings.duration = yaml.number("duration", Range::positive());
+    return;
   }
-  double segment_end(long segment) const override { return (segment + 1) / (2 * frequency_); }
-  double period() const override { return 1 / frequency_; }
+  if (settings.end_frequency < settings.start_frequency)
+    yaml.fail("end_frequency", "must be >= start_frequency");
+  settings.step_frequency = yaml.number("step_frequency", Range::positive());
+  settings.cycles = static_cast<int>(yaml.integer("cycles", 1, 1'000'000));
+}
 
- private:
-  double amplitude_, frequency_, bias_;
-};
-
-class MultiSine : public Excitation {
- public:
-  MultiSine(std::vector<SineLine> lines, double bias) : lines_(std::move(lines)), bias_(bias) {}
-  double torque(double t, long) const override {
-    double sum = bias_;
-    for (const SineLine& line : lines_)
-      sum += line.amplitude * std::sin(2 * M_PI * line.frequency * t + line.phase);
-    return sum;
+void read_speed_loop(const YamlReader& yaml, ExcitationSettings& settings) {
+  const YamlReader controller = yaml.map("controller");
+  settings.controller.rate = controller.number("rate", Range::positive());
+  settings.controller.proportional = controller.number("proportional", Range::not_negative());
+  settings.controller.integral = controller.number("integral", Range::not_negative());
+  settings.controller.torque_limit = controller.number("torque_limit", Range::positive());
+  settings.ramp = yaml.number("ramp", Range::positive());
+  if (settings.type == "sine_speed") {
+    settings.bias = yaml.number("offset", Range::any());
+    settings.amplitude = yaml.number("amplitude", Range::not_negative());
+    settings.frequency = yaml.number("frequency", Range::positive());
+  } else if (yaml.has("speeds")) {
+    settings.speeds = yaml.numbers("speeds", Range::any());
+    if (settings.speeds.empty()) yaml.fail("speeds", "needs at least one speed");
+    settings.hold = yaml.number("hold", Range::positive());
+  } else {
+    settings.speeds = {yaml.number("speed", Range::any())};
+    settings.hold = std::numeric_limits<double>::infinity();
   }
-  double segment_end(long) const override { return kNever; }
-  double period() const override {
-    if (lines_.size() == 1) return 1 / lines_.front().frequency;
-    double common = 0;
-    for (const SineLine& line : lines_) common = common_divisor(common, line.frequency);
-    return common >= 1e-3 ? 1 / common : 0;
-  }
+}
 
- private:
-  std::vector<SineLine> lines_;
-  double bias_;
-};
-
-class Random : public MultiSine {
- public:
-  using MultiSine::MultiSine;
-  double period() const override { return 0; }
-};
-
-class Chirp : public Excitation {
- public:
-  Chirp(double amplitude, double start, double end, double duration, double bias)
-      : amplitude_(amplitude),
-        start_(start),
-        rate_((end - start) / duration),
-        duration_(duration),
-        bias_(bias) {}
-  double torque(double t, long segment) const override {
-    const double s = t - segment * duration_;
-    return bias_ + amplitude_ * std::sin(2 * M_PI * (start_ + 0.5 * rate_ * s) * s);
-  }
-  double segment_end(long segment) const override { return (segment + 1) * duration_; }
-  double period() const override { return duration_; }
-
- private:
-  double amplitude_, start_, rate_, duration_, bias_;
-};
+/// Where the torque acts, and whether the motor is held meanwhile.
+void read_place(const YamlReader& yaml, ExcitationSettings& settings) {
+  settings.at_load = yaml.has("at") && yaml.choice("at", {"motor", "load"}) == "load";
+  settings.motor_brake = yaml.boolean_or("motor_brake", false);
+  if (settings.at_load && settings.is_speed_loop()) yaml.fail("at", "a speed loop drives the motor");
+  if (settings.motor_brake && !settings.at_load)
+    yaml.fail("motor_brake", "needs at: load, no torque of the motor moves it against its brake");
+}
 
 }  // namespace
 
-std::unique_ptr<Excitation> constant_excitation(double torque) {
-  require("torque", torque, Range::any());
-  return std::make_unique<Constant>(torque);
-}
-
-std::unique_ptr<Excitation> square_excitation(double amplitude, double frequency, double bias) {
-  require("amplitude", amplitude, Range::any());
-  require("frequency", frequency, Range::positive());
-  require("bias", bias, Range::any());
-  return std::make_unique<Square>(amplitude, frequency, bias);
-}
-
-std::unique_ptr<Excitation> sine_excitation(double amplitude, double frequency, double bias) {
-  return multi_sine_excitation({{amplitude, frequency, 0}}, bias);
-}
-
-std::unique_ptr<Excitation> chirp_excitation(double amplitude, double start, double end, double duration,
-                                             double bias) {
-  require("amplitude", amplitude, Range::any());
-  require("start_frequency", start, Range::positive());
-  require("end_frequency", end, Range::positive());
-  require("duration", duration, Range::positive());
-  require("bias", bias, Range::any());
-  return std::make_unique<Chirp>(amplitude, start, end, duration, bias);
-}
-
-std::unique_ptr<Excitation> multi_sine_excitation(std::vector<SineLine> lines, double bias) {
-  for (const SineLine& line : lines) {
-    require("amplitude", line.amplitude, Range::any());
-    require("frequency", line.frequency, Range::positive());
-    require("phase", line.phase, Range::any());
-  }
-  require("bias", bias, Range::any());
-  return std::make_unique<MultiSine>(std::move(lines), bias);
-}
-
-std::unique_ptr<Excitation> random_excitation(double rms, double lower, double upper, int lines,
-                                              std::uint64_t seed, double bias) {
-  require("rms", rms, Range::not_negative());
-  require("lower_frequency", lower, Range::positive());
-  require("upper_frequency", upper, Range::positive());
-  require("lines", lines, Range::between(kFewestLines, kMostLines));
-  require("bias", bias, Range::any());
-  if (!(upper > lower))
-    throw InvalidParameter("excitation.upper_frequency", upper, "must be > lower_frequency");
-  std::mt19937_64 generator(seed);
-  // The same numbers on every platform, which std::uniform_real_distribution does not promise.
-  const auto uniform = [&generator] { return static_cast<double>(generator() >> 11) * 0x1p-53; };
-  std::vector<SineLine> sines;
-  for (int k = 0; k < lines; ++k) {
-    const double frequency = lower + (upper - lower) * (k + uniform()) / lines;
-    sines.push_back({rms * std::sqrt(2.0 / lines), frequency, 2 * M_PI * uniform()});
-  }
-  return std::make_unique<Random>(std::move(sines), bias);
-}
-
-std::unique_ptr<Excitation> external_excitation() {
-  return std::make_unique<External>();
+bool ExcitationSettings::is_speed_loop() const {
+  return type == "constant_speed" || type == "sine_speed";
 }
 
 std::unique_ptr<Excitation> ExcitationSettings::create() const {
@@ -181,44 +97,24 @@ std::unique_ptr<Excitation> ExcitationSettings::create() const {
     return random_excitation(amplitude, start_frequency, end_frequency, line_count, seed, bias);
   if (type == "constant") return constant_excitation(amplitude);
   if (type == "topic") return external_excitation();
-  throw InvalidParameter("excitation.type", type,
-                         "must be square, sine, chirp, multi_sine, random, constant or topic");
+  if (type == "stepped_sine")
+    return stepped_sine_excitation(amplitude, start_frequency, end_frequency, step_frequency, cycles, bias);
+  if (type == "constant_speed") return constant_speed_excitation(controller, speeds, hold, ramp);
+  if (type == "sine_speed") return sine_speed_excitation(controller, bias, amplitude, frequency, ramp);
+  throw InvalidParameter("excitation.type", type, "must be one of " + joined(kTypes));
 }
 
 ExcitationSettings read_excitation(const YamlReader& yaml) {
   ExcitationSettings settings;
-  settings.type =
-      yaml.choice("type", {"square", "sine", "chirp", "multi_sine", "random", "constant", "topic"});
+  settings.type = yaml.choice("type", kTypes);
   const std::string& type = settings.type;
   if (type == "constant") settings.amplitude = yaml.number("torque", Range::any());
-  if (type == "square" || type == "sine" || type == "chirp") {
-    settings.amplitude = yaml.number("amplitude", Range::not_negative());
-    settings.bias = yaml.number_or("bias", 0, Range::any());
-  }
-  if (type == "square" || type == "sine") settings.frequency = yaml.number("frequency", Range::positive());
-  if (type == "chirp") {
-    settings.start_frequency = yaml.number("start_frequency", Range::positive());
-    settings.end_frequency = yaml.number("end_frequency", Range::positive());
-    settings.duration = yaml.number("duration", Range::positive());
-  }
-  if (type == "random") {
-    settings.amplitude = yaml.number("rms", Range::not_negative());
-    settings.bias = yaml.number_or("bias", 0, Range::any());
-    settings.start_frequency = yaml.number("lower_frequency", Range::positive());
-    settings.end_frequency = yaml.number("upper_frequency", Range::positive());
-    if (!(settings.end_frequency > settings.start_frequency))
-      yaml.fail("upper_frequency", "must be > lower_frequency");
-    settings.line_count = static_cast<int>(yaml.integer("lines", kFewestLines, kMostLines));
-    settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
-  }
-  if (type == "multi_sine") {
-    settings.bias = yaml.number_or("bias", 0, Range::any());
-    for (const YamlReader& line : yaml.maps("lines"))
-      settings.lines.push_back({line.number("amplitude", Range::not_negative()),
-                                line.number("frequency", Range::positive()),
-                                line.number_or("phase", 0, Range::any())});
-    if (settings.lines.empty()) yaml.fail("lines", "needs at least one line");
-  }
+  if (type == "square" || type == "sine" || type == "chirp" || type == "stepped_sine")
+    read_waves(yaml, settings);
+  if (type == "random") read_random(yaml, settings);
+  if (type == "multi_sine") read_multi_sine(yaml, settings);
+  if (settings.is_speed_loop()) read_speed_loop(yaml, settings);
+  read_place(yaml, settings);
   return settings;
 }
 

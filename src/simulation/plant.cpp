@@ -18,6 +18,8 @@ std::vector<double> absolute_tolerances(int dof, const SolverSettings& solver) {
 constexpr long kMaxChangesPerCall = 100'000;
 
 GearTrain gear_train_of(const Rig& rig, const ExcitationSettings& excitation) {
+  if (excitation.at_load && rig.link_locked)
+    throw InvalidParameter("excitation.at", "load", "the link is locked");
   GearTrain train(rig);
   if (excitation.motor_brake) train.brake_motor();
   return train;

@@ -64,6 +64,8 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   yaml.integer("schema_version", 1, 1);
   file.rig = read_rig(yaml);
   file.simulation = read_simulation_settings(yaml);
+  check_excitation(yaml.map("excitation"), file.simulation.excitation, file.rig);
+  file.test_runs = read_test_runs(yaml, file.rig);
   file.diagnosis = read_diagnosis_settings(yaml.map("diagnosis"));
   yaml.finish();
   if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())

@@ -39,6 +39,9 @@ class YamlReader {
   bool has(const std::string& key) const;
   bool is_text(const std::string& key) const;  ///< the value is a plain scalar, not a map or list
 
+  /// All keys of the map in the order of the file; only asking for one by name makes it known.
+  std::vector<std::string> keys() const;
+
   /// Readers of one value; BadData when it is absent, has another type or lies outside the range.
   double number(const std::string& key, const Range& range) const;
   long integer(const std::string& key, long lower, long upper) const;

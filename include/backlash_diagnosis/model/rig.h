@@ -85,4 +85,7 @@ struct Rig {
 /// file, line, key, value and limit.
 Rig read_rig(const YamlReader& yaml);
 
+/// The driver alone, taken out of mesh: its teeth never touch, whatever the positions.
+Rig without_load(Rig rig);
+
 }  // namespace backlash

@@ -29,7 +29,7 @@ class Excitation {
   /// machine: where a closed loop decides.
   virtual void begin_segment(long /*segment*/, const Observation& /*machine*/) {}
 
-  /// Repetition time [s]; 0 where the torque does not repeat.
+  /// Repetition time [s]; 0 where the torque does not repeat (that of a closed loop does so only nearly).
   virtual double period() const { return 0; }
 
   /// Torque set from outside [N m], held until the next call. Refused (false) by all but the `topic`
@@ -64,19 +64,52 @@ std::unique_ptr<Excitation> random_excitation(double rms, double lower, double u
 /// Zero until set_torque() is called.
 std::unique_ptr<Excitation> external_excitation();
 
+/// Sine whose frequency goes from `start` to at most `end` [Hz] in steps of `step` [Hz], `cycles` whole
+/// cycles at each and continuous throughout, then starts again: a sine sweep as in Yumrukcal (2013, Chapter
+/// 3).
+std::unique_ptr<Excitation> stepped_sine_excitation(double amplitude, double start, double end, double step,
+                                                    int cycles, double bias = 0);
+
+/// PI controller of the motor's speed, in the units of motor_torque and motor_velocity:
+///   torque = P e + I sum(e) / rate,  e = reference - speed,  limited; held until its next sample
+/// The sum stands still while the limit acts (no wind-up). It is given the exact speed, not a sensor's.
+struct SpeedController {
+  double rate = 0;          // Hz
+  double proportional = 0;  // P, N m s/rad
+  double integral = 0;      // I, N m/rad
+  double torque_limit = 0;  // N m
+};
+
+/// One speed [rad/s] after the other, each held for `hold` [s] (infinite: the first for ever) after a smooth
+/// ramp of `ramp` [s] from the one before, the first from rest; then again from the first.
+std::unique_ptr<Excitation> constant_speed_excitation(const SpeedController& controller,
+                                                      std::vector<double> speeds, double hold, double ramp);
+/// Speed offset + amplitude sin(2 pi f t) [rad/s], faded in smoothly within `ramp` [s].
+std::unique_ptr<Excitation> sine_speed_excitation(const SpeedController& controller, double offset,
+                                                  double amplitude, double frequency, double ramp);
+
 /// What a rig file says under `excitation`; a recipe, so that copies of it can run side by side.
 struct ExcitationSettings {
-  std::string type = "square";  // square, sine, chirp, multi_sine, random, constant, topic
-  double amplitude = 0;         // N m; the torque itself for `constant`, its rms for `random`
-  double frequency = 0;         // Hz, square and sine
-  double bias = 0;              // N m
-  double start_frequency = 0, end_frequency = 0, duration = 0;  // Hz, Hz, s: chirp
-  std::vector<SineLine> lines;                                  // multi_sine
-  int line_count = 0;        // random, with start_ and end_frequency as the band
-  std::uint64_t seed = 0;    // random
-  bool at_load = false;      // the torque acts on the load, not on the motor
-  bool motor_brake = false;  // the motor is held
+  // square, sine, chirp, multi_sine, random, constant, topic, stepped_sine, constant_speed, sine_speed
+  std::string type = "square";
+  double amplitude =
+      0;  // N m; the torque itself for `constant`, its rms for `random`; rad/s for `sine_speed`
+  double frequency = 0;  // Hz, square, sine and sine_speed
+  double bias = 0;       // N m; rad/s, the offset of `sine_speed`
+  double start_frequency = 0, end_frequency = 0,
+         duration = 0;          // Hz, Hz, s: chirp, the first two stepped_sine
+  double step_frequency = 0;    // Hz, stepped_sine
+  int cycles = 0;               // per frequency, stepped_sine
+  std::vector<SineLine> lines;  // multi_sine
+  int line_count = 0;           // random, with start_ and end_frequency as the band
+  std::uint64_t seed = 0;       // random
+  SpeedController controller;   // constant_speed and sine_speed
+  std::vector<double> speeds;   // rad/s, constant_speed
+  double hold = 0, ramp = 0;    // s, constant_speed; sine_speed has a ramp
+  bool at_load = false;         // the torque acts on the load, not on the motor
+  bool motor_brake = false;     // the motor is held
 
+  bool is_speed_loop() const;
   std::unique_ptr<Excitation> create() const;
 };
 

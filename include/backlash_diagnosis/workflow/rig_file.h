@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/model/rig.h"
 #include "backlash_diagnosis/simulation/simulation.h"
+#include "backlash_diagnosis/workflow/test_runs.h"
 
 namespace backlash {
 
@@ -13,6 +14,7 @@ struct RigFile {
   Rig rig;
   SimulationSettings simulation;
   DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
+  std::vector<TestRun> test_runs;
   std::string source;           // path, or "built-in sarkar_1997"
   std::string text;             // as read
   std::string digest;           // 64-bit FNV-1a of the text, hexadecimal
