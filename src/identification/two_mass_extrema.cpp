@@ -13,7 +13,7 @@ namespace {
 
 using Points = std::vector<ResponsePoint>;
 
-constexpr double kWindow = 4;                 // of |H|^2, around an extremum
+constexpr double kWindow = 2;                 // of |H|^2, around an extremum
 constexpr std::size_t kBeside = 3;            // points on either side of an extremum
 constexpr double kLeastError = 1e-3;          // relative, of any point
 constexpr double kBelow = 0.5, kAbove = 1.5;  // of F_AR and F_R: bands of the plateaus

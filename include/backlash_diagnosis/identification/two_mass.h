@@ -41,9 +41,10 @@ struct Resonances {
 };
 
 /// Where |wM/T| has its maximum above and its minimum below: extrema of the cubics through 1/|H|^2 (maximum)
-/// and |H|^2 (minimum) within a factor four of the extremum, weighted. For z up to 0.2 within 1 % of F_R and
-/// F_AR of the undamped system. Standard errors are those of the fit, at least what the points' own errors
-/// give. Throws CannotIdentify where there is no such pair with three points on either side of each.
+/// and |H|^2 (minimum) within a factor two of the extremum, weighted. To 0.15 % of the extrema, which for z
+/// up to 0.2 are within 1 % of F_R and F_AR of the undamped system. Standard errors are those of the fit, at
+/// least what the points' own errors give. Throws CannotIdentify where there is no such pair with three
+/// points on either side of each.
 Resonances find_resonances(const FrequencyResponse& motor);
 
 /// Inertia from 1 / (w |H|) between two frequencies [Hz], robust weighted mean, the plateau taken as it is as
