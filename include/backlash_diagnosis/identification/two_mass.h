@@ -57,7 +57,8 @@ Measured inertia_plateau(const FrequencyResponse& motor, double from, double to)
 /// The same with the undamped response to either side of known frequencies taken out:
 ///   total inertia |1 - (f/F_AR)^2| / |1 - (f/F_R)^2|,   motor inertia |1 - (F_AR/f)^2| / |1 - (F_R/f)^2|
 /// times 1 / (w |H|). Total below F_AR / 2; motor above 1.5 F_R, where with z = 0.15 the damping that it
-/// leaves out still takes 6 % at 1.5 F_R and 2 % at 2 F_R. Standard errors do not hold that.
+/// leaves out still makes some per cent. The standard error holds what the two halves of the band
+/// differ by. Throws CannotIdentify with fewer than five points in a band.
 struct InertiaPlateaus {
   Measured total, motor;  // kg m^2
 };
