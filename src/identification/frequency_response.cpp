@@ -25,6 +25,7 @@ constexpr double kLongestSegment = 16;  // s, if not asked for
 constexpr std::size_t kShortestSegment = 64, kFewestSegments = 8;
 constexpr std::size_t kFirstLine = 3;  // below, what drifts leaks in
 constexpr double kExcited = 1e-5;      // of the largest power of a line
+constexpr std::size_t kLeakReach = 8;  // lines
 constexpr double kAlone = 1e-2;        // of a line's power, three lines beside it: it stands alone
 
 struct Signals {
@@ -158,6 +159,17 @@ bool alone(const std::vector<double>& power, std::size_t k) {
          std::max(power[k - 3], power[k + 3]) < kAlone * power[k];
 }
 
+/// Whether the line may be no more than what a Hann window leaks from a stronger one: d lines beside a sine
+/// 1 / (pi d (d^2 - 1)) of its amplitude at most; here twice that.
+bool leaked(const std::vector<double>& power, std::size_t k) {
+  for (std::size_t d = 2; d <= kLeakReach; ++d) {
+    const double share = std::pow(2 / (M_PI * double(d) * double(d * d - 1)), 2);
+    const double below = k >= d ? power[k - d] : 0, above = k + d < power.size() ? power[k + d] : 0;
+    if (power[k] < share * std::max(below, above)) return true;
+  }
+  return false;
+}
+
 /// Where between the lines a single sine under a Hann window lies.
 double interpolated(const std::vector<double>& power, std::size_t k) {
   const bool above = power[k + 1] > power[k - 1];
@@ -196,7 +208,7 @@ FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) 
   FrequencyResponse response;
   std::size_t single = 0;  // line of the last sine that stands alone
   for (std::size_t k = kFirstLine; k + 3 < sum.uu.size(); ++k) {
-    if (!(sum.uu[k] > kExcited * largest) || !(sum.yy[k] > 0)) continue;
+    if (!(sum.uu[k] > kExcited * largest) || !(sum.yy[k] > 0) || leaked(sum.uu, k)) continue;
     if (single > 0 && k <= single + 2) continue;
     double line = double(k);
     if (alone(sum.uu, k)) {

@@ -13,7 +13,7 @@ namespace {
 
 using Points = std::vector<ResponsePoint>;
 
-constexpr double kWindow = 4;                 // of |H|^2, around an extremum
+constexpr double kWindow = 2;                 // of |H|^2, around an extremum
 constexpr std::size_t kBeside = 3;            // points on either side of an extremum
 constexpr double kLeastError = 1e-3;          // relative, of any point
 constexpr double kBelow = 0.5, kAbove = 1.5;  // of F_AR and F_R: bands of the plateaus
@@ -86,6 +86,20 @@ Measured plateau(const FrequencyResponse& motor, double from, double to,
   return found;
 }
 
+/// The plateau whose halves should agree: what they differ by is added to its error.
+Measured checked_plateau(const FrequencyResponse& motor, double from, double to,
+                         const std::function<double(double frequency)>& factor) {
+  Measured found = plateau(motor, from, to, factor);
+  std::vector<double> inside;
+  for (const ResponsePoint& p : motor.points)
+    if (p.frequency >= from && p.frequency <= to) inside.push_back(p.frequency);
+  const double middle = inside[inside.size() / 2];
+  const double difference =
+      plateau(motor, from, middle, factor).value - plateau(motor, middle, to, factor).value;
+  found.standard_error = std::hypot(found.standard_error, difference);
+  return found;
+}
+
 }  // namespace
 
 Resonances find_resonances(const FrequencyResponse& motor) {
@@ -119,8 +133,8 @@ InertiaPlateaus find_inertias(const FrequencyResponse& motor, const Resonances& 
   const double r = resonances.resonance.value, ar = resonances.anti_resonance.value;
   const auto off = [](double ratio) { return std::fabs(1 - ratio * ratio); };
   const double infinite = std::numeric_limits<double>::infinity();
-  return {plateau(motor, 0, kBelow * ar, [&](double f) { return off(f / ar) / off(f / r); }),
-          plateau(motor, kAbove * r, infinite, [&](double f) { return off(ar / f) / off(r / f); })};
+  return {checked_plateau(motor, 0, kBelow * ar, [&](double f) { return off(f / ar) / off(f / r); }),
+          checked_plateau(motor, kAbove * r, infinite, [&](double f) { return off(ar / f) / off(r / f); })};
 }
 
 }  // namespace backlash

@@ -41,9 +41,10 @@ struct Resonances {
 };
 
 /// Where |wM/T| has its maximum above and its minimum below: extrema of the cubics through 1/|H|^2 (maximum)
-/// and |H|^2 (minimum) within a factor four of the extremum, weighted. For z up to 0.2 within 1 % of F_R and
-/// F_AR of the undamped system. Standard errors are those of the fit, at least what the points' own errors
-/// give. Throws CannotIdentify where there is no such pair with three points on either side of each.
+/// and |H|^2 (minimum) within a factor two of the extremum, weighted. To 0.15 % of the extrema, which for z
+/// up to 0.2 are within 1 % of F_R and F_AR of the undamped system. Standard errors are those of the fit, at
+/// least what the points' own errors give. Throws CannotIdentify where there is no such pair with three
+/// points on either side of each.
 Resonances find_resonances(const FrequencyResponse& motor);
 
 /// Inertia from 1 / (w |H|) between two frequencies [Hz], robust weighted mean, the plateau taken as it is as
@@ -56,7 +57,8 @@ Measured inertia_plateau(const FrequencyResponse& motor, double from, double to)
 /// The same with the undamped response to either side of known frequencies taken out:
 ///   total inertia |1 - (f/F_AR)^2| / |1 - (f/F_R)^2|,   motor inertia |1 - (F_AR/f)^2| / |1 - (F_R/f)^2|
 /// times 1 / (w |H|). Total below F_AR / 2; motor above 1.5 F_R, where with z = 0.15 the damping that it
-/// leaves out still takes 6 % at 1.5 F_R and 2 % at 2 F_R. Standard errors do not hold that.
+/// leaves out still makes some per cent. The standard error holds what the two halves of the band
+/// differ by. Throws CannotIdentify with fewer than five points in a band.
 struct InertiaPlateaus {
   Measured total, motor;  // kg m^2
 };
