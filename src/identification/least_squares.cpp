@@ -182,14 +182,15 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
   return fit;
 }
 
-Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block) {
+Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block, Eigen::Index known) {
   const Eigen::MatrixXd& j = fit.jacobian;
   const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
   const Eigen::MatrixXd scaled = j * unit.asDiagonal();
   Eigen::MatrixXd outer = Eigen::MatrixXd::Zero(j.cols(), j.cols());
   double blocks = 0;
-  for (Eigen::Index row = 0; row < j.rows(); row += block, ++blocks) {
-    const Eigen::Index rows = std::min(block, j.rows() - row);
+  const Eigen::Index end = j.rows() - known;
+  for (Eigen::Index row = 0; row < end; row += block, ++blocks) {
+    const Eigen::Index rows = std::min(block, end - row);
     const Eigen::VectorXd gradient =
         scaled.middleRows(row, rows).transpose() * fit.residuals.segment(row, rows);
     outer += gradient * gradient.transpose();
@@ -200,8 +201,9 @@ Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block)
                          " parameters");
   const Eigen::MatrixXd inverse =
       (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
-  const double correction = blocks / (blocks - double(j.cols()));
-  return unit.asDiagonal() * (inverse * outer * inverse) * unit.asDiagonal() * correction;
+  outer *= blocks / (blocks - double(j.cols()));
+  outer += scaled.bottomRows(known).transpose() * scaled.bottomRows(known);
+  return unit.asDiagonal() * (inverse * outer * inverse) * unit.asDiagonal();
 }
 
 }  // namespace backlash

@@ -128,6 +128,12 @@ void append_residuals(const ServoPrediction& p, const ServoData& data, double cu
   }
 }
 
+double misfit(const Finding& finding, const Rig& rig) {
+  double value = 0;
+  for (const auto& [name, factor] : finding.combination) value += factor * servo_parameter(name).get(rig);
+  return (finding.measured.value - value) / finding.measured.standard_error;
+}
+
 /// The unknowns of a fit: parameters of the rig, then delay and offset of each record.
 class Unknowns {
  public:

@@ -41,6 +41,17 @@ std::vector<double> second_difference(const std::vector<double>& x, double inter
 
 }  // namespace
 
+Record load_side(const Record& record, const Rig& rig) {
+  Record out = record;
+  const double ratio = rig.motor_axis_ratio();
+  for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
+    for (double& value : out.column(channel)) value *= ratio;
+  for (const Channel channel :
+       {Channel::motor_position, Channel::motor_velocity, Channel::reference_position})
+    for (double& value : out.column(channel)) value /= ratio;
+  return out;
+}
+
 ServoData servo_data(const Record& raw, const Rig& rig) {
   for (const Channel channel : {Channel::motor_torque, Channel::motor_position})
     if (!raw.has(channel)) throw CannotIdentify(raw.name + " has no " + channel_name(channel));

@@ -130,4 +130,22 @@ Rig read_rig(const YamlReader& yaml) {
   return rig;
 }
 
+Rig load_side(const Rig& rig) {
+  Rig out = rig;
+  const double ratio = rig.motor_axis_ratio(), square = ratio * ratio;
+  for (Body* body : {&out.motor, &out.pinion}) {
+    body->inertia *= square;
+    body->viscous_damping *= square;
+    body->viscous_asymmetry *= square;
+    body->coulomb_friction *= ratio;
+    body->coulomb_asymmetry *= ratio;
+  }
+  out.input_coupling.stiffness *= square;
+  out.input_coupling.damping *= square;
+  out.input_coupling.inertia *= square;
+  out.torque_constant *= ratio;
+  out.motor_side = false;
+  return out;
+}
+
 }  // namespace backlash

@@ -45,8 +45,8 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
                               const Eigen::VectorXd& scale, const NonlinearOptions& options = {});
 
 /// Covariance of the values where neighbouring rows are not independent: the gradients of the sum of squares
-/// are summed over blocks of `block` successive rows, which count as independent (Liang and Zeger 1986).
-/// Needs `jacobian`.
-Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block);
+/// are summed over blocks of `block` successive rows, which count as independent (Liang and Zeger 1986). The
+/// last `known` rows are independent and of variance 1. Needs `jacobian`.
+Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block, Eigen::Index known = 0);
 
 }  // namespace backlash

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/identification/least_squares.h"
 #include "backlash_diagnosis/identification/servo_data.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
@@ -24,6 +25,7 @@ struct OutputErrorSettings {
   double cutoff = 60;                   // Hz, low-pass of both residuals
   double feedback = kLoadFeedback;      // 1/s
   std::vector<std::string> parameters;  // of servo_parameters(), to be fitted
+  std::vector<Finding> findings;        // of other records, which count by their standard errors
   int iterations = 20;
 };
 

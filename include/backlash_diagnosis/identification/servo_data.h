@@ -19,6 +19,9 @@ struct ServoData {
   std::size_t size() const { return motor.size(); }
 };
 
+/// The record with all channels at the load side of the reduction.
+Record load_side(const Record& record, const Rig& rig);
+
 /// Hz; the speed that feeds back to the simulated load needs no more.
 constexpr double kLoadRateCutoff = 60;
 

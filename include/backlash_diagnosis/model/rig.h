@@ -81,6 +81,9 @@ struct Rig {
   double backlash_angle(double backlash) const { return backlash / mesh.lever() * motor_axis_ratio(); }
 };
 
+/// The same machine with all values at the load side of the reduction.
+Rig load_side(const Rig& rig);
+
 /// Reads the machine's part of a rig file (`name`, `joint`, `gear_train`, `terms`). Throws BadData naming
 /// file, line, key, value and limit.
 Rig read_rig(const YamlReader& yaml);

@@ -1,0 +1,28 @@
+// What the procedures find, in one form, so that they can be put together: a linear combination of parameters
+// has a value.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/measured.h"
+#include "backlash_diagnosis/model/rig.h"
+
+namespace backlash {
+
+/// sum of factor * parameter = measured; parameters are those of servo_parameters(). A system's friction is
+/// {motor_coulomb: 1, load_coulomb: 1}.
+struct Finding {
+  std::string procedure;
+  std::map<std::string, double> combination;
+  Measured measured;
+};
+
+/// The parameters that the findings determine, by least squares weighted with their standard errors; the
+/// others keep what `rig` says, and a combination with one of those is read with it. Standard errors grow
+/// where findings contradict each other. Only `names` are touched.
+std::map<std::string, Measured> combine_findings(const std::vector<Finding>& findings, const Rig& rig,
+                                                 const std::vector<std::string>& names);
+
+}  // namespace backlash

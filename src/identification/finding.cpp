@@ -1,0 +1,67 @@
+#include "backlash_diagnosis/identification/finding.h"
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/identification/rig_parameters.h"
+
+namespace backlash {
+namespace {
+
+/// Relative standard error of what a rig file says, against findings that only tell a sum.
+constexpr double kDeclaredUncertainty = 0.4;
+
+}  // namespace
+
+std::map<std::string, Measured> combine_findings(const std::vector<Finding>& findings, const Rig& rig,
+                                                 const std::vector<std::string>& names) {
+  const auto index = [&](const std::string& name) {
+    return Eigen::Index(std::find(names.begin(), names.end(), name) - names.begin());
+  };
+  const Eigen::Index n = Eigen::Index(names.size());
+  Eigen::VectorXd declared(n), size(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    declared[i] = servo_parameter(names[i]).get(rig);
+    size[i] = declared[i] != 0 ? kDeclaredUncertainty * std::fabs(declared[i]) : 1;
+  }
+  // Deviations from the declared values in units of what these are uncertain by.
+  Eigen::MatrixXd information = Eigen::MatrixXd::Identity(n, n);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(n);
+  struct Row {
+    Eigen::VectorXd a;
+    double b;
+  };
+  std::vector<Row> rows;
+  std::vector<bool> told(n, false);
+  for (const Finding& finding : findings) {
+    const double error = finding.measured.standard_error;
+    if (!(error > 0) || !std::isfinite(finding.measured.value)) continue;
+    Row row{Eigen::VectorXd::Zero(n), finding.measured.value / error};
+    for (const auto& [name, factor] : finding.combination) {
+      const Eigen::Index i = index(name);
+      if (i == n) continue;
+      row.a[i] = factor * size[i] / error;
+      row.b -= factor * declared[i] / error;
+      told[i] = true;
+    }
+    information += row.a * row.a.transpose();
+    gradient += row.a * row.b;
+    rows.push_back(std::move(row));
+  }
+  const Eigen::MatrixXd covariance = information.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::VectorXd deviation = covariance * gradient;
+  double chi2 = 0;
+  for (const Row& row : rows) chi2 += std::pow(row.b - row.a.dot(deviation), 2);
+  const double freedom = double(rows.size()) - double(std::count(told.begin(), told.end(), true));
+  const double growth = freedom > 0 ? std::sqrt(std::max(1.0, chi2 / freedom)) : 1;
+  std::map<std::string, Measured> result;
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (told[i])
+      result[names[i]] = {declared[i] + size[i] * deviation[i],
+                          growth * size[i] * std::sqrt(covariance(i, i))};
+  return result;
+}
+
+}  // namespace backlash

@@ -1,0 +1,132 @@
+// The last step of an identification: everything together, on the raw records.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/record/zero_phase.h"
+#include "procedures.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kTellingCutoff = 20;  // Hz, of the deflection
+constexpr double kMostSeconds = 60;    // of one record, and of all
+constexpr double kTellingShare = 0.3;  // of the most telling record, from which another is worth its time
+constexpr double kFewestSeconds = 2;
+
+struct Stretch {
+  const CaseRecord* record;
+  std::size_t from, to;  // samples
+  double telling;        // rad/s, how much the deflection varies
+};
+
+/// The stretch of a record whose deflection varies most: the teeth change flanks there.
+Stretch most_telling(const CaseRecord& r) {
+  const double interval = r.record.sampling_interval();
+  const auto &motor = r.record.column(Channel::motor_position),
+             &load = r.record.column(Channel::load_position);
+  std::vector<double> deflection(motor.size());
+  for (std::size_t k = 0; k < motor.size(); ++k) deflection[k] = motor[k] - load[k];
+  const double cutoff = std::min(kTellingCutoff, 0.2 / interval);
+  deflection = low_pass(deflection, interval, cutoff);
+  std::vector<double> sum(motor.size(), 0);
+  for (std::size_t k = 1; k < sum.size(); ++k)
+    sum[k] = sum[k - 1] + std::fabs(deflection[k] - deflection[k - 1]);
+  const std::size_t length = std::min<std::size_t>(motor.size(), std::lround(kMostSeconds / interval));
+  std::size_t best = 0;
+  for (std::size_t from = 0; from + length <= motor.size(); ++from)
+    if (sum[from + length - 1] - sum[from] > sum[best + length - 1] - sum[best]) best = from;
+  return {&r, best, best + length, (sum[best + length - 1] - sum[best]) / (double(length) * interval)};
+}
+
+Record cut(const Stretch& s) {
+  const std::vector<double>& t = s.record->record.time;
+  const double end = s.to < t.size() ? t[s.to] : INFINITY;
+  return s.record->record.slice(t[s.from], end);
+}
+
+std::vector<Stretch> telling_stretches(const IdentificationCase& c) {
+  std::vector<Stretch> all;
+  for (const CaseRecord& r : c.records)
+    if (r.drive() && r.has_load && r.record.time.back() - r.record.time.front() >= kFewestSeconds)
+      all.push_back(most_telling(r));
+  std::sort(all.begin(), all.end(), [](const Stretch& a, const Stretch& b) { return a.telling > b.telling; });
+  std::vector<Stretch> chosen;
+  double seconds = 0;
+  for (const Stretch& s : all) {
+    const double length = double(s.to - s.from) * s.record->record.sampling_interval();
+    if (!chosen.empty() &&
+        (s.telling < kTellingShare * all.front().telling || seconds + length > kMostSeconds))
+      continue;
+    chosen.push_back(s);
+    seconds += length;
+  }
+  return chosen;
+}
+
+/// Over all records: norms add up.
+ChannelError total(const std::vector<ChannelError>& errors, const std::vector<double>& weights) {
+  ChannelError sum;
+  double all = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    sum.error += std::pow(weights[i] * errors[i].error, 2);
+    sum.floor += std::pow(weights[i] * errors[i].floor, 2);
+    all += weights[i] * weights[i];
+  }
+  return {std::sqrt(sum.error / all), std::sqrt(sum.floor / all)};
+}
+
+double spread(const std::vector<double>& y) {
+  const double mean = std::accumulate(y.begin(), y.end(), 0.0) / double(y.size());
+  double square = 0;
+  for (const double v : y) square += (v - mean) * (v - mean);
+  return std::sqrt(square);
+}
+
+/// Two flanks that the zero of both encoders lies between.
+double start_in_gap(const Rig& rig, double encoder_offset) {
+  const double half = 0.5 * rig.mesh.backlash / rig.mesh.lever();
+  return half > 0 ? std::clamp(rig.mesh.start_in_gap + encoder_offset / half, -1.0, 1.0) : 0;
+}
+
+}  // namespace
+
+ProcedureReport run_output_error(IdentificationCase& c) {
+  ProcedureReport report{"output_error", {}, ""};
+  const std::vector<Stretch> stretches = telling_stretches(c);
+  if (stretches.empty()) throw CannotIdentify("no record in which motor and load move, with both positions");
+  std::vector<ServoData> data;
+  for (const Stretch& s : stretches) {
+    data.push_back(servo_data(cut(s), c.declared));
+    report.records.push_back(s.record->record.name);
+  }
+  OutputErrorSettings settings;
+  settings.cutoff = std::min(settings.cutoff, 0.2 / data.front().interval);
+  settings.parameters = c.names;
+  settings.findings = c.result.findings;
+  const OutputError fit = fit_output_error(c.result.rig, data, settings);
+  c.result.rig = fit.rig;
+  c.result.parameters = fit.parameters;
+  c.result.rig.mesh.start_in_gap = start_in_gap(fit.rig, fit.calibrations.front().encoder_offset);
+  c.result.delay = Measured{fit.calibrations.front().torque_delay * data.front().interval, std::nan("")};
+  std::vector<double> torque, deflection;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const ServoPrediction p = predict_servo(fit.rig, data[i], settings, fit.calibrations[i]);
+    torque.push_back(spread(p.measured_torque));
+    deflection.push_back(spread(p.measured_deflection));
+    c.result.torque.push_back({report.records[i], data[i].interval, p.measured_torque, p.torque, p.counts});
+    c.result.deflection.push_back(
+        {report.records[i], data[i].interval, p.measured_deflection, p.deflection, {}});
+  }
+  c.result.channels["torque"] = total(fit.torque, torque);
+  c.result.channels["deflection"] = total(fit.deflection, deflection);
+  char text[128];
+  std::snprintf(text, sizeof text, "torque error %.2g %% (noise alone %.2g %%), deflection %.2g %% (%.2g %%)",
+                100 * c.result.channels["torque"].error, 100 * c.result.channels["torque"].floor,
+                100 * c.result.channels["deflection"].error, 100 * c.result.channels["deflection"].floor);
+  report.message = text;
+  return report;
+}
+
+}  // namespace backlash

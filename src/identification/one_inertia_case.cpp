@@ -1,0 +1,50 @@
+// The one procedure for a machine of one inertia.
+#include <cmath>
+
+#include "procedures.h"
+
+namespace backlash {
+
+ProcedureReport run_one_inertia(IdentificationCase& c) {
+  ProcedureReport report{"one_inertia", {}, ""};
+  if (c.records.size() != 1)
+    c.result.warnings.push_back("a machine of one inertia is fitted to the first record that allows it");
+  std::string reasons;
+  for (const CaseRecord& r : c.records) {
+    try {
+      c.result.one_inertia = identify_one_inertia(r.record);
+    } catch (const CannotIdentify& error) {
+      reasons += (reasons.empty() ? "" : "; ") + r.record.name + ": " + error.what();
+      continue;
+    }
+    report.records = {r.record.name};
+    break;
+  }
+  if (!c.result.one_inertia) throw CannotIdentify(reasons);
+  const OneInertia& found = *c.result.one_inertia;
+  const bool linear = c.declared.linear;
+  c.result.parameters = {{"inertia", found.inertia},
+                         {"viscous", found.viscous},
+                         {"coulomb", found.coulomb},
+                         {"offset", found.offset}};
+  c.result.units = {{"inertia", linear ? "kg" : "kg m^2"},
+                    {"viscous", linear ? "N s/m" : "N m s/rad"},
+                    {"coulomb", linear ? "N" : "N m"},
+                    {"offset", linear ? "N" : "N m"}};
+  c.result.channels["torque"] = {found.relative_error, found.floor};
+  c.result.delay = found.delay;
+  c.result.warnings.insert(c.result.warnings.end(), found.warnings.begin(), found.warnings.end());
+  Body& body = c.result.rig.motor;
+  body.inertia =
+      found.inertia.value - c.declared.pinion.inertia - c.declared.gear.inertia - c.declared.link.inertia;
+  body.viscous_damping = found.viscous.value;
+  body.coulomb_friction = found.coulomb.value;
+  body.coulomb_asymmetry = found.offset.value;
+  char text[128];
+  std::snprintf(text, sizeof text, "torque error %.3g %%, low-pass %.3g Hz, torque acts %.3g ms late",
+                100 * found.relative_error, found.cutoff, 1e3 * found.delay.value);
+  report.message = text;
+  return report;
+}
+
+}  // namespace backlash
