@@ -1,13 +1,11 @@
 #include "backlash_diagnosis/identification/clearance.h"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <sstream>
 
-#include "backlash_diagnosis/identification/least_squares.h"
+#include "backlash_diagnosis/identification/flank_fit.h"
 #include "backlash_diagnosis/identification/robust_mean.h"
 #include "backlash_diagnosis/record/zero_phase.h"
 
@@ -22,6 +20,7 @@ constexpr int kPushes[] = {2, 3};    // degrees of the push over J
 constexpr double kSlow = 0.2;        // of the fastest: below it friction changes
 constexpr double kSensitive = 0.05;  // of the gap, between the two pushes: worth a warning
 constexpr double kUncertain = 0.25;  // of the gap: beyond it is not told
+constexpr double kFlanks = 1.3;      // by which flanks must better the fit
 constexpr int kLeastSamples = 20;
 
 using Values = std::vector<double>;
@@ -108,140 +107,10 @@ std::vector<Stretch> find_passages(const Run& run, double contact_time) {
   return stretches;
 }
 
-/// Where the flanks are.
-struct Flanks {
-  double lower = 0, gap = 0;
-};
-
-/// One passage without what a polynomial explains: start, and a push of the given degree, integrated twice.
-class Passage {
- public:
-  Passage(const Run& run, const Stretch& s, int push) : interval_(run.interval), polynomial_(push + 3) {
-    const int n = s.end - s.begin;
-    fine_ = Eigen::Map<const Eigen::VectorXd>(run.fine.data() + s.begin, n);
-    Eigen::MatrixXd powers(n, polynomial_);
-    const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(n, -1, 1);
-    powers.col(0).setOnes();
-    for (int k = 1; k < polynomial_; ++k) powers.col(k) = powers.col(k - 1).array() * t;
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(powers);
-    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(n, polynomial_);
-    measured_ = without_polynomial(Eigen::Map<const Eigen::VectorXd>(run.relative.data() + s.begin, n));
-  }
-
-  Eigen::Index size() const { return fine_.size(); }
-  int polynomial() const { return polynomial_; }
-  const Eigen::VectorXd& measured() const { return measured_; }
-
-  /// Columns of -w^2 and -2 z w.
-  Eigen::MatrixXd columns(const Flanks& f) const {
-    Eigen::VectorXd p(size()), rate(size());
-    for (Eigen::Index i = 0; i < size(); ++i) {
-      const double x = fine_[i], upper = f.lower + f.gap;
-      p[i] = x > upper ? x - upper : x < f.lower ? x - f.lower : 0;
-    }
-    // The double integral of p' is the integral of p.
-    Eigen::MatrixXd c(size(), 2);
-    const Eigen::VectorXd once = integral(p);
-    c.col(0) = without_polynomial(integral(once));
-    c.col(1) = without_polynomial(once);
-    return c;
-  }
-
- private:
-  Eigen::VectorXd integral(const Eigen::VectorXd& y) const {
-    Eigen::VectorXd sum(y.size());
-    sum[0] = 0;
-    for (Eigen::Index i = 1; i < y.size(); ++i) sum[i] = sum[i - 1] + interval_ / 2 * (y[i] + y[i - 1]);
-    return sum;
-  }
-  Eigen::VectorXd without_polynomial(const Eigen::VectorXd& y) const {
-    return y - basis_ * (basis_.transpose() * y);
-  }
-
-  double interval_;
-  int polynomial_;
-  Eigen::VectorXd fine_, measured_;
-  Eigen::MatrixXd basis_;
-};
-
-/// w^2 and 2 z w of the load on a flank; NaN: not known.
-struct Contact {
-  double stiffness = std::numeric_limits<double>::quiet_NaN();
-  double damping = std::numeric_limits<double>::quiet_NaN();
-};
-
-/// Least squares over what is not known of the contact, at given flanks; damping >= 0.
-Contact contact_of(const std::vector<Passage>& passages, const Flanks& flanks, double stiffness) {
-  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d right = Eigen::Vector2d::Zero();
-  for (const Passage& p : passages) {
-    const Eigen::MatrixXd c = p.columns(flanks);
-    normal += c.transpose() * c;
-    right -= c.transpose() * p.measured();
-  }
-  if (std::isfinite(stiffness))
-    return {stiffness, std::max(0.0, (right[1] - normal(0, 1) * stiffness) / normal(1, 1))};
-  const Eigen::Vector2d k = normal.inverse() * right;
-  if (k[1] < 0) return {right[0] / normal(0, 0), 0};
-  return {k[0], k[1]};
-}
-
-Eigen::VectorXd residuals_of(const std::vector<Passage>& passages, const Flanks& flanks,
-                             const Contact& contact) {
-  Eigen::Index rows = 0;
-  for (const Passage& p : passages) rows += p.size();
-  Eigen::VectorXd all(rows);
-  Eigen::Index at = 0;
-  for (const Passage& p : passages) {
-    all.segment(at, p.size()) =
-        p.measured() + p.columns(flanks) * Eigen::Vector2d(contact.stiffness, contact.damping);
-    at += p.size();
-  }
-  return all;
-}
-
-struct FlankFit {
-  Flanks flanks;
-  Contact contact;
-  Measured gap;
-  double deviation = 0;
-  Eigen::VectorXd residuals;
-};
-
-/// The flanks in passages that together reach from `low` to `high`. `known`: what of the contact is not
-/// fitted.
-FlankFit fit_flanks(const std::vector<Passage>& passages, double low, double high, const Contact& known) {
-  const auto contact_at = [&](const Flanks& f) {
-    return std::isfinite(known.damping) ? known : contact_of(passages, f, known.stiffness);
-  };
-  const auto residuals = [&](const Eigen::VectorXd& p) -> Eigen::VectorXd {
-    const Flanks f{p[0], p[1]};
-    if (!(f.gap > 0)) throw CannotIdentify("no gap");
-    return residuals_of(passages, f, contact_at(f));
-  };
-  const double travel = high - low;
-  Eigen::Vector2d start(low + 0.2 * travel, 0.6 * travel);
-  double least = std::numeric_limits<double>::infinity();
-  for (double below = 0.05; below < 0.5; below += 0.08)
-    for (double above = 0.05; below + above < 0.95 && above < 0.5; above += 0.08) {
-      const Eigen::Vector2d p(low + below * travel, (1 - below - above) * travel);
-      if (!(contact_at({p[0], p[1]}).stiffness > 0)) continue;
-      const double sum = residuals(p).squaredNorm();
-      if (!(sum < least)) continue;
-      least = sum;
-      start = p;
-    }
-  const LeastSquaresFit fit = fit_nonlinear(residuals, start, Eigen::Vector2d::Constant(0.1 * travel));
-  FlankFit f;
-  f.flanks = {fit.values[0], fit.values[1]};
-  f.contact = contact_at(f.flanks);
-  const double unknowns = 2 + passages[0].polynomial() * double(passages.size()) + 2;
-  const double more = std::sqrt(double(fit.residuals.size() - 2) / (double(fit.residuals.size()) - unknowns));
-  f.gap = fit.parameter(1);
-  f.gap.standard_error *= more;
-  f.deviation = fit.deviation * more;
-  f.residuals = fit.residuals;
-  return f;
+FlankPassage passage_of(const Run& run, const Stretch& s, int push) {
+  const int n = s.end - s.begin;
+  return {Eigen::Map<const Eigen::VectorXd>(run.relative.data() + s.begin, n),
+          Eigen::Map<const Eigen::VectorXd>(run.fine.data() + s.begin, n), run.interval, push};
 }
 
 double travel_of(const Values& values, int begin, int end) {
@@ -250,7 +119,7 @@ double travel_of(const Values& values, int begin, int end) {
 }
 
 /// One passage with the contact of all.
-std::optional<GapPassage> measure(const Run& run, const Stretch& s, const Contact& contact, int push) {
+std::optional<GapPassage> measure(const Run& run, const Stretch& s, const FlankContact& contact, int push) {
   GapPassage p;
   p.time.assign(run.time.begin() + s.begin, run.time.begin() + s.end);
   p.measured.assign(run.relative.begin() + s.begin, run.relative.begin() + s.end);
@@ -258,7 +127,7 @@ std::optional<GapPassage> measure(const Run& run, const Stretch& s, const Contac
   p.motor_travel = travel_of(run.motor, s.begin, s.end);
   const auto [low, high] = std::minmax_element(run.smooth.begin() + s.begin, run.smooth.begin() + s.end);
   try {
-    const FlankFit fit = fit_flanks({Passage(run, s, push)}, *low, *high, contact);
+    const FlankFit fit = fit_flanks({passage_of(run, s, push)}, *low, *high, contact);
     p.lower = fit.flanks.lower;
     p.upper = fit.flanks.lower + fit.flanks.gap;
     p.gap = fit.gap;
@@ -304,15 +173,15 @@ struct Passages {
 };
 
 FlankFit fit_all(const Run& run, const std::vector<Stretch>& stretches, double stiffness, int push) {
-  std::vector<Passage> passages;
+  std::vector<FlankPassage> passages;
   Values lows, highs;
   for (const Stretch& s : stretches) {
-    passages.emplace_back(run, s, push);
+    passages.push_back(passage_of(run, s, push));
     const auto [low, high] = std::minmax_element(run.smooth.begin() + s.begin, run.smooth.begin() + s.end);
     lows.push_back(*low);
     highs.push_back(*high);
   }
-  Contact known;
+  FlankContact known;
   known.stiffness = stiffness;
   return fit_flanks(passages, quantile(lows, 0.5), quantile(highs, 0.5), known);
 }
@@ -375,6 +244,10 @@ Clearance identify_clearance(const Record& record, const ClearanceSettings& sett
   const Measured gaps[] = {gap_of(by_push[0]), gap_of(by_push[1])};
   const double difference = std::fabs(gaps[0].value - gaps[1].value);
   const double noise = std::max(gaps[0].standard_error, gaps[1].standard_error);
+  if (by_push[1].fit.without_flanks < kFlanks * by_push[1].fit.deviation)
+    throw CannotIdentify(sentence("the load meets no flanks: its passages fit a slow push alone to ",
+                                  by_push[1].fit.without_flanks, " rad, with flanks to ",
+                                  by_push[1].fit.deviation, " rad"));
   c.gap = {0.5 * (gaps[0].value + gaps[1].value), std::hypot(noise, difference)};
   if (c.gap.standard_error > kUncertain * c.gap.value)
     throw CannotIdentify(sentence("the passages do not tell flank from push: ", gaps[0].value,

@@ -85,14 +85,14 @@ TEST(Clearance, StiffnessAndInertiaMayBeGiven) {
 }
 
 TEST(Clearance, SpringBackOfTheMotorIsTakenOff) {
-  // The brake gives way by three steps of the motor's sensor on either side, and the flanks with it.
+  // The brake gives way by thirty steps of the motor's sensor on either side, and the flanks with it.
   const TwoMass machine = pushed(42, 80, 1.5);
   Record record = simulate(machine, 6);
   auto& motor = record.column(Channel::motor_position);
   auto& load = record.column(Channel::load_position);
   for (std::size_t i = 0; i < motor.size(); ++i) {
     const double x = load[i], step = 0.0055 / 110 * M_PI / 180;
-    const double give = 3 * step * (x > kGap / 2 ? 1 : x < -kGap / 2 ? -1 : 0);
+    const double give = 30 * step * (x > kGap / 2 ? 1 : x < -kGap / 2 ? -1 : 0);
     motor[i] += give;
     load[i] += give;
   }
