@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "backlash_diagnosis/identification/harmonics.h"
 #include "backlash_diagnosis/identification/least_squares.h"
 #include "backlash_diagnosis/record/zero_phase.h"
 
@@ -192,90 +193,21 @@ std::vector<GapBin> common_bins(const Binned& forward, const Binned& reverse, in
   return common;
 }
 
-/// Equal weight for every bin, whatever time was spent in it.
-LeastSquaresFit fit_orders(const std::vector<GapBin>& bins, const std::vector<int>& orders) {
-  const auto n = Eigen::Index(bins.size());
-  Eigen::MatrixXd a(n, 1 + 2 * Eigen::Index(orders.size()));
-  Eigen::VectorXd b(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    b[i] = bins[std::size_t(i)].separation.value;
-    a(i, 0) = 1;
-    for (std::size_t k = 0; k < orders.size(); ++k) {
-      const double angle = orders[k] * bins[std::size_t(i)].position;
-      a(i, 1 + 2 * Eigen::Index(k)) = std::sin(angle);
-      a(i, 2 + 2 * Eigen::Index(k)) = std::cos(angle);
-    }
-  }
-  return fit_linear(a, b);
-}
-
-/// P(F > f) for 2 and `freedom` degrees: closed form.
-double f_tail(double f, double freedom) {
-  return std::pow(1 + 2 * f / freedom, -freedom / 2);
-}
-
-struct Selection {
-  std::vector<int> orders;
-  std::map<int, double> chance;
-  double first_chance = 1;  // of the strongest order, taken or not
-};
-
-Selection select_orders(const std::vector<GapBin>& bins, std::vector<int> left, double false_alarm) {
-  Selection s;
-  double before = fit_orders(bins, {}).residuals.squaredNorm();
-  while (!left.empty() && bins.size() > 2 * s.orders.size() + 5) {
-    int best = -1;
-    double least = before;
-    for (const int order : left) {
-      std::vector<int> with = s.orders;
-      with.push_back(order);
-      const double sum = fit_orders(bins, with).residuals.squaredNorm();
-      if (sum < least) {
-        least = sum;
-        best = order;
-      }
-    }
-    if (best < 0) break;
-    const double freedom = double(bins.size()) - 3 - 2 * double(s.orders.size());
-    const double f = least > 0 ? (before - least) / 2 / (least / freedom) : 1e300;
-    const double chance = std::min(1.0, double(left.size()) * f_tail(f, freedom));
-    if (s.orders.empty()) s.first_chance = chance;
-    if (chance > false_alarm) break;
-    s.orders.push_back(best);
-    s.chance[best] = chance;
-    left.erase(std::find(left.begin(), left.end(), best));
-    before = least;
-  }
-  std::sort(s.orders.begin(), s.orders.end());
-  return s;
-}
-
-GapHarmonic harmonic_of(const LeastSquaresFit& fit, std::size_t k, int order, double chance) {
-  const auto at = 1 + 2 * Eigen::Index(k);
-  const double s = fit.values[at], c = fit.values[at + 1], size = std::hypot(s, c);
-  const Eigen::Matrix2d covariance = fit.covariance.block<2, 2>(at, at);
-  const Eigen::Vector2d along(s / size, c / size), across(-c / size, s / size);
-  GapHarmonic h;
-  h.order = order;
-  h.amplitude = {size, std::sqrt(along.dot(covariance * along))};
-  h.phase = {std::atan2(c, s), std::sqrt(across.dot(covariance * across)) / size};
-  h.chance = chance;
-  return h;
-}
-
 void fit_series(GapMap& map, const GapMapSettings& settings) {
   std::vector<int> orders;
   for (int n = 1; n <= settings.highest_order; ++n)
     if (n * map.coverage >= 0.999) orders.push_back(n);
-  const Selection selection = select_orders(map.bins, orders, settings.false_alarm);
-  const LeastSquaresFit fit = fit_orders(map.bins, selection.orders);
-  map.mean_separation = fit.parameter(0);
-  map.deviation = fit.deviation;
-  for (std::size_t k = 0; k < selection.orders.size(); ++k)
-    map.harmonics.push_back(
-        harmonic_of(fit, k, selection.orders[k], selection.chance.at(selection.orders[k])));
+  Values angle, separation;  // equal weight for every bin, whatever time was spent in it
+  for (const GapBin& b : map.bins) {
+    angle.push_back(b.position);
+    separation.push_back(b.separation.value);
+  }
+  const HarmonicSeries series = fit_harmonics(angle, separation, orders, settings.false_alarm);
+  map.mean_separation = series.mean;
+  map.deviation = series.deviation;
+  map.harmonics = series.harmonics;
   map.varies = !map.harmonics.empty();
-  map.confidence = 1 - selection.first_chance;
+  map.confidence = 1 - series.chance;
 }
 
 double relative(const Measured& m) {
@@ -332,8 +264,7 @@ void check(const GapMapSettings& s) {
 
 double GapMap::gap_at(double position) const {
   double gap = std::isfinite(mean_gap.value) ? mean_gap.value : mean_separation.value;
-  for (const GapHarmonic& h : harmonics)
-    gap += h.amplitude.value * std::sin(h.order * position + h.phase.value);
+  for (const Harmonic& h : harmonics) gap += h.amplitude.value * std::sin(h.order * position + h.phase.value);
   return gap;
 }
 

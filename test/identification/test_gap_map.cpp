@@ -63,7 +63,7 @@ TEST(GapMap, SeriesOfAKnownGapIsFound) {
   ASSERT_EQ(map.harmonics.size(), 2u);
   const double order[] = {3, 5}, amplitude[] = {0.1 * r.gap, 0.05 * r.gap}, phase[] = {0.7, -1.1};
   for (int i = 0; i < 2; ++i) {
-    const GapHarmonic& h = map.harmonics[i];
+    const Harmonic& h = map.harmonics[i];
     EXPECT_EQ(h.order, order[i]);
     // Four deviations, and what the scale of 3e-4 does to the gap.
     EXPECT_NEAR(h.amplitude.value, amplitude[i], 4 * h.amplitude.standard_error + 3e-4 * amplitude[i]);
@@ -138,7 +138,7 @@ TEST(GapMap, StandardErrorsAreThoseOfTheScatter) {
     ASSERT_GE(map.harmonics.size(), 2u);
     scatter += std::pow(map.mean_separation.value - r.gap, 2) / runs;
     stated += std::pow(map.mean_separation.standard_error, 2) / runs;
-    const GapHarmonic& h = map.harmonics[0];
+    const Harmonic& h = map.harmonics[0];
     amplitude += std::pow(h.amplitude.value - 0.1 * r.gap, 2) / runs;
     amplitude_stated += std::pow(h.amplitude.standard_error, 2) / runs;
     for (const GapBin& b : map.bins) {
@@ -197,7 +197,7 @@ TEST(GapMap, PartOfATurnIsSaid) {
   const GapMap map = map_of(r);
   EXPECT_NEAR(map.coverage, 0.4, 0.01);
   ASSERT_GE(map.warnings.size(), 1u);
-  for (const GapHarmonic& h : map.harmonics) EXPECT_GE(h.order, 3);
+  for (const Harmonic& h : map.harmonics) EXPECT_GE(h.order, 3);
   for (double q = r.start + 0.1; q < r.start + 0.4 * kTurn - 0.1; q += 0.1)
     EXPECT_NEAR(map.gap_at(q), r.at(q), 0.01 * r.gap) << q;
 }

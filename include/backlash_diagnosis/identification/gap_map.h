@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/identification/harmonics.h"
 #include "backlash_diagnosis/identification/measured.h"
 #include "backlash_diagnosis/record/record.h"
 
@@ -40,12 +41,6 @@ struct GapBin {
   Measured centre;            // rad, mean of both
 };
 
-struct GapHarmonic {
-  int order;
-  Measured amplitude, phase;  // rad, rad; of sin(order q + phase)
-  double chance;              // of such an amplitude or more without a variation, all orders considered
-};
-
 struct GapMap {
   std::vector<GapBin> bins;                      // by position, those that both runs visited
   double coverage = 0;                           // of the turn, that these are
@@ -53,7 +48,7 @@ struct GapMap {
   Measured wind_up, mean_gap;                    // rad; NaN where stiffness or friction is not given
   Measured scale_forward, scale_reverse, scale;  // motor travel per load travel of the runs, and mean
   double forward_speed = 0, reverse_speed = 0;   // rad/s, of the load, medians
-  std::vector<GapHarmonic> harmonics;            // by order
+  std::vector<Harmonic> harmonics;               // by order
   double deviation = 0;                          // rad, of the bins from the series
   bool varies = false;
   double confidence = 0;  // that it varies: 1 - chance of the strongest harmonic

@@ -1,0 +1,37 @@
+// Standard errors where neighbouring samples share their error: everything in blocks longer than that
+// sharing.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/measured.h"
+
+namespace backlash {
+
+/// A number with three digits, for messages.
+std::string figure(double value);
+
+/// Means of consecutive blocks of `length` samples; the rest at the end is left out.
+std::vector<double> block_means(const std::vector<double>& values, std::size_t length);
+
+/// Mean of a correlated signal: standard error from the scatter of the means of ten to nineteen batches
+/// (fewer values: NaN). Honest where a batch is longer than the correlation.
+Measured batch_mean(const std::vector<double>& values);
+
+/// How the least squares solution of A x = b changes where one block of rows after the other is left out: one
+/// column per block, about their mean. `residuals` b - A x at the solution; `block` the number of each row's
+/// block, 0 ... Throws CannotIdentify with fewer than four blocks, and where without one of them the unknowns
+/// cannot be told apart.
+Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
+                                  const std::vector<std::size_t>& block);
+
+/// Covariance from them (jackknife, Efron 1982): needs no independence of the rows inside a block.
+Eigen::MatrixXd jackknife_covariance(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
+                                     const std::vector<std::size_t>& block);
+
+/// The same for numbers of which the changes are known.
+double jackknife_error(const Eigen::VectorXd& changes);
+
+}  // namespace backlash
