@@ -12,11 +12,11 @@ sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import plotting  # noqa: E402
 
 plt = plotting.pyplot()
+plt.rcParams["agg.path.chunksize"] = 10000  # long records
 
 CHANNELS = ("motor_torque", "sensor_torque", "motor_current", "motor_velocity", "load_velocity", "acceleration",
             "motor_position", "load_position", "reference_position")
 COLOURS = {"motor": "tab:blue", "load": "tab:orange", "sensor": "tab:green"}
-POINTS = 20000  # most that a panel draws
 
 
 def load(path):
@@ -59,9 +59,8 @@ def panels(record):
 
 
 def draw(axes, time, lines):
-    step = max(1, len(time) // POINTS)
     for label, values in lines:
-        axes.plot(time[::step], values[::step], lw=0.7, label=label, color=COLOURS.get(label.split("_")[0]))
+        axes.plot(time, values, lw=0.7, label=label, color=COLOURS.get(label.split("_")[0]))
     if len(lines) > 1:
         axes.legend(fontsize=7, loc="upper right")
     axes.grid(True, alpha=0.3)
@@ -96,8 +95,7 @@ def main():
     if loop:
         for column, (source, shown) in enumerate(((record, whole), (zoom, near))):
             axes = figure.add_subplot(grid[len(whole), column])
-            step = max(1, len(source["time"]) // POINTS)
-            axes.plot(shown[-1][1][0][1][::step], source["motor_torque"][::step], lw=0.5, color="tab:purple")
+            axes.plot(shown[-1][1][0][1], source["motor_torque"], lw=0.5, color="tab:purple")
             axes.set_xlabel("position difference, motor - load [rad]")
             axes.set_ylabel("motor torque [N m]" if column == 0 else "")
             axes.grid(True, alpha=0.3)

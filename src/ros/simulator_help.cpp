@@ -9,6 +9,7 @@ Usage: rosrun backlash_diagnosis simulator [_PARAMETER:=VALUE ...] [NAME:=NEW_NA
 
 Private parameters; unknown ones are refused. In brackets: units of values that override the rig file
   rig                   path of a rig file; without it the built-in rig of Sarkar et al. (1997)
+  run                   [text] one of the rig file's test_runs: its excitation replaces that of the rig file
   joint                 [text] prefix of the names in joint_states: JOINT_motor, JOINT_sensor, JOINT_load, and
                         JOINT_current, JOINT_accelerometer where the rig file declares these sensors
   backlash              [m] total free play along the line of action, >= 0 (rig without base radius: rad)

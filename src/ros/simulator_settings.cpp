@@ -21,6 +21,7 @@ class Overrides {
   Overrides(Parameters& parameters, RigFile& file) : parameters_(parameters), file_(file) {}
 
   void apply() {
+    run();
     joint();
     backlash();
     sensors();
@@ -46,6 +47,17 @@ class Overrides {
     joint = parameters_.text("joint", joint);
     if (joint.empty()) throw InvalidParameter("~joint", "''", "must not be empty");
     if (parameters_.has("joint")) given_.push_back("joint = " + printable(joint));
+  }
+
+  void run() {
+    if (!parameters_.has("run")) return parameters_.allow("run");
+    const std::string name = parameters_.text("run", "");
+    try {
+      apply_test_run(find_test_run(file_.test_runs, name), file_);
+    } catch (const InvalidParameter& e) {
+      throw InvalidParameter("~run", e.value(), e.limit());
+    }
+    given_.push_back("run = " + name);
   }
 
   void backlash() {

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <limits>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/workflow/rig_file.h"
 #include "tools/common/command_line.h"
@@ -21,9 +22,10 @@ Command command() {
   c.summary = "Simulates the rig that a file describes, from rest, and writes the record of its sensors.";
   c.positional = {"RIG.yaml"};
   c.options = {
-      {"duration", "S", "length of the record [s]", true},
-      {"out", "RECORD.{csv,bag}", "record to write; a bag has the joint of the rig file on /joint_states",
-       true},
+      {"duration", "S", "length of the record [s]; default: that of --run"},
+      {"out", "RECORD.{csv,bag}", "record to write; a bag has the joint of the rig file on /joint_states"},
+      {"run", "NAME", "one of the rig file's test runs instead of its excitation"},
+      {"list-runs", "", "print the rig file's test runs, simulate nothing"},
       {"backlash", "M",
        "total free play along the line of action [m] (a rig without base radius: angle at the load "
        "[rad]) instead of the rig file's"},
@@ -31,7 +33,9 @@ Command command() {
       {"seed", "N", "of all sensor noise, instead of the rig file's; the same seed gives the same record"},
       {"sample-rate", "HZ", "instead of the rig file's"},
   };
-  c.examples = {"simulate config/sarkar_1997.yaml --duration 2 --backlash 60e-6 --out run.csv"};
+  c.examples = {"simulate config/sarkar_1997.yaml --duration 2 --backlash 60e-6 --out run.csv",
+                "simulate config/yumrukcal_2013.yaml --run sine_sweep --out sweep.csv",
+                "simulate config/yumrukcal_2013.yaml --list-runs"};
   c.exit_codes = "  0   done\n";
   return c;
 }
@@ -47,15 +51,43 @@ void apply(const Arguments& arguments, RigFile& file) {
   sensors.sampling_rate = arguments.number("sample-rate", sensors.sampling_rate, Range::positive());
 }
 
+const TestRun& chosen_run(const Arguments& arguments, const RigFile& file) {
+  try {
+    return find_test_run(file.test_runs, arguments.text("run"));
+  } catch (const InvalidParameter& e) {
+    throw UsageError(std::string("--") + e.what());
+  }
+}
+
+int list_runs(const Arguments& arguments) {
+  for (const char* option : {"out", "run", "duration"})
+    if (arguments.has(option)) throw UsageError(std::string("--list-runs simulates nothing: no --") + option);
+  for (const TestRun& run : load_rig_file(arguments.positional(0)).test_runs)
+    std::cout << run.name << ": " << to_text(run.duration) << " s, " << run.excitation.type
+              << (run.excitation.at_load ? " at the load" : "")
+              << (run.excitation.motor_brake ? ", motor braked" : "")
+              << (run.without_load ? ", driver alone" : "") << '\n';
+  return kHealthy;
+}
+
 int simulate(const Arguments& arguments) {
+  if (arguments.has("list-runs")) return list_runs(arguments);
+  for (const char* option : {"out", "duration"})
+    if (!arguments.has(option) && !(arguments.has("run") && std::string(option) == "duration"))
+      throw UsageError(std::string("missing --") + option);
   const std::string out = arguments.text("out");
   check_record_path(out);
-  const double duration = arguments.number("duration", 0, Range::positive());
+  double duration = arguments.number("duration", 0, Range::positive());
   RigFile file = load_rig_file(arguments.positional(0));
+  if (arguments.has("run")) {
+    const TestRun& run = chosen_run(arguments, file);
+    if (!arguments.has("duration")) duration = run.duration;
+    apply_test_run(run, file);
+  }
   apply(arguments, file);
   const double samples = std::round(duration * file.simulation.sensors.sampling_rate);
   if (samples < 1 || samples > kMostSamples)
-    throw UsageError("--duration = " + to_text(duration) + " s at " +
+    throw UsageError("a duration of " + to_text(duration) + " s at " +
                      to_text(file.simulation.sensors.sampling_rate) + " Hz: must give from 1 to 1e9 samples");
   check_output(out, {arguments.positional(0)});
   Record record;
@@ -66,8 +98,8 @@ int simulate(const Arguments& arguments) {
   write_record(record, out, file.rig.joint);
   std::cout << out << ": " << record.size() << " samples at "
             << to_text(file.simulation.sensors.sampling_rate) << " Hz of " << file.rig.name
-            << " with backlash " << to_text(file.rig.mesh.backlash)
-            << (file.rig.mesh.angular() ? " rad" : " m") << '\n';
+            << (arguments.has("run") ? ", run " + arguments.text("run") + "," : "") << " with backlash "
+            << to_text(file.rig.mesh.backlash) << (file.rig.mesh.angular() ? " rad" : " m") << '\n';
   return kHealthy;
 }
 

@@ -23,7 +23,7 @@ class SimulatorStartTest(unittest.TestCase):
     def rig(self, **changes):
         rig = default_rig()
         for key, value in changes.items():
-            rig[key].update(value) if isinstance(value, dict) else rig.update({key: value})
+            rig.setdefault(key, {}).update(value) if isinstance(value, dict) else rig.update({key: value})
         return write_rig(self.folder, rig)
 
     def assert_refused(self, parameters, code, *shown):
@@ -53,6 +53,18 @@ class SimulatorStartTest(unittest.TestCase):
         with open(path, "w") as file:  # a topic has neither amplitude nor frequency
             file.write(re.sub(r"^  (amplitude|frequency): .*\n", "", text, flags=re.MULTILINE))
         self.assert_refused({"rig": path, "excitation_amplitude": 0.1}, 64, "~excitation_amplitude", "topic")
+
+    def test_a_run_of_the_rig_file_replaces_its_excitation(self):
+        runs = {"push": {"duration": 1.0, "excitation": {"type": "constant", "torque": 0.03}}}
+        path = self.rig(test_runs=dict(runs, wait=dict(runs["push"], excitation={"type": "topic"})))
+        self.assert_refused({"rig": path, "run": "pull"}, 64, "~run", "pull", "push, wait")
+        self.assert_refused({"run": "push"}, 64, "~run", "test_runs")
+        self.assert_refused({"rig": path, "run": "push", "excitation_amplitude": 1.0}, 64, "constant")
+        with Simulator({"rig": path, "run": "push"}) as simulator:
+            messages = Inbox(simulator.topic("joint_states"), JointState).wait_for_count(100)
+            self.assertEqual({m.effort[MOTOR] for m in messages}, {0.03})
+            description = latched(simulator.topic("rig_description"), String).data
+            self.assertIn("run = push", description.splitlines()[0])
 
     def test_a_missing_or_wrong_rig_file_ends_the_node_with_its_name(self):
         self.assert_refused({"rig": self.folder + "/absent.yaml"}, 66, "~rig", "absent.yaml")

@@ -214,6 +214,40 @@ TEST(ExcitationSettings, EveryTypeIsReadAndCreated) {
       "{type: multi_sine, bias: 2, lines: [{amplitude: 1, frequency: 2, phase: 0.5}, "
       "{amplitude: 3, frequency: 5}]}");
   EXPECT_DOUBLE_EQ(sum->torque(0, 0), 2 + std::sin(0.5));
+  const auto stepped = created(
+      "{type: stepped_sine, amplitude: 3, bias: 1, start_frequency: 1, end_frequency: 2, step_frequency: 1, "
+      "cycles: 4}");
+  EXPECT_EQ(stepped->period(), 6);
+  EXPECT_NEAR(stepped->torque(0.25, 0), 4, 1e-14);
+}
+
+TEST(ExcitationSettings, SpeedLoopsAreReadAndCreated) {
+  const std::string controller = "controller: {rate: 10, proportional: 2, integral: 0, torque_limit: 5}";
+  const auto asked = [](Excitation& loop, long sample) {
+    loop.begin_segment(sample, Observation{});
+    return loop.torque(0, sample);
+  };
+  const auto one = created("{type: constant_speed, speed: 1.5, ramp: 1, " + controller + "}");
+  EXPECT_EQ(asked(*one, 5), 2 * 0.75);
+  EXPECT_EQ(asked(*one, 1000), 2 * 1.5);
+  const auto two = created("{type: constant_speed, speeds: [1, -2], hold: 2, ramp: 1, " + controller + "}");
+  EXPECT_EQ(asked(*two, 20), 2);
+  EXPECT_EQ(asked(*two, 50), -4);
+  const auto sine =
+      created("{type: sine_speed, offset: 1, amplitude: 0.5, frequency: 0.5, ramp: 1, " + controller + "}");
+  EXPECT_NEAR(asked(*sine, 25), 2 * 1.5, 1e-14);
+  EXPECT_EQ(asked(*created("{type: constant_speed, speed: 9, ramp: 1, " + controller + "}"), 99), 5);
+}
+
+TEST(ExcitationSettings, PlaceAndBrake) {
+  const auto read = [](const std::string& text) { return read_excitation(parse(text)); };
+  const ExcitationSettings plain = read("{type: constant, torque: 1}");
+  EXPECT_FALSE(plain.at_load || plain.motor_brake);
+  EXPECT_FALSE(read("{type: constant, torque: 1, at: motor, motor_brake: false}").at_load);
+  const ExcitationSettings hand =
+      read("{type: sine, amplitude: 1, frequency: 1, at: load, motor_brake: true}");
+  EXPECT_TRUE(hand.at_load && hand.motor_brake);
+  EXPECT_FALSE(read("{type: topic, at: load}").motor_brake);
 }
 
 TEST(RandomExcitation, HasTheRmsAndTheBandAndNeverRepeats) {
@@ -268,16 +302,18 @@ TEST(ExcitationSettings, CopiesAreIndependent) {
 }
 
 TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
+  const std::string kLoop =
+      "type: constant_speed\ncontroller: {rate: 1, proportional: 1, integral: 1, torque_limit: 1}\n";
   const struct {
-    const char* text;
-    const char* message;
+    std::string text;
+    std::string message;
   } cases[] = {
       {"amplitude: 1\n",
        "rig.yaml:1: type: is missing, expected one of square, sine, chirp, multi_sine, random, constant, "
-       "topic"},
+       "topic, stepped_sine, constant_speed, sine_speed"},
       {"type: triangle\n",
        "rig.yaml:1: type = triangle: must be one of square, sine, chirp, multi_sine, random, constant, "
-       "topic"},
+       "topic, stepped_sine, constant_speed, sine_speed"},
       {"type: square\nfrequency: 10\n", "rig.yaml:1: amplitude: is missing"},
       {"type: square\namplitude: -1\nfrequency: 10\n", "rig.yaml:2: amplitude = -1: must be >= 0"},
       {"type: square\namplitude: 1\nfrequency: 0\n", "rig.yaml:3: frequency = 0: must be > 0"},
@@ -300,13 +336,28 @@ TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
        "rig.yaml:4: upper_frequency = 9: must be > lower_frequency"},
       {"type: random\nrms: 1\nlower_frequency: 1\nupper_frequency: 9\nlines: 3\nseed: 1\n",
        "rig.yaml:5: lines = 3: must be"},
+      {"{type: stepped_sine, amplitude: 1, start_frequency: 3, end_frequency: 2, step_frequency: 1, cycles: 1}",
+       "rig.yaml:1: end_frequency = 2: must be >= start_frequency"},
+      {"{type: stepped_sine, amplitude: 1, start_frequency: 1, end_frequency: 2, step_frequency: 1, cycles: 1.5}",
+       "rig.yaml:1: cycles = 1.5: must be an integer"},
+      {"type: constant_speed\nspeed: 1\nramp: 1\n", "rig.yaml:1: controller: is missing"},
+      {"type: constant_speed\ncontroller: {rate: 1, proportional: 1, integral: 1, torque_limit: 0}\n",
+       "rig.yaml:2: controller.torque_limit = 0: must be > 0"},
+      {kLoop + "ramp: 1\n", "rig.yaml:1: speed: is missing"},
+      {kLoop + "ramp: 1\nspeeds: []\nhold: 1\n", "rig.yaml:4: speeds = [...]: needs at least one"},
+      {kLoop + "ramp: 1\nspeeds: [1]\n", "rig.yaml:1: hold: is missing"},
+      {kLoop + "ramp: 1\nspeed: 1\nhold: 1\n", "rig.yaml:5: hold = 1: unknown key"},
+      {kLoop + "ramp: 1\nspeed: 1\nat: load\n", "rig.yaml:5: at = load: a speed loop drives the motor"},
+      {kLoop + "ramp: 1\nspeed: 1\nmotor_brake: true\n", "rig.yaml:5: motor_brake = true: needs at: load"},
+      {"type: constant\ntorque: 1\nat: gear\n", "rig.yaml:3: at = gear: must be one of motor, load"},
+      {"type: constant\ntorque: 1\nmotor_brake: true\n", "rig.yaml:3: motor_brake = true: needs at: load"},
   };
   for (const auto& bad : cases) {
     try {
       created(bad.text);
       ADD_FAILURE() << "accepted: " << bad.text;
     } catch (const BadData& error) {
-      EXPECT_EQ(std::string(error.what()).substr(0, std::string(bad.message).size()), bad.message);
+      EXPECT_EQ(std::string(error.what()).substr(0, bad.message.size()), bad.message);
     }
   }
 }

@@ -11,7 +11,7 @@ Command command() {
   c.name = "saw";
   c.summary = "Saws.";
   c.positional = {"WOOD"};
-  c.options = {{"length", "M", "length [m]", true}, {"count", "N", "pieces; default: 1"}};
+  c.options = {{"length", "M", "length [m]", true}, {"count", "N", "pieces; default: 1"}, {"dry", "", "no oil"}};
   c.examples = {"saw oak --length 2"};
   c.exit_codes = "  0   done\n";
   return c;
@@ -46,6 +46,12 @@ TEST(CommandLine, AbsentOptionIsTheFallback) {
   EXPECT_EQ(arguments.text("count"), "");
 }
 
+TEST(CommandLine, AnOptionWithoutValueIsGivenOrNot) {
+  EXPECT_TRUE(parse({"oak", "--dry", "--length", "1"}).has("dry"));
+  EXPECT_FALSE(parse({"oak", "--length", "1"}).has("dry"));
+  EXPECT_NE(complaint({"oak", "--length", "1", "--dry=yes"}).find("--dry"), std::string::npos);
+}
+
 TEST(CommandLine, ComplaintsNameOptionValueAndLimit) {
   const std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>> cases = {
       {{"--length", "1"}, {"WOOD"}},
@@ -78,7 +84,7 @@ TEST(CommandLine, ComplaintsNameOptionValueAndLimit) {
 TEST(CommandLine, HelpNamesEverythingWithinThePage) {
   const std::string help = help_text(command());
   for (const char* part :
-       {"Usage: saw WOOD --length M [--count N]", "Saws.", "length [m]", "default: 1", "--help", "--version",
+       {"Usage: saw WOOD --length M [--count N] [--dry]", "Saws.", "length [m]", "default: 1", "--help", "--version",
         "saw oak --length 2", "0   done", "64", "65", "66", "70", "73"})
     EXPECT_NE(help.find(part), std::string::npos) << help << " lacks " << part;
 }

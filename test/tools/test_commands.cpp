@@ -79,6 +79,10 @@ TEST_F(Commands, UsageErrorsEndWith64AndPointToHelp) {
            "simulate rig.yaml --duration 1 --out x.csv --seed 1.5",
            "simulate rig.yaml --duration 1 --out x.csv --sample-rate 0",
            "simulate rig.yaml --duration 1 --out x.csv --wrong 1",
+           "simulate rig.yaml --run walk --out x.csv",
+           "simulate rig.yaml --run walk",
+           "simulate rig.yaml --list-runs --out x.csv",
+           "simulate rig.yaml --list-runs=1",
            "simulate rig.yaml rig.yaml --duration 1 --out x.csv",
            "build_curve rig.yaml",
            curve + "--points 1",
@@ -104,6 +108,25 @@ TEST_F(Commands, UsageErrorsEndWith64AndPointToHelp) {
   }
   EXPECT_EQ(files(), 2u);
   EXPECT_EQ(read("a.csv"), "time,motor_torque\n0,1\n1,2\n");
+}
+
+TEST_F(Commands, SimulateKnowsTheTestRunsOfARig) {
+  for (const char* name : {"yumrukcal_2013.yaml", "yumrukcal_2013_runs.yaml"})
+    std::filesystem::create_symlink(package_file(std::string("config/") + name), path(name));
+  const std::string servo = "simulate yumrukcal_2013.yaml ";
+  const std::string list = done(servo + "--list-runs").out;
+  expect_contains(list, "external_excitation: 40 s, sine at the load, motor braked\n");
+  expect_contains(list, "motor_inertia_sine: 30 s, sine_speed, driver alone\n");
+  EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), 10);
+  EXPECT_EQ(done("simulate rig.yaml --list-runs").out, "");
+  const std::string square = servo + "--run square_wave --sample-rate 50 --out a.csv";
+  expect_contains(done(square).out, "1000 samples at 50 Hz of yumrukcal_2013, run square_wave,");  // 20 s
+  expect_contains(done(square + " --duration 1").out, ": 50 samples");
+  const Outcome unknown = run(servo + "--run walk --out b.csv");
+  EXPECT_EQ(unknown.code, 64);
+  expect_contains(unknown.err, "--run = 'walk': must be one of external_excitation, sine_sweep,");
+  expect_contains(run("simulate rig.yaml --run walk --out b.csv").err, "has no test_runs");
+  EXPECT_FALSE(exists("b.csv"));
 }
 
 TEST_F(Commands, MissingInputEndsWith66) {

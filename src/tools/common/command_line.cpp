@@ -32,8 +32,12 @@ const std::string kCommonExitCodes =
 
 po::options_description described(const Command& command) {
   po::options_description all;
-  for (const Option& option : command.options)
-    all.add_options()(option.name.c_str(), po::value<std::string>(), "");
+  for (const Option& option : command.options) {
+    if (option.value.empty())
+      all.add_options()(option.name.c_str(), "");
+    else
+      all.add_options()(option.name.c_str(), po::value<std::string>(), "");
+  }
   all.add_options()(kPositional.c_str(), po::value<std::vector<std::string>>(), "");
   return all;
 }
@@ -61,11 +65,15 @@ void append_option(std::string& text, const std::string& head, const std::string
   append_wrapped(text, help, kIndent);
 }
 
+std::string spelling(const Option& option) {
+  return "--" + option.name + (option.value.empty() ? "" : " " + option.value);
+}
+
 std::string usage_line(const Command& command) {
   std::string line = "Usage: " + command.name;
   for (const std::string& name : command.positional) line += " " + name;
   for (const Option& option : command.options) {
-    const std::string part = "--" + option.name + " " + option.value;
+    const std::string part = spelling(option);
     line += option.required ? " " + part : " [" + part + "]";
   }
   return line;
@@ -148,10 +156,11 @@ Arguments parse_arguments(const Command& command, const std::vector<std::string>
   std::map<std::string, std::string> options;
   for (const Option& option : command.options) {
     if (given.count(option.name)) {
-      options[option.name] = given[option.name].as<std::string>();
-      if (options[option.name].empty()) throw UsageError("--" + option.name + " is empty");
+      options[option.name] = option.value.empty() ? "" : given[option.name].as<std::string>();
+      if (!option.value.empty() && options[option.name].empty())
+        throw UsageError("--" + option.name + " is empty");
     } else if (option.required) {
-      throw UsageError("missing --" + option.name + " " + option.value);
+      throw UsageError("missing " + spelling(option));
     }
   }
   return {std::move(positional), std::move(options)};
@@ -164,7 +173,7 @@ std::string help_text(const Command& command) {
   append_wrapped(text, command.summary, 0);
   text += "\nOptions:\n";
   for (const Option& option : command.options)
-    append_option(text, "--" + option.name + " " + option.value, option.help);
+    append_option(text, spelling(option), option.help);
   append_option(text, "--help", "show this text");
   append_option(text, "--version", "show the version");
   if (!command.notes.empty()) {

@@ -17,7 +17,7 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// "--name VALUE", with a help text that states unit and default.
+/// "--name VALUE", with a help text that states unit and default; "--name" alone where `value` is empty.
 struct Option {
   std::string name, value, help;
   bool required = false;
@@ -41,7 +41,7 @@ class Arguments {
 
   const std::string& positional(std::size_t i) const { return positional_.at(i); }
   bool has(const std::string& option) const { return options_.count(option) > 0; }
-  std::string text(const std::string& option) const;  ///< empty where absent, never where given
+  std::string text(const std::string& option) const;  ///< empty where absent, never where a value is given
   double number(const std::string& option, double absent, const Range& range) const;
   std::uint64_t integer(const std::string& option, std::uint64_t absent, std::uint64_t lower,
                         std::uint64_t upper) const;
