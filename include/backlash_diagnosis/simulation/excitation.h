@@ -29,6 +29,9 @@ class Excitation {
   /// machine: where a closed loop decides.
   virtual void begin_segment(long /*segment*/, const Observation& /*machine*/) {}
 
+  /// Time [s] within which the torque may rise and fall again; infinite where it is constant in a segment.
+  virtual double shortest_period() const;
+
   /// Repetition time [s]; 0 where the torque does not repeat.
   virtual double period() const { return 0; }
 
