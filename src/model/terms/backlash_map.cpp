@@ -59,7 +59,7 @@ class BacklashMap : public Term {
 void check(const std::vector<double>& positions, const std::vector<double>& backlash,
            const std::vector<double>& centre) {
   const auto refuse = [](const char* name, double value, const char* limit) {
-    throw InvalidParameter(std::string("backlash_map.") + name, value, limit);
+    throw InvalidParameter(name, value, limit);
   };
   if (positions.size() < 2) refuse("positions", double(positions.size()), "needs at least two points");
   if (backlash.size() != positions.size())
