@@ -351,6 +351,27 @@ TEST(MeshTerms, AnElasticImpactOnASlopeKeepsEnergyAndItsMomentum) {
   }
 }
 
+// Where neither flank touches, the events are the penetrations and the ends of their approaches.
+TEST(MeshTerms, TheTurningPointsAreThoseOfEachFlank) {
+  Rig rig = free_rig({kEccentric});
+  rig.mesh.contact = make_contact_law(
+      "lankarani_nikravesh",
+      {{"stiffness", 1e8}, {"exponent", 1.5}, {"restitution", 0.7}, {"minimum_speed", 1e-4}});
+  GearTrain train(rig);
+  double state[] = {0.3, 0.3003, 0.2, -0.4}, values[GearTrain::kContactEvents];
+  train.begin_contact(state);
+  train.contact_events(state, values);
+  const double d = 1e-6;
+  const auto depth = [&](int side, double t) {
+    const double motor = state[0] + t * state[2], load = state[1] + t * state[3];
+    return side * (motor - load) - kHalf - shift(term(kEccentric), side, load, motor).opening;
+  };
+  EXPECT_NEAR(values[0], depth(1, 0), 1e-16);
+  EXPECT_NEAR(values[1], depth(-1, 0), 1e-16);
+  EXPECT_NEAR(values[2], -(depth(-1, d) - depth(-1, -d)) / (2 * d), 1e-9);  // rounding over d
+  EXPECT_NEAR(values[3], -(depth(1, d) - depth(1, -d)) / (2 * d), 1e-9);
+}
+
 TEST(MeshTerms, RefusalsNameWhatIsWrong) {
   const struct {
     const char* text;
