@@ -5,12 +5,11 @@
 
 namespace backlash {
 
-// Zero belongs to the mode: a speed of zero is where sliding begins, and a torque of just the limit is held. A value
-// of zero at a restart would hide a mode that ends at once; SUNDIALS multiplies the values at both ends of a step,
-// which must not underflow.
+// Zero belongs to the mode: a speed of zero is where sliding begins, and a torque of just the limit is held.
+// A value of zero at a restart would hide a mode that ends at once; SUNDIALS multiplies the values at both
+// ends of a step, which must not underflow.
 double StickSlip::event(double net, double speed, const FrictionLimits& limits) const {
-  const double value =
-      stuck() ? std::max(net - limits.forward, -net - limits.backward) : -direction_ * speed;
+  const double value = stuck() ? std::max(net - limits.forward, -net - limits.backward) : -direction_ * speed;
   return value == 0 ? -1e-100 : value;
 }
 

@@ -94,9 +94,9 @@ bool Plant::update_modes(int event) {
   return gear_train_.update_friction(time_, state_.data(), applied_torque()) || touched;
 }
 
-// A body that sticks lets the solver take steps of any length; it breaks away only where a step ends with too much
-// torque, and one that slides stops only where a step ends with its speed reversed. A hundred steps per period
-// see all but the last 0.05 percent of a peak.
+// A body that sticks lets the solver take steps of any length; it breaks away only where a step ends with too
+// much torque, and one that slides stops only where a step ends with its speed reversed. A hundred steps per
+// period see all but the last 0.05 percent of a peak.
 void Plant::restart() {
   const double longest = gear_train_.friction_event_count() > 0 ? excitation_->shortest_period() / 100
                                                                 : std::numeric_limits<double>::infinity();

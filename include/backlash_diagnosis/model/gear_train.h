@@ -9,8 +9,8 @@
 // neighbours one body; a locked link has q_L = 0. F_M and F_L are dry friction with sticking, see StickSlip;
 // a braked motor sticks whatever the torque. Terms may shift either flank by an opening o(q_M, q_L, torque);
 // then its penetration is side x - backlash / 2 - r o, and the mesh torque acts on both ends through the
-// slopes of o, so that no energy is lost or gained (but see terms that follow the torque). After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and
-// Table 1, with absolute instead of relative coordinates.
+// slopes of o, so that no energy is lost or gained (but see terms that follow the torque). After Sarkar,
+// Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute instead of relative coordinates.
 #pragma once
 
 #include <array>

@@ -48,9 +48,9 @@ class Integrator {
   Integrator(Integrator&&) noexcept;
   Integrator& operator=(Integrator&&) noexcept;
 
-  /// Starts anew from `state` at `t`, forgetting step size and history. `stop` is a time beyond which the derivative
-  /// is not evaluated (infinite: none): the next jump of the right-hand side. `longest_step` [s] (infinite: as
-  /// the error allows) for events that depend on time more than the state does.
+  /// Starts anew from `state` at `t`, forgetting step size and history. `stop` is a time beyond which the
+  /// derivative is not evaluated (infinite: none): the next jump of the right-hand side. `longest_step` [s]
+  /// (infinite: as the error allows) for events that depend on time more than the state does.
   void restart(double t, const double* state, double stop,
                double longest_step = std::numeric_limits<double>::infinity());
 
