@@ -190,6 +190,7 @@ void check(const DecaySettings& s) {
     throw InvalidParameter("reduced_inertia", s.reduced_inertia.value, "must be > 0");
   if (!(s.shortest >= 1 && s.longest >= s.shortest))
     throw InvalidParameter("longest", s.longest, "and shortest must be 1 <= shortest <= longest periods");
+  if (!(s.bearing_damping >= 0)) throw InvalidParameter("bearing_damping", s.bearing_damping, "must be >= 0");
   if (s.least_engagements < 2)
     throw InvalidParameter("least_engagements", s.least_engagements, "must be >= 2");
 }
@@ -208,6 +209,8 @@ void fill(DecayIdentification& d, const DecaySettings& s) {
   d.damping_by_rate.value = 2 * rate.value * j;
   d.damping_by_rate.standard_error =
       d.damping_by_rate.value * std::sqrt(relative_variance(rate) + relative_variance(s.reduced_inertia));
+  d.damping.value -= s.bearing_damping;
+  d.damping_by_rate.value -= s.bearing_damping;
   const double expected = std::sqrt(k / j), found = d.natural_frequency.value;
   if (std::fabs(found / expected - 1) > 0.05)
     d.warnings.push_back(sentence("the ringing is at ", found / (2 * M_PI),

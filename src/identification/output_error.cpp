@@ -11,6 +11,7 @@
 namespace backlash {
 namespace {
 
+constexpr double kHold = 0.5;             // samples, mean delay of a held torque
 constexpr double kLargestDelay = 3;  // samples
 constexpr Eigen::Index kRowsPerBlock = 200;
 constexpr double kEnds = 3;           // periods of the cutoff at either end, where the filter has not settled
@@ -50,6 +51,27 @@ std::vector<double> held_over_second_difference(const std::vector<double>& x) {
   std::vector<double> mean = x;
   for (std::size_t k = 1; k < x.size(); ++k) mean[k] = 0.5 * (x[k - 1] + x[k]);
   return mean;
+}
+
+/// Part of the two intervals about each sample, weighted like a second difference, in which a speed that is linear between
+/// samples is > 0: Coulomb friction changes sign between samples, not at one.
+std::vector<double> share_forward(const std::vector<double>& w) {
+  std::vector<double> share(w.size(), 0);
+  for (std::size_t k = 0; k + 1 < w.size(); ++k) {
+    const double a = w[k], b = w[k + 1];
+    double left = 0.5, right = 0.5;  // of the weights 1 - u and u over 0 < u < 1, where the speed is > 0
+    if (a <= 0 && b <= 0) {
+      left = right = 0;
+    } else if (a < 0 || b < 0) {
+      const double u = a / (a - b), early = u - 0.5 * u * u, late = 0.5 * u * u;
+      left = a > 0 ? early : 0.5 - early;
+      right = a > 0 ? late : 0.5 - late;
+    }
+    share[k] += left;
+    share[k + 1] += right;
+  }
+  if (!share.empty()) share.front() *= 2, share.back() *= 2;  // one interval only
+  return share;
 }
 
 /// Motor moves, with a margin as long as the filter remembers.
@@ -99,11 +121,16 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const Outpu
   p.load = simulate_driven_load(rig, motion, settings.feedback);
   const double inertia = GearTrain(rig).motor_inertia();
   std::vector<double> rest(data.size());  // all that is not inertia
-  for (std::size_t k = 0; k < rest.size(); ++k) rest[k] = p.load.motor_limit[k] - p.load.motor_net[k];
+  for (std::size_t k = 0; k < rest.size(); ++k) rest[k] = -p.load.motor_net[k];
   std::vector<double> torque = over_second_difference(rest);
-  for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += inertia * data.motor_acceleration[k];
+  const std::vector<double> forward = share_forward(data.motor_rate);
+  for (std::size_t k = 0; k < torque.size(); ++k) {
+    const FrictionLimits& f = p.load.motor_friction[k];
+    torque[k] += inertia * data.motor_acceleration[k] + forward[k] * f.forward - (1 - forward[k]) * f.backward;
+  }
   p.torque = smooth(torque);
-  p.measured_torque = smooth(delayed(held_over_second_difference(data.torque), calibration.torque_delay));
+  const std::vector<double> acting = calibration.held ? held_over_second_difference(data.torque) : over_second_difference(data.torque);
+  p.measured_torque = smooth(delayed(acting, calibration.torque_delay));
   p.measured_deflection = smooth(difference(data.motor, data.load));
   p.deflection = smooth(difference(data.motor, p.load.load));
   for (double& d : p.deflection) d -= calibration.encoder_offset;
@@ -137,8 +164,8 @@ double misfit(const Finding& finding, const Rig& rig) {
 /// The unknowns of a fit: parameters of the rig, then delay and offset of each record.
 class Unknowns {
  public:
-  Unknowns(const Rig& start, const std::vector<std::string>& names, std::size_t records)
-      : start_(start), records_(records) {
+  Unknowns(const Rig& start, const std::vector<std::string>& names, std::vector<Calibration> calibrations)
+      : start_(start), calibrations_(std::move(calibrations)), records_(calibrations_.size()) {
     for (const std::string& name : names) fitted_.push_back(&servo_parameter(name));
   }
   Eigen::Index size() const { return Eigen::Index(fitted_.size() + 2 * records_); }
@@ -146,6 +173,10 @@ class Unknowns {
   Eigen::VectorXd values() const {
     Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
     for (std::size_t i = 0; i < fitted_.size(); ++i) p[i] = fitted_[i]->get(start_);
+    for (std::size_t r = 0; r < records_; ++r) {
+      p[fitted_.size() + 2 * r] = calibrations_[r].torque_delay;
+      p[fitted_.size() + 2 * r + 1] = calibrations_[r].encoder_offset;
+    }
     return p;
   }
   Eigen::VectorXd scale() const {
@@ -170,7 +201,7 @@ class Unknowns {
   Calibration calibration(const Eigen::VectorXd& p, std::size_t record) const {
     const Eigen::Index at = fitted_.size() + 2 * record;
     if (std::fabs(p[at]) > kLargestDelay) throw InvalidParameter("torque_delay", p[at], "beyond calibration");
-    return {p[at], p[at + 1]};
+    return {p[at], p[at + 1], calibrations_[record].held};
   }
   std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const {
     std::map<std::string, Measured> all;
@@ -181,35 +212,58 @@ class Unknowns {
  private:
   Rig start_;
   std::vector<const RigParameter*> fitted_;
+  std::vector<Calibration> calibrations_;
   std::size_t records_;
 };
 
 }  // namespace
 
-OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
-                             const OutputErrorSettings& settings) {
-  const Unknowns unknowns(start, settings.parameters, records.size());
+namespace {
+
+OutputError fit_from(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings,
+                     const std::vector<Calibration>& calibrations) {
+  const Unknowns unknowns(start, settings.parameters, calibrations);
   const auto residuals = [&](const Eigen::VectorXd& p) {
     const Rig rig = unknowns.rig(p);
     std::vector<double> rows;
     for (std::size_t r = 0; r < records.size(); ++r)
       append_residuals(predict_servo(rig, records[r], settings, unknowns.calibration(p, r)), records[r],
                        settings.cutoff, rows);
+    for (const Finding& finding : settings.findings) rows.push_back(misfit(finding, rig));
     return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(rows.data(), rows.size()));
   };
   NonlinearOptions options;
   options.iterations = settings.iterations;
+  options.step = settings.step;
   LeastSquaresFit fit = fit_nonlinear(residuals, unknowns.values(), unknowns.scale(), options);
   // A block is as long as the slowest oscillation that a servo record shows, and there are enough of them.
-  const Eigen::Index rows = fit.residuals.size();
-  fit.covariance =
-      block_covariance(fit, std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, kRowsPerBlock));
+  const Eigen::Index rows = fit.residuals.size(), known = Eigen::Index(settings.findings.size());
+  const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, kRowsPerBlock);
+  fit.covariance = block_covariance(fit, block, known);
   OutputError result;
   result.rig = unknowns.rig(fit.values);
   result.parameters = unknowns.parameters(fit);
-  for (std::size_t r = 0; r < records.size(); ++r) {
+  for (std::size_t r = 0; r < records.size(); ++r)
     result.calibrations.push_back(unknowns.calibration(fit.values, r));
-    const ServoPrediction p = predict_servo(result.rig, records[r], settings, result.calibrations.back());
+  return result;
+}
+
+}  // namespace
+
+OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
+                             const OutputErrorSettings& settings) {
+  OutputError result = fit_from(start, records, settings, std::vector<Calibration>(records.size()));
+  std::vector<Calibration> calibrations = result.calibrations;
+  bool changed = false;
+  for (Calibration& c : calibrations) {
+    if (c.torque_delay > -0.5 * kHold) continue;
+    c.held = false;  // what acts half a sample earlier than a held torque is not held
+    c.torque_delay += kHold;
+    changed = true;
+  }
+  if (changed) result = fit_from(result.rig, records, settings, calibrations);
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    const ServoPrediction p = predict_servo(result.rig, records[r], settings, result.calibrations[r]);
     result.torque.push_back(p.torque_error);
     result.deflection.push_back(p.deflection_error);
   }

@@ -229,6 +229,15 @@ ProcedureReport response(IdentificationCase& c) {
   return report;
 }
 
+/// Torque that jumps by half of its range several times.
+bool is_square(const Record& record) {
+  const std::vector<double>& torque = record.column(Channel::motor_torque);
+  const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
+  int jumps = 0;
+  for (std::size_t k = 1; k < torque.size(); ++k) jumps += std::fabs(torque[k] - torque[k - 1]) > 0.5 * (*high - *low);
+  return jumps >= 3;
+}
+
 ProcedureReport decay(IdentificationCase& c) {
   ProcedureReport report{"decay", {}, ""};
   const Rig& rig = c.result.rig;
@@ -237,8 +246,10 @@ ProcedureReport decay(IdentificationCase& c) {
   settings.stiffness.value = servo_parameter("mesh_stiffness").get(rig);
   settings.reduced_inertia.value = motor * load / (motor + load);
   std::vector<DecayIdentification> all;
-  report.records = on_each(c, &CaseRecord::drive,
-                           [&](const CaseRecord& r) { all.push_back(identify_decay(r.record, settings)); });
+  report.records = on_each(c, &CaseRecord::drive, [&](const CaseRecord& r) {
+    if (!is_square(r.record)) throw CannotIdentify("no square wave of torque");
+    all.push_back(identify_decay(r.record, settings));
+  });
   for (const DecayIdentification& d : all)
     add(c, report.name, {{"mesh_damping", 1}}, with_model_error(d.damping, kDecayModel));
   report.message = "damping " + plus_minus(all.front().damping, "N m s/rad") + " from " +

@@ -127,7 +127,8 @@ FlankShift GearTrain::shift(const Slots& s, int side, double mesh_torque) const 
 }
 
 /// Force >= 0 on the flank of this side [N]. Where its shape follows the torque that it carries both are
-/// found together, by the secant method.
+/// found together, between no torque and one that the flank does not bear, by the Illinois method. Infinite
+/// where the flank advances faster with the torque than the teeth give way.
 double GearTrain::shaped_force(const Slots& s, int side, FlankShift& at) const {
   const double x = side * relative(s) - acting_gap_, w = side * lever_ * (s.w[kPinion] - s.w[kGear]);
   const auto force = [&](double mesh_torque) {
@@ -138,16 +139,28 @@ double GearTrain::shaped_force(const Slots& s, int side, FlankShift& at) const {
     const double f = contact_->force(penetration, rate, impact_speed_);
     return variation_ ? f * variation_->factor(lever_ * s.q[kPinion], side) : f;
   };
-  double f0 = force(0);
+  const double f0 = force(0);
   if (!shape_follows_torque_ || f0 == 0) return f0;
-  double t0 = 0, t1 = side * lever_ * f0, g0 = t1;
-  for (int i = 0; i < 50; ++i) {
-    const double g1 = side * lever_ * force(t1) - t1;
-    if (std::fabs(g1) <= 1e-12 * std::fabs(t1) || g1 == g0) break;
-    const double next = t1 - g1 * (t1 - t0) / (g1 - g0);
-    t0 = t1, g0 = g1, t1 = next;
+  const auto excess = [&](double t) { return lever_ * force(side * t) - t; };
+  double low = 0, above = lever_ * f0, high = above, below = excess(high);
+  for (int i = 0; below > 0 && i < 50; ++i) low = high, above = below, below = excess(high *= 2);
+  if (below > 0) return std::numeric_limits<double>::infinity();
+  double t = high, rest = below;
+  int last = 0;
+  for (int i = 0; std::fabs(rest) > 1e-13 * t && i < 100; ++i) {
+    t = (low * below - high * above) / (below - above);
+    rest = excess(t);
+    if (rest > 0) {
+      low = t, above = rest;
+      if (last == 1) below *= 0.5;
+      last = 1;
+    } else {
+      high = t, below = rest;
+      if (last == -1) above *= 0.5;
+      last = -1;
+    }
   }
-  return std::fabs(t1) / lever_;
+  return t / lever_;
 }
 
 /// Adds what both flanks do to pinion and gear and returns the mesh torque. A gap that a term closes
@@ -179,8 +192,8 @@ const FrictionLimits& GearTrain::limits(const DryEnd& end, const EndFriction& fr
   return end.slot == kMotor ? friction.motor : friction.load;
 }
 
-GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorque applied) const {
-  const Slots s = unpack(state);
+/// All torques but dry friction, per degree of freedom [N m]; returns that through the teeth.
+inline double GearTrain::net_torques(double t, const Slots& s, AppliedTorque applied, double* net) const {
   double torque[kSlots];
   for (int slot = 0; slot < kSlots; ++slot)
     torque[slot] = -damping_[slot] * s.w[slot] - asymmetry_[slot] * std::fabs(s.w[slot]);
@@ -198,40 +211,52 @@ GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorq
     torque[kGear] -= through;
     torque[kLink] += through;
   }
-  Balance b;
+  double mesh_torque;
   if (shaped_ && contact_) {
-    b.mesh_torque = shaped_torques(s, torque);
+    mesh_torque = shaped_torques(s, torque);
   } else {
-    b.mesh_torque = lever_ * contact_force(s);
-    torque[kPinion] -= b.mesh_torque;
-    torque[kGear] += b.mesh_torque;
+    mesh_torque = lever_ * contact_force(s);
+    torque[kPinion] -= mesh_torque;
+    torque[kGear] += mesh_torque;
   }
-  if (!terms_.empty() || !dry_ends_.empty()) {
-    const Motion motion{t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink], b.mesh_torque};
+  if (!terms_.empty()) {
+    const Motion motion = motion_of(t, s, mesh_torque);
     EndTorques ends;
     for (const auto& term : terms_) term->add(motion, ends);
     torque[kMotor] += ends.motor;
     torque[kLink] += ends.load;
-    if (!dry_ends_.empty()) b.friction = friction(motion);
   }
+  std::fill(net, net + kSlots, 0.0);
   for (int slot = 0; slot < kSlots; ++slot)
-    if (node_[slot] != kFixed) b.net[node_[slot]] += torque[slot];
+    if (node_[slot] != kFixed) net[node_[slot]] += torque[slot];
+  return mesh_torque;
+}
+
+GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorque applied) const {
+  const Slots s = unpack(state);
+  Balance b;
+  b.mesh_torque = net_torques(t, s, applied, b.net);
+  if (!dry_ends_.empty()) b.friction = friction(motion_of(t, s, b.mesh_torque));
   return b;
 }
 
 void GearTrain::derivative(double t, const double* state, AppliedTorque applied, double* rate) const {
-  const Balance b = balance(t, state, applied);
+  const Slots s = unpack(state);
+  double net[kSlots];
+  const double mesh_torque = net_torques(t, s, applied, net);
   for (int node = 0; node < dof_; ++node) {
     rate[node] = state[dof_ + node];
-    rate[dof_ + node] = b.net[node] / inertia_[node];
+    rate[dof_ + node] = net[node] / inertia_[node];
   }
+  if (dry_ends_.empty()) return;
+  const EndFriction rubbing = friction(motion_of(t, s, mesh_torque));
   for (const DryEnd& end : dry_ends_) {
     const int node = node_[end.slot];
     double& acceleration = rate[dof_ + node];
     if (end.mode.stuck())
       acceleration = rate[node] = 0;
     else
-      acceleration += end.mode.torque(limits(end, b.friction)) / inertia_[node];
+      acceleration += end.mode.torque(limits(end, rubbing)) / inertia_[node];
   }
 }
 
@@ -250,23 +275,35 @@ void GearTrain::friction_events(double t, const double* state, AppliedTorque app
 }
 
 void GearTrain::begin_friction(double t, double* state, AppliedTorque applied) {
-  if (dry_ends_.empty()) return;
-  const Balance b = balance(t, state, applied);
   for (DryEnd& end : dry_ends_) {
+    const Balance b = balance(t, state, applied);  // anew: the end before may have been stopped
     const int node = node_[end.slot];
     end.mode.begin(b.net[node], state[dof_ + node], limits(end, b.friction));
+    end.position = state[node];
   }
 }
 
 bool GearTrain::update_friction(double t, double* state, AppliedTorque applied) {
-  if (dry_ends_.empty()) return false;
-  const Balance b = balance(t, state, applied);
   bool changed = false;
   for (DryEnd& end : dry_ends_) {
+    const Balance b = balance(t, state, applied);
     const int node = node_[end.slot];
     changed |= end.mode.update(b.net[node], state[dof_ + node], limits(end, b.friction));
+    end.position = state[node];
   }
   return changed;
+}
+
+void GearTrain::hold(double* state) const {
+  for (const DryEnd& end : dry_ends_) {
+    if (!end.mode.stuck()) continue;
+    state[node_[end.slot]] = end.position;
+    state[dof_ + node_[end.slot]] = 0;
+  }
+}
+
+bool GearTrain::any_stuck() const {
+  return std::any_of(dry_ends_.begin(), dry_ends_.end(), [](const DryEnd& end) { return end.mode.stuck(); });
 }
 
 Observation GearTrain::observe(const double* state, AppliedTorque applied, double t) const {
@@ -293,6 +330,8 @@ Observation GearTrain::observe(const double* state, AppliedTorque applied, doubl
 
 double GearTrain::energy(const double* state) const {
   const Slots s = unpack(state);
+  Slots resting = s;
+  std::fill(resting.w, resting.w + kSlots, 0.0);
   double energy = 0;
   for (int node = 0; node < dof_; ++node)
     energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
@@ -300,7 +339,9 @@ double GearTrain::energy(const double* state) const {
   if (!output_.rigid) energy += 0.5 * output_.stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
   if (!contact_) return energy;
   for (const int side : {1, -1}) {
-    const double penetration = side * relative(s) - half_gap_ - lever_ * shift(s, side, 0).opening;
+    FlankShift at;
+    if (shaped_) shaped_force(resting, side, at);
+    const double penetration = side * relative(s) - half_gap_ - lever_ * at.opening;
     if (penetration > 0)
       energy += contact_->elastic_energy(penetration) *
                 (variation_ ? variation_->factor(lever_ * s.q[kPinion], side) : 1);
@@ -340,9 +381,13 @@ void GearTrain::contact_events(const double* state, double* values) const {
   const Slots s = unpack(state);
   values[0] = penetration(s, kForward);
   values[1] = penetration(s, kReverse);
-  const double rate = approach(s, kForward), no_turn = -std::numeric_limits<double>::min();
-  values[2] = flank_ != kApart ? -penetration(s, flank_) : rate == 0 ? no_turn : rate;
-  values[3] = flank_ != kApart ? no_turn : rate == 0 ? no_turn : -rate;
+  const double no_turn = -std::numeric_limits<double>::min();
+  const auto parting = [&](Flank flank) {
+    const double rate = approach(s, flank);
+    return rate == 0 ? no_turn : -rate;
+  };
+  values[2] = flank_ != kApart ? -penetration(s, flank_) : parting(kReverse);
+  values[3] = flank_ != kApart ? no_turn : parting(kForward);
 }
 
 void GearTrain::begin_contact(double* state) {
@@ -383,14 +428,20 @@ void GearTrain::touch(Flank flank, double* state) {
   impact_speed_ = std::max(0.0, approach(s, flank));
   enter(flank);
   const std::optional<double> restitution = contact_->jump_restitution(impact_speed_);
-  if (!restitution || half_gap_ == 0) return;  // without play there is no room to bounce
+  // without play there is no room to bounce
+  if (!restitution || half_gap_ == 0 || penetration(s, flank == kForward ? kReverse : kForward) >= 0) return;
   const int pinion = node_[kPinion], gear = node_[kGear];
-  const double square = lever_ * lever_, wall = std::numeric_limits<double>::infinity();
+  const FlankShift at = shift(s, flank, 0);
+  const double to_pinion = lever_ * (flank - at.motor_slope), to_gear = lever_ * (flank + at.load_slope);
+  const double wall = std::numeric_limits<double>::infinity();
+  const bool held = braked_ && pinion == node_[kMotor];
+  if (held && gear == kFixed) return;
   const ImpactSpeeds after =
-      speeds_after_impact(inertia_[pinion] / square, gear == kFixed ? wall : inertia_[gear] / square,
-                          {flank * lever_ * s.w[kPinion], flank * lever_ * s.w[kGear]}, *restitution);
-  state[dof_ + pinion] = flank * after.first / lever_;
-  if (gear != kFixed) state[dof_ + gear] = flank * after.second / lever_;
+      speeds_after_impact(held ? wall : inertia_[pinion] / (to_pinion * to_pinion),
+                          gear == kFixed ? wall : inertia_[gear] / (to_gear * to_gear),
+                          {to_pinion * s.w[kPinion], to_gear * s.w[kGear]}, *restitution);
+  if (!held) state[dof_ + pinion] = after.first / to_pinion;
+  if (gear != kFixed) state[dof_ + gear] = after.second / to_gear;
   if (contact_->jump_restitution(*restitution * impact_speed_)) enter(kApart);  // else too slow to leave
 }
 

@@ -1,17 +1,20 @@
 #include "backlash_diagnosis/model/stick_slip.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace backlash {
 
+// Zero belongs to the mode: a speed of zero is where sliding begins, and a torque of just the limit is held.
+// A value of zero at a restart would hide a mode that ends at once; SUNDIALS multiplies the values at both
+// ends of a step, which must not underflow.
 double StickSlip::event(double net, double speed, const FrictionLimits& limits) const {
-  if (!stuck()) return -direction_ * speed;
-  return std::max(net - limits.forward, -net - limits.backward);
+  const double value = stuck() ? std::max(net - limits.forward, -net - limits.backward) : -direction_ * speed;
+  return value == 0 ? -1e-100 : value;
 }
 
-// At the limit it slides: an event found where net equals the limit would not be found again.
 void StickSlip::decide(double net, const FrictionLimits& limits) {
-  direction_ = net >= limits.forward ? 1 : net <= -limits.backward ? -1 : 0;
+  direction_ = net > limits.forward ? 1 : net < -limits.backward ? -1 : 0;
 }
 
 void StickSlip::begin(double net, double& speed, const FrictionLimits& limits) {
@@ -22,7 +25,8 @@ void StickSlip::begin(double net, double& speed, const FrictionLimits& limits) {
 bool StickSlip::update(double net, double& speed, const FrictionLimits& limits) {
   const int before = direction_;
   const double speed_before = speed;
-  if (stuck() && speed != 0) {  // set in motion by an impact
+  const double against = speed > 0 ? limits.forward : limits.backward;
+  if (stuck() && speed != 0 && std::isfinite(against)) {  // set in motion by an impact
     direction_ = speed > 0 ? 1 : -1;
   } else if (direction_ * speed <= 0) {
     speed = 0;

@@ -1,5 +1,6 @@
 #include "backlash_diagnosis/model/term.h"
 
+#include "backlash_diagnosis/base/error.h"
 #include "terms/terms.h"
 
 namespace backlash {
@@ -16,8 +17,14 @@ std::shared_ptr<const Term> read_term(const YamlReader& yaml) {
   std::vector<std::string> ids;
   for (const TermType& type : term_types()) ids.push_back(type.id);
   const std::string id = yaml.choice("id", ids);
-  for (const TermType& type : term_types())
-    if (type.id == id) return type.create(read_parameters(yaml, type.parameters));
+  for (const TermType& type : term_types()) {
+    if (type.id != id) continue;
+    try {
+      return type.create(read_parameters(yaml, type.parameters));
+    } catch (const InvalidParameter& error) {  // of values that do not go together
+      yaml.fail(error.name(), error.limit() + ", not " + error.value());
+    }
+  }
   yaml.fail("id", "is not a known term");  // choice() has refused it already
 }
 

@@ -119,8 +119,9 @@ DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, do
   check(rig);
   const std::size_t n = motion.motor->size();
   DrivenLoad out;
-  for (auto* column : {&out.load, &out.load_rate, &out.mesh_torque, &out.motor_net, &out.motor_limit})
+  for (auto* column : {&out.load, &out.load_rate, &out.mesh_torque, &out.motor_net})
     column->resize(n);
+  out.motor_friction.resize(n);
   Load load(rig, motion.load_rate ? feedback : 0);
   load.q = motion.first_load;
   load.w = motion.first_load_rate;
@@ -138,7 +139,7 @@ DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, do
     const GearTrain::EndForces f = load.observe(segment, t, 0);
     out.mesh_torque[k] = f.mesh_torque;
     out.motor_net[k] = f.motor;
-    out.motor_limit[k] = w[k] >= 0 ? f.friction.motor.forward : -f.friction.motor.backward;
+    out.motor_friction[k] = f.friction.motor;
     if (!(std::fabs(load.w) < kFarthest))
       throw IntegrationError("the load runs away at t = " + std::to_string(t) + " s");
     load.step(segment, t);

@@ -84,6 +84,10 @@ void read_place(const YamlReader& yaml, ExcitationSettings& settings) {
 
 }  // namespace
 
+double Excitation::shortest_period(long) const {
+  return std::numeric_limits<double>::infinity();
+}
+
 bool ExcitationSettings::is_speed_loop() const {
   return type == "constant_speed" || type == "sine_speed";
 }

@@ -127,7 +127,7 @@ struct Integrator::Impl {
   SUNLinearSolver linear_solver = nullptr;
   SUNNonlinearSolver nonlinear_solver = nullptr;
   void* memory = nullptr;
-  double time = 0, stop = 0;
+  double time = 0, stop = 0, longest_step = 0;
   long not_finite = 0;                  // derivatives of this call
   std::exception_ptr thrown;            // by the derivative: it must not pass through the solver's C frames
   IntegratorStatistics before_restart;  // the solvers' counters start again at each reset
@@ -294,10 +294,14 @@ void Integrator::Impl::restart(double t) {
   }
   // Set after each restart: ERKStep forgets the stop time, CVODE keeps the old one.
   const double last = std::isfinite(stop) ? stop : 1e300;
-  if (multistep)
+  const double longest = std::isfinite(longest_step) ? longest_step : 0;  // 0: any
+  if (multistep) {
     check(CVodeSetStopTime(memory, last), "CVodeSetStopTime");
-  else
+    check(CVodeSetMaxStep(memory, longest), "CVodeSetMaxStep");
+  } else {
     check(ERKStepSetStopTime(memory, last), "ERKStepSetStopTime");
+    check(ERKStepSetMaxStep(memory, longest), "ERKStepSetMaxStep");
+  }
 }
 
 void Integrator::Impl::refuse_unreachable(double t) const {
@@ -350,11 +354,12 @@ Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;
 Integrator& Integrator::operator=(Integrator&&) noexcept = default;
 
-void Integrator::restart(double t, const double* state, double stop) {
+void Integrator::restart(double t, const double* state, double stop, double longest_step) {
   Impl& s = *impl_;
   std::copy(state, state + N_VGetLength(s.state), N_VGetArrayPointer(s.state));
   s.time = t;
   s.stop = stop;
+  s.longest_step = longest_step;
   s.restart(t);
 }
 

@@ -110,6 +110,21 @@ TEST(Decay, TheRigOfTheThesisWithItsSensors) {
   }
 }
 
+TEST(Decay, BearingDampingIsTakenOff) {
+  TwoMass machine = square_wave(200, 1);
+  machine.motor_viscous = 13;
+  machine.load_viscous = 7;
+  DecaySettings settings = settings_of(machine);
+  const double raw = identify_decay(simulate(machine, 6), settings).damping.value;
+  // The part of the ringing that each body has: Jp / J1 and Jp / J2.
+  const double jp = machine.reduced_inertia();
+  settings.bearing_damping = jp * jp * (13 / (8.4 * 8.4) + 7 / (40.5 * 40.5));
+  EXPECT_NEAR(raw, machine.damping + settings.bearing_damping, 0.004 * machine.damping);
+  EXPECT_GT(settings.bearing_damping, 0.016 * machine.damping);
+  EXPECT_NEAR(identify_decay(simulate(machine, 6), settings).damping.value, raw - settings.bearing_damping,
+              1e-9);
+}
+
 TEST(Decay, PassagesOfTheGapServeWithoutATorque) {
   const TwoMass machine = square_wave(200, 1);
   Record record = simulate(machine, 4);

@@ -249,6 +249,60 @@ TEST(Rig, UnknownKeysAreRefused) {
   expect_refused(kUnknownKeys);
 }
 
+TEST(Rig, FrictionIsANumberOrOneForEachDirection) {
+  Rig rig = parse(changed("viscous_damping: 0.004", "coulomb_friction: 3, viscous_damping: 0.004"));
+  EXPECT_EQ(rig.motor.coulomb_friction, 3);
+  EXPECT_EQ(rig.motor.coulomb_asymmetry, 0);
+  EXPECT_EQ(rig.motor.viscous_asymmetry, 0);
+  EXPECT_EQ(rig.link.coulomb_friction, 0) << "without any";
+  rig = parse(changed("viscous_damping: 0.004",
+                      "coulomb_friction: {forward: 5, backward: 2}, viscous_damping: "
+                      "{forward: 0, backward: 0.5}"));
+  EXPECT_EQ(rig.motor.coulomb_friction, 3.5);
+  EXPECT_EQ(rig.motor.coulomb_asymmetry, 1.5);
+  EXPECT_EQ(rig.motor.viscous_damping, 0.25);
+  EXPECT_EQ(rig.motor.viscous_asymmetry, -0.25);
+  rig = parse(
+      changed("link: {inertia: 7e-4}",
+              "link: {inertia: 7e-4, coulomb_friction: {forward: 1, backward: 2}, viscous_damping: 4}"));
+  EXPECT_EQ(rig.link.coulomb_friction, 1.5);
+  EXPECT_EQ(rig.link.coulomb_asymmetry, -0.5);
+  EXPECT_EQ(rig.link.viscous_damping, 4);
+  EXPECT_EQ(GearTrain(rig).friction_event_count(), 1);
+}
+
+TEST(Rig, ThePlaceInTheGapMayBeStated) {
+  EXPECT_EQ(parse(kRig).mesh.start_in_gap, 0);
+  EXPECT_EQ(parse(changed("backlash: 6e-5", "start_in_gap: -0.4\n    backlash: 6e-5")).mesh.start_in_gap,
+            -0.4);
+}
+
+const BadRig kWrongFriction[] = {
+    {"viscous_damping: 0.004", "coulomb_friction: -3",
+     "rig.yaml:6: gear_train.motor.coulomb_friction = -3: must be >= 0"},
+    {"viscous_damping: 0.004", "coulomb_friction: {forward: 3}",
+     "rig.yaml:6: gear_train.motor.coulomb_friction.backward: is missing, expected a number"},
+    {"viscous_damping: 0.004", "coulomb_friction: {forward: 3, backward: -1}",
+     "rig.yaml:6: gear_train.motor.coulomb_friction.backward = -1: must be >= 0"},
+    {"viscous_damping: 0.004", "coulomb_friction: {forward: 3, backward: 1, sideways: 2}",
+     "rig.yaml:6: gear_train.motor.coulomb_friction.sideways = 2: unknown key, known here: "},
+    {"viscous_damping: 0.004", "coulomb_friction: [3, 4]",
+     "rig.yaml:6: gear_train.motor.coulomb_friction = [...]: must be a map"},
+    {"viscous_damping: 0.004", "viscous_damping: much",
+     "rig.yaml:6: gear_train.motor.viscous_damping = much: not a number, must be >= 0"},
+    {"viscous_damping: 0.001", "coulomb_friction: 3",
+     "rig.yaml:13: gear_train.gear.coulomb_friction = 3: unknown key, known here: "},
+    {"backlash: 6e-5", "start_in_gap: 1.5\n    backlash: 6e-5",
+     "rig.yaml:11: gear_train.mesh.start_in_gap = 1.5: must be >= -1 and <= 1"},
+    {"terms: [{id: gravity, amplitude: 1, phase: 0}",
+     "terms: [{id: backlash_map, positions: [0, 1], backlash: [1e-3], centre: [0, 0]}",
+     "rig.yaml:16: terms[0].backlash = [...]: one value per position, not 1"},
+};
+
+TEST(Rig, WrongFrictionIsRefusedWithPlace) {
+  expect_refused(kWrongFriction);
+}
+
 TEST(Rig, ShippedSarkarRigHoldsTheStatedParameters) {
   const Rig rig = read_rig(YamlReader::from_file(test::package_file("config/sarkar_1997.yaml")));
   EXPECT_EQ(rig.name, "sarkar_1997");

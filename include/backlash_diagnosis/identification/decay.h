@@ -5,8 +5,8 @@
 //   y(t) = c0 + c1 t + exp(-a t) (p cos(wd t) + q sin(wd t)),  a = z w0,  wd = w0 sqrt(1 - z^2),
 //   c = 2 z sqrt(k Jp)  (5.10)  and also  c = 2 a Jp,
 // equal where k and Jp agree with the ringing. Fitted to the raw samples of every engagement, with the
-// thesis' method of peaks as a cross-check. Bearing damping adds Jp (c1/J1^2 + c2/J2^2) to what is found (2 %
-// on the rig of the thesis).
+// thesis' method of peaks as a cross-check. The viscous
+// friction of both bearings rings along and adds Jp^2 (c1/J1^2 + c2/J2^2) to c, 2 % on the rig of the thesis.
 #pragma once
 
 #include <optional>
@@ -24,6 +24,7 @@ enum class RingingSignal { speed_difference, position_difference };  // motor mi
 struct DecaySettings {
   Measured stiffness;                   // N m/rad, > 0; standard error may be NaN: taken as exact
   Measured reduced_inertia;             // kg m^2, > 0
+  double bearing_damping = 0;           // N m s/rad, >= 0: Jp^2 (c1/J1^2 + c2/J2^2), taken off the damping
   std::optional<RingingSignal> signal;  // absent: the speeds where both are recorded
   double longest = 5, shortest = 1.5;   // periods of sqrt(k / Jp), of the stretch that is fitted
   int least_engagements = 3;
@@ -32,7 +33,7 @@ struct DecaySettings {
 struct DecayIdentification {
   RingingSignal signal = RingingSignal::speed_difference;
   Measured damping_ratio, natural_frequency;  // -, rad/s, over the engagements
-  Measured damping;                           // N m s/rad, by 5.10
+  Measured damping;                           // N m s/rad, by 5.10, of the mesh
   Measured damping_by_rate;                   // N m s/rad, 2 z w0 Jp, needs no stiffness
   Measured peak_damping_ratio;                // cross-check; NaN with less than two engagements
   std::vector<Ringing> ringings;

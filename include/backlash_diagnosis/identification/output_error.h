@@ -6,8 +6,8 @@
 //   samples near
 //               standstill do not count, there dry friction takes any value
 //   deflection  (motor - load) recorded - simulated, through the same low-pass
-// A torque that is held between samples lies half a sample later than the accelerations; a further delay of a
-// part of a sample is calibration and fitted. So is the constant difference of the two encoders.
+// A torque that is held between samples acts half a sample later than its stamp; whether it is, the fitted delay tells. A further
+// delay of a part of a sample is calibration and fitted. So is the constant difference of the two encoders.
 #pragma once
 
 #include <map>
@@ -27,6 +27,7 @@ struct OutputErrorSettings {
   std::vector<std::string> parameters;  // of servo_parameters(), to be fitted
   std::vector<Finding> findings;        // of other records, which count by their standard errors
   int iterations = 20;
+  double step = 1e-4;
 };
 
 /// Relative error norm(r) / norm(y - mean(y)), and what noise alone leaves.
@@ -36,8 +37,9 @@ struct ChannelError {
 
 /// What belongs to a record and not to the machine.
 struct Calibration {
-  double torque_delay = 0;    // samples, beyond the half of a held torque
+  double torque_delay = 0;    // samples, beyond that of the hold
   double encoder_offset = 0;  // rad, load encoder minus motor encoder in the middle of the gap
+  bool held = true;           // the torque is held from its sample to the next, as loops command it; else it is that of the moment
 };
 
 struct OutputError {

@@ -9,8 +9,8 @@
 // neighbours one body, so does a rigid mesh; a locked link has q_L = 0. F_M and F_L are dry friction with sticking, see StickSlip;
 // a braked motor sticks whatever the torque. Terms may shift either flank by an opening o(q_M, q_L, torque);
 // then its penetration is side x - backlash / 2 - r o, and the mesh torque acts on both ends through the
-// slopes of o, so that no energy is lost or gained. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and
-// Table 1, with absolute instead of relative coordinates.
+// slopes of o, so that no energy is lost or gained (but see terms that follow the torque). After Sarkar,
+// Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute instead of relative coordinates.
 #pragma once
 
 #include <array>
@@ -67,7 +67,8 @@ class GearTrain {
   double motor_inertia() const { return inertia_[node_[kMotor]]; }
   double load_inertia() const;
 
-  /// Kinetic plus elastic energy (couplings, contact) [J], without terms.
+  /// Kinetic plus elastic energy (couplings, contact) [J], without terms and without what a flank stores that
+  /// gives way under its torque.
   double energy(const double* state) const;
 
   /// Power that the dampers of motor, couplings and link take out [W]; contact damping is not among them.
@@ -104,6 +105,9 @@ class GearTrain {
   void friction_events(double t, const double* state, AppliedTorque applied, double* values) const;
   void begin_friction(double t, double* state, AppliedTorque applied);
   bool update_friction(double t, double* state, AppliedTorque applied);
+  /// Puts each body that sticks where it came to rest: a solver's interpolation moves it by roundings.
+  void hold(double* state) const;
+  bool any_stuck() const;
   /// Holds the motor from now on; before begin_friction().
   void brake_motor();
 
@@ -118,16 +122,21 @@ class GearTrain {
 
   /// All torques of one moment, per degree of freedom, and what they are made of.
   struct Balance {
-    double net[kSlots] = {};  // N m, without dry friction
-    double mesh_torque = 0;
+    double net[kSlots];  // N m, without dry friction
+    double mesh_torque;
     EndFriction friction;
   };
   struct DryEnd {
     Slot slot;
     StickSlip mode;
+    double position = 0;  // rad, where it sticks
   };
 
   Slots unpack(const double* state) const;
+  Motion motion_of(double t, const Slots& s, double mesh_torque) const {
+    return {t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink], mesh_torque};
+  }
+  double net_torques(double t, const Slots& s, AppliedTorque applied, double* net) const;
   Balance balance(double t, const double* state, AppliedTorque applied) const;
   double relative(const Slots& s) const { return lever_ * (s.q[kPinion] - s.q[kGear]) + start_ * half_gap_; }
   FlankShift shift(const Slots& s, int side, double mesh_torque) const;

@@ -4,8 +4,8 @@
 //   stuck    w = 0, a = 0 while -F_- <= net <= F_+           net: all other torques on the body
 //
 // A body that slides comes to rest where its speed crosses zero; there and wherever the torque jumps it is
-// decided anew (Karnopp 1985, ASME J. Dyn. Syst. Meas. Control 107:100, with the zero of the speed found as
-// an event instead of his interval of speeds).
+// decided anew. Infinite friction is a brake: it stops a body at once (Karnopp 1985, ASME J. Dyn. Syst. Meas.
+// Control 107:100, with the zero of the speed found as an event instead of his interval of speeds).
 #pragma once
 
 #include "backlash_diagnosis/model/term.h"

@@ -30,7 +30,7 @@ struct DrivenLoad {
   std::vector<double> load, load_rate;  // rad, rad/s
   std::vector<double> mesh_torque;      // N m, through the teeth
   std::vector<double> motor_net;        // N m on the motor, all but its torque, inertia and dry friction
-  std::vector<double> motor_limit;      // N m, its dry friction in the direction of its speed
+  std::vector<FrictionLimits> motor_friction;  // its dry friction
 };
 
 /// Typical k [1/s].

@@ -29,6 +29,9 @@ class Excitation {
   /// machine: where a closed loop decides.
   virtual void begin_segment(long /*segment*/, const Observation& /*machine*/) {}
 
+  /// Time [s] within which the torque may rise and fall again inside a segment; infinite where it does not.
+  virtual double shortest_period(long segment) const;
+
   /// Repetition time [s]; 0 where the torque does not repeat (that of a closed loop does so only nearly).
   virtual double period() const { return 0; }
 

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -47,9 +48,11 @@ class Integrator {
   Integrator(Integrator&&) noexcept;
   Integrator& operator=(Integrator&&) noexcept;
 
-  /// Starts anew from `state` at `t`, forgetting step size and history. `stop` is a time beyond which the derivative
-  /// is not evaluated (infinite: none): the next jump of the right-hand side.
-  void restart(double t, const double* state, double stop);
+  /// Starts anew from `state` at `t`, forgetting step size and history. `stop` is a time beyond which the
+  /// derivative is not evaluated (infinite: none): the next jump of the right-hand side. `longest_step` [s]
+  /// (infinite: as the error allows) for events that depend on time more than the state does.
+  void restart(double t, const double* state, double stop,
+               double longest_step = std::numeric_limits<double>::infinity());
 
   /// State at `t`, or at the first event on the way: then time() is that of the event (to some 100 roundings
   /// of t and of the step; the value has risen to 0 or above) and its index is returned, kNoEvent otherwise.

@@ -48,6 +48,8 @@ class Plant {
 
  private:
   AppliedTorque applied_torque(double t) const;
+  State held(const double* state) const;
+  void derivative(double t, const double* state, double* rate) const;
   void events(double t, const double* state, double* values) const;
   bool update_modes(int event);
   void restart();

@@ -25,8 +25,9 @@ class TurnTable {
 
   Point at(double angle) const {
     const double turn = 2 * M_PI;
-    const double q = positions_.front() + (angle - positions_.front()) -
-                     turn * std::floor((angle - positions_.front()) / turn);
+    const double from_first = angle - positions_.front();
+    // the quotient may round up to a whole turn
+    const double q = positions_.front() + std::max(0.0, from_first - turn * std::floor(from_first / turn));
     const std::size_t after = std::upper_bound(positions_.begin(), positions_.end(), q) - positions_.begin();
     const bool wraps = after == positions_.size();
     const std::size_t i = after - 1, j = wraps ? 0 : after;
@@ -58,7 +59,7 @@ class BacklashMap : public Term {
 void check(const std::vector<double>& positions, const std::vector<double>& backlash,
            const std::vector<double>& centre) {
   const auto refuse = [](const char* name, double value, const char* limit) {
-    throw InvalidParameter(std::string("backlash_map.") + name, value, limit);
+    throw InvalidParameter(name, value, limit);
   };
   if (positions.size() < 2) refuse("positions", double(positions.size()), "needs at least two points");
   if (backlash.size() != positions.size())

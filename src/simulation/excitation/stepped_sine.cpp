@@ -26,6 +26,7 @@ class SteppedSine : public Excitation {
   double segment_end(long segment) const override {
     return turns(segment) * period() + starts_[step(segment) + 1];
   }
+  double shortest_period(long segment) const override { return 1 / frequencies_[step(segment)]; }
   double period() const override { return starts_.back(); }
 
  private:

@@ -69,6 +69,11 @@ class MultiSine : public Excitation {
     return sum;
   }
   double segment_end(long) const override { return kNever; }
+  double shortest_period(long) const override {
+    double highest = 0;
+    for (const SineLine& line : lines_) highest = std::max(highest, line.frequency);
+    return 1 / highest;
+  }
   double period() const override {
     if (lines_.size() == 1) return 1 / lines_.front().frequency;
     double common = 0;
@@ -94,16 +99,18 @@ class Chirp : public Excitation {
         start_(start),
         rate_((end - start) / duration),
         duration_(duration),
+        shortest_(1 / std::max(start, end)),
         bias_(bias) {}
   double torque(double t, long segment) const override {
     const double s = t - segment * duration_;
     return bias_ + amplitude_ * std::sin(2 * M_PI * (start_ + 0.5 * rate_ * s) * s);
   }
   double segment_end(long segment) const override { return (segment + 1) * duration_; }
+  double shortest_period(long) const override { return shortest_; }
   double period() const override { return duration_; }
 
  private:
-  double amplitude_, start_, rate_, duration_, bias_;
+  double amplitude_, start_, rate_, duration_, shortest_, bias_;
 };
 
 }  // namespace
