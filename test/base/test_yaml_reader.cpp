@@ -411,5 +411,11 @@ TEST(Range, TextNamesTheBoundsAndContainsKeepsThem) {
   EXPECT_FALSE(Range::any().contains(kHuge));
 }
 
+TEST(YamlReader, KeysComeInTheOrderOfTheFileAndStayUnknown) {
+  const YamlReader yaml = YamlReader::from_text("walk: 1\nalone: 2\nhand: 3\n", "t");
+  EXPECT_EQ(yaml.keys(), (std::vector<std::string>{"walk", "alone", "hand"}));
+  EXPECT_THROW(yaml.finish(), BadData);
+}
+
 }  // namespace
 }  // namespace backlash
