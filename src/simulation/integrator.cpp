@@ -94,7 +94,7 @@ SolverSettings read_solver(const YamlReader& yaml) {
 }
 
 struct Integrator::Impl {
-  Impl(Derivative f, std::vector<double> tolerances, const SolverSettings& s, Events e, int count);
+  Impl(Derivative f, std::vector<StateTolerance> t, const SolverSettings& s, Events e, int count);
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -122,7 +122,8 @@ struct Integrator::Impl {
   SolverSettings settings;
   bool multistep;
   SUNContext context = nullptr;
-  N_Vector state = nullptr, tolerances = nullptr;
+  N_Vector state = nullptr;
+  std::vector<StateTolerance> tolerances;
   SUNMatrix matrix = nullptr;
   SUNLinearSolver linear_solver = nullptr;
   SUNNonlinearSolver nonlinear_solver = nullptr;
@@ -134,6 +135,7 @@ struct Integrator::Impl {
 
   static int evaluate(realtype t, N_Vector y, N_Vector ydot, void* user);
   static int evaluate_events(realtype t, N_Vector y, realtype* values, void* user);
+  static int weigh(N_Vector y, N_Vector weights, void* user);
 };
 
 template <typename Function>
@@ -164,7 +166,18 @@ int Integrator::Impl::evaluate_events(realtype t, N_Vector y, realtype* values, 
   return self.guarded([&] { self.events(t, N_VGetArrayPointer(y), values); });
 }
 
-Integrator::Impl::Impl(Derivative f, std::vector<double> absolute, const SolverSettings& s, Events e,
+int Integrator::Impl::weigh(N_Vector y, N_Vector weights, void* user) {
+  const Impl& self = *static_cast<Impl*>(user);
+  const double* values = N_VGetArrayPointer(y);
+  double* out = N_VGetArrayPointer(weights);
+  for (std::size_t i = 0; i < self.tolerances.size(); ++i) {
+    const StateTolerance& t = self.tolerances[i];
+    out[i] = 1 / (t.absolute + self.settings.relative_tolerance * std::min(std::fabs(values[i]), t.largest));
+  }
+  return 0;
+}
+
+Integrator::Impl::Impl(Derivative f, std::vector<StateTolerance> t, const SolverSettings& s, Events e,
                        int count)
     : derivative(std::move(f)),
       events(std::move(e)),
@@ -177,13 +190,12 @@ Integrator::Impl::Impl(Derivative f, std::vector<double> absolute, const SolverS
     if (!Range::positive().contains(value)) throw InvalidParameter(name, value, "must be > 0 and finite");
   };
   require_tolerance("solver.relative_tolerance", s.relative_tolerance);
-  for (double tolerance : absolute) require_tolerance("solver absolute tolerance", tolerance);
+  for (const StateTolerance& each : t) require_tolerance("solver absolute tolerance", each.absolute);
+  tolerances = std::move(t);
   check(SUNContext_Create(nullptr, &context), "SUNContext_Create");
-  state = N_VNew_Serial(static_cast<sunindextype>(absolute.size()), context);
-  tolerances = N_VNew_Serial(static_cast<sunindextype>(absolute.size()), context);
-  if (!state || !tolerances) throw IntegrationError("N_VNew_Serial: out of memory");
+  state = N_VNew_Serial(static_cast<sunindextype>(tolerances.size()), context);
+  if (!state) throw IntegrationError("N_VNew_Serial: out of memory");
   check(N_VEnableFusedOps_Serial(state, SUNTRUE), "N_VEnableFusedOps_Serial");
-  std::copy(absolute.begin(), absolute.end(), N_VGetArrayPointer(tolerances));
 }
 
 Integrator::Impl::~Impl() {
@@ -191,7 +203,6 @@ Integrator::Impl::~Impl() {
   if (nonlinear_solver) SUNNonlinSolFree(nonlinear_solver);
   if (linear_solver) SUNLinSolFree(linear_solver);
   if (matrix) SUNMatDestroy(matrix);
-  if (tolerances) N_VDestroy(tolerances);
   if (state) N_VDestroy(state);
   if (context) SUNContext_Free(&context);
 }
@@ -224,7 +235,7 @@ void Integrator::Impl::create_explicit(double t) {
   } else {
     check(ERKStepSetTableNum(memory, explicit_tables().at(settings.method)), "ERKStepSetTableNum");
   }
-  check(ERKStepSVtolerances(memory, settings.relative_tolerance, tolerances), "ERKStepSVtolerances");
+  check(ERKStepWFtolerances(memory, weigh), "ERKStepWFtolerances");
   check(ERKStepSetUserData(memory, this), "ERKStepSetUserData");
   check(ERKStepSetMaxNumSteps(memory, kMaxStepsPerCall), "ERKStepSetMaxNumSteps");
 }
@@ -235,7 +246,7 @@ void Integrator::Impl::create_multistep(double t) {
   if (!memory) throw IntegrationError("CVodeCreate failed");
   check(CVodeSetErrHandlerFn(memory, silence, nullptr), "CVodeSetErrHandlerFn");
   check(CVodeInit(memory, evaluate, t, state), "CVodeInit");
-  check(CVodeSVtolerances(memory, settings.relative_tolerance, tolerances), "CVodeSVtolerances");
+  check(CVodeWFtolerances(memory, weigh), "CVodeWFtolerances");
   check(CVodeSetUserData(memory, this), "CVodeSetUserData");
   check(CVodeSetMaxNumSteps(memory, kMaxStepsPerCall), "CVodeSetMaxNumSteps");
   if (stiff) {  // Newton with a dense difference-quotient Jacobian
@@ -346,9 +357,9 @@ void Integrator::Impl::require_finite() const {
     if (!std::isfinite(values[i])) fail("state " + std::to_string(i) + " is not finite");
 }
 
-Integrator::Integrator(Derivative derivative, std::vector<double> absolute_tolerances,
+Integrator::Integrator(Derivative derivative, std::vector<StateTolerance> tolerances,
                        const SolverSettings& settings, Events events, int event_count)
-    : impl_(std::make_unique<Impl>(std::move(derivative), std::move(absolute_tolerances), settings,
+    : impl_(std::make_unique<Impl>(std::move(derivative), std::move(tolerances), settings,
                                    std::move(events), event_count)) {}
 Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;

@@ -9,9 +9,12 @@
 namespace backlash {
 namespace {
 
-std::vector<double> absolute_tolerances(int dof, const SolverSettings& solver) {
-  std::vector<double> tolerances(2 * dof, solver.position_tolerance);
-  std::fill(tolerances.begin() + dof, tolerances.end(), solver.velocity_tolerance);
+/// Elastic deflections and play are differences of angles and far below this; beyond it no angle says more about them.
+constexpr double kLargestAngle = 0.01;  // rad
+
+std::vector<StateTolerance> state_tolerances(int dof, const SolverSettings& solver) {
+  std::vector<StateTolerance> tolerances(2 * dof, {solver.position_tolerance, kLargestAngle});
+  std::fill(tolerances.begin() + dof, tolerances.end(), StateTolerance{solver.velocity_tolerance});
   return tolerances;
 }
 
@@ -41,7 +44,7 @@ Plant::Plant(const Rig& rig, const ExcitationSettings& excitation, const SolverS
       excitation_settings_(excitation),
       excitation_(excitation.create()),
       integrator_([this](double t, const double* state, double* rate) { derivative(t, state, rate); },
-                  absolute_tolerances(gear_train_.dof(), solver), solver,
+                  state_tolerances(gear_train_.dof(), solver), solver,
                   [this](double t, const double* state, double* values) { events(t, state, values); },
                   event_count(gear_train_)),
       initial_backlash_(rig.mesh.backlash) {

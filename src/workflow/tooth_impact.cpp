@@ -9,7 +9,7 @@
 namespace backlash {
 namespace {
 
-std::vector<double> tolerances(const Tooth& tooth, double relative, AbsoluteTolerance kind) {
+std::vector<StateTolerance> tolerances(const Tooth& tooth, double relative, AbsoluteTolerance kind) {
   if (kind == AbsoluteTolerance::plain) return {relative, relative};
   return {relative * tooth.depth(), relative * tooth.impact_speed()};
 }

@@ -33,6 +33,14 @@ struct IntegratorStatistics {
   long steps = 0, evaluations = 0, error_test_failures = 0;
 };
 
+/// What an error of one state is measured by: absolute + relative_tolerance * min(|state|, largest). An angle that has turned
+/// far is to be known no less precisely than one that has not.
+struct StateTolerance {
+  StateTolerance(double absolute_error, double largest_size = std::numeric_limits<double>::infinity())
+      : absolute(absolute_error), largest(largest_size) {}
+  double absolute, largest;
+};
+
 class Integrator {
  public:
   using Derivative = std::function<void(double t, const double* state, double* rate)>;
@@ -40,9 +48,9 @@ class Integrator {
   using Events = std::function<void(double t, const double* state, double* values)>;
   static constexpr int kNoEvent = -1;
 
-  /// `absolute_tolerances` has one entry per state. Without events nothing is spent on finding them. Throws
+  /// `tolerances` has one entry per state. Without events nothing is spent on finding them. Throws
   /// InvalidParameter for an unknown method or a tolerance <= 0.
-  Integrator(Derivative derivative, std::vector<double> absolute_tolerances, const SolverSettings& settings,
+  Integrator(Derivative derivative, std::vector<StateTolerance> tolerances, const SolverSettings& settings,
              Events events = nullptr, int event_count = 0);
   ~Integrator();
   Integrator(Integrator&&) noexcept;
