@@ -10,7 +10,7 @@ namespace backlash {
 namespace {
 
 /// Elastic deflections and play are differences of angles and far below this; beyond it no angle says more about them.
-constexpr double kLargestAngle = 0.01;  // rad
+constexpr double kLargestAngle = 0.1;  // rad
 
 std::vector<StateTolerance> state_tolerances(int dof, const SolverSettings& solver) {
   std::vector<StateTolerance> tolerances(2 * dof, {solver.position_tolerance, kLargestAngle});

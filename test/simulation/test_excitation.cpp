@@ -15,13 +15,13 @@ namespace {
 const double kNever = std::numeric_limits<double>::infinity();
 
 TEST(Excitation, ShortestPeriodIsThatOfTheHighestFrequency) {
-  EXPECT_DOUBLE_EQ(sine_excitation(1, 4)->shortest_period(), 0.25);
-  EXPECT_DOUBLE_EQ(multi_sine_excitation({{1, 3, 0}, {1, 50, 0}, {1, 7, 0}})->shortest_period(), 0.02);
-  EXPECT_DOUBLE_EQ(chirp_excitation(1, 0.25, 100, 8)->shortest_period(), 0.01);
-  EXPECT_DOUBLE_EQ(chirp_excitation(1, 100, 0.25, 8)->shortest_period(), 0.01);
-  EXPECT_GE(random_excitation(1, 5, 40, 16, 1)->shortest_period(), 1 / 40.0);
-  EXPECT_TRUE(std::isinf(constant_excitation(3)->shortest_period()));
-  EXPECT_TRUE(std::isinf(square_excitation(1, 10)->shortest_period()));
+  EXPECT_DOUBLE_EQ(sine_excitation(1, 4)->shortest_period(0), 0.25);
+  EXPECT_DOUBLE_EQ(multi_sine_excitation({{1, 3, 0}, {1, 50, 0}, {1, 7, 0}})->shortest_period(0), 0.02);
+  EXPECT_DOUBLE_EQ(chirp_excitation(1, 0.25, 100, 8)->shortest_period(0), 0.01);
+  EXPECT_DOUBLE_EQ(chirp_excitation(1, 100, 0.25, 8)->shortest_period(0), 0.01);
+  EXPECT_GE(random_excitation(1, 5, 40, 16, 1)->shortest_period(0), 1 / 40.0);
+  EXPECT_TRUE(std::isinf(constant_excitation(3)->shortest_period(0)));
+  EXPECT_TRUE(std::isinf(square_excitation(1, 10)->shortest_period(0)));
 }
 
 TEST(Excitation, SquareSwitchesAtExactTimes) {
