@@ -4,6 +4,29 @@
 #include "procedures.h"
 
 namespace backlash {
+namespace {
+
+/// The samples that were used, in their places.
+ChannelTrace trace_of(const OneInertia& found, const Record& record) {
+  ChannelTrace trace;
+  trace.record = record.name;
+  trace.interval = record.sampling_interval();
+  const std::size_t n =
+      std::lround((record.time.back() - record.time.front()) / trace.interval) + 1;
+  trace.measured.assign(n, 0);
+  trace.predicted.assign(n, 0);
+  trace.counts.assign(n, 0);
+  for (std::size_t i = 0; i < found.time.size(); ++i) {
+    const std::size_t k = std::lround((found.time[i] - record.time.front()) / trace.interval);
+    if (k >= n) continue;
+    trace.measured[k] = found.measured[i];
+    trace.predicted[k] = found.predicted[i];
+    trace.counts[k] = 1;
+  }
+  return trace;
+}
+
+}  // namespace
 
 ProcedureReport run_one_inertia(IdentificationCase& c) {
   ProcedureReport report{"one_inertia", {}, ""};
@@ -18,6 +41,7 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
       continue;
     }
     report.records = {r.record.name};
+    c.result.torque = {trace_of(*c.result.one_inertia, r.record)};
     break;
   }
   if (!c.result.one_inertia) throw CannotIdentify(reasons);

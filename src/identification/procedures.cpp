@@ -44,7 +44,9 @@ std::vector<std::string> on_each(const IdentificationCase& c, bool (CaseRecord::
       body(record);
       used.push_back(record.record.name);
     } catch (const CannotIdentify& error) {
-      reasons.push_back(record.record.name + ": " + error.what());
+      const std::string reason = error.what();
+      const bool named = reason.compare(0, record.record.name.size(), record.record.name) == 0;
+      reasons.push_back(named ? reason : record.record.name + ": " + reason);
     }
   }
   if (used.empty()) throw CannotIdentify(reasons.empty() ? "no such record" : joined(reasons));

@@ -53,7 +53,7 @@ class Commands : public CommandTest {
 TEST_F(Commands, HelpAndVersion) {
   for (const std::string& command :
        std::vector<std::string>{"simulate", "build_curve", "diagnose_record", "convert_record", "gear_geometry",
-                                "integrator_study", "search_parameters", "separability_map", "uncertainty_study"}) {
+                                "identify", "integrator_study", "search_parameters", "separability_map", "uncertainty_study"}) {
     const std::string help = done(command + " --help").out;
     expect_contains(help, "Usage: " + command);
     for (const char* part : {"Options:", "rosrun", "Exit codes"}) expect_contains(help, part);

@@ -1,0 +1,98 @@
+// Identifies the machine of a rig file from records of it and writes the fitted rig file.
+#include "backlash_diagnosis/identification/identify.h"
+
+#include <filesystem>
+#include <iostream>
+
+#include "backlash_diagnosis/workflow/fitted_rig.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/identification_report.h"
+#include "tools/common/plot.h"
+#include "tools/common/progress_bar.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+Command command() {
+  Command c;
+  c.name = "identify";
+  c.summary =
+      "Finds the parameters of a machine from records of it: chooses the procedures that the records allow, "
+      "fits all parameters "
+      "together, writes the rig file with the fitted values.";
+  c.positional = {"RECORD..."};
+  c.options = {
+      {"rig", "RIG.yaml", "the machine as declared: structure, and values to start from (within some 40 %)",
+       true},
+      {"out", "FITTED.yaml", "the rig file with the fitted values, each with its standard error", true},
+      {"json", "OUT.json", "procedures, parameters with standard errors, errors per channel, warnings", true},
+      {"plot", "OUT.png", "also draw what the procedures saw"},
+  };
+  c.notes =
+      "A rig with two inertias (rigid couplings, free link) is identified from motor_torque, motor_position "
+      "and load_position; one "
+      "inertia (mesh: rigid) from motor_torque and motor_position. More runs tell more: constant speeds both "
+      "ways (friction, gap "
+      "over position), sine about a speed (inertia), sweep with bias (frequency response), square wave "
+      "(damping), load moved by "
+      "hand with the motor braked (clearance), the driver alone. All parameters are those of the load side "
+      "of the reduction.";
+  c.examples = {"identify run.csv --rig config/two_inertia_servo.yaml --out fitted.yaml --json fit.json",
+                "identify runs/*.csv --rig config/yumrukcal_2013.yaml --out fitted.yaml --json fit.json "
+                "--plot fit.png"};
+  c.exit_codes = "  0   done\n  3   the records allow no procedure\n";
+  return c;
+}
+
+void check_outputs(const Arguments& arguments) {
+  std::vector<std::string> inputs = arguments.positionals();
+  inputs.push_back(arguments.text("rig"));
+  const std::string json = arguments.text("json"), out = arguments.text("out"), plot = arguments.text("plot");
+  if (json == out) throw UsageError("--json and --out name the same file");
+  check_output(json, inputs);
+  check_output(out, inputs);
+  if (plot.empty()) return;
+  check_plot_path(plot);
+  check_output(plot, inputs);
+}
+
+int identify_machine(const Arguments& arguments) {
+  for (const std::string& path : arguments.positionals()) check_record_path(path);
+  check_outputs(arguments);
+  const RigFile file = load_rig_file(arguments.text("rig"));
+  std::vector<Record> records;
+  for (const std::string& path : arguments.positionals()) {
+    records.push_back(read_record(path, {file.rig.joint}));
+    records.back().name = std::filesystem::path(path).filename();
+  }
+  Identification found;
+  try {
+    ProgressBar bar;
+    found = identify(file.rig, records, bar.progress());
+  } catch (const CannotIdentify& error) {
+    std::cerr << "identify: " << error.what() << '\n';
+    return kInconclusive;
+  }
+  for (const Record& record : records)
+    for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);
+  write_text(arguments.text("out"), fitted_rig_text(file, found));
+  auto json = to_json(found);
+  json["rig"] = arguments.text("rig");
+  json["records"] = arguments.positionals();
+  write_text(arguments.text("json"),
+             json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  print_summary(found, std::cout);
+  std::cout.flush();
+  if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
+  return kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, identify_machine);
+}

@@ -1,0 +1,109 @@
+// `identify` as its users run it.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "support/data.h"
+#include "tools/command_runner.h"
+
+namespace backlash::test {
+namespace {
+
+using Json = nlohmann::json;
+
+const std::string kServo = package_file("config/two_inertia_servo.yaml");
+
+class Identify : public CommandTest {
+ protected:
+  void SetUp() override {
+    CommandTest::SetUp();
+    std::filesystem::create_symlink(kServo, path("servo.yaml"));
+    std::filesystem::create_symlink(package_file("config/emps.yaml"), path("emps.yaml"));
+  }
+  Json json(const std::string& name) const { return Json::parse(read(name)); }
+};
+
+TEST_F(Identify, ServoFromItsOwnRecord) {
+  done("simulate servo.yaml --duration 8 --out run.csv");
+  done("convert_record run.csv run.bag --rig servo.yaml");
+  for (const std::string record : {"run.csv", "run.bag"}) {
+    const std::string out =
+        done("identify " + record + " --rig servo.yaml --out fit.yaml --json fit.json").out;
+    expect_contains(out, "output_error");
+    expect_contains(out, "mesh_stiffness");
+    const Json result = json("fit.json");
+    EXPECT_EQ(result.at("schema_version"), 1);
+    const std::map<std::string, double> truth = {{"motor_inertia", 6.3},    {"load_inertia", 108},
+                                                 {"mesh_stiffness", 460e3}, {"backlash_angle", 5.4e-4},
+                                                 {"motor_coulomb", 63},     {"load_coulomb", 15}};
+    for (const auto& [name, value] : truth) {
+      const Json& parameter = result.at("parameters").at(name);
+      EXPECT_NEAR(parameter.at("value").get<double>() / value, 1, 0.02) << name;  // 8 s of a square wave
+      EXPECT_GT(parameter.at("standard_error").get<double>(), 0) << name;
+      EXPECT_FALSE(parameter.at("unit").get<std::string>().empty()) << name;
+    }
+    for (const char* channel : {"torque", "deflection"}) {
+      EXPECT_LT(result.at("channels").at(channel).at("train").get<double>(), 0.02) << channel;
+      EXPECT_GT(result.at("channels").at(channel).at("floor").get<double>(), 0) << channel;
+    }
+    EXPECT_EQ(result.at("procedures").back().at("name"), "output_error");
+  }
+  done("simulate fit.yaml --duration 0.1 --out again.csv");  // the fitted file is a rig file
+}
+
+TEST_F(Identify, DrawsWhatItSaw) {
+  done("simulate servo.yaml --duration 4 --out run.csv");
+  done("identify run.csv --rig servo.yaml --out fit.yaml --json fit.json --plot fit.png");
+  EXPECT_EQ(read("fit.png").substr(1, 3), "PNG");
+}
+
+TEST_F(Identify, OneInertia) {
+  done("simulate emps.yaml --duration 20 --out run.csv");
+  done("identify run.csv --rig emps.yaml --out fit.yaml --json fit.json");
+  const Json parameters = json("fit.json").at("parameters");
+  const std::map<std::string, std::pair<double, const char*>> truth = {{"inertia", {95.1, "kg"}},
+                                                                       {"coulomb", {20.4, "N"}},
+                                                                       {"viscous", {203.5, "N s/m"}},
+                                                                       {"offset", {-3.2, "N"}}};
+  for (const auto& [name, expected] : truth) {
+    // Inertia and friction of a sine are told apart by its harmonics only.
+    EXPECT_NEAR(parameters.at(name).at("value").get<double>() / expected.first, 1, 0.05) << name;
+    EXPECT_EQ(parameters.at(name).at("unit"), expected.second);
+  }
+}
+
+TEST_F(Identify, PublishedValuesOfTheEmpsAxis) {
+  const auto record = find_data("measured/emps_train.csv");
+  if (!record) GTEST_SKIP() << "the EMPS record is not here";
+  done("identify '" + *record + "' --rig emps.yaml --out fit.yaml --json fit.json");
+  const Json result = json("fit.json");
+  const std::map<std::string, double> published = {
+      {"inertia", 95.1}, {"coulomb", 20.4}, {"viscous", 203.5}, {"offset", -3.2}};
+  for (const auto& [name, value] : published)
+    EXPECT_NEAR(result.at("parameters").at(name).at("value").get<double>() / value, 1, 0.01) << name;
+  EXPECT_TRUE(result.at("torque_delay").at("value").is_number());
+  EXPECT_TRUE(result.at("torque_delay").at("standard_error").is_number());
+}
+
+TEST_F(Identify, SaysWhatARecordLacks) {
+  write("bare.csv", "time,motor_torque\n0,1\n0.001,2\n0.002,3\n0.003,1\n0.004,2\n");
+  const Outcome outcome = run("identify bare.csv --rig servo.yaml --out fit.yaml --json fit.json");
+  EXPECT_EQ(outcome.code, 3);
+  expect_contains(outcome.err, "output_error");
+  EXPECT_FALSE(exists("fit.yaml"));
+}
+
+TEST_F(Identify, Refusals) {
+  write("run.csv", "time,motor_torque,motor_position\n0,1,0\n0.001,2,0\n");
+  const std::string rest = " --rig servo.yaml --out fit.yaml --json fit.json";
+  EXPECT_EQ(run("identify" + rest).code, 64);
+  EXPECT_EQ(run("identify run.txt" + rest).code, 64);
+  EXPECT_EQ(run("identify run.csv --rig servo.yaml --out fit.yaml").code, 64);
+  EXPECT_EQ(run("identify run.csv --rig servo.yaml --out run.csv --json fit.json").code, 64);
+  EXPECT_EQ(run("identify run.csv --rig servo.yaml --out x.yaml --json x.yaml").code, 64);
+  EXPECT_EQ(run("identify none.csv" + rest).code, 66);
+  EXPECT_EQ(run("identify run.csv --rig none.yaml --out fit.yaml --json fit.json").code, 66);
+  EXPECT_EQ(run("identify run.csv --rig servo.yaml --out none/fit.yaml --json fit.json").code, 73);
+}
+
+}  // namespace
+}  // namespace backlash::test
