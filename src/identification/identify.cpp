@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/record/time_base.h"
+#include "backlash_diagnosis/record/zero_phase.h"
 #include "procedures.h"
 
 namespace backlash {
@@ -17,10 +20,19 @@ double travel(const std::vector<double>& values) {
   return *high - *low;
 }
 
+void require_finite(const Record& record) {
+  for (const Channel channel : kChannels)
+    for (std::size_t k = 0; k < record.column(channel).size(); ++k)
+      if (!std::isfinite(record.column(channel)[k]))
+        throw BadData(record.name,
+                      channel_name(channel) + " has no value at t = " + time_text(record.time[k]) + " s");
+}
+
 /// A body stands where it moves less than a twentieth of what the other does.
 CaseRecord case_record(const Record& record, const Rig& declared) {
   CaseRecord r;
-  r.record = load_side(record, declared);
+  require_finite(record);
+  r.record = evenly_sampled(load_side(record, declared));
   r.has_load = r.record.has(Channel::load_position);
   if (!r.record.has(Channel::motor_position) || !r.has_load) return r;
   const double motor = travel(r.record.column(Channel::motor_position));
@@ -28,6 +40,20 @@ CaseRecord case_record(const Record& record, const Rig& declared) {
   r.motor_moves = motor > 0.05 * load;
   r.load_moves = load > 0.05 * motor;
   return r;
+}
+
+/// A record with a gap or a hole does not spoil the others; it is an error where there is no other.
+void read_records(const std::vector<Record>& records, const Rig& declared, IdentificationCase& c) {
+  for (const Record& record : records) {
+    try {
+      c.records.push_back(case_record(record, declared));
+    } catch (const BadData& error) {
+      if (records.size() == 1) throw;
+      c.result.warnings.push_back(std::string("not used: ") + error.what());
+    }
+  }
+  if (c.records.empty())
+    throw BadData(records.empty() ? "identify" : c.result.warnings.front(), "no record that could be used");
 }
 
 /// What can be fitted: all that the rig declares. Asymmetries only where it declares directions apart.
@@ -81,7 +107,7 @@ Identification identify(const Rig& declared, const std::vector<Record>& records,
   IdentificationCase c;
   c.declared = load_side(declared);
   c.result.rig = c.declared;
-  for (const Record& record : records) c.records.push_back(case_record(record, declared));
+  read_records(records, declared, c);
   std::vector<Procedure> procedures = {{"one_inertia", run_one_inertia}};
   if (!declared.mesh.rigid) {
     require_servo(declared);

@@ -1,0 +1,91 @@
+// Which procedures a set of records allows, and what is said about the others.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/identification/identify.h"
+#include "support/servo.h"
+
+namespace backlash {
+namespace {
+
+Record square_wave(double duration) {
+  Record record = simulate_record(test::servo_file().rig, test::servo_file().simulation, duration);
+  record.name = "square.csv";
+  return record;
+}
+
+const ProcedureReport& report(const Identification& found, const std::string& name) {
+  return *std::find_if(found.procedures.begin(), found.procedures.end(),
+                       [&](const ProcedureReport& p) { return p.name == name; });
+}
+
+TEST(Identify, SquareWaveAllowsDecayAndOutputError) {
+  const Identification found = identify(test::servo_file().rig, {square_wave(6)});
+  EXPECT_EQ(report(found, "output_error").records, std::vector<std::string>{"square.csv"});
+  EXPECT_EQ(report(found, "decay").records, std::vector<std::string>{"square.csv"});
+  for (const char* name : {"friction_lines", "line_inertia", "clearance", "gap_map"}) {
+    EXPECT_TRUE(report(found, name).records.empty()) << name;
+    EXPECT_FALSE(report(found, name).message.empty()) << name;
+  }
+  EXPECT_EQ(found.parameters.size(), 9u);
+  EXPECT_EQ(found.units.at("mesh_stiffness"), "N m/rad");
+}
+
+TEST(Identify, ARecordOfTheMotorSideAloneTellsItsFriction) {
+  // Speeds with their torque, as a drive without load encoder shows them: 63 + 13 w of the motor, 15 + 9 w of
+  // the load.
+  Record record;
+  record.name = "speeds.csv";
+  for (int k = 0; k < 40000; ++k) {
+    const double t = k * 1e-3, speed = std::vector<double>{0.2, 0.8, -0.3, -1.0}[k / 10000];
+    record.time.push_back(t);
+    record.column(Channel::motor_velocity).push_back(speed + 1e-4 * std::sin(17.3 * k));
+    record.column(Channel::motor_torque).push_back((speed > 0 ? 78 : -78) + 22 * speed + std::sin(31.7 * k));
+    record.column(Channel::motor_position).push_back(speed * (t - 10 * (k / 10000)));
+  }
+  const Identification found = identify(test::servo_file().rig, {record});
+  EXPECT_EQ(report(found, "friction_lines").records.size(), 1u);
+  EXPECT_TRUE(report(found, "output_error").records.empty());
+  const auto& p = found.parameters;
+  EXPECT_NEAR(p.at("motor_coulomb").value + p.at("load_coulomb").value, 78, 0.5);
+  EXPECT_NEAR(p.at("motor_viscous").value + p.at("load_viscous").value, 22, 0.5);
+  EXPECT_GT(p.at("motor_coulomb").standard_error, 1);  // how it is shared out is what the rig file declares
+  EXPECT_EQ(p.count("mesh_stiffness"), 0u);
+}
+
+TEST(Identify, NothingToGoByIsSaidWithAllReasons) {
+  Record record = square_wave(1);
+  for (const Channel channel : {Channel::motor_position, Channel::motor_velocity})
+    record.column(channel).clear();
+  try {
+    identify(test::servo_file().rig, {record});
+    FAIL() << "nothing thrown";
+  } catch (const CannotIdentify& error) {
+    for (const char* name : {"friction_lines", "frequency_response", "output_error"})
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+  }
+}
+
+TEST(Identify, HolesAndGapsAreNamed) {
+  Record hole = square_wave(3), gap = square_wave(3);
+  hole.column(Channel::load_position)[1500] = std::nan("");
+  for (std::size_t k = 1000; k < gap.size(); ++k) gap.time[k] += 0.5;
+  for (const Record& bad : {hole, gap}) {
+    EXPECT_THROW(identify(test::servo_file().rig, {bad}), BadData);
+    const Identification found = identify(test::servo_file().rig, {bad, square_wave(3)});
+    ASSERT_FALSE(found.warnings.empty());
+    EXPECT_EQ(found.warnings.front().rfind("not used: square.csv", 0), 0u) << found.warnings.front();
+  }
+}
+
+TEST(Identify, CancelsAndRefusesOtherMachines) {
+  const Progress cancel = [](double, const std::string&) { return false; };
+  EXPECT_THROW(identify(test::servo_file().rig, {square_wave(1)}, cancel), Cancelled);
+  const Rig locked = load_rig_file(test::package_file("config/sarkar_1997.yaml")).rig;
+  EXPECT_THROW(identify(locked, {square_wave(1)}), CannotIdentify);
+}
+
+}  // namespace
+}  // namespace backlash
