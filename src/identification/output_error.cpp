@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/zero_phase.h"
@@ -15,27 +16,14 @@ constexpr double kHold = 0.5;             // samples, mean delay of a held torqu
 constexpr double kLargestDelay = 3;  // samples
 constexpr Eigen::Index kRowsPerBlock = 200;
 constexpr double kEnds = 3;           // periods of the cutoff at either end, where the filter has not settled
-constexpr double kStandstill = 0.02;  // of the largest motor speed
+constexpr double kSureSpeed = 5;      // standard deviations of the motor speed, from which it has a sign
+constexpr double kRateNoise = 0.95;   // of a five-point difference, position noise over interval
+constexpr long kReach = 2;            // samples to either side that it uses
 
 std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
   std::vector<double> d(a.size());
   for (std::size_t k = 0; k < a.size(); ++k) d[k] = a[k] - b[k];
   return d;
-}
-
-/// Standard deviation of white noise from third differences, the largest tenth left out: what moves smoothly,
-/// and the few samples where it does not, cancel.
-double white_noise(const std::vector<double>& x) {
-  std::vector<double> d;
-  for (std::size_t k = 3; k < x.size(); ++k)
-    d.push_back(std::pow(x[k] - 3 * x[k - 1] + 3 * x[k - 2] - x[k - 3], 2));
-  const std::size_t kept = d.size() * 9 / 10;
-  if (kept == 0) return 0;
-  std::nth_element(d.begin(), d.begin() + kept, d.end());
-  double sum = 0;
-  for (std::size_t i = 0; i < kept; ++i) sum += d[i];
-  constexpr double kNormalShare = 0.6231;  // of the variance of normal values without the largest tenth
-  return std::sqrt(sum / (double(kept) * kNormalShare * 20));
 }
 
 // A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
@@ -53,40 +41,19 @@ std::vector<double> held_over_second_difference(const std::vector<double>& x) {
   return mean;
 }
 
-/// Part of the two intervals about each sample, weighted like a second difference, in which a speed that is linear between
-/// samples is > 0: Coulomb friction changes sign between samples, not at one.
-std::vector<double> share_forward(const std::vector<double>& w) {
-  std::vector<double> share(w.size(), 0);
-  for (std::size_t k = 0; k + 1 < w.size(); ++k) {
-    const double a = w[k], b = w[k + 1];
-    double left = 0.5, right = 0.5;  // of the weights 1 - u and u over 0 < u < 1, where the speed is > 0
-    if (a <= 0 && b <= 0) {
-      left = right = 0;
-    } else if (a < 0 || b < 0) {
-      const double u = a / (a - b), early = u - 0.5 * u * u, late = 0.5 * u * u;
-      left = a > 0 ? early : 0.5 - early;
-      right = a > 0 ? late : 0.5 - late;
-    }
-    share[k] += left;
-    share[k + 1] += right;
-  }
-  if (!share.empty()) share.front() *= 2, share.back() *= 2;  // one interval only
-  return share;
-}
-
-/// Motor moves, with a margin as long as the filter remembers.
-std::vector<char> moving(const ServoData& data, double cutoff) {
-  double fastest = 0;
-  for (const double w : data.motor_rate) fastest = std::max(fastest, std::fabs(w));
-  const long n = static_cast<long>(data.size()), margin = std::lround(0.5 / (cutoff * data.interval));
-  const long ends = std::lround(kEnds / (cutoff * data.interval));
-  std::vector<char> counts(n, 1);
+/// +1 or -1 where the motor slides that way over both intervals about the sample and all that its rate was
+/// taken from; 0 where it may stand or turn round, where dry friction takes any value.
+std::vector<int> sliding(const ServoData& data) {
+  const double slowest = kSureSpeed * kRateNoise * position_noise(data.motor) / data.interval;
+  const long n = static_cast<long>(data.size());
+  std::vector<int> direction(n), sure(n);
+  for (long k = 0; k < n; ++k) direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);
   for (long k = 0; k < n; ++k) {
-    if (k < ends || k >= n - ends) counts[k] = 0;
-    if (std::fabs(data.motor_rate[k]) < kStandstill * fastest)
-      for (long j = std::max(0L, k - margin); j <= std::min(n - 1, k + margin); ++j) counts[j] = 0;
+    sure[k] = direction[k];
+    for (long j = std::max(0L, k - kReach); j <= std::min(n - 1, k + kReach); ++j)
+      if (direction[j] != direction[k]) sure[k] = 0;
   }
-  return counts;
+  return sure;
 }
 
 /// Over the samples that count (all where `counts` is empty).
@@ -120,21 +87,25 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const Outpu
                               data.load_rate.front()};
   p.load = simulate_driven_load(rig, motion, settings.feedback);
   const double inertia = GearTrain(rig).motor_inertia();
-  std::vector<double> rest(data.size());  // all that is not inertia
-  for (std::size_t k = 0; k < rest.size(); ++k) rest[k] = -p.load.motor_net[k];
-  std::vector<double> torque = over_second_difference(rest);
-  const std::vector<double> forward = share_forward(data.motor_rate);
-  for (std::size_t k = 0; k < torque.size(); ++k) {
+  std::vector<double> torque(data.size());
+  const std::vector<double> acting = delayed(
+      calibration.held ? held_over_second_difference(data.torque) : over_second_difference(data.torque),
+      calibration.torque_delay);
+  const std::vector<int> direction = sliding(data);
+  const long n = static_cast<long>(data.size()), ends = std::lround(kEnds / (settings.cutoff * data.interval));
+  p.counts.assign(n, 0);
+  for (long k = 0; k < n; ++k) {
     const FrictionLimits& f = p.load.motor_friction[k];
-    torque[k] += inertia * data.motor_acceleration[k] + forward[k] * f.forward - (1 - forward[k]) * f.backward;
+    p.counts[k] = direction[k] != 0 && k >= ends && k < n - ends;
+    torque[k] = direction[k] == 0 ? acting[k]  // friction takes what balances
+                                  : inertia * data.motor_acceleration[k] - p.load.motor_mean[k] +
+                                        (direction[k] > 0 ? f.forward : -f.backward);
   }
   p.torque = smooth(torque);
-  const std::vector<double> acting = calibration.held ? held_over_second_difference(data.torque) : over_second_difference(data.torque);
-  p.measured_torque = smooth(delayed(acting, calibration.torque_delay));
+  p.measured_torque = smooth(acting);
   p.measured_deflection = smooth(difference(data.motor, data.load));
   p.deflection = smooth(difference(data.motor, p.load.load));
   for (double& d : p.deflection) d -= calibration.encoder_offset;
-  p.counts = moving(data, settings.cutoff);
   p.torque_floor = white_noise(data.torque) * std::sqrt(2 * settings.cutoff * data.interval);
   p.deflection_floor = white_noise(data.load) * std::sqrt(2 * settings.cutoff * data.interval);
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
