@@ -5,6 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/bandwidth.h"
+#include "backlash_diagnosis/identification/noise_floor.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/zero_phase.h"
@@ -106,8 +107,9 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const Outpu
   p.measured_deflection = smooth(difference(data.motor, data.load));
   p.deflection = smooth(difference(data.motor, p.load.load));
   for (double& d : p.deflection) d -= calibration.encoder_offset;
-  p.torque_floor = white_noise(data.torque) * std::sqrt(2 * settings.cutoff * data.interval);
-  p.deflection_floor = white_noise(data.load) * std::sqrt(2 * settings.cutoff * data.interval);
+  const NoiseFloors floors = noise_floors(rig, data, p.load.load, settings.cutoff, settings.feedback);
+  p.torque_floor = floors.torque;
+  p.deflection_floor = floors.deflection;
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
   p.deflection_error = relative(p.measured_deflection, p.deflection, {}, p.deflection_floor);
   return p;
