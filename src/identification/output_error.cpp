@@ -4,128 +4,51 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
-#include "backlash_diagnosis/model/gear_train.h"
-#include "backlash_diagnosis/record/zero_phase.h"
+#include "servo_prediction.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kHold = 0.5;             // samples, mean delay of a held torque
-constexpr double kLargestDelay = 3;  // samples
-constexpr Eigen::Index kRowsPerBlock = 200;
-constexpr double kEnds = 3;           // periods of the cutoff at either end, where the filter has not settled
-constexpr double kSureSpeed = 5;      // standard deviations of the motor speed, from which it has a sign
-constexpr double kRateNoise = 0.95;   // of a five-point difference, position noise over interval
-constexpr long kReach = 2;            // samples to either side that it uses
+constexpr double kHold = 0.5;         // samples, mean delay of a held torque
+constexpr double kLargestDelay = 3;   // samples
+constexpr double kBlock = 1;          // s: the slowest oscillation that a servo record shows
+constexpr int kRounds = 3;            // of weighing and fitting
+constexpr double kRoughTolerance = 1e-3;
 
-std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
-  std::vector<double> d(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) d[k] = a[k] - b[k];
-  return d;
+/// Standard deviation of either residual of one record [N m, rad].
+struct Weights {
+  double torque, deflection;
+};
+
+/// What counts of one record is one row per channel and `stride` samples: as many as a signal of this
+/// bandwidth has independent values.
+std::size_t stride(const PreparedServo& record) {
+  return std::max(1L, std::lround(0.4 / (record.cutoff * record.data.interval)));
 }
 
-// A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
-// torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
-// the next, by half and half.
-std::vector<double> over_second_difference(const std::vector<double>& x) {
-  std::vector<double> mean = x;
-  for (std::size_t k = 1; k + 1 < x.size(); ++k) mean[k] = (x[k - 1] + 10 * x[k] + x[k + 1]) / 12;
-  return mean;
-}
-
-std::vector<double> held_over_second_difference(const std::vector<double>& x) {
-  std::vector<double> mean = x;
-  for (std::size_t k = 1; k < x.size(); ++k) mean[k] = 0.5 * (x[k - 1] + x[k]);
-  return mean;
-}
-
-/// +1 or -1 where the motor slides that way over both intervals about the sample and all that its rate was
-/// taken from; 0 where it may stand or turn round, where dry friction takes any value.
-std::vector<int> sliding(const ServoData& data) {
-  const double slowest = kSureSpeed * kRateNoise * position_noise(data.motor) / data.interval;
-  const long n = static_cast<long>(data.size());
-  std::vector<int> direction(n), sure(n);
-  for (long k = 0; k < n; ++k) direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);
-  for (long k = 0; k < n; ++k) {
-    sure[k] = direction[k];
-    for (long j = std::max(0L, k - kReach); j <= std::min(n - 1, k + kReach); ++j)
-      if (direction[j] != direction[k]) sure[k] = 0;
-  }
-  return sure;
-}
-
-/// Over the samples that count (all where `counts` is empty).
-ChannelError relative(const std::vector<double>& measured, const std::vector<double>& predicted,
-                      const std::vector<char>& counts, double floor) {
-  double n = 0, sum = 0, square = 0, residual = 0;
-  for (std::size_t k = 0; k < measured.size(); ++k) {
-    if (!counts.empty() && !counts[k]) continue;
-    ++n;
-    sum += measured[k];
-    square += measured[k] * measured[k];
-    residual += std::pow(measured[k] - predicted[k], 2);
-  }
-  const double spread = std::sqrt(square - sum * sum / n);
-  return {std::sqrt(residual) / spread, floor * std::sqrt(n) / spread};
-}
-
-}  // namespace
-
-ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
-                              const Calibration& calibration) {
-  const auto smooth = [&](const std::vector<double>& values) {
-    return low_pass(values, data.interval, settings.cutoff);
-  };
-  ServoPrediction p;
-  const RecordedMotion motion{data.interval,
-                              &data.motor,
-                              &data.motor_rate,
-                              &data.load_rate,
-                              data.load.front() - calibration.encoder_offset,
-                              data.load_rate.front()};
-  p.load = simulate_driven_load(rig, motion, settings.feedback);
-  const double inertia = GearTrain(rig).motor_inertia();
-  std::vector<double> torque(data.size());
-  const std::vector<double> acting = delayed(
-      calibration.held ? held_over_second_difference(data.torque) : over_second_difference(data.torque),
-      calibration.torque_delay);
-  const std::vector<int> direction = sliding(data);
-  const long n = static_cast<long>(data.size()), ends = std::lround(kEnds / (settings.cutoff * data.interval));
-  p.counts.assign(n, 0);
-  for (long k = 0; k < n; ++k) {
-    const FrictionLimits& f = p.load.motor_friction[k];
-    p.counts[k] = direction[k] != 0 && k >= ends && k < n - ends;
-    torque[k] = direction[k] == 0 ? acting[k]  // friction takes what balances
-                                  : inertia * data.motor_acceleration[k] - p.load.motor_mean[k] +
-                                        (direction[k] > 0 ? f.forward : -f.backward);
-  }
-  p.torque = smooth(torque);
-  p.measured_torque = smooth(acting);
-  p.measured_deflection = smooth(difference(data.motor, data.load));
-  p.deflection = smooth(difference(data.motor, p.load.load));
-  for (double& d : p.deflection) d -= calibration.encoder_offset;
-  const NoiseFloors floors = noise_floors(rig, data, p.load.load, settings.cutoff, settings.feedback);
-  p.torque_floor = floors.torque;
-  p.deflection_floor = floors.deflection;
-  p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
-  p.deflection_error = relative(p.measured_deflection, p.deflection, {}, p.deflection_floor);
-  return p;
-}
-
-namespace {
-
-/// Residuals of one record in units of their floors, both channels of a moment side by side, as many rows as
-/// a signal of this bandwidth has independent values.
-void append_residuals(const ServoPrediction& p, const ServoData& data, double cutoff,
+void append_residuals(const PreparedServo& record, const ServoResiduals& r, const Weights& weights,
                       std::vector<double>& rows) {
-  const std::size_t stride = std::max(1L, std::lround(0.4 / (cutoff * data.interval)));
-  for (std::size_t k = 0; k < data.size(); k += stride) {
-    rows.push_back(p.counts[k] ? (p.measured_torque[k] - p.torque[k]) / p.torque_floor : 0);
-    rows.push_back((p.measured_deflection[k] - p.deflection[k]) / p.deflection_floor);
+  for (std::size_t k = 0; k < record.data.size(); k += stride(record)) {
+    rows.push_back(record.counts[k] ? r.torque[k] / weights.torque : 0);
+    rows.push_back(r.deflection[k] / weights.deflection);
   }
+}
+
+/// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
+Weights weigh(const Rig& rig, const PreparedServo& record, const Calibration& calibration) {
+  const ServoResiduals r = record.residuals(rig, calibration);
+  const NoiseFloors floor = noise_floors(rig, record.data, r.load.load, record.cutoff, record.feedback);
+  double torque = 0, deflection = 0, count = 0;
+  for (std::size_t k = 0; k < r.torque.size(); ++k) {
+    deflection += r.deflection[k] * r.deflection[k] / double(r.torque.size());
+    if (!record.counts[k]) continue;
+    torque += r.torque[k] * r.torque[k];
+    ++count;
+  }
+  return {std::max(floor.torque, std::sqrt(torque / std::max(1.0, count))),
+          std::max(floor.deflection, std::sqrt(deflection))};
 }
 
 double misfit(const Finding& finding, const Rig& rig) {
@@ -189,58 +112,89 @@ class Unknowns {
   std::size_t records_;
 };
 
-}  // namespace
+/// The fit of all records, round after round.
+class Fit {
+ public:
+  Fit(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings)
+      : settings_(settings), rig_(start), calibrations_(records.size()) {
+    records_.reserve(records.size());
+    for (const ServoData& data : records) records_.emplace_back(data, settings);
+  }
 
-namespace {
+  /// Weighs with the present rig and fits.
+  void run(double tolerance) {
+    weights_.clear();
+    for (std::size_t r = 0; r < records_.size(); ++r)
+      weights_.push_back(weigh(rig_, records_[r], calibrations_[r]));
+    const Unknowns unknowns(rig_, settings_.parameters, calibrations_);
+    NonlinearOptions options;
+    options.iterations = settings_.iterations;
+    options.step = settings_.step;
+    options.tolerance = tolerance;
+    options.parallel = true;
+    fit_ = fit_nonlinear([&](const Eigen::VectorXd& p) { return rows(unknowns, p); }, unknowns.values(),
+                         unknowns.scale(), options);
+    rig_ = unknowns.rig(fit_.values);
+    for (std::size_t r = 0; r < records_.size(); ++r)
+      calibrations_[r] = unknowns.calibration(fit_.values, r);
+  }
 
-OutputError fit_from(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings,
-                     const std::vector<Calibration>& calibrations) {
-  const Unknowns unknowns(start, settings.parameters, calibrations);
-  const auto residuals = [&](const Eigen::VectorXd& p) {
+  /// What acts half a sample earlier than a held torque is not held.
+  void tell_held() {
+    for (Calibration& c : calibrations_) {
+      if (!c.held || c.torque_delay > -0.5 * kHold) continue;
+      c.held = false;
+      c.torque_delay += kHold;
+    }
+  }
+
+  OutputError result() {
+    const Unknowns unknowns(rig_, settings_.parameters, calibrations_);
+    const Eigen::Index known = Eigen::Index(settings_.findings.size());
+    const Eigen::Index rows = fit_.residuals.size() - known;
+    const Eigen::Index wanted = 2 * std::lround(kBlock / (double(stride(records_[0])) * records_[0].data.interval));
+    const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
+    fit_.covariance = block_covariance(fit_, block, known);
+    OutputError result;
+    result.rig = rig_;
+    result.parameters = unknowns.parameters(fit_);
+    result.calibrations = calibrations_;
+    for (std::size_t r = 0; r < records_.size(); ++r) {
+      const ServoPrediction p = predict_servo(rig_, records_[r].data, settings_, calibrations_[r]);
+      result.torque.push_back(p.torque_error);
+      result.deflection.push_back(p.deflection_error);
+    }
+    return result;
+  }
+
+ private:
+  Eigen::VectorXd rows(const Unknowns& unknowns, const Eigen::VectorXd& p) const {
     const Rig rig = unknowns.rig(p);
     std::vector<double> rows;
-    for (std::size_t r = 0; r < records.size(); ++r)
-      append_residuals(predict_servo(rig, records[r], settings, unknowns.calibration(p, r)), records[r],
-                       settings.cutoff, rows);
-    for (const Finding& finding : settings.findings) rows.push_back(misfit(finding, rig));
-    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(rows.data(), rows.size()));
-  };
-  NonlinearOptions options;
-  options.iterations = settings.iterations;
-  options.step = settings.step;
-  LeastSquaresFit fit = fit_nonlinear(residuals, unknowns.values(), unknowns.scale(), options);
-  // A block is as long as the slowest oscillation that a servo record shows, and there are enough of them.
-  const Eigen::Index rows = fit.residuals.size(), known = Eigen::Index(settings.findings.size());
-  const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, kRowsPerBlock);
-  fit.covariance = block_covariance(fit, block, known);
-  OutputError result;
-  result.rig = unknowns.rig(fit.values);
-  result.parameters = unknowns.parameters(fit);
-  for (std::size_t r = 0; r < records.size(); ++r)
-    result.calibrations.push_back(unknowns.calibration(fit.values, r));
-  return result;
-}
+    for (std::size_t r = 0; r < records_.size(); ++r)
+      append_residuals(records_[r], records_[r].residuals(rig, unknowns.calibration(p, r)), weights_[r], rows);
+    for (const Finding& finding : settings_.findings) rows.push_back(misfit(finding, rig));
+    return Eigen::Map<Eigen::VectorXd>(rows.data(), Eigen::Index(rows.size()));
+  }
+
+  const OutputErrorSettings& settings_;
+  std::vector<PreparedServo> records_;
+  std::vector<Weights> weights_;
+  Rig rig_;
+  std::vector<Calibration> calibrations_;
+  LeastSquaresFit fit_;
+};
 
 }  // namespace
 
 OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& settings) {
-  OutputError result = fit_from(start, records, settings, std::vector<Calibration>(records.size()));
-  std::vector<Calibration> calibrations = result.calibrations;
-  bool changed = false;
-  for (Calibration& c : calibrations) {
-    if (c.torque_delay > -0.5 * kHold) continue;
-    c.held = false;  // what acts half a sample earlier than a held torque is not held
-    c.torque_delay += kHold;
-    changed = true;
+  Fit fit(start, records, settings);
+  for (int round = 0; round < kRounds; ++round) {
+    fit.run(round + 1 < kRounds ? kRoughTolerance : NonlinearOptions().tolerance);
+    if (round == 0) fit.tell_held();
   }
-  if (changed) result = fit_from(result.rig, records, settings, calibrations);
-  for (std::size_t r = 0; r < records.size(); ++r) {
-    const ServoPrediction p = predict_servo(result.rig, records[r], settings, result.calibrations[r]);
-    result.torque.push_back(p.torque_error);
-    result.deflection.push_back(p.deflection_error);
-  }
-  return result;
+  return fit.result();
 }
 
 ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,

@@ -70,7 +70,7 @@ ServoData servo_data(const Record& raw, const Rig& rig) {
   if (!record.has(Channel::load_position)) return data;
   data.load = scaled(record, Channel::load_position, 1);
   data.load_rate =
-      low_pass(derivative(data.load, data.interval), data.interval, load_rate_cutoff(data.interval));
+      low_pass(fast_derivative(data.load, data.interval), data.interval, load_rate_cutoff(data.interval));
   return data;
 }
 

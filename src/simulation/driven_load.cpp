@@ -1,5 +1,6 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <tuple>
@@ -14,16 +15,30 @@ namespace {
 
 constexpr double kFarthest = 1e3;  // rad/s, beyond which the load has run away
 
-/// Motion within one sample, u = 0 .. 1.
-struct Segment {
-  double q0, w0, q1, w1, v0, v1, interval;
+/// A sampled signal between two of its samples, u = 0 .. 1: cubic with the slopes [per sample] at its ends.
+struct Cubic {
+  double y0, y1, d0, d1;
 
-  double motor(double u) const {  // cubic Hermite
+  double operator()(double u) const {
     const double s = 1 - u;
-    return s * s * ((1 + 2 * u) * q0 + u * interval * w0) + u * u * ((3 - 2 * u) * q1 - s * interval * w1);
+    return s * s * ((1 + 2 * u) * y0 + u * d0) + u * u * ((3 - 2 * u) * y1 - s * d1);
   }
-  double motor_rate(double u) const { return (1 - u) * w0 + u * w1; }
-  double load_rate(double u) const { return (1 - u) * v0 + u * v1; }
+};
+
+/// After sample k, with slopes from the samples beside it (Catmull and Rom): a straight line would lose 0.03 %
+/// of a speed at a hundredth of the sampling rate, which next to the feedback is no longer small.
+Cubic between(const std::vector<double>& y, std::size_t k) {
+  const std::size_t last = y.size() - 1, j = std::min(k + 1, last);
+  const auto slope = [&](std::size_t i) {
+    return i == 0 || i == last ? y[j] - y[k] : 0.5 * (y[i + 1] - y[i - 1]);
+  };
+  return {y[k], y[j], slope(k), slope(j)};
+}
+
+/// Motion within one sample.
+struct Segment {
+  Cubic motor, motor_rate, load_rate;
+  double interval;
 };
 
 /// Integrals over one sample with the weights 1 - u and u.
@@ -68,7 +83,7 @@ class Load {
 
  private:
   static constexpr int kMostPieces = 30;
-  static constexpr int kHalvings = 14;  // of a sample, that place an event
+  static constexpr int kHalvings = 10;  // of a sample, that place an event
   struct Forces {
     GearTrain::EndForces ends;
     double net;  // N m on the load, without dry friction
@@ -203,10 +218,11 @@ DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, do
   const auto& w = *motion.motor_rate;
   GearTrain::EndForces f{};
   for (std::size_t k = 0; k < n; ++k) {
-    const std::size_t j = k + 1 < n ? k + 1 : k;
-    const double v0 = motion.load_rate ? (*motion.load_rate)[k] : 0,
-                 v1 = motion.load_rate ? (*motion.load_rate)[j] : 0;
-    const Segment segment{q[k], w[k], q[j], w[j], v0, v1, motion.interval};
+    const std::size_t j = std::min(k + 1, n - 1);
+    const Segment segment{{q[k], q[j], motion.interval * w[k], motion.interval * w[j]},
+                          between(w, k),
+                          motion.load_rate ? between(*motion.load_rate, k) : Cubic{0, 0, 0, 0},
+                          motion.interval};
     const double t = k * motion.interval;
     if (k == 0) f = load.begin(segment, t);
     out.load[k] = load.q;
