@@ -94,7 +94,8 @@ class Load {
   };
   struct Move {
     double q, w;
-    Forces middle;
+    int side;            // that touches halfway
+    double motor_torque;  // halfway
   };
 
   Forces forces(const Segment& s, double t, double u, double position, double rate) const {
@@ -111,12 +112,15 @@ class Load {
   Move moved(const Segment& s, double t, double u, double v, const Forces& f) const {
     const double h = (v - u) * s.interval, m = 0.5 * (u + v);
     const double a1 = acceleration(f);
-    const double w2 = w + 0.5 * h * a1, a2 = acceleration(forces(s, t, m, q + 0.5 * h * w, w2));
-    const double w3 = w + 0.5 * h * a2;
-    const Forces middle = forces(s, t, m, q + 0.5 * h * w2, w3);
-    const double a3 = acceleration(middle), w4 = w + h * a3;
+    const double w2 = w + 0.5 * h * a1;
+    const Forces early = forces(s, t, m, q + 0.5 * h * w, w2);
+    const double a2 = acceleration(early), w3 = w + 0.5 * h * a2;
+    const Forces late = forces(s, t, m, q + 0.5 * h * w2, w3);
+    const double a3 = acceleration(late), w4 = w + h * a3;
     const double a4 = acceleration(forces(s, t, v, q + h * w3, w4));
-    return {q + h / 6 * (w + 2 * w2 + 2 * w3 + w4), w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), middle};
+    // Halfway the first estimate of the position lags by h^2 a / 8, the second leads by as much.
+    return {q + h / 6 * (w + 2 * w2 + 2 * w3 + w4), w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), late.side(),
+            0.5 * (early.ends.motor + late.ends.motor)};
   }
 
   /// The first change between u and v, known to lie there: last moment before and first after it.
@@ -134,13 +138,13 @@ class Load {
     double v = 1;
     Move to = moved(s, t, u, v, f);
     Forces end = forces(s, t, v, to.q, to.w);
-    if (divide && to.middle.side() != f.side() && !changes(to, end)) {  // touched and left within
+    if (divide && to.side != f.side() && !changes(to, end)) {  // touched and left within
       v = 0.5 * (u + v);
       to = moved(s, t, u, v, f);
       end = forces(s, t, v, to.q, to.w);
     }
     if (!divide || !changes(to, end)) {
-      sum.add(u, v, f.ends.motor, to.middle.ends.motor, end.ends.motor);
+      sum.add(u, v, f.ends.motor, to.motor_torque, end.ends.motor);
       q = to.q;
       w = to.w;
       f = end;
@@ -152,7 +156,7 @@ class Load {
     });
     to = moved(s, t, u, before, f);
     end = forces(s, t, before, to.q, to.w);
-    sum.add(u, before, f.ends.motor, to.middle.ends.motor, end.ends.motor);
+    sum.add(u, before, f.ends.motor, to.motor_torque, end.ends.motor);
     const double h = (after - before) * s.interval;
     q = to.q + h * to.w;
     w = to.w + h * acceleration(end);
