@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <random>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
@@ -14,7 +16,12 @@ namespace {
 constexpr double kHold = 0.5;         // samples, mean delay of a held torque
 constexpr double kLargestDelay = 3;   // samples
 constexpr double kBlock = 1;          // s: the slowest oscillation that a servo record shows
-constexpr int kRounds = 3;            // of weighing and fitting
+constexpr double kFarthest = 30;      // times the start or a part of it: no parameter is sought beyond
+constexpr double kRoughCutoff = 15;   // Hz, of the first round: what moves slowly has fewer wrong minima
+// A model that leaves a twentieth of the torque, where the machine is one of its kind, sits in a wrong minimum.
+constexpr double kWrongMinimum = 0.05;
+constexpr int kOtherStarts = 8;
+constexpr double kBeside = 0.4;  // of the logarithm of a parameter
 constexpr double kRoughTolerance = 1e-3;
 
 /// Standard deviation of either residual of one record [N m, rad].
@@ -57,18 +64,24 @@ double misfit(const Finding& finding, const Rig& rig) {
   return (finding.measured.value - value) / finding.measured.standard_error;
 }
 
-/// The unknowns of a fit: parameters of the rig, then delay and offset of each record.
+/// The unknowns of a fit: parameters of the rig (of those that are positive the logarithm, relative to the
+/// start), then delay and offset of each record.
 class Unknowns {
  public:
   Unknowns(const Rig& start, const std::vector<std::string>& names, std::vector<Calibration> calibrations)
       : start_(start), calibrations_(std::move(calibrations)), records_(calibrations_.size()) {
-    for (const std::string& name : names) fitted_.push_back(&servo_parameter(name));
+    for (const std::string& name : names) {
+      fitted_.push_back(&servo_parameter(name));
+      if (const double value = fitted_.back()->get(start); fitted_.back()->positive && !(value > 0))
+        throw InvalidParameter(name, value, "must be > 0");
+    }
   }
   Eigen::Index size() const { return Eigen::Index(fitted_.size() + 2 * records_); }
 
   Eigen::VectorXd values() const {
     Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
-    for (std::size_t i = 0; i < fitted_.size(); ++i) p[i] = fitted_[i]->get(start_);
+    for (std::size_t i = 0; i < fitted_.size(); ++i)
+      if (!fitted_[i]->positive) p[i] = fitted_[i]->get(start_);
     for (std::size_t r = 0; r < records_; ++r) {
       p[fitted_.size() + 2 * r] = calibrations_[r].torque_delay;
       p[fitted_.size() + 2 * r + 1] = calibrations_[r].encoder_offset;
@@ -76,9 +89,7 @@ class Unknowns {
     return p;
   }
   Eigen::VectorXd scale() const {
-    Eigen::VectorXd s = values().cwiseAbs();
-    for (std::size_t i = 0; i < fitted_.size(); ++i)
-      if (!fitted_[i]->positive || s[i] == 0) s[i] = 1;
+    Eigen::VectorXd s = Eigen::VectorXd::Ones(size());
     const double gap = start_.mesh.backlash / start_.mesh.lever();
     for (std::size_t r = 0; r < records_; ++r) {
       s[fitted_.size() + 2 * r] = 1;
@@ -89,8 +100,9 @@ class Unknowns {
   Rig rig(const Eigen::VectorXd& p) const {
     Rig rig = start_;
     for (std::size_t i = 0; i < fitted_.size(); ++i) {
-      if (fitted_[i]->positive && !(p[i] > 0)) throw InvalidParameter(fitted_[i]->name, p[i], "must be > 0");
-      fitted_[i]->set(rig, p[i]);
+      if (fitted_[i]->positive && std::fabs(p[i]) > std::log(kFarthest))
+        throw InvalidParameter(fitted_[i]->name, std::exp(p[i]), "of its start: too far");
+      fitted_[i]->set(rig, fitted_[i]->positive ? fitted_[i]->get(start_) * std::exp(p[i]) : p[i]);
     }
     return rig;
   }
@@ -101,7 +113,10 @@ class Unknowns {
   }
   std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const {
     std::map<std::string, Measured> all;
-    for (std::size_t i = 0; i < fitted_.size(); ++i) all[fitted_[i]->name] = fit.parameter(i);
+    for (std::size_t i = 0; i < fitted_.size(); ++i) {
+      Measured& m = all[fitted_[i]->name] = fit.parameter(i);
+      if (fitted_[i]->positive) m.value = fitted_[i]->get(start_) * std::exp(m.value), m.standard_error *= m.value;
+    }
     return all;
   }
 
@@ -112,21 +127,31 @@ class Unknowns {
   std::size_t records_;
 };
 
+/// The covariance of neighbouring rows is itself an estimate from few blocks and now and then far too small.
+void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
+  const Eigen::VectorXd growth = (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
+  covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
+}
+
 /// The fit of all records, round after round.
 class Fit {
  public:
   Fit(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings)
       : settings_(settings), rig_(start), calibrations_(records.size()) {
-    records_.reserve(records.size());
-    for (const ServoData& data : records) records_.emplace_back(data, settings);
+    data_ = &records;
   }
 
   /// Weighs with the present rig and fits.
-  void run(double tolerance) {
+  void run(double cutoff, double tolerance) {
+    OutputErrorSettings settings = settings_;
+    settings.cutoff = std::min(cutoff, settings_.cutoff);
+    records_.clear();
+    for (const ServoData& data : *data_) records_.emplace_back(data, settings);
     weights_.clear();
     for (std::size_t r = 0; r < records_.size(); ++r)
       weights_.push_back(weigh(rig_, records_[r], calibrations_[r]));
-    const Unknowns unknowns(rig_, settings_.parameters, calibrations_);
+    unknowns_.emplace(rig_, settings_.parameters, calibrations_);
+    const Unknowns& unknowns = *unknowns_;
     NonlinearOptions options;
     options.iterations = settings_.iterations;
     options.step = settings_.step;
@@ -139,6 +164,30 @@ class Fit {
       calibrations_[r] = unknowns.calibration(fit_.values, r);
   }
 
+  bool try_run(double cutoff, double tolerance) {
+    try {
+      run(cutoff, tolerance);
+      return true;
+    } catch (const CannotIdentify&) {
+      return false;
+    }
+  }
+
+  /// Of all records, relative.
+  double torque_error() const {
+    double residual = 0, square = 0;
+    for (std::size_t r = 0; r < records_.size(); ++r) {
+      const ServoResiduals left = records_[r].residuals(rig_, calibrations_[r]);
+      const std::vector<double> torque = records_[r].acting_torque(calibrations_[r]);
+      for (std::size_t k = 0; k < torque.size(); ++k) {
+        if (!records_[r].counts[k]) continue;
+        residual += left.torque[k] * left.torque[k];
+        square += torque[k] * torque[k];
+      }
+    }
+    return std::sqrt(residual / square);
+  }
+
   /// What acts half a sample earlier than a held torque is not held.
   void tell_held() {
     for (Calibration& c : calibrations_) {
@@ -149,12 +198,12 @@ class Fit {
   }
 
   OutputError result() {
-    const Unknowns unknowns(rig_, settings_.parameters, calibrations_);
+    const Unknowns& unknowns = *unknowns_;
     const Eigen::Index known = Eigen::Index(settings_.findings.size());
     const Eigen::Index rows = fit_.residuals.size() - known;
     const Eigen::Index wanted = 2 * std::lround(kBlock / (double(stride(records_[0])) * records_[0].data.interval));
     const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
-    fit_.covariance = block_covariance(fit_, block, known);
+    take_larger(fit_.covariance, block_covariance(fit_, block, known));
     OutputError result;
     result.rig = rig_;
     result.parameters = unknowns.parameters(fit_);
@@ -177,23 +226,52 @@ class Fit {
     return Eigen::Map<Eigen::VectorXd>(rows.data(), Eigen::Index(rows.size()));
   }
 
-  const OutputErrorSettings& settings_;
+  OutputErrorSettings settings_;
+  const std::vector<ServoData>* data_;
   std::vector<PreparedServo> records_;
   std::vector<Weights> weights_;
   Rig rig_;
   std::vector<Calibration> calibrations_;
+  std::optional<Unknowns> unknowns_;  // of the last round
   LeastSquaresFit fit_;
 };
+
+/// Another start not far away, the same for the same number.
+Rig beside(const Rig& start, const std::vector<std::string>& names, int number) {
+  std::mt19937 random(number);
+  Rig rig = start;
+  for (const std::string& name : names) {
+    const RigParameter& parameter = servo_parameter(name);
+    const double share = double(random()) / double(std::mt19937::max());
+    if (parameter.positive) parameter.set(rig, parameter.get(rig) * std::exp(kBeside * (2 * share - 1)));
+  }
+  return rig;
+}
+
+/// The first round, from other starts where it ends in a minimum that cannot be that of the machine.
+Fit rough_fit(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings) {
+  Fit best(start, records, settings);
+  bool ran = best.try_run(kRoughCutoff, kRoughTolerance);
+  for (int i = 1; i <= kOtherStarts && !(ran && best.torque_error() < kWrongMinimum); ++i) {
+    if (settings.parameters.empty()) break;
+    Fit other(beside(start, settings.parameters, i), records, settings);
+    if (!other.try_run(kRoughCutoff, kRoughTolerance)) continue;
+    if (!ran || other.torque_error() < best.torque_error()) best = std::move(other);
+    ran = true;
+  }
+  if (!ran) best.run(kRoughCutoff, kRoughTolerance);  // says why
+  return best;
+}
 
 }  // namespace
 
 OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& settings) {
-  Fit fit(start, records, settings);
-  for (int round = 0; round < kRounds; ++round) {
-    fit.run(round + 1 < kRounds ? kRoughTolerance : NonlinearOptions().tolerance);
-    if (round == 0) fit.tell_held();
-  }
+  Fit fit = rough_fit(start, records, settings);
+  fit.tell_held();
+  fit.run(settings.cutoff, kRoughTolerance);
+  fit.tell_held();
+  fit.run(settings.cutoff, NonlinearOptions().tolerance);
   return fit.result();
 }
 

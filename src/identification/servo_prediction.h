@@ -22,7 +22,7 @@ struct PreparedServo {
   /// Safe to call from several threads.
   ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
 
-  const ServoData& data;
+  const ServoData& data;  // of the caller
   double cutoff, feedback;
   std::vector<int> direction;  // +1, -1: the motor slides that way; 0: dry friction may take any value
   std::vector<char> counts;    // whether the torque sample counts
