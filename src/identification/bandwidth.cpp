@@ -19,6 +19,8 @@ constexpr double kPositionNoiseFrom = 0.1;  // cycles per sample
 constexpr double kBand = 0.05;
 constexpr double kMeanPerMedian = 1 / M_LN2;  // of a periodogram of noise: exponential distribution
 constexpr double kHighest = 0.4;              // cycles per sample
+constexpr double kRounding = 1e-12;           // of a number in a file
+constexpr double kFewSteps = 10, kOffStep = 0.05, kLeastSteps = 10;  // of a resolution
 
 /// Second differences; of white noise of variance 1 they have the gain 16 sin^4(pi f).
 std::vector<double> second_difference(const std::vector<double>& x) {
@@ -69,6 +71,18 @@ double white_variance(const std::vector<double>& power, double from, double to) 
   return kMeanPerMedian * *middle;
 }
 
+/// From third differences, the largest tenth left out: what moves smoothly, and the few samples where a
+/// signal jumps, cancel. A jump is white, so its spectrum does not tell it from noise.
+double variance_between_jumps(const std::vector<double>& x) {
+  constexpr double kNormalShare = 0.6231;  // of the variance of normal values without the largest tenth
+  std::vector<double> square;
+  for (std::size_t k = 3; k < x.size(); ++k)
+    square.push_back(std::pow(x[k] - 3 * x[k - 1] + 3 * x[k - 2] - x[k - 3], 2));
+  const auto kept = square.begin() + square.size() * 9 / 10;
+  std::nth_element(square.begin(), kept, square.end());
+  return std::accumulate(square.begin(), kept, 0.0) / (double(kept - square.begin()) * kNormalShare * 20);
+}
+
 /// The largest density in the bands above a tenth of the sampling rate.
 double position_variance(const std::vector<double>& power) {
   double largest = 0;
@@ -80,11 +94,29 @@ double position_variance(const std::vector<double>& power) {
 }  // namespace
 
 double white_noise(const std::vector<double>& values) {
-  return std::sqrt(white_variance(periodogram(values), kNoiseFrom, 1));
+  const double spectral = white_variance(periodogram(values), kNoiseFrom, 1);
+  return std::sqrt(std::min(spectral, variance_between_jumps(values)));
 }
 
 double position_noise(const std::vector<double>& position) {
   return std::sqrt(position_variance(periodogram(position)));
+}
+
+double resolution(const std::vector<double>& position) {
+  const auto size = [&](std::size_t k) { return std::fabs(position[k] - position[k - 1]); };
+  double step = INFINITY;
+  for (std::size_t k = 1; k < position.size(); ++k)
+    if (size(k) > kRounding * std::fabs(position[k])) step = std::min(step, size(k));
+  double travel = 0, steps = 0, odd = 0, all = 0;
+  for (std::size_t k = 1; k < position.size(); ++k) {
+    if (size(k) > kFewSteps * step || size(k) < 0.5 * step) continue;
+    const double whole = std::round(size(k) / step);
+    odd += std::fabs(size(k) - whole * step) > kOffStep * step;
+    all += 1;
+    travel += size(k);
+    steps += whole;
+  }
+  return all >= kLeastSteps && odd < 0.01 * all ? travel / steps : 0;
 }
 
 double motion_bandwidth(const std::vector<double>& position, double interval) {

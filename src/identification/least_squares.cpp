@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/parallel.h"
+
 namespace backlash {
 namespace {
 
@@ -116,14 +118,14 @@ Eigen::VectorXd try_residuals(const ResidualFunction& f, const Eigen::VectorXd& 
 
 /// Columns in units of `scale`; a step that is refused is tried the other way.
 Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, const Eigen::VectorXd& r,
-                         const Eigen::VectorXd& scale, double step) {
+                         const Eigen::VectorXd& scale, const NonlinearOptions& options) {
   Eigen::MatrixXd j(r.size(), p.size());
-  for (Eigen::Index i = 0; i < p.size(); ++i) {
+  const auto column = [&](int i) {
     Eigen::VectorXd moved;
-    double h = step;
+    double h = options.step;
     for (const double sign : {1.0, -1.0}) {
       Eigen::VectorXd q = p;
-      h = sign * step;
+      h = sign * options.step;
       q[i] += h * scale[i];
       moved = try_residuals(f, q);
       if (moved.size() == r.size()) break;
@@ -133,7 +135,12 @@ Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, co
     j.col(i) = (moved - r) / h;
     if (!(j.col(i).norm() > 0))
       throw CannotIdentify("parameter " + std::to_string(i) + " has no effect on the record");
-  }
+  };
+  const int n = static_cast<int>(p.size());
+  if (options.parallel)
+    for_each_in_parallel(n, column);
+  else
+    for (int i = 0; i < n; ++i) column(i);
   return j;
 }
 
@@ -145,7 +152,7 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
   if (!usable(r)) throw CannotIdentify("the model cannot be evaluated at the start values");
   double damping = 1e-3;
   bool done = false;
-  Eigen::MatrixXd j = jacobian(residuals, p, r, scale, options.step);
+  Eigen::MatrixXd j = jacobian(residuals, p, r, scale, options);
   for (int i = 0; i < options.iterations && !done; ++i) {
     const Eigen::MatrixXd normal = j.transpose() * j;
     const Eigen::VectorXd gradient = j.transpose() * r;
@@ -167,7 +174,7 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
         done = damping > kMostDamping || step.norm() < options.tolerance;
       }
     }
-    if (!done || i == 0) j = jacobian(residuals, p, r, scale, options.step);
+    if (!done || i == 0) j = jacobian(residuals, p, r, scale, options);
   }
   LeastSquaresFit fit;
   fit.values = p;

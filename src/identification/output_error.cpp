@@ -2,157 +2,60 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/noise_floor.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
-#include "backlash_diagnosis/model/gear_train.h"
-#include "backlash_diagnosis/record/zero_phase.h"
+#include "servo_prediction.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kHold = 0.5;             // samples, mean delay of a held torque
-constexpr double kLargestDelay = 3;  // samples
-constexpr Eigen::Index kRowsPerBlock = 200;
-constexpr double kEnds = 3;           // periods of the cutoff at either end, where the filter has not settled
-constexpr double kStandstill = 0.02;  // of the largest motor speed
+constexpr double kHold = 0.5;         // samples, mean delay of a held torque
+constexpr double kLargestDelay = 3;   // samples
+constexpr double kBlock = 1;          // s: the slowest oscillation that a servo record shows
+constexpr double kFarthest = 30;      // times the start or a part of it: no parameter is sought beyond
+constexpr double kRoughCutoff = 15;   // Hz, of the first round: what moves slowly has fewer wrong minima
+// A model that leaves a twentieth of the torque, where the machine is one of its kind, sits in a wrong minimum.
+constexpr double kWrongMinimum = 0.05;
+constexpr int kOtherStarts = 8;
+constexpr double kBeside = 0.4;  // of the logarithm of a parameter
+constexpr double kRoughTolerance = 1e-3;
 
-std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
-  std::vector<double> d(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) d[k] = a[k] - b[k];
-  return d;
+/// Standard deviation of either residual of one record [N m, rad].
+struct Weights {
+  double torque, deflection;
+};
+
+/// What counts of one record is one row per channel and `stride` samples: as many as a signal of this
+/// bandwidth has independent values.
+std::size_t stride(const PreparedServo& record) {
+  return std::max(1L, std::lround(0.4 / (record.cutoff * record.data.interval)));
 }
 
-/// Standard deviation of white noise from third differences, the largest tenth left out: what moves smoothly,
-/// and the few samples where it does not, cancel.
-double white_noise(const std::vector<double>& x) {
-  std::vector<double> d;
-  for (std::size_t k = 3; k < x.size(); ++k)
-    d.push_back(std::pow(x[k] - 3 * x[k - 1] + 3 * x[k - 2] - x[k - 3], 2));
-  const std::size_t kept = d.size() * 9 / 10;
-  if (kept == 0) return 0;
-  std::nth_element(d.begin(), d.begin() + kept, d.end());
-  double sum = 0;
-  for (std::size_t i = 0; i < kept; ++i) sum += d[i];
-  constexpr double kNormalShare = 0.6231;  // of the variance of normal values without the largest tenth
-  return std::sqrt(sum / (double(kept) * kNormalShare * 20));
-}
-
-// A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
-// torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
-// the next, by half and half.
-std::vector<double> over_second_difference(const std::vector<double>& x) {
-  std::vector<double> mean = x;
-  for (std::size_t k = 1; k + 1 < x.size(); ++k) mean[k] = (x[k - 1] + 10 * x[k] + x[k + 1]) / 12;
-  return mean;
-}
-
-std::vector<double> held_over_second_difference(const std::vector<double>& x) {
-  std::vector<double> mean = x;
-  for (std::size_t k = 1; k < x.size(); ++k) mean[k] = 0.5 * (x[k - 1] + x[k]);
-  return mean;
-}
-
-/// Part of the two intervals about each sample, weighted like a second difference, in which a speed that is linear between
-/// samples is > 0: Coulomb friction changes sign between samples, not at one.
-std::vector<double> share_forward(const std::vector<double>& w) {
-  std::vector<double> share(w.size(), 0);
-  for (std::size_t k = 0; k + 1 < w.size(); ++k) {
-    const double a = w[k], b = w[k + 1];
-    double left = 0.5, right = 0.5;  // of the weights 1 - u and u over 0 < u < 1, where the speed is > 0
-    if (a <= 0 && b <= 0) {
-      left = right = 0;
-    } else if (a < 0 || b < 0) {
-      const double u = a / (a - b), early = u - 0.5 * u * u, late = 0.5 * u * u;
-      left = a > 0 ? early : 0.5 - early;
-      right = a > 0 ? late : 0.5 - late;
-    }
-    share[k] += left;
-    share[k + 1] += right;
-  }
-  if (!share.empty()) share.front() *= 2, share.back() *= 2;  // one interval only
-  return share;
-}
-
-/// Motor moves, with a margin as long as the filter remembers.
-std::vector<char> moving(const ServoData& data, double cutoff) {
-  double fastest = 0;
-  for (const double w : data.motor_rate) fastest = std::max(fastest, std::fabs(w));
-  const long n = static_cast<long>(data.size()), margin = std::lround(0.5 / (cutoff * data.interval));
-  const long ends = std::lround(kEnds / (cutoff * data.interval));
-  std::vector<char> counts(n, 1);
-  for (long k = 0; k < n; ++k) {
-    if (k < ends || k >= n - ends) counts[k] = 0;
-    if (std::fabs(data.motor_rate[k]) < kStandstill * fastest)
-      for (long j = std::max(0L, k - margin); j <= std::min(n - 1, k + margin); ++j) counts[j] = 0;
-  }
-  return counts;
-}
-
-/// Over the samples that count (all where `counts` is empty).
-ChannelError relative(const std::vector<double>& measured, const std::vector<double>& predicted,
-                      const std::vector<char>& counts, double floor) {
-  double n = 0, sum = 0, square = 0, residual = 0;
-  for (std::size_t k = 0; k < measured.size(); ++k) {
-    if (!counts.empty() && !counts[k]) continue;
-    ++n;
-    sum += measured[k];
-    square += measured[k] * measured[k];
-    residual += std::pow(measured[k] - predicted[k], 2);
-  }
-  const double spread = std::sqrt(square - sum * sum / n);
-  return {std::sqrt(residual) / spread, floor * std::sqrt(n) / spread};
-}
-
-}  // namespace
-
-ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
-                              const Calibration& calibration) {
-  const auto smooth = [&](const std::vector<double>& values) {
-    return low_pass(values, data.interval, settings.cutoff);
-  };
-  ServoPrediction p;
-  const RecordedMotion motion{data.interval,
-                              &data.motor,
-                              &data.motor_rate,
-                              &data.load_rate,
-                              data.load.front() - calibration.encoder_offset,
-                              data.load_rate.front()};
-  p.load = simulate_driven_load(rig, motion, settings.feedback);
-  const double inertia = GearTrain(rig).motor_inertia();
-  std::vector<double> rest(data.size());  // all that is not inertia
-  for (std::size_t k = 0; k < rest.size(); ++k) rest[k] = -p.load.motor_net[k];
-  std::vector<double> torque = over_second_difference(rest);
-  const std::vector<double> forward = share_forward(data.motor_rate);
-  for (std::size_t k = 0; k < torque.size(); ++k) {
-    const FrictionLimits& f = p.load.motor_friction[k];
-    torque[k] += inertia * data.motor_acceleration[k] + forward[k] * f.forward - (1 - forward[k]) * f.backward;
-  }
-  p.torque = smooth(torque);
-  const std::vector<double> acting = calibration.held ? held_over_second_difference(data.torque) : over_second_difference(data.torque);
-  p.measured_torque = smooth(delayed(acting, calibration.torque_delay));
-  p.measured_deflection = smooth(difference(data.motor, data.load));
-  p.deflection = smooth(difference(data.motor, p.load.load));
-  for (double& d : p.deflection) d -= calibration.encoder_offset;
-  p.counts = moving(data, settings.cutoff);
-  p.torque_floor = white_noise(data.torque) * std::sqrt(2 * settings.cutoff * data.interval);
-  p.deflection_floor = white_noise(data.load) * std::sqrt(2 * settings.cutoff * data.interval);
-  p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
-  p.deflection_error = relative(p.measured_deflection, p.deflection, {}, p.deflection_floor);
-  return p;
-}
-
-namespace {
-
-/// Residuals of one record in units of their floors, both channels of a moment side by side, as many rows as
-/// a signal of this bandwidth has independent values.
-void append_residuals(const ServoPrediction& p, const ServoData& data, double cutoff,
+void append_residuals(const PreparedServo& record, const ServoResiduals& r, const Weights& weights,
                       std::vector<double>& rows) {
-  const std::size_t stride = std::max(1L, std::lround(0.4 / (cutoff * data.interval)));
-  for (std::size_t k = 0; k < data.size(); k += stride) {
-    rows.push_back(p.counts[k] ? (p.measured_torque[k] - p.torque[k]) / p.torque_floor : 0);
-    rows.push_back((p.measured_deflection[k] - p.deflection[k]) / p.deflection_floor);
+  for (std::size_t k = 0; k < record.data.size(); k += stride(record)) {
+    rows.push_back(record.counts[k] ? r.torque[k] / weights.torque : 0);
+    rows.push_back(r.deflection[k] / weights.deflection);
   }
+}
+
+/// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
+Weights weigh(const Rig& rig, const PreparedServo& record, const Calibration& calibration) {
+  const ServoResiduals r = record.residuals(rig, calibration);
+  const NoiseFloors floor = noise_floors(rig, record.data, r.load.load, record.cutoff, record.feedback);
+  double torque = 0, deflection = 0, count = 0;
+  for (std::size_t k = 0; k < r.torque.size(); ++k) {
+    deflection += r.deflection[k] * r.deflection[k] / double(r.torque.size());
+    if (!record.counts[k]) continue;
+    torque += r.torque[k] * r.torque[k];
+    ++count;
+  }
+  return {std::max(floor.torque, std::sqrt(torque / std::max(1.0, count))),
+          std::max(floor.deflection, std::sqrt(deflection))};
 }
 
 double misfit(const Finding& finding, const Rig& rig) {
@@ -161,18 +64,24 @@ double misfit(const Finding& finding, const Rig& rig) {
   return (finding.measured.value - value) / finding.measured.standard_error;
 }
 
-/// The unknowns of a fit: parameters of the rig, then delay and offset of each record.
+/// The unknowns of a fit: parameters of the rig (of those that are positive the logarithm, relative to the
+/// start), then delay and offset of each record.
 class Unknowns {
  public:
   Unknowns(const Rig& start, const std::vector<std::string>& names, std::vector<Calibration> calibrations)
       : start_(start), calibrations_(std::move(calibrations)), records_(calibrations_.size()) {
-    for (const std::string& name : names) fitted_.push_back(&servo_parameter(name));
+    for (const std::string& name : names) {
+      fitted_.push_back(&servo_parameter(name));
+      if (const double value = fitted_.back()->get(start); fitted_.back()->positive && !(value > 0))
+        throw InvalidParameter(name, value, "must be > 0");
+    }
   }
   Eigen::Index size() const { return Eigen::Index(fitted_.size() + 2 * records_); }
 
   Eigen::VectorXd values() const {
     Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
-    for (std::size_t i = 0; i < fitted_.size(); ++i) p[i] = fitted_[i]->get(start_);
+    for (std::size_t i = 0; i < fitted_.size(); ++i)
+      if (!fitted_[i]->positive) p[i] = fitted_[i]->get(start_);
     for (std::size_t r = 0; r < records_; ++r) {
       p[fitted_.size() + 2 * r] = calibrations_[r].torque_delay;
       p[fitted_.size() + 2 * r + 1] = calibrations_[r].encoder_offset;
@@ -180,9 +89,7 @@ class Unknowns {
     return p;
   }
   Eigen::VectorXd scale() const {
-    Eigen::VectorXd s = values().cwiseAbs();
-    for (std::size_t i = 0; i < fitted_.size(); ++i)
-      if (!fitted_[i]->positive || s[i] == 0) s[i] = 1;
+    Eigen::VectorXd s = Eigen::VectorXd::Ones(size());
     const double gap = start_.mesh.backlash / start_.mesh.lever();
     for (std::size_t r = 0; r < records_; ++r) {
       s[fitted_.size() + 2 * r] = 1;
@@ -193,8 +100,9 @@ class Unknowns {
   Rig rig(const Eigen::VectorXd& p) const {
     Rig rig = start_;
     for (std::size_t i = 0; i < fitted_.size(); ++i) {
-      if (fitted_[i]->positive && !(p[i] > 0)) throw InvalidParameter(fitted_[i]->name, p[i], "must be > 0");
-      fitted_[i]->set(rig, p[i]);
+      if (fitted_[i]->positive && std::fabs(p[i]) > std::log(kFarthest))
+        throw InvalidParameter(fitted_[i]->name, std::exp(p[i]), "of its start: too far");
+      fitted_[i]->set(rig, fitted_[i]->positive ? fitted_[i]->get(start_) * std::exp(p[i]) : p[i]);
     }
     return rig;
   }
@@ -205,7 +113,10 @@ class Unknowns {
   }
   std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const {
     std::map<std::string, Measured> all;
-    for (std::size_t i = 0; i < fitted_.size(); ++i) all[fitted_[i]->name] = fit.parameter(i);
+    for (std::size_t i = 0; i < fitted_.size(); ++i) {
+      Measured& m = all[fitted_[i]->name] = fit.parameter(i);
+      if (fitted_[i]->positive) m.value = fitted_[i]->get(start_) * std::exp(m.value), m.standard_error *= m.value;
+    }
     return all;
   }
 
@@ -216,58 +127,152 @@ class Unknowns {
   std::size_t records_;
 };
 
-}  // namespace
+/// The covariance of neighbouring rows is itself an estimate from few blocks and now and then far too small.
+void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
+  const Eigen::VectorXd growth = (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
+  covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
+}
 
-namespace {
+/// The fit of all records, round after round.
+class Fit {
+ public:
+  Fit(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings)
+      : settings_(settings), rig_(start), calibrations_(records.size()) {
+    data_ = &records;
+  }
 
-OutputError fit_from(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings,
-                     const std::vector<Calibration>& calibrations) {
-  const Unknowns unknowns(start, settings.parameters, calibrations);
-  const auto residuals = [&](const Eigen::VectorXd& p) {
+  /// Weighs with the present rig and fits.
+  void run(double cutoff, double tolerance) {
+    OutputErrorSettings settings = settings_;
+    settings.cutoff = std::min(cutoff, settings_.cutoff);
+    records_.clear();
+    for (const ServoData& data : *data_) records_.emplace_back(data, settings);
+    weights_.clear();
+    for (std::size_t r = 0; r < records_.size(); ++r)
+      weights_.push_back(weigh(rig_, records_[r], calibrations_[r]));
+    unknowns_.emplace(rig_, settings_.parameters, calibrations_);
+    const Unknowns& unknowns = *unknowns_;
+    NonlinearOptions options;
+    options.iterations = settings_.iterations;
+    options.step = settings_.step;
+    options.tolerance = tolerance;
+    options.parallel = true;
+    fit_ = fit_nonlinear([&](const Eigen::VectorXd& p) { return rows(unknowns, p); }, unknowns.values(),
+                         unknowns.scale(), options);
+    rig_ = unknowns.rig(fit_.values);
+    for (std::size_t r = 0; r < records_.size(); ++r)
+      calibrations_[r] = unknowns.calibration(fit_.values, r);
+  }
+
+  bool try_run(double cutoff, double tolerance) {
+    try {
+      run(cutoff, tolerance);
+      return true;
+    } catch (const CannotIdentify&) {
+      return false;
+    }
+  }
+
+  /// Of all records, relative.
+  double torque_error() const {
+    double residual = 0, square = 0;
+    for (std::size_t r = 0; r < records_.size(); ++r) {
+      const ServoResiduals left = records_[r].residuals(rig_, calibrations_[r]);
+      const std::vector<double> torque = records_[r].acting_torque(calibrations_[r]);
+      for (std::size_t k = 0; k < torque.size(); ++k) {
+        if (!records_[r].counts[k]) continue;
+        residual += left.torque[k] * left.torque[k];
+        square += torque[k] * torque[k];
+      }
+    }
+    return std::sqrt(residual / square);
+  }
+
+  /// What acts half a sample earlier than a held torque is not held.
+  void tell_held() {
+    for (Calibration& c : calibrations_) {
+      if (!c.held || c.torque_delay > -0.5 * kHold) continue;
+      c.held = false;
+      c.torque_delay += kHold;
+    }
+  }
+
+  OutputError result() {
+    const Unknowns& unknowns = *unknowns_;
+    const Eigen::Index known = Eigen::Index(settings_.findings.size());
+    const Eigen::Index rows = fit_.residuals.size() - known;
+    const Eigen::Index wanted = 2 * std::lround(kBlock / (double(stride(records_[0])) * records_[0].data.interval));
+    const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
+    take_larger(fit_.covariance, block_covariance(fit_, block, known));
+    OutputError result;
+    result.rig = rig_;
+    result.parameters = unknowns.parameters(fit_);
+    result.calibrations = calibrations_;
+    for (std::size_t r = 0; r < records_.size(); ++r) {
+      const ServoPrediction p = predict_servo(rig_, records_[r].data, settings_, calibrations_[r]);
+      result.torque.push_back(p.torque_error);
+      result.deflection.push_back(p.deflection_error);
+    }
+    return result;
+  }
+
+ private:
+  Eigen::VectorXd rows(const Unknowns& unknowns, const Eigen::VectorXd& p) const {
     const Rig rig = unknowns.rig(p);
     std::vector<double> rows;
-    for (std::size_t r = 0; r < records.size(); ++r)
-      append_residuals(predict_servo(rig, records[r], settings, unknowns.calibration(p, r)), records[r],
-                       settings.cutoff, rows);
-    for (const Finding& finding : settings.findings) rows.push_back(misfit(finding, rig));
-    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(rows.data(), rows.size()));
-  };
-  NonlinearOptions options;
-  options.iterations = settings.iterations;
-  options.step = settings.step;
-  LeastSquaresFit fit = fit_nonlinear(residuals, unknowns.values(), unknowns.scale(), options);
-  // A block is as long as the slowest oscillation that a servo record shows, and there are enough of them.
-  const Eigen::Index rows = fit.residuals.size(), known = Eigen::Index(settings.findings.size());
-  const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, kRowsPerBlock);
-  fit.covariance = block_covariance(fit, block, known);
-  OutputError result;
-  result.rig = unknowns.rig(fit.values);
-  result.parameters = unknowns.parameters(fit);
-  for (std::size_t r = 0; r < records.size(); ++r)
-    result.calibrations.push_back(unknowns.calibration(fit.values, r));
-  return result;
+    for (std::size_t r = 0; r < records_.size(); ++r)
+      append_residuals(records_[r], records_[r].residuals(rig, unknowns.calibration(p, r)), weights_[r], rows);
+    for (const Finding& finding : settings_.findings) rows.push_back(misfit(finding, rig));
+    return Eigen::Map<Eigen::VectorXd>(rows.data(), Eigen::Index(rows.size()));
+  }
+
+  OutputErrorSettings settings_;
+  const std::vector<ServoData>* data_;
+  std::vector<PreparedServo> records_;
+  std::vector<Weights> weights_;
+  Rig rig_;
+  std::vector<Calibration> calibrations_;
+  std::optional<Unknowns> unknowns_;  // of the last round
+  LeastSquaresFit fit_;
+};
+
+/// Another start not far away, the same for the same number.
+Rig beside(const Rig& start, const std::vector<std::string>& names, int number) {
+  std::mt19937 random(number);
+  Rig rig = start;
+  for (const std::string& name : names) {
+    const RigParameter& parameter = servo_parameter(name);
+    const double share = double(random()) / double(std::mt19937::max());
+    if (parameter.positive) parameter.set(rig, parameter.get(rig) * std::exp(kBeside * (2 * share - 1)));
+  }
+  return rig;
+}
+
+/// The first round, from other starts where it ends in a minimum that cannot be that of the machine.
+Fit rough_fit(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings) {
+  Fit best(start, records, settings);
+  bool ran = best.try_run(kRoughCutoff, kRoughTolerance);
+  for (int i = 1; i <= kOtherStarts && !(ran && best.torque_error() < kWrongMinimum); ++i) {
+    if (settings.parameters.empty()) break;
+    Fit other(beside(start, settings.parameters, i), records, settings);
+    if (!other.try_run(kRoughCutoff, kRoughTolerance)) continue;
+    if (!ran || other.torque_error() < best.torque_error()) best = std::move(other);
+    ran = true;
+  }
+  if (!ran) best.run(kRoughCutoff, kRoughTolerance);  // says why
+  return best;
 }
 
 }  // namespace
 
 OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& settings) {
-  OutputError result = fit_from(start, records, settings, std::vector<Calibration>(records.size()));
-  std::vector<Calibration> calibrations = result.calibrations;
-  bool changed = false;
-  for (Calibration& c : calibrations) {
-    if (c.torque_delay > -0.5 * kHold) continue;
-    c.held = false;  // what acts half a sample earlier than a held torque is not held
-    c.torque_delay += kHold;
-    changed = true;
-  }
-  if (changed) result = fit_from(result.rig, records, settings, calibrations);
-  for (std::size_t r = 0; r < records.size(); ++r) {
-    const ServoPrediction p = predict_servo(result.rig, records[r], settings, result.calibrations[r]);
-    result.torque.push_back(p.torque_error);
-    result.deflection.push_back(p.deflection_error);
-  }
-  return result;
+  Fit fit = rough_fit(start, records, settings);
+  fit.tell_held();
+  fit.run(settings.cutoff, kRoughTolerance);
+  fit.tell_held();
+  fit.run(settings.cutoff, NonlinearOptions().tolerance);
+  return fit.result();
 }
 
 ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,

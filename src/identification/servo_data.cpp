@@ -41,6 +41,10 @@ std::vector<double> second_difference(const std::vector<double>& x, double inter
 
 }  // namespace
 
+double load_rate_cutoff(double interval) {
+  return std::min(kLoadRateCutoff, 0.2 / interval);
+}
+
 Record load_side(const Record& record, const Rig& rig) {
   Record out = record;
   const double ratio = rig.motor_axis_ratio();
@@ -65,8 +69,8 @@ ServoData servo_data(const Record& raw, const Rig& rig) {
   data.motor_acceleration = second_difference(data.motor, data.interval);
   if (!record.has(Channel::load_position)) return data;
   data.load = scaled(record, Channel::load_position, 1);
-  const double cutoff = std::min(kLoadRateCutoff, 0.2 / data.interval);
-  data.load_rate = low_pass(derivative(data.load, data.interval), data.interval, cutoff);
+  data.load_rate =
+      low_pass(fast_derivative(data.load, data.interval), data.interval, load_rate_cutoff(data.interval));
   return data;
 }
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/workflow/curve_builder.h"
-#include "parallel.h"
+#include "backlash_diagnosis/base/parallel.h"
 
 namespace backlash {
 

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
 #include "drawn_record.h"
-#include "parallel.h"
+#include "backlash_diagnosis/base/parallel.h"
 
 namespace backlash {
 namespace {

@@ -5,15 +5,20 @@
 
 namespace backlash {
 
-/// Standard deviation of the white part of a signal: from the median of its periodogram (Hann window) in the
-/// upper three tenths of the frequencies, where machines no longer move. Coloured noise counts as white with
-/// the density that it has there. `values` of a position may drift and travel. Throws InvalidParameter for
-/// fewer than 64 values.
+/// Standard deviation of the white part of a signal: the smaller of two figures, which noise raises alike and
+/// motion differently. From the median of its periodogram (Hann window) in the upper three tenths of the
+/// frequencies, where machines no longer move; from third differences without the largest tenth, which jumps
+/// of a commanded torque do not reach. Coloured noise counts as white with the density that it has there.
+/// `values` of a position may drift and travel. Throws InvalidParameter for fewer than 64 values.
 double white_noise(const std::vector<double>& values);
 
 /// The same of a position, but with the largest density in bands above a tenth of the sampling rate: stamps
 /// that jitter make noise that is not white, the worst of it below the highest frequencies.
 double position_noise(const std::vector<double>& position);
+
+/// Step of a position of finite resolution: the smallest change, where all small changes are multiples of it;
+/// 0 where they are not.
+double resolution(const std::vector<double>& position);
 
 /// Frequency [Hz] below which 99 % of the power of the acceleration lie, the second difference of `position`,
 /// after position_noise (with the fourth power of frequency) is taken off and not beyond

@@ -35,6 +35,7 @@ struct NonlinearOptions {
   double tolerance =
       1e-6;            // of the relative decrease of the sum of squares, and of the step in units of `scale`
   double step = 1e-4;  // of the forward differences, in units of `scale`
+  bool parallel = false;  // differences on all processors: the function is called from several threads
 };
 
 /// Levenberg and Marquardt with forward differences. `scale` holds one typical size > 0 per parameter. Values

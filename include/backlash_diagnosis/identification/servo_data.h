@@ -22,8 +22,9 @@ struct ServoData {
 /// The record with all channels at the load side of the reduction.
 Record load_side(const Record& record, const Rig& rig);
 
-/// Hz; the speed that feeds back to the simulated load needs no more.
-constexpr double kLoadRateCutoff = 60;
+/// Hz; what is missing of the speed that feeds back to the simulated load counts like a friction of it.
+constexpr double kLoadRateCutoff = 120;
+double load_rate_cutoff(double interval);  ///< [Hz]; the same or less where the interval [s] needs it
 
 /// Needs motor_torque and motor_position; load_position where the record has it. Throws CannotIdentify
 /// without them, BadData for gaps or values that are not finite (naming channel and time).

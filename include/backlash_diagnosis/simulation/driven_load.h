@@ -7,8 +7,8 @@
 // recorded one (k [1/s]), it follows, and what remains between simulated and recorded load tells of the
 // model.
 //
-// Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples; where the load
-// comes to rest or breaks away the step is divided there.
+// Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples. A step is divided
+// where the load comes to rest or breaks away and where teeth touch or part.
 #pragma once
 
 #include <vector>
@@ -30,6 +30,9 @@ struct DrivenLoad {
   std::vector<double> load, load_rate;  // rad, rad/s
   std::vector<double> mesh_torque;      // N m, through the teeth
   std::vector<double> motor_net;        // N m on the motor, all but its torque, inertia and dry friction
+  /// Mean of motor_net about each sample, weighted 1 - |t| / interval: what a second difference of the motor
+  /// position sees. At the ends over one interval.
+  std::vector<double> motor_mean;
   std::vector<FrictionLimits> motor_friction;  // its dry friction
 };
 

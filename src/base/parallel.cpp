@@ -1,5 +1,6 @@
-#include "parallel.h"
+#include "backlash_diagnosis/base/parallel.h"
 
+#include <algorithm>
 #include <exception>
 #include <thread>
 #include <vector>
@@ -29,10 +30,17 @@ void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(in
       }
   };
   std::vector<std::thread> helpers;
-  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) helpers.emplace_back(work);
+  const unsigned workers = std::min<unsigned>(std::thread::hardware_concurrency(), count);
+  for (unsigned i = 1; i < workers; ++i) helpers.emplace_back(work);
   work();
   for (std::thread& helper : helpers) helper.join();
   if (failure) std::rethrow_exception(failure);
+}
+
+void for_each_in_parallel(int count, const std::function<void(int)>& job) {
+  const Progress silent;
+  Ticker ticker(silent, count, "");
+  for_each_in_parallel(count, ticker, job);
 }
 
 }  // namespace backlash

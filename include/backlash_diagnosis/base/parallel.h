@@ -28,7 +28,10 @@ class Ticker {
   std::atomic<bool> stop_{false};
 };
 
-/// Calls job(0) .. job(count - 1) on all processors; the first exception stops them and is thrown.
+/// Calls job(0) .. job(count - 1) on all processors, in any order; the first exception stops them and is thrown.
 void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job);
+
+/// The same without progress.
+void for_each_in_parallel(int count, const std::function<void(int)>& job);
 
 }  // namespace backlash

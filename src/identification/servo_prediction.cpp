@@ -1,0 +1,131 @@
+// What a rig says of a record: torque and deflection, and what is left of them.
+#include "servo_prediction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/identification/bandwidth.h"
+#include "backlash_diagnosis/identification/noise_floor.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/record/zero_phase.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kEnds = 3;          // periods of the cutoff at either end, where the filter has not settled
+constexpr double kSureSpeed = 5;     // standard deviations of the motor speed, from which it has a sign
+constexpr double kRateNoise = 0.95;  // of a five-point difference, position noise over interval
+constexpr long kReach = 2;           // samples to either side that it uses
+
+// A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
+// torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
+// the next, by half and half.
+std::vector<double> over_second_difference(const std::vector<double>& x) {
+  std::vector<double> mean = x;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) mean[k] = (x[k - 1] + 10 * x[k] + x[k + 1]) / 12;
+  return mean;
+}
+
+std::vector<double> held_over_second_difference(const std::vector<double>& x) {
+  std::vector<double> mean = x;
+  for (std::size_t k = 1; k < x.size(); ++k) mean[k] = 0.5 * (x[k - 1] + x[k]);
+  return mean;
+}
+
+/// +1 or -1 where the motor slides that way over both intervals about the sample and all that its rate was
+/// taken from; 0 where it may stand or turn round, where dry friction takes any value.
+std::vector<int> sliding(const ServoData& data) {
+  const double slowest = kSureSpeed * kRateNoise * position_noise(data.motor) / data.interval;
+  const long n = static_cast<long>(data.size());
+  std::vector<int> direction(n), sure(n);
+  for (long k = 0; k < n; ++k) direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);
+  for (long k = 0; k < n; ++k) {
+    sure[k] = direction[k];
+    for (long j = std::max(0L, k - kReach); j <= std::min(n - 1, k + kReach); ++j)
+      if (direction[j] != direction[k]) sure[k] = 0;
+  }
+  return sure;
+}
+
+/// Over the samples that count (all where `counts` is empty).
+ChannelError relative(const std::vector<double>& measured, const std::vector<double>& predicted,
+                      const std::vector<char>& counts, double floor) {
+  double n = 0, sum = 0, square = 0, residual = 0;
+  for (std::size_t k = 0; k < measured.size(); ++k) {
+    if (!counts.empty() && !counts[k]) continue;
+    ++n;
+    sum += measured[k];
+    square += measured[k] * measured[k];
+    residual += std::pow(measured[k] - predicted[k], 2);
+  }
+  const double spread = std::sqrt(square - sum * sum / n);
+  return {std::sqrt(residual) / spread, floor * std::sqrt(n) / spread};
+}
+
+}  // namespace
+
+PreparedServo::PreparedServo(const ServoData& servo, const OutputErrorSettings& settings)
+    : data(servo), cutoff(settings.cutoff), feedback(settings.feedback), direction(sliding(servo)) {
+  torque_of_moment_ = over_second_difference(data.torque);
+  torque_held_ = held_over_second_difference(data.torque);
+  const long n = static_cast<long>(data.size()), ends = std::lround(kEnds / (cutoff * data.interval));
+  counts.assign(n, 0);
+  for (long k = ends; k < n - ends; ++k) counts[k] = direction[k] != 0;
+}
+
+std::vector<double> PreparedServo::acting_torque(const Calibration& calibration) const {
+  return delayed(calibration.held ? torque_held_ : torque_of_moment_, calibration.torque_delay);
+}
+
+ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calibration) const {
+  const RecordedMotion motion{data.interval,
+                              &data.motor,
+                              &data.motor_rate,
+                              &data.load_rate,
+                              data.load.front() - calibration.encoder_offset,
+                              data.load_rate.front()};
+  ServoResiduals r;
+  r.load = simulate_driven_load(rig, motion, feedback);
+  const double inertia = GearTrain(rig).motor_inertia();
+  r.torque = acting_torque(calibration);
+  r.deflection.resize(data.size());
+  for (std::size_t k = 0; k < data.size(); ++k) {
+    const FrictionLimits& f = r.load.motor_friction[k];
+    const double friction = direction[k] > 0 ? f.forward : -f.backward;
+    if (direction[k] == 0)
+      r.torque[k] = 0;  // friction takes what balances
+    else
+      r.torque[k] -= inertia * data.motor_acceleration[k] - r.load.motor_mean[k] + friction;
+    r.deflection[k] = r.load.load[k] + calibration.encoder_offset - data.load[k];
+  }
+  r.torque = low_pass(r.torque, data.interval, cutoff);
+  r.deflection = low_pass(r.deflection, data.interval, cutoff);
+  return r;
+}
+
+ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+                              const Calibration& calibration) {
+  const PreparedServo prepared(data, settings);
+  ServoResiduals r = prepared.residuals(rig, calibration);
+  ServoPrediction p;
+  p.counts = prepared.counts;
+  p.measured_torque = low_pass(prepared.acting_torque(calibration), data.interval, settings.cutoff);
+  p.measured_deflection.resize(data.size());
+  for (std::size_t k = 0; k < data.size(); ++k) p.measured_deflection[k] = data.motor[k] - data.load[k];
+  p.measured_deflection = low_pass(p.measured_deflection, data.interval, settings.cutoff);
+  p.torque.resize(data.size());
+  p.deflection.resize(data.size());
+  for (std::size_t k = 0; k < data.size(); ++k) {
+    p.torque[k] = p.measured_torque[k] - r.torque[k];
+    p.deflection[k] = p.measured_deflection[k] - r.deflection[k];
+  }
+  const NoiseFloors floors = noise_floors(rig, data, r.load.load, settings.cutoff, settings.feedback);
+  p.torque_floor = floors.torque;
+  p.deflection_floor = floors.deflection;
+  p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
+  p.deflection_error = relative(p.measured_deflection, p.deflection, {}, p.deflection_floor);
+  p.load = std::move(r.load);
+  return p;
+}
+
+}  // namespace backlash

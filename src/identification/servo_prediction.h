@@ -1,0 +1,34 @@
+// A record made ready for many predictions by rigs that differ in their parameters.
+#pragma once
+
+#include <vector>
+
+#include "backlash_diagnosis/identification/output_error.h"
+
+namespace backlash {
+
+/// Recorded minus predicted, low-passed.
+struct ServoResiduals {
+  DrivenLoad load;
+  std::vector<double> torque, deflection;  // N m, rad
+};
+
+struct PreparedServo {
+  /// `data` must outlive it.
+  PreparedServo(const ServoData& data, const OutputErrorSettings& settings);
+
+  /// What a second difference of the motor position sees of the motor's torque [N m].
+  std::vector<double> acting_torque(const Calibration& calibration) const;
+  /// Safe to call from several threads.
+  ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
+
+  const ServoData& data;  // of the caller
+  double cutoff, feedback;
+  std::vector<int> direction;  // +1, -1: the motor slides that way; 0: dry friction may take any value
+  std::vector<char> counts;    // whether the torque sample counts
+
+ private:
+  std::vector<double> torque_of_moment_, torque_held_;
+};
+
+}  // namespace backlash
