@@ -69,6 +69,13 @@ std::string spelling(const Option& option) {
   return "--" + option.name + (option.value.empty() ? "" : " " + option.value);
 }
 
+bool takes_more(const Command& command) {
+  const std::string dots = "...";
+  if (command.positional.empty()) return false;
+  const std::string& last = command.positional.back();
+  return last.size() > dots.size() && last.compare(last.size() - dots.size(), dots.size(), dots) == 0;
+}
+
 std::string usage_line(const Command& command) {
   std::string line = "Usage: " + command.name;
   for (const std::string& name : command.positional) line += " " + name;
@@ -149,10 +156,11 @@ Arguments parse_arguments(const Command& command, const std::vector<std::string>
   if (given.count(kPositional)) positional = given[kPositional].as<std::vector<std::string>>();
   if (positional.size() < command.positional.size())
     throw UsageError("missing " + command.positional[positional.size()]);
-  if (positional.size() > command.positional.size())
+  if (positional.size() > command.positional.size() && !takes_more(command))
     throw UsageError("unexpected argument '" + printable(positional[command.positional.size()]) + "'");
   for (std::size_t i = 0; i < positional.size(); ++i)
-    if (positional[i].empty()) throw UsageError(command.positional[i] + " is empty");
+    if (positional[i].empty())
+      throw UsageError(command.positional[std::min(i, command.positional.size() - 1)] + " is empty");
   std::map<std::string, std::string> options;
   for (const Option& option : command.options) {
     if (given.count(option.name)) {
@@ -172,8 +180,7 @@ std::string help_text(const Command& command) {
   text += "\n";
   append_wrapped(text, command.summary, 0);
   text += "\nOptions:\n";
-  for (const Option& option : command.options)
-    append_option(text, spelling(option), option.help);
+  for (const Option& option : command.options) append_option(text, spelling(option), option.help);
   append_option(text, "--help", "show this text");
   append_option(text, "--version", "show the version");
   if (!command.notes.empty()) {

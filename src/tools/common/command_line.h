@@ -26,7 +26,7 @@ struct Option {
 struct Command {
   std::string name;
   std::string summary;                  ///< one sentence
-  std::vector<std::string> positional;  ///< "RIG.yaml", all required
+  std::vector<std::string> positional;  ///< "RIG.yaml", all required; "RECORD..." as the last: one or more
   std::vector<Option> options;
   std::string notes;                  ///< paragraphs after the options
   std::vector<std::string> examples;  ///< without "rosrun backlash_diagnosis"
@@ -40,6 +40,7 @@ class Arguments {
       : positional_(std::move(positional)), options_(std::move(options)) {}
 
   const std::string& positional(std::size_t i) const { return positional_.at(i); }
+  const std::vector<std::string>& positionals() const { return positional_; }
   bool has(const std::string& option) const { return options_.count(option) > 0; }
   std::string text(const std::string& option) const;  ///< empty where absent, never where a value is given
   double number(const std::string& option, double absent, const Range& range) const;

@@ -65,6 +65,10 @@ void plot_uncertainty_study(const std::string& json_path, const std::string& pic
   draw("plot_uncertainty_study.py", picture_path, json_path, "the study");
 }
 
+void plot_model_comparison(const std::string& json_path, const std::string& picture_path) {
+  draw("plot_model_comparison.py", picture_path, json_path, "the comparison");
+}
+
 void plot_separability_map(const std::string& json_path, const std::string& picture_path) {
   draw("plot_separability_map.py", picture_path, json_path, "the map");
 }
