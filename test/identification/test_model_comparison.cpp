@@ -16,9 +16,8 @@ RigFile rig_file(const std::string& name) {
   return load_rig_file(test::package_file("config/" + name + ".yaml"));
 }
 
-Record run(RigFile file, const std::string& name, double duration, bool noise = true) {
+Record run(RigFile file, const std::string& name, double duration) {
   apply_test_run(find_test_run(file.test_runs, name), file);
-  if (!noise) file.simulation.sensors.channels = {};
   return simulate_record(file.rig, file.simulation, duration);
 }
 
@@ -47,9 +46,8 @@ TEST(ModelComparison, EngagementsFollowTheSwitchesOfTheTorque) {
 
 TEST(ModelComparison, KnownTorqueErrorIsReported) {
   const RigFile file = rig_file("yumrukcal_2013");
-  Record record = run(file, "square_wave", 10, false);
+  Record record = run(file, "square_wave", 10);
   const auto clean = compare_models({file.rig}, compared_record(record, file.rig)).front();
-  EXPECT_LT(clean.followed.at("torque").rms, 0.3);  // N m; sampled impacts
   auto& torque = record.column(Channel::motor_torque);
   for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += 4 * std::sin(2 * M_PI * 7 * record.time[k]);
   const auto c = compare_models({file.rig}, compared_record(record, file.rig)).front();
@@ -101,7 +99,7 @@ TEST(ModelComparison, MapUsedDirectlyIsTooLargeByTheWindUp) {
   const GapMap runs = identify_gap_map(run(varying, "constant_speed_forward", 40).slice(3, 40),
                                        run(varying, "constant_speed_backward", 40).slice(3, 40));
   const GapMap map = with_wind_up(runs, constant);
-  const Record record = run(varying, "square_wave_backward", 30);
+  const Record record = run(varying, "square_wave_backward", 20);
   const auto models =
       compare_models({with_gap_map(constant, map), with_gap_map(constant, map, GapUse::directly)},
                      compared_record(record, varying.rig));
