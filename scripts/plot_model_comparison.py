@@ -12,7 +12,7 @@ import plotting  # noqa: E402
 
 COLOURS = ("tab:red", "tab:orange", "tab:blue", "tab:green", "tab:purple", "tab:brown")
 MEASURED = dict(color="black", lw=2.2, alpha=0.45, label="measured")
-SPAN = 1.0  # s either side of the engagement in the panels of the position difference
+SPAN = 0.3  # s either side of the engagement in the panels of the position difference
 CHANNELS = (("followed", "deflection", "position\ndifference"), ("followed", "speed_difference", "speed\ndifference"),
             ("followed", "torque", "torque"), ("free", "deflection", "free: position\ndifference"),
             ("free", "speed_difference", "free: speed\ndifference"), ("free", "motor_speed", "free: motor\nspeed"))
@@ -22,13 +22,6 @@ def finite(values, scale):
     return [math.nan if v is None else scale * v for v in values]
 
 
-def error_at(model, data, engagement):
-    """Mean deviation of the position difference around an engagement."""
-    low, high = window(data, engagement["time"], 0.5 * SPAN, 0.5 * SPAN)
-    pairs = zip(data["measured"]["deflection"][low:high], model["traces"]["deflection"][low:high])
-    return sum(abs(a - b) for a, b in pairs)
-
-
 def window(data, time, before, after):
     n = len(data["measured"]["deflection"])
     at = (time - data["first_time"]) / data["interval"]
@@ -36,23 +29,16 @@ def window(data, time, before, after):
 
 
 def two_engagements(data):
-    """Where all models but the best differ most from the record on either side: two places of the load."""
-    inside = [e for e in data["engagements"] if window(data, e["time"], SPAN, 0)[0] > 0]
-    best = sorted(data["models"], key=lambda m: m["followed"]["deflection"]["error"])
-    model = best[min(1, len(best) - 1)]  # the best but one shows what the best has more
-    first = max(inside, key=lambda e: error_at(model, data, e))
-    apart = [e for e in inside if abs(e["time"] - first["time"]) > 2 * SPAN]
-    if not apart:
-        return [first]
-    # elsewhere, where the gap differs the other way
-    low, high = window(data, first["time"], 0.5 * SPAN, 0.5 * SPAN)
+    """Two places of the load: where the best model but one swings less than the record, and where more."""
+    inside = [e for e in data["engagements"] if window(data, e["time"], SPAN, 0)[0] > 0] or data["engagements"]
+    by_error = sorted(data["models"], key=lambda m: m["followed"]["deflection"]["error"])
+    model = by_error[min(1, len(by_error) - 1)]
 
-    def sign(e):
-        low, high = window(data, e["time"], 0.5 * SPAN, 0.5 * SPAN)
+    def lacking(engagement):
+        low, high = window(data, engagement["time"], SPAN, SPAN)
         measured, told = data["measured"]["deflection"][low:high], model["traces"]["deflection"][low:high]
-        return (max(measured) - min(measured)) - (max(told) - min(told))
-    other = max(apart, key=lambda e: -sign(e) * sign(first))
-    return sorted([first, other], key=lambda e: e["time"])
+        return sum(abs(v) for v in measured) - sum(abs(v) for v in told)
+    return [max(inside, key=lacking), min(inside, key=lacking)]
 
 
 def draw_deflection(axes, data, engagement):
@@ -72,7 +58,6 @@ def draw_free(axes, data, engagement, measured, told, unit):
     scale = 1e3 if unit == "mrad" else 1
     axes.plot(time, finite(data["measured"][measured][low:high], scale), **MEASURED)
     for colour, model in zip(COLOURS, data["models"]):
-        offset = 0
         axes.plot(time, finite(model["traces"][told][low:high], scale), lw=1.1, color=colour, label=model["name"])
     axes.set_xlabel("time after the middle of the gap [ms]")
     axes.set_ylabel("motor - load [%s]" % unit)
@@ -92,7 +77,8 @@ def draw_errors(axes, data):
         axes.plot([c - 0.45, c + 0.45], [floor, floor], color="black", lw=1.2, ls="--",
                   label="noise alone" if c == 0 else None)
     axes.set_yscale("log")
-    axes.set_ylim(top=axes.get_ylim()[1] * 2)
+    low, high = axes.get_ylim()
+    axes.set_ylim(0.6 * low, 8 * high)  # room for the legend
     axes.set_xticks(range(len(shown)))
     axes.set_xticklabels([text for _, _, text in shown], fontsize=9)
     axes.set_ylabel("relative error [%]")
@@ -115,7 +101,7 @@ def draw(data, plt):
     draw_errors(figure.add_subplot(grid[rows - 1, :]), data)
     for axes in figure.axes:
         axes.grid(True, alpha=0.3)
-    figure.axes[-1].legend(fontsize=8, loc="upper right", ncol=2)
+    figure.axes[-1].legend(fontsize=8, loc="upper center", ncol=4)
     figure.axes[0].legend(fontsize=8, loc="upper right")
     figure.suptitle("%s. Top: load driven by the recorded motor; middle: the engagement at the left, driven by the "
                     "recorded torque" % os.path.basename(data["record"]), fontsize=11)
