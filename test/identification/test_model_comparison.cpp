@@ -73,6 +73,8 @@ TEST(ModelComparison, LadderOfTheThesis) {
   for (const char* channel : {"deflection", "motor_speed", "speed_difference"}) {
     EXPECT_GT(free(0, channel), 3 * free(1, channel)) << channel;
     EXPECT_GT(free(1, channel), 3 * free(2, channel)) << channel;
+    // Beyond the noise: what the noise of the start and of the torque grows to within 0.17 s.
+    EXPECT_LT(free(2, channel), 1.4 * models[2].free.at(channel).floor) << channel;
   }
   EXPECT_LT(error(2, "deflection"), 0.1 * error(0, "deflection"));
   // The true model leaves noise alone; how much that is is estimated to some 10 %.

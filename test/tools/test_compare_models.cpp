@@ -23,7 +23,7 @@ TEST_F(CompareModels, TableJsonAndPicture) {
   done("simulate yumrukcal_2013.yaml --run square_wave --duration 4 --out a.csv");
   const std::string table = done("compare_models a.csv" + rigs_ + "--json a.json --plot a.svg").out;
   expect_contains(table,
-                  "through 6 engagements");  // 7 switches, the last too near the end: half a second each
+                  "through 7 engagements");  // a switch every half second
   const auto json = nlohmann::json::parse(read("a.json"));
   ASSERT_EQ(json.at("models").size(), 2u);
   EXPECT_EQ(json["models"][1]["name"], "yumrukcal_2013");
