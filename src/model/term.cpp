@@ -13,19 +13,47 @@ const std::vector<TermType>& term_types() {
   return types;
 }
 
+namespace {
+
+const TermType& term_type(const std::string& id) {
+  for (const TermType& type : term_types())
+    if (type.id == id) return type;
+  throw InvalidParameter("id", id, "is not a known term");
+}
+
+std::shared_ptr<const Term> created(const TermType& type, const ParameterValues& values) {
+  std::unique_ptr<Term> term = type.create(values);
+  term->id = type.id;
+  return term;
+}
+
+void check(const ParameterSpec& spec, double value) {
+  if (!spec.range.contains(value)) throw InvalidParameter(spec.name, value, spec.range.text());
+}
+
+}  // namespace
+
+std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values) {
+  const TermType& type = term_type(id);
+  for (const ParameterSpec& spec : type.parameters) {
+    if (!spec.list) {
+      check(spec, values.at(spec.name));
+      continue;
+    }
+    for (const double value : values.list(spec.name)) check(spec, value);
+  }
+  return created(type, values);
+}
+
 std::shared_ptr<const Term> read_term(const YamlReader& yaml) {
   std::vector<std::string> ids;
   for (const TermType& type : term_types()) ids.push_back(type.id);
-  const std::string id = yaml.choice("id", ids);
-  for (const TermType& type : term_types()) {
-    if (type.id != id) continue;
-    try {
-      return type.create(read_parameters(yaml, type.parameters));
-    } catch (const InvalidParameter& error) {  // of values that do not go together
-      yaml.fail(error.name(), error.limit() + ", not " + error.value());
-    }
+  const TermType& type = term_type(yaml.choice("id", ids));
+  try {
+    return created(type, read_parameters(yaml, type.parameters));
+  } catch (const InvalidParameter& error) {  // of values that do not go together
+    yaml.fail(error.name(), error.limit() + ", not " + error.value());
   }
-  yaml.fail("id", "is not a known term");  // choice() has refused it already
 }
 
 }  // namespace backlash

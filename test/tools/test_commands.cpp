@@ -52,8 +52,9 @@ class Commands : public CommandTest {
 
 TEST_F(Commands, HelpAndVersion) {
   for (const std::string& command :
-       std::vector<std::string>{"simulate", "build_curve", "diagnose_record", "convert_record", "gear_geometry",
-                                "identify", "integrator_study", "search_parameters", "separability_map", "uncertainty_study"}) {
+       std::vector<std::string>{"simulate", "build_curve", "compare_models", "diagnose_record", "convert_record",
+                                "gear_geometry", "identify", "integrator_study", "search_parameters",
+                                "separability_map", "uncertainty_study"}) {
     const std::string help = done(command + " --help").out;
     expect_contains(help, "Usage: " + command);
     for (const char* part : {"Options:", "rosrun", "Exit codes"}) expect_contains(help, part);
@@ -117,7 +118,7 @@ TEST_F(Commands, SimulateKnowsTheTestRunsOfARig) {
   const std::string list = done(servo + "--list-runs").out;
   expect_contains(list, "external_excitation: 40 s, sine at the load, motor braked\n");
   expect_contains(list, "motor_inertia_sine: 30 s, sine_speed, driver alone\n");
-  EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), 10);
+  EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), 12);
   EXPECT_EQ(done("simulate rig.yaml --list-runs").out, "");
   const std::string square = servo + "--run square_wave --sample-rate 50 --out a.csv";
   expect_contains(done(square).out, "1000 samples at 50 Hz of yumrukcal_2013, run square_wave,");  // 20 s

@@ -101,6 +101,7 @@ double speed_limit() {
 TEST(YumrukcalRigs, TheirRunsStayWithinTheMachine) {
   const std::vector<std::string> expected = {"external_excitation",    "sine_sweep",
                                              "sine_sweep_bias",        "square_wave",
+                                             "square_wave_forward",    "square_wave_backward",
                                              "constant_speed_forward", "constant_speed_backward",
                                              "friction_speeds",        "motor_friction_speeds",
                                              "inertia_sine",           "motor_inertia_sine"};

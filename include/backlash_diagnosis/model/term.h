@@ -60,6 +60,8 @@ class Term {
  public:
   virtual ~Term() = default;
 
+  std::string id;  // in the rig file; set by make_term()
+
   /// Adds torques that change smoothly with the motion.
   virtual void add(const Motion&, EndTorques&) const {}
 
@@ -82,6 +84,10 @@ struct TermType {
 
 /// All terms. There is no second list of effects anywhere.
 const std::vector<TermType>& term_types();
+
+/// One term from its values, which must be all that its type names. Throws InvalidParameter for another id, for
+/// values out of range and for such as do not go together.
+std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values);
 
 /// Reads one entry of `terms:`: `id: ID` and that term's parameters.
 std::shared_ptr<const Term> read_term(const YamlReader& yaml);

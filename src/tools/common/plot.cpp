@@ -69,6 +69,10 @@ void plot_identification(const std::string& json_path, const std::string& pictur
   draw("plot_identification.py", picture_path, json_path, "the identification");
 }
 
+void plot_model_comparison(const std::string& json_path, const std::string& picture_path) {
+  draw("plot_model_comparison.py", picture_path, json_path, "the comparison");
+}
+
 void plot_separability_map(const std::string& json_path, const std::string& picture_path) {
   draw("plot_separability_map.py", picture_path, json_path, "the map");
 }

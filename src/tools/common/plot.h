@@ -21,6 +21,9 @@ void plot_uncertainty_study(const std::string& json_path, const std::string& pic
 /// Draws the JSON of identify. Throws as plot_curve.
 void plot_identification(const std::string& json_path, const std::string& picture_path);
 
+/// Draws the JSON of compare_models. Throws as plot_curve.
+void plot_model_comparison(const std::string& json_path, const std::string& picture_path);
+
 /// Draws the JSON of separability_map. Throws as plot_curve.
 void plot_separability_map(const std::string& json_path, const std::string& picture_path);
 

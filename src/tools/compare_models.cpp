@@ -1,0 +1,195 @@
+// How well several models of a machine say what a record of it shows: table, JSON and picture.
+#include <cmath>
+#include <iomanip>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/identification/model_comparison.h"
+#include "backlash_diagnosis/workflow/rig_file.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/plot.h"
+#include "tools/common/progress_bar.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Channels = std::map<std::string, ChannelComparison>;
+
+Command command() {
+  const ComparisonSettings defaults;
+  const auto fallback = [](double value) { return "; default: " + to_text(value); };
+  Command c;
+  c.name = "compare_models";
+  c.summary =
+      "Compares what several models of a machine say of one record: torque, position difference and speed "
+      "difference of motor and load, as in Chapter 6 of Yumrukcal (2013).";
+  c.positional = {"RECORD", "RIG..."};
+  c.options = {
+      {"json", "OUT.json", "errors per model and channel, engagements, traces", true},
+      {"plot", "OUT.png", "also draw them"},
+      {"cutoff", "HZ", "low-pass of torque and position difference" + fallback(defaults.cutoff)},
+      {"after", "S", "of an engagement that count" + fallback(defaults.after)},
+  };
+  c.notes =
+      "Followed: the load of the model is driven by the recorded motor position through the whole record. "
+      "Free: the whole model is driven by the recorded torque, from just before the teeth leave a flank to "
+      "the "
+      "end of the ringing on the other one, each time anew. Errors are norm(r) / norm(y - mean), r what the "
+      "model leaves of the measured y; the floor is what noise alone would leave. The record needs "
+      "motor_torque, motor_position and load_position; motor_velocity and load_velocity where it has them.";
+  c.examples = {"simulate config/yumrukcal_2013_varying.yaml --run square_wave_backward --out test.csv",
+                "compare_models test.csv config/yumrukcal_2013_basic.yaml config/yumrukcal_2013.yaml "
+                "config/yumrukcal_2013_varying.yaml --json models.json --plot models.png"};
+  c.exit_codes = "  0   done\n  3   the record does not allow a comparison\n";
+  return c;
+}
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+/// Shortest decimals that keep six digits: enough for a plot.
+Json numbers(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double value : values) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value);
+    list.push_back(std::isfinite(value) ? Json(std::stod(text)) : Json(nullptr));
+  }
+  return list;
+}
+
+Json to_json(const Channels& channels) {
+  Json json;
+  for (const auto& [name, c] : channels)
+    json[name] = {{"error", number(c.error)},
+                  {"floor", number(c.floor)},
+                  {"rms", number(c.rms)},
+                  {"peak", number(c.peak)},
+                  {"unit", c.unit}};
+  return json;
+}
+
+Json to_json(const ModelComparison& m, const RigFile& file) {
+  Json peaks = Json::array();
+  for (const EngagementPeak& p : m.peaks)
+    peaks.push_back({{"measured", number(p.measured)},
+                     {"predicted", number(p.predicted)},
+                     {"measured_frequency", number(p.measured_frequency)},
+                     {"predicted_frequency", number(p.predicted_frequency)},
+                     {"measured_damping_ratio", number(p.measured_damping_ratio)},
+                     {"predicted_damping_ratio", number(p.predicted_damping_ratio)}});
+  return {{"rig", file.source},
+          {"name", file.rig.name},
+          {"rig_digest", file.digest},
+          {"encoder_offset", number(m.calibration.encoder_offset)},
+          {"followed", to_json(m.followed)},
+          {"free", to_json(m.free)},
+          {"peak_ratio", number(m.peak_ratio)},
+          {"frequency_ratio", number(m.frequency_ratio)},
+          {"damping_ratio", number(m.damping_ratio)},
+          {"peaks", peaks},
+          {"traces",
+           {{"deflection", numbers(m.traces.deflection)},
+            {"free_deflection", numbers(m.traces.free_deflection)},
+            {"free_speed_difference", numbers(m.traces.free_speed_difference)}}}};
+}
+
+Json to_json(const ComparedRecord& record, const std::string& path) {
+  Json engagements = Json::array();
+  for (const Engagement& e : record.engagements)
+    engagements.push_back({{"time", e.time}, {"load_position", e.load_position}, {"direction", e.direction}});
+  return {{"record", path},
+          {"interval", record.data.interval},
+          {"first_time", record.time.front()},
+          {"engagements", engagements},
+          {"measured",
+           {{"deflection", numbers(record.deflection)},
+            {"raw_deflection", numbers(record.raw_deflection)},
+            {"speed_difference", numbers(record.speed_difference)}}}};
+}
+
+void tell(const std::vector<RigFile>& files, const std::vector<ModelComparison>& models,
+          std::size_t engagements) {
+  std::cout << std::fixed;
+  const auto rows = [&](const char* title, Channels ModelComparison::*channels) {
+    std::cout << title << '\n';
+    for (std::size_t i = 0; i < models.size(); ++i)
+      for (const auto& [name, c] : models[i].*channels)
+        std::cout << "  " << std::left << std::setw(28) << files[i].rig.name << std::setw(18) << name
+                  << std::right << std::setprecision(3) << std::setw(9) << 100 * c.error << " % (noise "
+                  << std::setw(6) << 100 * c.floor << " %), rms " << std::scientific << std::setprecision(2)
+                  << c.rms << ", at most " << c.peak << ' ' << c.unit << std::fixed << '\n';
+  };
+  rows("Followed: load driven by the recorded motor position", &ModelComparison::followed);
+  if (engagements == 0) {
+    std::cout << "The teeth do not change flanks in this record: no free runs\n";
+    return;
+  }
+  rows(("Free: driven by the torque through " + std::to_string(engagements) + " engagements").c_str(),
+       &ModelComparison::free);
+  std::cout << "After an engagement, model over measured: first peak of the speed difference, frequency and "
+               "damping ratio of the ringing\n"
+            << std::setprecision(3);
+  for (std::size_t i = 0; i < models.size(); ++i)
+    std::cout << "  " << std::left << std::setw(46) << files[i].rig.name << std::right << std::setw(9)
+              << models[i].peak_ratio << std::setw(9) << models[i].frequency_ratio << std::setw(9)
+              << models[i].damping_ratio << '\n';
+}
+
+void check_outputs(const Arguments& arguments) {
+  const std::string json = arguments.text("json"), plot = arguments.text("plot");
+  check_output(json, arguments.positionals());
+  if (plot.empty()) return;
+  check_plot_path(plot);
+  if (plot == json) throw UsageError("--plot and --json name the same file");
+  check_output(plot, arguments.positionals());
+}
+
+int compare(const Arguments& arguments) {
+  const std::string path = arguments.positional(0), out = arguments.text("json");
+  ComparisonSettings settings;
+  settings.cutoff = arguments.number("cutoff", settings.cutoff, Range::positive());
+  settings.after = arguments.number("after", settings.after, Range::positive());
+  check_record_path(path);
+  check_outputs(arguments);
+  std::vector<RigFile> files;
+  std::vector<Rig> rigs;
+  for (std::size_t i = 1; i < arguments.positionals().size(); ++i) {
+    files.push_back(load_rig_file(arguments.positional(i)));
+    rigs.push_back(files.back().rig);
+  }
+  Record given = read_record(path, {rigs.front().joint});
+  given.name = path;
+  ComparedRecord record;
+  std::vector<ModelComparison> models;
+  try {
+    ProgressBar bar;
+    record = compared_record(given, rigs.front(), settings);
+    models = compare_models(rigs, record, settings, bar.progress());
+  } catch (const CannotIdentify& error) {
+    std::cerr << "compare_models: " << error.what() << '\n';
+    return kInconclusive;
+  }
+  Json json = {{"schema_version", 1}, {"version", version()}};
+  json.update(to_json(record, path));
+  for (std::size_t i = 0; i < models.size(); ++i) json["models"].push_back(to_json(models[i], files[i]));
+  write_text(out, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+  tell(files, models, record.engagements.size());
+  std::cout.flush();
+  if (arguments.has("plot")) plot_model_comparison(out, arguments.text("plot"));
+  return kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, compare);
+}
