@@ -24,7 +24,8 @@ const std::vector<ContactLawType>& contact_laws() {
   static const std::vector<ContactLawType> laws = {
       linear_contact(),       power_law_contact(),           hunt_crossley_contact(),
       kelvin_voigt_contact(), herbert_mcwhannell_contact(),  yang_sun_contact(),
-      jankowski_contact(),    lankarani_nikravesh_contact(), stereomechanical_contact()};
+      jankowski_contact(),    lankarani_nikravesh_contact(), stereomechanical_contact(),
+      foundation_contact()};
   return laws;
 }
 
@@ -42,7 +43,8 @@ std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, cons
   const ContactLawType* type = find(name);
   if (!type) throw InvalidParameter("contact.law", name, "is not a known contact law");
   for (const ParameterSpec& spec : type->parameters) {
-    if (!values.has(spec.name)) throw InvalidParameter("contact." + spec.name, "absent", "is required by " + name);
+    if (!values.has(spec.name))
+      throw InvalidParameter("contact." + spec.name, "absent", "is required by " + name);
     if (const double value = values.at(spec.name); !spec.range.contains(value))
       throw InvalidParameter("contact." + spec.name, value, spec.range.text() + " " + spec.unit);
   }

@@ -46,6 +46,13 @@ std::vector<NamedLaw> all_laws() {
            make_contact_law(
                "lankarani_nikravesh",
                {{"stiffness", k}, {"exponent", n}, {"restitution", 0.5}, {"minimum_speed", 0.01}})});
+      laws.push_back({"foundation", k, n,
+                      make_contact_law("foundation", {{"stiffness", k},
+                                                      {"exponent", n},
+                                                      {"radius", 0.02},
+                                                      {"viscosity", 1e5},
+                                                      {"thickness", 2e-3},
+                                                      {"share", 0.4}})});
     }
     laws.push_back(
         {"kelvin_voigt", k, 1, make_contact_law("kelvin_voigt", {{"stiffness", k}, {"damping", 300}})});
@@ -89,6 +96,15 @@ TEST(ContactLaws, DampingIsThatOfTheEquations) {
   // 1e8 * (1e-4)^1.5 = 100 N at rest; 3/2 * 0.5 s/m * 0.2 m/s = 0.15
   EXPECT_NEAR(hunt_crossley->force(1e-4, 0.2, 0), 115, 1e-12);
   EXPECT_NEAR(hunt_crossley->force(1e-4, -0.2, 0), 85, 1e-12);
+  const Law foundation = make_contact_law("foundation", {{"stiffness", 1e8},
+                                                         {"exponent", 1.5},
+                                                         {"radius", 0.05 / M_PI},
+                                                         {"viscosity", 4e4},
+                                                         {"thickness", 2e-3},
+                                                         {"share", 0.75}});
+  // 100 N at rest; 2 pi R = 0.1 m, eta / h = 2e7 Pa s/m: 0.1 * 2e7 * 0.75 = 1.5e6 N s/m^2, times 1e-4 m
+  EXPECT_NEAR(foundation->force(1e-4, 0.2, 0), 130, 1e-12);
+  EXPECT_NEAR(foundation->force(1e-4, -0.2, 0), 70, 1e-12);
 }
 
 TEST(ContactLaws, NoneButKelvinVoigtPulls) {
@@ -249,6 +265,9 @@ TEST(ContactLaws, RefusalNamesParameterValueAndLimit) {
       {"stereomechanical",
        {{"restitution", 0.5}, {"resting_speed", 0}, {"stiffness", 1}, {"damping", 0}},
        "contact.resting_speed = 0: must be > 0 m/s"},
+      {"foundation",
+       {{"stiffness", 1}, {"exponent", 1}, {"radius", 1}, {"viscosity", 0}, {"thickness", 0}, {"share", 1}},
+       "contact.thickness = 0: must be > 0 m"},
   };
   for (const BadLaw& bad : cases) {
     try {

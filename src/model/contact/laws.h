@@ -14,5 +14,6 @@ ContactLawType yang_sun_contact();
 ContactLawType lankarani_nikravesh_contact();
 ContactLawType jankowski_contact();
 ContactLawType stereomechanical_contact();
+ContactLawType foundation_contact();
 
 }  // namespace backlash
