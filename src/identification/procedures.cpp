@@ -14,6 +14,7 @@ namespace {
 constexpr double kDecayModel =
     0.03;  // bearing friction and the contact's own damping at the start of a ringing
 constexpr double kResponseModel = 0.002;  // a mesh that is not quite linear
+constexpr double kLeastCoherence = 0.1;    // dropping faint points would leave the anti-resonance those that noise lifts
 constexpr double kSuspicious = 3;         // standard errors
 
 std::string plus_minus(const Measured& m, const std::string& unit) {
@@ -174,6 +175,7 @@ ResponseDetail respond(const Record& record) {
   for (const bool held : {false, true}) {
     ResponseSettings settings;
     settings.held = held;
+    settings.least_coherence = kLeastCoherence;
     ResponseDetail d;
     d.held = held;
     d.response = estimate_response(record, settings);
