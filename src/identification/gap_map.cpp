@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
+#include "backlash_diagnosis/identification/blocks.h"
 #include "backlash_diagnosis/identification/harmonics.h"
 #include "backlash_diagnosis/identification/least_squares.h"
 #include "backlash_diagnosis/record/zero_phase.h"
@@ -15,6 +17,7 @@ namespace {
 
 constexpr double kTurn = 2 * M_PI;
 constexpr double kSteady = 0.05;     // of the median speed
+constexpr double kMostStart = 0.25;  // of a run, for starting and for stopping
 constexpr double kSpeedCutoff = 5;   // Hz, of the speed that is judged
 constexpr double kBackwards = 0.01;  // share of samples that may go the other way: starting and stopping
 constexpr int kLeastSamples = 5;     // per bin and direction
@@ -37,6 +40,10 @@ double median(Values values) {
   return *middle;
 }
 
+double mean_of(const Values& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+}
+
 /// The steady part of a run.
 struct Run {
   Values load, difference;  // rad
@@ -53,18 +60,19 @@ Run steady_part(const Record& given) {
   const Values speed = derivative(low_pass(load, interval, std::min(kSpeedCutoff, 0.2 / interval)), interval);
   Run run;
   run.speed = median(speed);
+  const auto [from, to] = steady_range(speed, kMostStart);
   int backwards = 0;
   for (std::size_t i = 0; i < speed.size(); ++i) {
     backwards += speed[i] * run.speed < -kSteady * run.speed * run.speed;
-    if (std::fabs(speed[i] - run.speed) > kSteady * std::fabs(run.speed)) continue;
+    if (i < from || i >= to || std::fabs(speed[i] - run.speed) > kSteady * std::fabs(run.speed)) continue;
     run.load.push_back(load[i]);
     run.difference.push_back(motor[i] - load[i]);
   }
   if (backwards > kBackwards * double(speed.size()))
     throw CannotIdentify(sentence(record.name, ": the speed reverses: ", backwards, " of ", speed.size(),
                                   " samples go against the median of ", run.speed, " rad/s"));
-  if (run.load.size() < 100 || 2 * run.load.size() < speed.size() || run.speed == 0)
-    throw CannotIdentify(sentence(record.name, ": only ", run.load.size(), " of ", speed.size(),
+  if (run.load.size() < 100 || 2 * run.load.size() < to - from || run.speed == 0)
+    throw CannotIdentify(sentence(record.name, ": only ", run.load.size(), " of ", to - from,
                                   " samples within 5 % of the median speed"));
   return run;
 }
@@ -87,6 +95,21 @@ std::vector<std::pair<double, double>> averaged(const Run& run, double width) {
   return means;
 }
 
+/// By how much the variance of a mean of neighbours exceeds that of independent values: 1 + 2 sum of
+/// correlations.
+double inflation(const Values& residual) {
+  double zero = 0, sum = 1;
+  for (const double r : residual) zero += r * r;
+  if (zero == 0) return 1;
+  for (std::size_t lag = 1; lag < residual.size() / 4; ++lag) {
+    double product = 0;
+    for (std::size_t i = lag; i < residual.size(); ++i) product += residual[i] * residual[i - lag];
+    if (product < 0.05 * zero) break;
+    sum += 2 * product / zero;
+  }
+  return sum;
+}
+
 /// Slope of motor over load position. Over a turn and more the centre line repeats and is told from the slope
 /// by its first orders; over less they are one.
 void measure_scale(Run& run, double width) {
@@ -105,8 +128,10 @@ void measure_scale(Run& run, double width) {
     }
     b[row] = means[i].second;
   }
-  const Measured slope = fit_linear(a, b).parameter(1);
-  run.scale = {1 + slope.value / travel, slope.standard_error / travel};
+  const LeastSquaresFit fit = fit_linear(a, b);
+  const Measured slope = fit.parameter(1);
+  const double root = std::sqrt(inflation({fit.residuals.begin(), fit.residuals.end()}));
+  run.scale = {1 + slope.value / travel, root * slope.standard_error / travel};
 }
 
 /// One run in the bins of a turn.
@@ -124,21 +149,6 @@ LeastSquaresFit line_in_bin(const std::vector<int>& members, const Values& offse
     b[Eigen::Index(i)] = y[members[i]];
   }
   return fit_linear(a, b);
-}
-
-/// By how much the variance of a mean of neighbours exceeds that of independent values: 1 + 2 sum of
-/// correlations.
-double inflation(const Values& residual) {
-  double zero = 0, sum = 1;
-  for (const double r : residual) zero += r * r;
-  if (zero == 0) return 1;
-  for (std::size_t lag = 1; lag < residual.size() / 4; ++lag) {
-    double product = 0;
-    for (std::size_t i = lag; i < residual.size(); ++i) product += residual[i] * residual[i - lag];
-    if (product < 0.05 * zero) break;
-    sum += 2 * product / zero;
-  }
-  return sum;
 }
 
 /// `level` and `slope` are taken off: y = d - level - slope q.
@@ -299,6 +309,10 @@ GapMap identify_gap_map(const Record& one_way, const Record& other_way, const Ga
     map.warnings.push_back(sentence("both runs together cover ", 100 * map.coverage,
                                     " % of the turn: the map holds only there"));
   fit_series(map, settings);
+  // Runs from one start to opposite ends lie turns apart, and the scale over that distance is part of the gap.
+  const double apart = mean_of(forward.load) - mean_of(reverse.load);
+  map.mean_separation.standard_error =
+      std::hypot(map.mean_separation.standard_error, apart * map.scale.standard_error);
   correct_wind_up(map, settings);
   say(map);
   return map;

@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/line_inertia.h"
+#include "backlash_diagnosis/identification/robust_mean.h"
 
 namespace backlash {
 namespace {
@@ -71,22 +72,22 @@ TEST(InertiaFromAmplitudes, RefusesWhatCannotBe) {
   EXPECT_THROW(inertia_from_amplitudes(1, 1, 1, -1), InvalidParameter);
 }
 
-TEST(CombinedInertia, TheHighRowOfTableB1DoesNotDecide) {
-  const CombinedInertia driver = combined_inertia(printed(kTableB1));
+TEST(RobustMean, TheHighRowOfTableB1DoesNotDecide) {
+  const RobustMean driver = robust_mean(printed(kTableB1));
   // Mean 7.10 with, 6.98 without the row 7.8; the robust value must be nearer to the latter.
-  EXPECT_NEAR(driver.inertia.value, 6.98, 0.05);
+  EXPECT_NEAR(driver.value, 6.98, 0.05);
   ASSERT_EQ(driver.outliers.size(), 1u);
   EXPECT_EQ(driver.outliers[0], 2u);
 }
 
-TEST(CombinedInertia, TableB2) {
-  const CombinedInertia total = combined_inertia(printed(kTableB2));
+TEST(RobustMean, TableB2) {
+  const RobustMean total = robust_mean(printed(kTableB2));
   // 14 rows of standard deviation 2.6: the mean 38.7 and the robust value differ by a fraction of 2.6 /
   // sqrt(14).
-  EXPECT_NEAR(total.inertia.value, 38.7, 0.35);
-  EXPECT_NEAR(total.inertia.standard_error, 2.6 / std::sqrt(14.0), 0.2);
-  EXPECT_THROW(combined_inertia({}), CannotIdentify);
-  EXPECT_EQ(combined_inertia({{7, 0.1}}).inertia.standard_error, 0.1);
+  EXPECT_NEAR(total.value, 38.7, 0.35);
+  EXPECT_NEAR(total.standard_error, 2.6 / std::sqrt(14.0), 0.2);
+  EXPECT_THROW(robust_mean({}), CannotIdentify);
+  EXPECT_EQ(robust_mean({{7, 0.1}}).standard_error, 0.1);
 }
 
 struct SineRecipe {
