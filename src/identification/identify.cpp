@@ -77,17 +77,23 @@ void require_servo(const Rig& rig) {
 
 }  // namespace
 
-Identification identify(const Rig& declared, const std::vector<Record>& records, const Progress& progress) {
+IdentificationCase identification_case(const Rig& declared, const std::vector<Record>& records) {
   IdentificationCase c;
   c.declared = load_side(declared);
   c.result.rig = c.declared;
   for (const Record& record : records) c.records.push_back(case_record(record, declared));
+  if (declared.mesh.rigid) return c;
+  c.names = parameter_names(c.declared);
+  for (const std::string& name : c.names) c.result.units[name] = servo_parameter(name).unit;
+  return c;
+}
+
+Identification identify(const Rig& declared, const std::vector<Record>& records, const Progress& progress) {
+  IdentificationCase c = identification_case(declared, records);
   std::vector<Procedure> procedures = {{"one_inertia", run_one_inertia}};
   if (!declared.mesh.rigid) {
     require_servo(declared);
     procedures = servo_procedures();
-    c.names = parameter_names(c.declared);
-    for (const std::string& name : c.names) c.result.units[name] = servo_parameter(name).unit;
   }
   double done = 0;
   for (const Procedure& procedure : procedures) {

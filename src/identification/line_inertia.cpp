@@ -15,9 +15,9 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr std::size_t kLeastCycles = 4;
-constexpr double kLeastShare = 0.5;  // of the speed's variance that the sine must explain
-constexpr double kSettled = 1e-3;       // of the amplitude, of a cycle from those of the second half
-constexpr double kScatter = 4;          // deviations of those, the same
+constexpr double kLeastShare = 0.5;      // of the speed's variance that the sine must explain
+constexpr double kSettled = 1e-3;        // of the amplitude, of a cycle from those of the second half
+constexpr double kScatter = 4;           // deviations of those, the same
 constexpr std::size_t kMostGroups = 20;  // of cycles, for the error
 
 /// x = Re(amplitude exp(i w k)) + polynomial, k in samples.
@@ -98,12 +98,14 @@ double largest_line(const std::vector<double>& values) {
 
 /// Leading cycles whose sine differs from those of the second half: it is faded in, or a transient dies. At
 /// most half of them.
-std::size_t unsettled_cycles(const std::vector<double>& speed, std::size_t begin, std::size_t cycles, double w) {
+std::size_t unsettled_cycles(const std::vector<double>& speed, std::size_t begin, std::size_t cycles,
+                             double w) {
   const double per_cycle = 2 * M_PI / w;
   const auto length = static_cast<std::size_t>(per_cycle);
   Eigen::VectorXcd amplitude(cycles);
   for (std::size_t i = 0; i < cycles; ++i)
-    amplitude[i] = fit_sine(speed, begin + static_cast<std::size_t>(double(i) * per_cycle), length, w, 1).amplitude;
+    amplitude[i] =
+        fit_sine(speed, begin + static_cast<std::size_t>(double(i) * per_cycle), length, w, 1).amplitude;
   const auto later = amplitude.tail(cycles - cycles / 2);
   const Complex mean = later.mean();
   const double scatter = std::sqrt((later.array() - mean).abs2().mean());
@@ -175,7 +177,8 @@ void require_one_way(const Record& record, const Sine& speed) {
                          " rad/s): Coulomb friction would count as inertia and damping");
 }
 
-/// The motion of all that turns, as if it were the motor's: mean of motor and load, weighted with their inertias.
+/// The motion of all that turns, as if it were the motor's: mean of motor and load, weighted with their
+/// inertias.
 Record weighted(Record record, double motor_share) {
   const std::pair<Channel, Channel> pairs[] = {{Channel::motor_position, Channel::load_position},
                                                {Channel::motor_velocity, Channel::load_velocity}};

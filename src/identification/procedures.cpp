@@ -11,12 +11,14 @@ namespace backlash {
 namespace {
 
 // What the models of the procedures leave out, as a share of the value, beside the noise.
-constexpr double kLineModel = 0.0005;  // share of the motor in the inertia, not known better than to 40 %
-constexpr double kDecayModel = 0.01;   // the contact's own damping at the start of a ringing
+constexpr double kLineModel = 0.0005;     // share of the motor in the inertia, not known better than to 40 %
+constexpr double kDecayModel = 0.01;      // the contact's own damping at the start of a ringing
 constexpr double kResponseModel = 0.002;  // a mesh that is not quite linear
-constexpr double kLeastCoherence = 0.1;    // dropping faint points would leave the anti-resonance those that noise lifts
-constexpr double kDeclared = 0.4;           // relative standard error of what a rig file says
-constexpr double kSuspicious = 3;         // standard errors
+constexpr double kLeastCoherence =
+    0.1;  // dropping faint points would leave the anti-resonance those that noise lifts
+constexpr double kDeclared = 0.4;          // relative standard error of what a rig file says
+constexpr double kClearanceModel = 0.005;  // a push that is no polynomial, steps of the sensor
+constexpr double kSuspicious = 3;          // standard errors
 
 std::string plus_minus(const Measured& m, const std::string& unit) {
   char text[96];
@@ -166,8 +168,8 @@ ProcedureReport inertia(IdentificationCase& c) {
       if (!alone) sum["load_inertia"] = 1;
       add(c, "line_inertia", sum, with_model_error(detail.combined, kLineModel));
       report.records.insert(report.records.end(), used.begin(), used.end());
-      report.message += (report.message.empty() ? "" : "; ") + detail.subject + " " +
-                        plus_minus(detail.combined, "kg m^2");
+      report.message +=
+          (report.message.empty() ? "" : "; ") + detail.subject + " " + plus_minus(detail.combined, "kg m^2");
       c.result.inertia.push_back(std::move(detail));
     } catch (const CannotIdentify& error) {
       reasons += std::string(reasons.empty() ? "" : "; ") + detail.subject + ": " + error.what();
@@ -250,7 +252,8 @@ bool is_square(const Record& record) {
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
   int jumps = 0;
-  for (std::size_t k = 1; k < torque.size(); ++k) jumps += std::fabs(torque[k] - torque[k - 1]) > 0.5 * (*high - *low);
+  for (std::size_t k = 1; k < torque.size(); ++k)
+    jumps += std::fabs(torque[k] - torque[k - 1]) > 0.5 * (*high - *low);
   return jumps >= 3;
 }
 
@@ -264,8 +267,9 @@ ProcedureReport decay(IdentificationCase& c) {
   settings.reduced_inertia = {
       reduced, reduced * std::hypot(load / (motor + load) * relative(known(c, "motor_inertia")),
                                     motor / (motor + load) * relative(known(c, "load_inertia")))};
-  settings.bearing_damping = reduced * reduced *
-                             (rig.motor.viscous_damping / (motor * motor) + rig.link.viscous_damping / (load * load));
+  settings.bearing_damping =
+      reduced * reduced *
+      (rig.motor.viscous_damping / (motor * motor) + rig.link.viscous_damping / (load * load));
   std::vector<DecayIdentification> all;
   report.records = on_each(c, &CaseRecord::drive, [&](const CaseRecord& r) {
     if (!is_square(r.record)) throw CannotIdentify("no square wave of torque");
@@ -289,7 +293,7 @@ ProcedureReport clearance(IdentificationCase& c) {
     if (r.motor_moves || !r.load_moves) continue;
     try {
       const Clearance found = identify_clearance(r.record, settings);
-      add(c, report.name, {{"backlash_angle", 1}}, found.gap);
+      add(c, report.name, {{"backlash_angle", 1}}, with_model_error(found.gap, kClearanceModel));
       report.records.push_back(r.record.name);
       report.message =
           plus_minus(found.gap, "rad") + " from " + std::to_string(found.passages.size()) + " passages";
@@ -309,7 +313,8 @@ Measured load_friction_at(const IdentificationCase& c, double speed) {
   const double sign = speed > 0 ? 1 : -1;
   const double value = link.coulomb_friction + sign * link.coulomb_asymmetry +
                        (link.viscous_damping + sign * link.viscous_asymmetry) * std::fabs(speed);
-  return {value, c.result.parameters.count("load_coulomb") ? known(c, "load_coulomb").standard_error : kDeclared * value};
+  return {value, c.result.parameters.count("load_coulomb") ? known(c, "load_coulomb").standard_error
+                                                           : kDeclared * value};
 }
 
 ProcedureReport gap_map(IdentificationCase& c) {
@@ -330,13 +335,16 @@ ProcedureReport gap_map(IdentificationCase& c) {
   std::string reasons;
   for (const OneWay& a : runs)
     for (const OneWay& b : runs) {
-      if (!(a.speed > 0 && b.speed < 0) || c.result.gap_map) continue;
+      if (!(a.speed > 0 && b.speed < 0)) continue;
       GapMapSettings settings;
       settings.stiffness = known(c, "mesh_stiffness");
       settings.friction_forward = load_friction_at(c, a.speed);
       settings.friction_reverse = load_friction_at(c, b.speed);
       try {
-        c.result.gap_map = identify_gap_map(a.record->record, b.record->record, settings);
+        GapMap map = identify_gap_map(a.record->record, b.record->record, settings);
+        if (c.result.gap_map && c.result.gap_map->mean_gap.standard_error <= map.mean_gap.standard_error)
+          continue;  // the pair that tells more
+        c.result.gap_map = std::move(map);
         report.records = {a.record->record.name, b.record->record.name};
       } catch (const CannotIdentify& error) {
         reasons += std::string(reasons.empty() ? "" : "; ") + error.what();

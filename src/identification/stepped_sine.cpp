@@ -12,7 +12,7 @@ namespace backlash {
 namespace {
 
 constexpr std::size_t kFewestCycles = 4, kMostCycles = 200;
-constexpr std::size_t kFewest = 64;  // samples
+constexpr std::size_t kFewestForNoise = 64;  // samples that tell the noise
 constexpr double kBetween =
     2.5;  // cycles between two runs that count as inside: the step from one to the other
 constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // cycles
@@ -68,16 +68,18 @@ void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
     const Eigen::Vector3d fit = normal.ldlt().solve(right);
     const double early = std::atan2(fit[1], fit[2]) / (2 * M_PI);
     const bool found = std::isfinite(early) && std::fabs(early) < 0.25;
-    refined.push_back(found ? Passage{rough - early * period, fit[0], std::hypot(fit[1], fit[2])} : passages[i]);
+    refined.push_back(found ? Passage{rough - early * period, fit[0], std::hypot(fit[1], fit[2])}
+                            : passages[i]);
   }
   std::copy(refined.begin(), refined.end(), passages.begin() + !passages.empty());
 }
 
 std::vector<Passage> find_passages(const std::vector<double>& u) {
   std::vector<Passage> passages;
-  if (u.size() < kFewest) return passages;
+  if (u.size() < 8) return passages;
   const double reach = range(u);
-  const double turn = std::clamp(kNoiseTurn * white_noise(u), kTurn * reach, kMostTurn * reach);
+  const double noise = u.size() < kFewestForNoise ? 0 : white_noise(u);
+  const double turn = std::clamp(kNoiseTurn * noise, kTurn * reach, kMostTurn * reach);
   if (!(turn > 0)) return passages;
   std::optional<std::size_t> low;
   std::size_t extreme = 0;

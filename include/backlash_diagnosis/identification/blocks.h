@@ -22,9 +22,11 @@ std::vector<double> block_means(const std::vector<double>& values, std::size_t l
 Measured batch_mean(const std::vector<double>& values);
 
 /// From where to where (one past the last) a signal is as steady as in its middle half: the last value within
-/// `most` (0 to 1/2) of the signal from its start, that lies more than four deviations (and 1e-4 of the median)
-/// off the median, and all before it are left out, and so at the end. Deviation from the median absolute one.
-std::pair<std::size_t, std::size_t> steady_range(const std::vector<double>& values, double most);
+/// `most` (0 to 1/2) of the signal from its start, that lies more than four deviations (and `allowed_change`
+/// of the median) off the median, and all before it are left out, and so at the end. Deviation from the
+/// median absolute one.
+std::pair<std::size_t, std::size_t> steady_range(const std::vector<double>& values, double most,
+                                                 double allowed_change);
 
 /// How the least squares solution of A x = b changes where one block of rows after the other is left out: one
 /// column per block, about their mean. `residuals` b - A x at the solution; `block` the number of each row's

@@ -3,8 +3,8 @@
 // is the load.
 //
 // Whether the line is straight: a quadratic term and a root are added in turn; a warning where Student's t of
-// either has a chance below 1 % on a straight line (t beyond 3.5 with ten runs). Table B.3: forward the root with
-// t = 3.9, backward nothing (quadratic t = 2.3, a chance of 5 %).
+// either has a chance below 1 % on a straight line (t beyond 3.5 with ten runs). Table B.3: forward the root
+// with t = 3.9, backward nothing (quadratic t = 2.3, a chance of 5 %).
 #pragma once
 
 #include <string>

@@ -7,10 +7,10 @@
 // speed never reverses: Coulomb friction is then a constant and has no line. In magnitudes
 // I = sqrt(|T|^2 - (c |V|)^2) / (w |V|); (5.4) prints a plus.
 //
-// Of a whole drive T = (i w I1 + c1) V1 + (i w I2 + c2) V2 whatever happens between the teeth: their torque acts
-// on both and cancels. V is then the mean of both speeds weighted with the inertias. The motor's speed alone
-// reads (f / F_AR)^2 too much, 0.9 % at 1 Hz with F_AR = 10.4 Hz, and more where the teeth change flanks, which
-// they do unless the load's friction exceeds its I2 w |V|.
+// Of a whole drive T = (i w I1 + c1) V1 + (i w I2 + c2) V2 whatever happens between the teeth: their torque
+// acts on both and cancels. V is then the mean of both speeds weighted with the inertias. The motor's speed
+// alone reads (f / F_AR)^2 too much, 0.9 % at 1 Hz with F_AR = 10.4 Hz, and more where the teeth change
+// flanks, which they do unless the load's friction exceeds its I2 w |V|.
 #pragma once
 
 #include <string>
