@@ -11,8 +11,8 @@ namespace backlash {
 namespace {
 
 constexpr double kSameSpeed = 0.01;  // relative: speeds closer than this count as one
-constexpr double kSurprise = 0.01;   // chance of so much curvature on a straight line, that is worth telling
-constexpr double kFarOff = 4.0;      // t value of a row against the line through the others
+constexpr double kSurprise = 0.01;   // chance of so much curvature on a straight line, that is worth telling,
+                                     // or of a row so far off among all
 
 struct Rows {
   Eigen::VectorXd speed, torque, error;
@@ -128,7 +128,7 @@ void name_far_rows(FrictionLine& line, const Rows& rows, const Eigen::VectorXd& 
     const double scaled = weight[i] * line.residual[i] * line.residual[i] / (1 - leverage);
     const double variance = (all.chi2 - scaled) / double(n - 3);
     const double t = std::sqrt(scaled / std::max(variance, 1e-12 * all.chi2));
-    if (t > kFarOff)
+    if (double(n) * chance_of(t, int(n) - 3) < kSurprise)
       line.warnings.push_back("the run at " + figure(rows.speed[i]) + " rad/s (" + figure(rows.torque[i]) +
                               " N m) lies " + figure(t) +
                               " standard deviations off the line through the others");

@@ -138,6 +138,50 @@ TEST(LineInertia, ComplexFormGivesInertiaAndDamping) {
   }
 }
 
+TEST(LineInertia, ASineThatIsFadedInIsLeftOut) {
+  Record record = sine_run({});
+  // T = 7 a + 13.7 v + 63, v = 0.6 + 0.35 r sin(w t) with r = t / 3 s at first.
+  const double w = 2 * M_PI * 1.03;
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    const double t = record.time[k], r = std::min(1.0, t / 3), slope = t < 3 ? 1.0 / 3 : 0;
+    const double v = 0.6 + 0.35 * r * std::sin(w * t);
+    const double a = 0.35 * (slope * std::sin(w * t) + r * w * std::cos(w * t));
+    record.column(Channel::motor_velocity)[k] = v;
+    record.column(Channel::motor_torque)[k] = 7 * a + 13.7 * v + 63;
+  }
+  record.column(Channel::motor_position).clear();
+  LineInertiaOptions options;
+  options.frequency = 1.03;
+  const LineInertia line = line_inertia(record, options);
+  EXPECT_EQ(line.cycles, 9u);  // of 12.36: one skipped and two that are faded in
+  EXPECT_NEAR(line.inertia.value, 7, 7e-4);
+}
+
+TEST(LineInertia, OfADriveByTheMeanMotion) {
+  // Closed form with the elasticity of configuration 2: J1 = 6.3, J2 = 108.3 kg m^2, F_AR = 10.4 Hz, no friction
+  // but 63 N m: V2 = V1 / (1 - (f / F_AR)^2), T = i w (J1 V1 + J2 V2).
+  Record record = sine_run({});
+  const double w = 2 * M_PI * 1.03, more = 1 / (1 - std::pow(1.03 / 10.4, 2));
+  for (const Channel channel : {Channel::motor_velocity, Channel::load_velocity, Channel::motor_torque})
+    record.column(channel).assign(record.size(), 0);
+  record.column(Channel::motor_position).clear();
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    const double sine = 0.35 * std::sin(w * record.time[k]), cosine = 0.35 * w * std::cos(w * record.time[k]);
+    record.column(Channel::motor_velocity)[k] = 0.6 + sine;
+    record.column(Channel::load_velocity)[k] = 0.6 + more * sine;
+    record.column(Channel::motor_torque)[k] = 63 + (6.3 + more * 108.3) * cosine;
+  }
+  LineInertiaOptions options;
+  options.frequency = 1.03;
+  EXPECT_NEAR(line_inertia(record, options).inertia.value, 6.3 + more * 108.3, 0.01);  // the motor's motion alone
+  options.motor_share = 6.3 / 114.6;
+  EXPECT_NEAR(line_inertia(record, options).inertia.value, 114.6, 0.01);
+  options.motor_share = 0.08;  // not known better than that: (0.08 - 0.055) 1 % of it
+  EXPECT_NEAR(line_inertia(record, options).inertia.value, 114.6, 3e-4 * 114.6);
+  options.motor_share = -0.1;
+  EXPECT_THROW(line_inertia(record, options), InvalidParameter);
+}
+
 TEST(LineInertia, FindsTheLine) {
   const LineInertia line = line_inertia(sine_run({}));
   EXPECT_NEAR(line.frequency, 1.03, 1e-3);  // small against the width 1 / (12 s) of the line

@@ -5,6 +5,7 @@
 // Whether the line is straight: a quadratic term and a root are added in turn; a warning where Student's t of
 // either has a chance below 1 % on a straight line (t beyond 3.5 with ten runs). Table B.3: forward the root
 // with t = 3.9, backward nothing (quadratic t = 2.3, a chance of 5 %).
+// A row is named where its t against the line through the others has a chance below 1 % among all rows.
 #pragma once
 
 #include <string>
