@@ -12,6 +12,14 @@ namespace {
 constexpr std::size_t kBatches = 10;
 constexpr double kSmallestPivot = 1e-10;  // of the equations with columns of length 1
 
+constexpr double kUnsteady = 4;  // deviations
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace
 
 std::string figure(double value) {
@@ -25,6 +33,21 @@ std::vector<double> block_means(const std::vector<double>& values, std::size_t l
   for (std::size_t k = 0; k + length <= values.size(); k += length)
     means.push_back(std::accumulate(values.begin() + k, values.begin() + k + length, 0.0) / double(length));
   return means;
+}
+
+std::pair<std::size_t, std::size_t> steady_range(const std::vector<double>& values, double most,
+                                                 double allowed_change) {
+  const std::size_t n = values.size();
+  if (n < 4) return {0, n};
+  std::vector<double> middle(values.begin() + n / 4, values.begin() + (3 * n + 3) / 4);
+  const double level = median(middle);
+  for (double& value : middle) value = std::fabs(value - level);
+  const double allowed = std::max(kUnsteady * 1.4826 * median(middle), allowed_change * std::fabs(level));
+  const auto reach = static_cast<std::size_t>(most * double(n));
+  std::size_t first = reach, last = n - reach;
+  while (first > 0 && std::fabs(values[first - 1] - level) <= allowed) --first;
+  while (last < n && std::fabs(values[last] - level) <= allowed) ++last;
+  return {first, last};
 }
 
 Measured batch_mean(const std::vector<double>& values) {

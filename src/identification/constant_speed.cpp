@@ -10,6 +10,8 @@ namespace backlash {
 namespace {
 
 constexpr std::size_t kLeastBlocks = 4;
+constexpr double kSettled = 1e-4;      // of the speed
+constexpr double kMostSettling = 0.5;  // of a stretch
 
 void require(const ConstantSpeedOptions& options) {
   if (!(options.block > 0)) throw InvalidParameter("block", options.block, "must be > 0 s");
@@ -62,9 +64,15 @@ std::vector<ConstantSpeedRun> find_constant_speed(const Record& recorded,
       ++first;
       continue;
     }
-    ConstantSpeedRun run{mean_of(speed, first + 1, end - 1, length),
-                         mean_of(torque, first + 1, end - 1, length), record.time[(first + 1) * length],
-                         record.time[(end - 1) * length - 1]};
+    const auto steady =
+        steady_range({blocks.begin() + first + 1, blocks.begin() + end - 1}, kMostSettling, kSettled);
+    const std::size_t from = first + 1 + steady.first, to = first + 1 + steady.second;
+    if (to < from + kLeastBlocks) {
+      first = end;
+      continue;
+    }
+    ConstantSpeedRun run{mean_of(speed, from, to, length), mean_of(torque, from, to, length),
+                         record.time[from * length], record.time[to * length - 1]};
     if (std::fabs(run.speed.value) > 5 * run.speed.standard_error) runs.push_back(run);
     first = end;
   }

@@ -11,8 +11,8 @@ namespace backlash {
 namespace {
 
 constexpr double kSameSpeed = 0.01;  // relative: speeds closer than this count as one
-constexpr double kSurprise = 2.0;    // t value of a curvature worth telling
-constexpr double kFarOff = 4.0;      // t value of a row against the line through the others
+constexpr double kSurprise = 0.01;   // chance of so much curvature on a straight line, that is worth telling,
+                                     // or of a row so far off among all
 
 struct Rows {
   Eigen::VectorXd speed, torque, error;
@@ -76,6 +76,16 @@ Eigen::VectorXd weights(const Rows& rows) {
   return with(high);
 }
 
+/// P(|T| > t) of Student's t with whole degrees of freedom (Abramowitz and Stegun 1964, 26.7.3 and 26.7.4).
+double chance_of(double t, int freedom) {
+  const double angle = std::atan(std::fabs(t) / std::sqrt(double(freedom)));
+  const double c = std::cos(angle);
+  const bool odd = freedom % 2 == 1;
+  double term = odd ? c : 1, sum = freedom > 1 ? term : 0;
+  for (int k = odd ? 3 : 2; k <= freedom - 2; k += 2) sum += term *= c * c * double(k - 1) / double(k);
+  return 1 - (odd ? 2 / M_PI * (angle + std::sin(angle) * sum) : std::sin(angle) * sum);
+}
+
 /// t value of one more column beside constant and speed, and its coefficient.
 std::pair<double, double> extra_term(const Rows& rows, const Eigen::VectorXd& weight,
                                      const Eigen::VectorXd& column) {
@@ -97,7 +107,8 @@ void test_curvature(FrictionLine& line, const Rows& rows, const Eigen::VectorXd&
   line.root_rms = std::sqrt((rows.torque - a * fit.values).squaredNorm() / double(a.rows()));
   std::tie(line.quadratic, line.quadratic_t) = extra_term(rows, weight, rows.speed.cwiseAbs2());
   line.root_t = extra_term(rows, weight, root).second;
-  if (std::fabs(line.quadratic_t) <= kSurprise && std::fabs(line.root_t) <= kSurprise) return;
+  const int freedom = int(a.rows()) - 3;
+  if (std::min(chance_of(line.quadratic_t, freedom), chance_of(line.root_t, freedom)) > kSurprise) return;
   const bool concave = line.quadratic * sign < 0;
   line.warnings.push_back("a straight line leaves a " + std::string(concave ? "concave" : "convex") +
                           " trend: quadratic term " + figure(line.quadratic) +
@@ -117,7 +128,7 @@ void name_far_rows(FrictionLine& line, const Rows& rows, const Eigen::VectorXd& 
     const double scaled = weight[i] * line.residual[i] * line.residual[i] / (1 - leverage);
     const double variance = (all.chi2 - scaled) / double(n - 3);
     const double t = std::sqrt(scaled / std::max(variance, 1e-12 * all.chi2));
-    if (t > kFarOff)
+    if (double(n) * chance_of(t, int(n) - 3) < kSurprise)
       line.warnings.push_back("the run at " + figure(rows.speed[i]) + " rad/s (" + figure(rows.torque[i]) +
                               " N m) lies " + figure(t) +
                               " standard deviations off the line through the others");

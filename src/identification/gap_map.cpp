@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "backlash_diagnosis/identification/blocks.h"
 #include "backlash_diagnosis/identification/harmonics.h"
 #include "backlash_diagnosis/identification/least_squares.h"
 #include "backlash_diagnosis/record/zero_phase.h"
@@ -15,9 +16,13 @@ namespace {
 
 constexpr double kTurn = 2 * M_PI;
 constexpr double kSteady = 0.05;     // of the median speed
+constexpr double kSettled = 5e-3;    // of the median speed: the filter's own at the ends of a run
+constexpr double kMostStart = 0.25;  // of a run, for starting and for stopping
 constexpr double kSpeedCutoff = 5;   // Hz, of the speed that is judged
 constexpr double kBackwards = 0.01;  // share of samples that may go the other way: starting and stopping
 constexpr int kLeastSamples = 5;     // per bin and direction
+constexpr double kRelevant = 1e-3;   // of the mean: smaller harmonics may be the steps of the sensors
+constexpr double kLopsided = 0.1;    // of the bin's width
 constexpr int kLeastBins = 8;
 constexpr int kCentreOrders = 6;  // of the centre line beside the scale
 
@@ -53,18 +58,19 @@ Run steady_part(const Record& given) {
   const Values speed = derivative(low_pass(load, interval, std::min(kSpeedCutoff, 0.2 / interval)), interval);
   Run run;
   run.speed = median(speed);
+  const auto [from, to] = steady_range(speed, kMostStart, kSettled);
   int backwards = 0;
   for (std::size_t i = 0; i < speed.size(); ++i) {
     backwards += speed[i] * run.speed < -kSteady * run.speed * run.speed;
-    if (std::fabs(speed[i] - run.speed) > kSteady * std::fabs(run.speed)) continue;
+    if (i < from || i >= to || std::fabs(speed[i] - run.speed) > kSteady * std::fabs(run.speed)) continue;
     run.load.push_back(load[i]);
     run.difference.push_back(motor[i] - load[i]);
   }
   if (backwards > kBackwards * double(speed.size()))
     throw CannotIdentify(sentence(record.name, ": the speed reverses: ", backwards, " of ", speed.size(),
                                   " samples go against the median of ", run.speed, " rad/s"));
-  if (run.load.size() < 100 || 2 * run.load.size() < speed.size() || run.speed == 0)
-    throw CannotIdentify(sentence(record.name, ": only ", run.load.size(), " of ", speed.size(),
+  if (run.load.size() < 100 || 2 * run.load.size() < to - from || run.speed == 0)
+    throw CannotIdentify(sentence(record.name, ": only ", run.load.size(), " of ", to - from,
                                   " samples within 5 % of the median speed"));
   return run;
 }
@@ -87,6 +93,21 @@ std::vector<std::pair<double, double>> averaged(const Run& run, double width) {
   return means;
 }
 
+/// By how much the variance of a mean of neighbours exceeds that of independent values: 1 + 2 sum of
+/// correlations.
+double inflation(const Values& residual) {
+  double zero = 0, sum = 1;
+  for (const double r : residual) zero += r * r;
+  if (zero == 0) return 1;
+  for (std::size_t lag = 1; lag < residual.size() / 4; ++lag) {
+    double product = 0;
+    for (std::size_t i = lag; i < residual.size(); ++i) product += residual[i] * residual[i - lag];
+    if (product < 0.05 * zero) break;
+    sum += 2 * product / zero;
+  }
+  return sum;
+}
+
 /// Slope of motor over load position. Over a turn and more the centre line repeats and is told from the slope
 /// by its first orders; over less they are one.
 void measure_scale(Run& run, double width) {
@@ -105,14 +126,17 @@ void measure_scale(Run& run, double width) {
     }
     b[row] = means[i].second;
   }
-  const Measured slope = fit_linear(a, b).parameter(1);
-  run.scale = {1 + slope.value / travel, slope.standard_error / travel};
+  const LeastSquaresFit fit = fit_linear(a, b);
+  const Measured slope = fit.parameter(1);
+  const double root = std::sqrt(inflation({fit.residuals.begin(), fit.residuals.end()}));
+  run.scale = {1 + slope.value / travel, root * slope.standard_error / travel};
 }
 
 /// One run in the bins of a turn.
 struct Binned {
   std::map<int, Measured> value;  // at the middle of the bin
   std::map<int, int> samples;
+  std::map<int, double> place;  // rad, mean load position, turns not taken off
 };
 
 /// The line through the samples of a bin; nothing where they are too few or all at one place.
@@ -124,21 +148,6 @@ LeastSquaresFit line_in_bin(const std::vector<int>& members, const Values& offse
     b[Eigen::Index(i)] = y[members[i]];
   }
   return fit_linear(a, b);
-}
-
-/// By how much the variance of a mean of neighbours exceeds that of independent values: 1 + 2 sum of
-/// correlations.
-double inflation(const Values& residual) {
-  double zero = 0, sum = 1;
-  for (const double r : residual) zero += r * r;
-  if (zero == 0) return 1;
-  for (std::size_t lag = 1; lag < residual.size() / 4; ++lag) {
-    double product = 0;
-    for (std::size_t i = lag; i < residual.size(); ++i) product += residual[i] * residual[i - lag];
-    if (product < 0.05 * zero) break;
-    sum += 2 * product / zero;
-  }
-  return sum;
 }
 
 /// `level` and `slope` are taken off: y = d - level - slope q.
@@ -156,10 +165,15 @@ Binned bin_run(const Run& run, double level, double slope, int bins) {
   Binned binned;
   for (const auto& [bin, list] : members) {
     if (int(list.size()) < kLeastSamples) continue;
+    double middle = 0;
+    for (const int i : list) middle += offset[i] / double(list.size());
+    if (std::fabs(middle) > kLopsided * width)
+      continue;  // a line to the middle would reach beyond its samples
     try {
       const LeastSquaresFit fit = line_in_bin(list, offset, y);
       binned.value[bin] = fit.parameter(0);
       binned.samples[bin] = int(list.size());
+      for (const int i : list) binned.place[bin] += run.load[i] / double(list.size());
       for (std::size_t i = 0; i < list.size(); ++i) residual[list[i]] = fit.residuals[Eigen::Index(i)];
     } catch (const CannotIdentify&) {
       continue;
@@ -205,7 +219,8 @@ void fit_series(GapMap& map, const GapMapSettings& settings) {
   const HarmonicSeries series = fit_harmonics(angle, separation, orders, settings.false_alarm);
   map.mean_separation = series.mean;
   map.deviation = series.deviation;
-  map.harmonics = series.harmonics;
+  for (const Harmonic& h : series.harmonics)
+    if (h.amplitude.value > kRelevant * map.mean_separation.value) map.harmonics.push_back(h);
   map.varies = !map.harmonics.empty();
   map.confidence = 1 - series.chance;
 }
@@ -243,9 +258,10 @@ void say(GapMap& map) {
                  100 * (highest - lowest) / mean, " % of its mean (confidence ", 100 * map.confidence, " %)");
   } else {
     // Amplitude that one harmonic would have to have: 3 standard errors of sqrt(2 / bins) deviations.
-    map.statement =
-        sentence("no variation of the gap with load position is found; one below ",
-                 3 * map.deviation * std::sqrt(2.0 / double(map.bins.size())), " rad would not be seen");
+    map.statement = sentence("no variation of the gap with load position is found; one below ",
+                             std::max(3 * map.deviation * std::sqrt(2.0 / double(map.bins.size())),
+                                      kRelevant * map.mean_separation.value),
+                             " rad would not be seen");
   }
 }
 
@@ -292,13 +308,22 @@ GapMap identify_gap_map(const Record& one_way, const Record& other_way, const Ga
     return sum / double(run.load.size());
   };
   const double level = 0.5 * (level_of(forward) + level_of(reverse));
-  map.bins = common_bins(bin_run(forward, level, slope, settings.bins),
-                         bin_run(reverse, level, slope, settings.bins), settings.bins);
+  const Binned forward_bins = bin_run(forward, level, slope, settings.bins);
+  const Binned reverse_bins = bin_run(reverse, level, slope, settings.bins);
+  map.bins = common_bins(forward_bins, reverse_bins, settings.bins);
   map.coverage = double(map.bins.size()) / settings.bins;
   if (map.coverage < 0.999)
     map.warnings.push_back(sentence("both runs together cover ", 100 * map.coverage,
                                     " % of the turn: the map holds only there"));
   fit_series(map, settings);
+  // Runs from one start to opposite ends lie a turn apart, and the scale over that distance is part of the
+  // gap.
+  double apart = 0;
+  for (const auto& [bin, place] : forward_bins.place)
+    if (const auto other = reverse_bins.place.find(bin); other != reverse_bins.place.end())
+      apart += (place - other->second) / double(map.bins.size());
+  map.mean_separation.standard_error =
+      std::hypot(map.mean_separation.standard_error, apart * map.scale.standard_error);
   correct_wind_up(map, settings);
   say(map);
   return map;

@@ -5,6 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/identification/gap_terms.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/record/zero_phase.h"
@@ -66,6 +67,12 @@ std::vector<std::string> parameter_names(const Rig& rig) {
   return names;
 }
 
+/// The map with the wind-up of the machine as fitted, and the rig with its variation where it declares one.
+void refine_gap_map(IdentificationCase& c) {
+  *c.result.gap_map = with_wind_up(*c.result.gap_map, c.result.rig);
+  if (gap_varies(c.declared)) c.result.rig = with_gap_map(c.result.rig, *c.result.gap_map, GapUse::variation);
+}
+
 /// Both directions declared alike, and the friction lines say otherwise.
 void warn_of_asymmetry(IdentificationCase& c) {
   for (const FrictionDetail& d : c.result.friction) {
@@ -87,7 +94,7 @@ void warn_of_misfit(Identification& result) {
       result.warnings.push_back(
           name + ": the fitted model leaves " + to_text(std::round(1e4 * channel.error) / 100) +
           " % where noise alone would leave " + to_text(std::round(1e4 * channel.floor) / 100) +
-          " %; trace_residual tells what it lacks");
+          " %: the machine has an effect that the rig file lacks");
 }
 
 void require_servo(const Rig& rig) {
@@ -103,18 +110,22 @@ void require_servo(const Rig& rig) {
 
 }  // namespace
 
-Identification identify(const Rig& declared, const std::vector<Record>& records, const Progress& progress) {
+IdentificationCase identification_case(const Rig& declared, const std::vector<Record>& records) {
   IdentificationCase c;
   c.declared = load_side(declared);
   c.result.rig = c.declared;
   read_records(records, declared, c);
+  if (declared.mesh.rigid) return c;
+  require_servo(declared);
+  c.names = parameter_names(c.declared);
+  for (const std::string& name : c.names) c.result.units[name] = servo_parameter(name).unit;
+  return c;
+}
+
+Identification identify(const Rig& declared, const std::vector<Record>& records, const Progress& progress) {
+  IdentificationCase c = identification_case(declared, records);
   std::vector<Procedure> procedures = {{"one_inertia", run_one_inertia}};
-  if (!declared.mesh.rigid) {
-    require_servo(declared);
-    procedures = servo_procedures();
-    c.names = parameter_names(c.declared);
-    for (const std::string& name : c.names) c.result.units[name] = servo_parameter(name).unit;
-  }
+  if (!declared.mesh.rigid) procedures = servo_procedures();
   double done = 0;
   for (const Procedure& procedure : procedures) {
     if (progress && !progress(done++ / double(procedures.size()), procedure.name)) throw Cancelled();
@@ -124,7 +135,9 @@ Identification identify(const Rig& declared, const std::vector<Record>& records,
       c.result.procedures.push_back({procedure.name, {}, error.what()});
       continue;
     }
-    if (!declared.mesh.rigid && procedure.run != run_output_error) update_from_findings(c);
+    if (declared.mesh.rigid || procedure.run == run_output_error) continue;
+    if (c.result.gap_map && gap_varies(c.declared)) c.declared = with_gap_map(c.declared, *c.result.gap_map);
+    update_from_findings(c);
   }
   if (progress) progress(1, "done");
   if (c.result.parameters.empty()) {
@@ -133,6 +146,7 @@ Identification identify(const Rig& declared, const std::vector<Record>& records,
       reasons.push_back(report.name + ": " + report.message);
     throw CannotIdentify("the records allow no procedure: " + joined(reasons));
   }
+  if (c.result.gap_map && !declared.mesh.rigid) refine_gap_map(c);
   warn_of_asymmetry(c);
   warn_of_misfit(c.result);
   return c.result;

@@ -15,8 +15,9 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr std::size_t kLeastCycles = 4;
-constexpr double kLeastShare = 0.5;  // of the speed's variance that the sine must explain
-constexpr double kOutlier = 3;
+constexpr double kLeastShare = 0.5;      // of the speed's variance that the sine must explain
+constexpr double kSettled = 1e-3;        // of the amplitude, of a cycle from those of the second half
+constexpr double kScatter = 4;           // deviations of those, the same
 constexpr std::size_t kMostGroups = 20;  // of cycles, for the error
 
 /// x = Re(amplitude exp(i w k)) + polynomial, k in samples.
@@ -95,6 +96,26 @@ double largest_line(const std::vector<double>& values) {
   return 0.5 * (low + high) / double(step);
 }
 
+/// Leading cycles whose sine differs from those of the second half: it is faded in, or a transient dies. At
+/// most half of them.
+std::size_t unsettled_cycles(const std::vector<double>& speed, std::size_t begin, std::size_t cycles,
+                             double w) {
+  const double per_cycle = 2 * M_PI / w;
+  const auto length = static_cast<std::size_t>(per_cycle);
+  Eigen::VectorXcd amplitude(cycles);
+  for (std::size_t i = 0; i < cycles; ++i)
+    amplitude[i] =
+        fit_sine(speed, begin + static_cast<std::size_t>(double(i) * per_cycle), length, w, 1).amplitude;
+  const auto later = amplitude.tail(cycles - cycles / 2);
+  const Complex mean = later.mean();
+  const double scatter = std::sqrt((later.array() - mean).abs2().mean());
+  std::size_t first = 0;
+  while (first < cycles / 2 &&
+         std::abs(amplitude[first] - mean) > std::max(kSettled * std::abs(mean), kScatter * scatter))
+    ++first;
+  return first;
+}
+
 /// The part of the record that is used, in samples, and the line.
 struct Section {
   std::size_t begin, count, cycles;
@@ -107,10 +128,15 @@ Section choose(const Record& record, const LineInertiaOptions& options, const st
   s.interval = record.sampling_interval();
   s.w = options.frequency > 0 ? 2 * M_PI * options.frequency * s.interval : largest_line(speed);
   const double per_cycle = 2 * M_PI / s.w;
-  s.begin = static_cast<std::size_t>(std::lround(options.skip * per_cycle));
-  s.cycles = record.size() > s.begin
-                 ? static_cast<std::size_t>((double(record.size() - s.begin) + 0.5) / per_cycle)
-                 : 0;
+  const auto skip = [&](double cycles) {
+    s.begin = static_cast<std::size_t>(std::lround(cycles * per_cycle));
+    s.cycles = record.size() > s.begin
+                   ? static_cast<std::size_t>((double(record.size() - s.begin) + 0.5) / per_cycle)
+                   : 0;
+  };
+  skip(options.skip);
+  if (s.cycles > kLeastCycles && per_cycle > 8)
+    skip(options.skip + double(unsettled_cycles(speed, s.begin, s.cycles, s.w)));
   if (s.cycles < kLeastCycles)
     throw CannotIdentify(record.name + ": " + std::to_string(s.cycles) + " cycles of " +
                          figure(s.w / (2 * M_PI * s.interval)) + " Hz after the start, inertia needs " +
@@ -151,15 +177,32 @@ void require_one_way(const Record& record, const Sine& speed) {
                          " rad/s): Coulomb friction would count as inertia and damping");
 }
 
+/// The motion of all that turns, as if it were the motor's: mean of motor and load, weighted with their
+/// inertias.
+Record weighted(Record record, double motor_share) {
+  const std::pair<Channel, Channel> pairs[] = {{Channel::motor_position, Channel::load_position},
+                                               {Channel::motor_velocity, Channel::load_velocity}};
+  for (const auto& [motor, load] : pairs) {
+    if (!record.has(motor) || !record.has(load)) continue;
+    std::vector<double>& m = record.column(motor);
+    const std::vector<double>& l = record.column(load);
+    for (std::size_t k = 0; k < m.size(); ++k) m[k] = motor_share * m[k] + (1 - motor_share) * l[k];
+  }
+  return record;
+}
+
 }  // namespace
 
 LineInertia line_inertia(const Record& recorded, const LineInertiaOptions& options) {
   if (!(options.frequency >= 0)) throw InvalidParameter("frequency", options.frequency, "must be >= 0 Hz");
   if (!(options.skip >= 0)) throw InvalidParameter("skip", options.skip, "must be >= 0 cycles");
+  if (!(options.motor_share >= 0 && options.motor_share <= 1))
+    throw InvalidParameter("motor_share", options.motor_share, "must be 0 to 1");
   if (!recorded.has(Channel::motor_torque) ||
       !(recorded.has(Channel::motor_position) || recorded.has(Channel::motor_velocity)))
     throw CannotIdentify(recorded.name + ": inertia needs motor_torque and motor_position or motor_velocity");
-  const Record record = evenly_sampled(recorded);
+  Record record = evenly_sampled(recorded);
+  if (options.motor_share < 1) record = weighted(std::move(record), options.motor_share);
   const std::vector<double> speed =
       record.has(Channel::motor_velocity)
           ? record.column(Channel::motor_velocity)
@@ -188,18 +231,6 @@ double inertia_from_amplitudes(double torque, double speed, double frequency, do
     throw InvalidParameter("viscous", viscous, "must be >= 0 and take less than the torque");
   const double damping = viscous * speed;
   return std::sqrt(torque * torque - damping * damping) / (2 * M_PI * frequency * speed);
-}
-
-CombinedInertia combined_inertia(const std::vector<Measured>& runs) {
-  if (runs.empty()) throw CannotIdentify("no run at a sine gave an inertia");
-  if (runs.size() == 1) return {runs.front(), {}};
-  Eigen::VectorXd values(runs.size());
-  for (std::size_t i = 0; i < runs.size(); ++i) values[i] = runs[i].value;
-  const LeastSquaresFit fit = fit_robust(Eigen::MatrixXd::Ones(values.size(), 1), values);
-  CombinedInertia out{fit.parameter(0), {}};
-  for (std::size_t i = 0; i < runs.size(); ++i)
-    if (std::fabs(fit.residuals[i]) > kOutlier * fit.deviation) out.outliers.push_back(i);
-  return out;
 }
 
 }  // namespace backlash

@@ -11,10 +11,14 @@ namespace backlash {
 namespace {
 
 // What the models of the procedures leave out, as a share of the value, beside the noise.
-constexpr double kDecayModel =
-    0.03;  // bearing friction and the contact's own damping at the start of a ringing
+constexpr double kLineModel = 0.0005;     // share of the motor in the inertia, not known better than to 40 %
+constexpr double kDecayModel = 0.01;      // the contact's own damping at the start of a ringing
 constexpr double kResponseModel = 0.002;  // a mesh that is not quite linear
-constexpr double kSuspicious = 3;         // standard errors
+constexpr double kLeastCoherence =
+    0.1;  // dropping faint points would leave the anti-resonance those that noise lifts
+constexpr double kDeclared = 0.4;          // relative standard error of what a rig file says
+constexpr double kClearanceModel = 0.005;  // a push that is no polynomial, steps of the sensor
+constexpr double kSuspicious = 3;          // standard errors
 
 std::string plus_minus(const Measured& m, const std::string& unit) {
   char text[96];
@@ -31,6 +35,17 @@ void add(IdentificationCase& c, const std::string& procedure, std::map<std::stri
          const Measured& measured) {
   if (std::isfinite(measured.value) && measured.standard_error > 0)
     c.result.findings.push_back({procedure, std::move(combination), measured});
+}
+
+/// A parameter as it is known by now.
+Measured known(const IdentificationCase& c, const std::string& name) {
+  const double value = servo_parameter(name).get(c.result.rig);
+  const auto found = c.result.parameters.find(name);
+  return {value, found == c.result.parameters.end() ? kDeclared * value : found->second.standard_error};
+}
+
+double relative(const Measured& m) {
+  return m.standard_error / m.value;
 }
 
 /// Calls `body` on every record that `wanted` accepts and keeps the names of those that it can use; the
@@ -136,6 +151,7 @@ ProcedureReport friction(IdentificationCase& c) {
 
 ProcedureReport inertia(IdentificationCase& c) {
   ProcedureReport report{"line_inertia", {}, ""};
+  const Rig& rig = c.result.rig;
   std::string reasons;
   for (const bool alone : {true, false}) {
     InertiaDetail detail{alone ? "motor" : "drive", {}, {}};
@@ -145,16 +161,17 @@ ProcedureReport inertia(IdentificationCase& c) {
           on_each(c, alone ? &CaseRecord::motor_alone : &CaseRecord::drive, [&](const CaseRecord& r) {
             LineInertiaOptions options;
             options.torque_delay = 0.5 * r.record.sampling_interval();  // held where a loop commands it
+            if (!alone) options.motor_share = rig.motor.inertia / (rig.motor.inertia + rig.link.inertia);
             detail.runs.push_back(line_inertia(r.record, options));
             values.push_back(detail.runs.back().inertia);
           });
-      detail.combined = combined_inertia(values);
+      detail.combined = robust_mean(values);
       std::map<std::string, double> sum = {{"motor_inertia", 1}};
       if (!alone) sum["load_inertia"] = 1;
-      add(c, "line_inertia", sum, detail.combined.inertia);
+      add(c, "line_inertia", sum, with_model_error(detail.combined, kLineModel));
       report.records.insert(report.records.end(), used.begin(), used.end());
-      report.message += (report.message.empty() ? "" : "; ") + detail.subject + " " +
-                        plus_minus(detail.combined.inertia, "kg m^2");
+      report.message +=
+          (report.message.empty() ? "" : "; ") + detail.subject + " " + plus_minus(detail.combined, "kg m^2");
       c.result.inertia.push_back(std::move(detail));
     } catch (const CannotIdentify& error) {
       reasons += std::string(reasons.empty() ? "" : "; ") + detail.subject + ": " + error.what();
@@ -176,6 +193,7 @@ ResponseDetail respond(const Record& record) {
   for (const bool held : {false, true}) {
     ResponseSettings settings;
     settings.held = held;
+    settings.least_coherence = kLeastCoherence;
     ResponseDetail d;
     d.held = held;
     d.response = estimate_response(record, settings);
@@ -236,7 +254,8 @@ bool is_square(const Record& record) {
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
   int jumps = 0;
-  for (std::size_t k = 1; k < torque.size(); ++k) jumps += std::fabs(torque[k] - torque[k - 1]) > 0.5 * (*high - *low);
+  for (std::size_t k = 1; k < torque.size(); ++k)
+    jumps += std::fabs(torque[k] - torque[k - 1]) > 0.5 * (*high - *low);
   return jumps >= 3;
 }
 
@@ -245,8 +264,14 @@ ProcedureReport decay(IdentificationCase& c) {
   const Rig& rig = c.result.rig;
   const double motor = rig.motor.inertia, load = rig.link.inertia;
   DecaySettings settings;
-  settings.stiffness.value = servo_parameter("mesh_stiffness").get(rig);
-  settings.reduced_inertia.value = motor * load / (motor + load);
+  settings.stiffness = known(c, "mesh_stiffness");
+  const double reduced = motor * load / (motor + load);
+  settings.reduced_inertia = {
+      reduced, reduced * std::hypot(load / (motor + load) * relative(known(c, "motor_inertia")),
+                                    motor / (motor + load) * relative(known(c, "load_inertia")))};
+  settings.bearing_damping =
+      reduced * reduced *
+      (rig.motor.viscous_damping / (motor * motor) + rig.link.viscous_damping / (load * load));
   std::vector<DecayIdentification> all;
   report.records = on_each(c, &CaseRecord::drive, [&](const CaseRecord& r) {
     if (!is_square(r.record)) throw CannotIdentify("no square wave of torque");
@@ -270,7 +295,7 @@ ProcedureReport clearance(IdentificationCase& c) {
     if (r.motor_moves || !r.load_moves) continue;
     try {
       const Clearance found = identify_clearance(r.record, settings);
-      add(c, report.name, {{"backlash_angle", 1}}, found.gap);
+      add(c, report.name, {{"backlash_angle", 1}}, with_model_error(found.gap, kClearanceModel));
       report.records.push_back(r.record.name);
       report.message =
           plus_minus(found.gap, "rad") + " from " + std::to_string(found.passages.size()) + " passages";
@@ -290,8 +315,8 @@ Measured load_friction_at(const IdentificationCase& c, double speed) {
   const double sign = speed > 0 ? 1 : -1;
   const double value = link.coulomb_friction + sign * link.coulomb_asymmetry +
                        (link.viscous_damping + sign * link.viscous_asymmetry) * std::fabs(speed);
-  const auto found = c.result.parameters.find("load_coulomb");
-  return {value, found == c.result.parameters.end() ? 0.4 * value : found->second.standard_error};
+  return {value, c.result.parameters.count("load_coulomb") ? known(c, "load_coulomb").standard_error
+                                                           : kDeclared * value};
 }
 
 ProcedureReport gap_map(IdentificationCase& c) {
@@ -312,16 +337,16 @@ ProcedureReport gap_map(IdentificationCase& c) {
   std::string reasons;
   for (const OneWay& a : runs)
     for (const OneWay& b : runs) {
-      if (!(a.speed > 0 && b.speed < 0) || c.result.gap_map) continue;
+      if (!(a.speed > 0 && b.speed < 0)) continue;
       GapMapSettings settings;
-      settings.stiffness = {servo_parameter("mesh_stiffness").get(c.result.rig), 0};
-      const auto known = c.result.parameters.find("mesh_stiffness");
-      settings.stiffness.standard_error =
-          known == c.result.parameters.end() ? 0.4 * settings.stiffness.value : known->second.standard_error;
+      settings.stiffness = known(c, "mesh_stiffness");
       settings.friction_forward = load_friction_at(c, a.speed);
       settings.friction_reverse = load_friction_at(c, b.speed);
       try {
-        c.result.gap_map = identify_gap_map(a.record->record, b.record->record, settings);
+        GapMap map = identify_gap_map(a.record->record, b.record->record, settings);
+        if (c.result.gap_map && c.result.gap_map->mean_gap.standard_error <= map.mean_gap.standard_error)
+          continue;  // the pair that tells more
+        c.result.gap_map = std::move(map);
         report.records = {a.record->record.name, b.record->record.name};
       } catch (const CannotIdentify& error) {
         reasons += std::string(reasons.empty() ? "" : "; ") + error.what();

@@ -25,6 +25,8 @@ struct IdentificationCase {
   Identification result;  // result.rig: what is known by now
 };
 
+IdentificationCase identification_case(const Rig& declared, const std::vector<Record>& records);
+
 struct Procedure {
   std::string name;
   /// Adds findings, details and warnings; returns its report. Throws CannotIdentify.

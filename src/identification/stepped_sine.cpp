@@ -6,10 +6,13 @@
 #include <cmath>
 #include <optional>
 
+#include "backlash_diagnosis/identification/bandwidth.h"
+
 namespace backlash {
 namespace {
 
 constexpr std::size_t kFewestCycles = 4, kMostCycles = 200;
+constexpr std::size_t kFewestForNoise = 64;  // samples that tell the noise
 constexpr double kBetween =
     2.5;  // cycles between two runs that count as inside: the step from one to the other
 constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // cycles
@@ -18,6 +21,8 @@ constexpr std::size_t kJitterReach = 10;                   // passages on either
 constexpr double kSameHeight = 0.2;                        // of the amplitude
 constexpr double kNoSine = 0.1;                            // of the torque's power
 constexpr double kTurn = 0.1;                              // of the torque's range; a smaller turn is noise
+constexpr double kNoiseTurn = 8;                           // standard deviations; the same for known noise
+constexpr double kMostTurn = 0.5;                          // of the range, lest the sine itself be noise
 constexpr double kFewestSamples = 8;  // a cycle or a group of them is fitted with, three unknowns
 
 /// A rising passage of the mean between a minimum and the next maximum.
@@ -45,9 +50,9 @@ Passage passage(const std::vector<double>& u, std::size_t low, std::size_t high)
 }
 
 /// Passages from the sine through the cycle around each, which averages noise and needs no sample at the
-/// extremes. The first and the last stay as they are.
+/// extremes; mean and amplitude too. The first and the last stay as they are.
 void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
-  std::vector<double> at;
+  std::vector<Passage> refined;
   for (std::size_t i = 1; i + 1 < passages.size(); ++i) {
     const double period = 0.5 * (passages[i + 1].at - passages[i - 1].at), rough = passages[i].at;
     const auto begin = static_cast<std::size_t>(std::max(0.0, std::ceil(rough - period / 2)));
@@ -62,14 +67,19 @@ void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
     }
     const Eigen::Vector3d fit = normal.ldlt().solve(right);
     const double early = std::atan2(fit[1], fit[2]) / (2 * M_PI);
-    at.push_back(std::isfinite(early) && std::fabs(early) < 0.25 ? rough - early * period : rough);
+    const bool found = std::isfinite(early) && std::fabs(early) < 0.25;
+    refined.push_back(found ? Passage{rough - early * period, fit[0], std::hypot(fit[1], fit[2])}
+                            : passages[i]);
   }
-  for (std::size_t i = 0; i < at.size(); ++i) passages[i + 1].at = at[i];
+  std::copy(refined.begin(), refined.end(), passages.begin() + !passages.empty());
 }
 
 std::vector<Passage> find_passages(const std::vector<double>& u) {
-  const double turn = u.size() < 8 ? 0 : kTurn * range(u);
   std::vector<Passage> passages;
+  if (u.size() < 8) return passages;
+  const double reach = range(u);
+  const double noise = u.size() < kFewestForNoise ? 0 : white_noise(u);
+  const double turn = std::clamp(kNoiseTurn * noise, kTurn * reach, kMostTurn * reach);
   if (!(turn > 0)) return passages;
   std::optional<std::size_t> low;
   std::size_t extreme = 0;

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "backlash_diagnosis/base/yaml_edit.h"
+#include "backlash_diagnosis/identification/gap_terms.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 
 namespace backlash {
@@ -118,8 +119,11 @@ std::string fitted_rig_text(const RigFile& declared, const Identification& found
     write_one_inertia(text, found, ratio);
   else
     write_servo(text, found, ratio);
-  rig_file_from_text(text.text(), declared.source);  // what is written can be read
-  return text.text();
+  std::string fitted = text.text();
+  if (found.gap_map && gap_varies(declared.rig))
+    fitted = with_gap_terms(fitted, declared.source, *found.gap_map, found.rig.mesh.backlash / found.rig.mesh.lever());
+  rig_file_from_text(fitted, declared.source);  // what is written can be read
+  return fitted;
 }
 
 }  // namespace backlash

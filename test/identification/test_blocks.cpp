@@ -19,6 +19,17 @@ TEST(Blocks, FewValuesHaveNoError) {
   EXPECT_TRUE(std::isnan(mean.standard_error));
 }
 
+TEST(SteadyRange, LeavesStartAndEndOut) {
+  // Settles as exp(-k / 10) from 20 % off: below 1e-3 from k = 53 on (10 ln 200 = 52.98); stops at 190.
+  std::vector<double> speed;
+  for (int k = 0; k < 200; ++k) speed.push_back(k < 190 ? 2 * (1 - 0.2 * std::exp(-k / 10.0)) : 0);
+  const auto [first, last] = steady_range(speed, 0.5, 1e-3);
+  EXPECT_NEAR(double(first), 53, 1);  // the median is not quite that of the settled speed
+  EXPECT_EQ(last, 190u);
+  EXPECT_EQ(steady_range(speed, 0.1, 1e-3).first, 20u);  // no more than it may
+  EXPECT_EQ(steady_range({1, 1, 1}, 0.5, 0).second, 3u);
+}
+
 TEST(Jackknife, OfAMeanIsTheTextbookError) {
   // One row per block: the jackknife of a mean is exactly s / sqrt(n).
   const Eigen::VectorXd b = (Eigen::VectorXd(5) << 1, 2, 4, 7, 11).finished();

@@ -79,6 +79,21 @@ TEST(FrictionLine, TheTwoFastestReverseRunsContradictEachOther) {
   EXPECT_TRUE(mentions(fit_friction_line(table(), Direction::negative).warnings, "-1.57 rad/s"));
 }
 
+TEST(FrictionLine, AStraightLineRarelyWarns) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  int warned = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    std::vector<ConstantSpeedRun> rows;
+    for (const double w : {0.17, 0.35, 0.52, 0.7, 0.87, 1.4, 1.57})
+      rows.push_back(row(w, 79 + 18 * w + 0.01 * normal(random), 0.01));
+    warned += !fit_friction_line(rows, Direction::positive).warnings.empty();
+  }
+  // Three tests at 1 % (quadratic, root, rows): 30 at most where they were independent, and three deviations.
+  EXPECT_LT(warned, 30 + 3 * std::sqrt(30));
+  EXPECT_GT(warned, 5);  // and not for lack of attention
+}
+
 TEST(FrictionLine, LoadIsDriveMinusMotor) {
   // Printed lines of both (Figures 5.2 and 5.3, Section 5.2.1) as rows; straight lines come back exactly.
   std::vector<ConstantSpeedRun> motor, drive;

@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/line_inertia.h"
+#include "backlash_diagnosis/identification/robust_mean.h"
 
 namespace backlash {
 namespace {
@@ -71,22 +72,22 @@ TEST(InertiaFromAmplitudes, RefusesWhatCannotBe) {
   EXPECT_THROW(inertia_from_amplitudes(1, 1, 1, -1), InvalidParameter);
 }
 
-TEST(CombinedInertia, TheHighRowOfTableB1DoesNotDecide) {
-  const CombinedInertia driver = combined_inertia(printed(kTableB1));
+TEST(RobustMean, TheHighRowOfTableB1DoesNotDecide) {
+  const RobustMean driver = robust_mean(printed(kTableB1));
   // Mean 7.10 with, 6.98 without the row 7.8; the robust value must be nearer to the latter.
-  EXPECT_NEAR(driver.inertia.value, 6.98, 0.05);
+  EXPECT_NEAR(driver.value, 6.98, 0.05);
   ASSERT_EQ(driver.outliers.size(), 1u);
   EXPECT_EQ(driver.outliers[0], 2u);
 }
 
-TEST(CombinedInertia, TableB2) {
-  const CombinedInertia total = combined_inertia(printed(kTableB2));
+TEST(RobustMean, TableB2) {
+  const RobustMean total = robust_mean(printed(kTableB2));
   // 14 rows of standard deviation 2.6: the mean 38.7 and the robust value differ by a fraction of 2.6 /
   // sqrt(14).
-  EXPECT_NEAR(total.inertia.value, 38.7, 0.35);
-  EXPECT_NEAR(total.inertia.standard_error, 2.6 / std::sqrt(14.0), 0.2);
-  EXPECT_THROW(combined_inertia({}), CannotIdentify);
-  EXPECT_EQ(combined_inertia({{7, 0.1}}).inertia.standard_error, 0.1);
+  EXPECT_NEAR(total.value, 38.7, 0.35);
+  EXPECT_NEAR(total.standard_error, 2.6 / std::sqrt(14.0), 0.2);
+  EXPECT_THROW(robust_mean({}), CannotIdentify);
+  EXPECT_EQ(robust_mean({{7, 0.1}}).standard_error, 0.1);
 }
 
 struct SineRecipe {
@@ -135,6 +136,50 @@ TEST(LineInertia, ComplexFormGivesInertiaAndDamping) {
     EXPECT_EQ(line.cycles, 11u);
     EXPECT_NEAR(inertia_from_amplitudes(line.torque, line.speed, line.frequency, 13.7), 7, 1e-3);
   }
+}
+
+TEST(LineInertia, ASineThatIsFadedInIsLeftOut) {
+  Record record = sine_run({});
+  // T = 7 a + 13.7 v + 63, v = 0.6 + 0.35 r sin(w t) with r = t / 3 s at first.
+  const double w = 2 * M_PI * 1.03;
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    const double t = record.time[k], r = std::min(1.0, t / 3), slope = t < 3 ? 1.0 / 3 : 0;
+    const double v = 0.6 + 0.35 * r * std::sin(w * t);
+    const double a = 0.35 * (slope * std::sin(w * t) + r * w * std::cos(w * t));
+    record.column(Channel::motor_velocity)[k] = v;
+    record.column(Channel::motor_torque)[k] = 7 * a + 13.7 * v + 63;
+  }
+  record.column(Channel::motor_position).clear();
+  LineInertiaOptions options;
+  options.frequency = 1.03;
+  const LineInertia line = line_inertia(record, options);
+  EXPECT_EQ(line.cycles, 9u);  // of 12.36: one skipped and two that are faded in
+  EXPECT_NEAR(line.inertia.value, 7, 7e-4);
+}
+
+TEST(LineInertia, OfADriveByTheMeanMotion) {
+  // Closed form with the elasticity of configuration 2: J1 = 6.3, J2 = 108.3 kg m^2, F_AR = 10.4 Hz, no friction
+  // but 63 N m: V2 = V1 / (1 - (f / F_AR)^2), T = i w (J1 V1 + J2 V2).
+  Record record = sine_run({});
+  const double w = 2 * M_PI * 1.03, more = 1 / (1 - std::pow(1.03 / 10.4, 2));
+  for (const Channel channel : {Channel::motor_velocity, Channel::load_velocity, Channel::motor_torque})
+    record.column(channel).assign(record.size(), 0);
+  record.column(Channel::motor_position).clear();
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    const double sine = 0.35 * std::sin(w * record.time[k]), cosine = 0.35 * w * std::cos(w * record.time[k]);
+    record.column(Channel::motor_velocity)[k] = 0.6 + sine;
+    record.column(Channel::load_velocity)[k] = 0.6 + more * sine;
+    record.column(Channel::motor_torque)[k] = 63 + (6.3 + more * 108.3) * cosine;
+  }
+  LineInertiaOptions options;
+  options.frequency = 1.03;
+  EXPECT_NEAR(line_inertia(record, options).inertia.value, 6.3 + more * 108.3, 0.01);  // the motor's motion alone
+  options.motor_share = 6.3 / 114.6;
+  EXPECT_NEAR(line_inertia(record, options).inertia.value, 114.6, 0.01);
+  options.motor_share = 0.08;  // not known better than that: (0.08 - 0.055) 1 % of it
+  EXPECT_NEAR(line_inertia(record, options).inertia.value, 114.6, 3e-4 * 114.6);
+  options.motor_share = -0.1;
+  EXPECT_THROW(line_inertia(record, options), InvalidParameter);
 }
 
 TEST(LineInertia, FindsTheLine) {

@@ -116,7 +116,7 @@ TEST_F(Commands, SimulateKnowsTheTestRunsOfARig) {
     std::filesystem::create_symlink(package_file(std::string("config/") + name), path(name));
   const std::string servo = "simulate yumrukcal_2013.yaml ";
   const std::string list = done(servo + "--list-runs").out;
-  expect_contains(list, "external_excitation: 40 s, sine at the load, motor braked\n");
+  expect_contains(list, "external_excitation: 40 s, multi_sine at the load, motor braked\n");
   expect_contains(list, "motor_inertia_sine: 30 s, sine_speed, driver alone\n");
   EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), 12);
   EXPECT_EQ(done("simulate rig.yaml --list-runs").out, "");

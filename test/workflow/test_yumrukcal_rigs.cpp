@@ -181,7 +181,7 @@ TEST(YumrukcalRigs, ExternalExcitationCrossesTheGapWithTheMotorStill) {
   }
   const double gap = 0.0307 * kDegree;
   EXPECT_GT(highest - lowest, gap);
-  EXPECT_LT(highest - lowest, gap + deepest(20 - 16.8, gap, 460e3) + deepest(20 - 13.3, gap, 460e3));
+  EXPECT_LT(highest - lowest, gap + deepest(80 + 15 - 16.8, gap, 460e3) + deepest(80 + 15 - 13.3, gap, 460e3));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/identification/measured.h"
@@ -19,6 +20,13 @@ std::vector<double> block_means(const std::vector<double>& values, std::size_t l
 /// Mean of a correlated signal: standard error from the scatter of the means of ten to nineteen batches
 /// (fewer values: NaN). Honest where a batch is longer than the correlation.
 Measured batch_mean(const std::vector<double>& values);
+
+/// From where to where (one past the last) a signal is as steady as in its middle half: the last value within
+/// `most` (0 to 1/2) of the signal from its start, that lies more than four deviations (and `allowed_change`
+/// of the median) off the median, and all before it are left out, and so at the end. Deviation from the
+/// median absolute one.
+std::pair<std::size_t, std::size_t> steady_range(const std::vector<double>& values, double most,
+                                                 double allowed_change);
 
 /// How the least squares solution of A x = b changes where one block of rows after the other is left out: one
 /// column per block, about their mean. `residuals` b - A x at the solution; `block` the number of each row's

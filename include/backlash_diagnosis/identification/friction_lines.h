@@ -1,6 +1,11 @@
 // Friction from runs at constant speed: torque without acceleration is friction. Yumrukcal (2013), Sections
 // 5.1.1 and 5.2.1: one straight line per direction, T_f = a + b w; motor alone, whole drive, the difference
 // is the load.
+//
+// Whether the line is straight: a quadratic term and a root are added in turn; a warning where Student's t of
+// either has a chance below 1 % on a straight line (t beyond 3.5 with ten runs). Table B.3: forward the root
+// with t = 3.9, backward nothing (quadratic t = 2.3, a chance of 5 %).
+// A row is named where its t against the line through the others has a chance below 1 % among all rows.
 #pragma once
 
 #include <string>

@@ -48,7 +48,7 @@ struct GapMap {
   Measured wind_up, mean_gap;                    // rad; NaN where stiffness or friction is not given
   Measured scale_forward, scale_reverse, scale;  // motor travel per load travel of the runs, and mean
   double forward_speed = 0, reverse_speed = 0;   // rad/s, of the load, medians
-  std::vector<Harmonic> harmonics;               // by order
+  std::vector<Harmonic> harmonics;               // by order, those above a thousandth of the mean
   double deviation = 0;                          // rad, of the bins from the series
   bool varies = false;
   double confidence = 0;  // that it varies: 1 - chance of the strongest harmonic
@@ -59,11 +59,12 @@ struct GapMap {
   double gap_at(double position) const;
 };
 
-/// The runs in either order, with the same zeros of the sensors; slice the start off, while the load gains
-/// speed its inertia winds the mesh up as well. Of each only samples within 5 % of its median speed (below 5
-/// Hz) are used. With less than a turn orders below 1 / coverage are not sought. Throws CannotIdentify
-/// without the channels, where both runs go one way, one reverses or is not steady for half of its time, or
-/// with fewer than 8 common bins; InvalidParameter for settings.
+/// The runs in either order, with the same zeros of the sensors. While the load gains or loses speed its
+/// inertia winds the mesh up as well: of each run the start and the end are left out while the speed (below 5
+/// Hz) is not as steady as in the middle (a quarter of the run at most each), and samples beyond 5 % of its
+/// median. With less than a turn orders below 1 / coverage are not sought. Throws CannotIdentify without the
+/// channels, where both runs go one way, one reverses or is not steady for half of its time, or with fewer
+/// than 8 common bins; InvalidParameter for settings.
 GapMap identify_gap_map(const Record& one_way, const Record& other_way, const GapMapSettings& settings = {});
 
 }  // namespace backlash

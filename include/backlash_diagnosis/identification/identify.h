@@ -16,6 +16,7 @@
 #include "backlash_diagnosis/identification/line_inertia.h"
 #include "backlash_diagnosis/identification/one_inertia.h"
 #include "backlash_diagnosis/identification/output_error.h"
+#include "backlash_diagnosis/identification/robust_mean.h"
 #include "backlash_diagnosis/identification/sensor_calibration.h"
 #include "backlash_diagnosis/identification/two_mass.h"
 
@@ -37,7 +38,7 @@ struct FrictionDetail {
 struct InertiaDetail {
   std::string subject;
   std::vector<LineInertia> runs;
-  CombinedInertia combined;
+  RobustMean combined;
 };
 
 struct ResponseDetail {
