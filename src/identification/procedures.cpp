@@ -357,8 +357,13 @@ ProcedureReport gap_map(IdentificationCase& c) {
   const GapMap& map = *c.result.gap_map;
   add(c, report.name, {{"backlash_angle", 1}}, map.mean_gap);
   report.message = "mean gap " + plus_minus(map.mean_gap, "rad") + "; " + map.statement;
-  if (map.varies)
+  if (map.varies) {  // the clearance is then that of one place
+    auto& all = c.result.findings;
+    all.erase(
+        std::remove_if(all.begin(), all.end(), [](const Finding& f) { return f.procedure == "clearance"; }),
+        all.end());
     c.result.warnings.push_back("backlash depends on the position of the load: " + map.statement);
+  }
   return report;
 }
 

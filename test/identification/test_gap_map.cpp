@@ -101,8 +101,8 @@ TEST(GapMap, CentreLineIsTheMeanOfBothFlanks) {
       EXPECT_NEAR(b.centre.value - Recipe::centre(b.position), mean, 4 * map.scale.standard_error * kTurn / 2)
           << b.position;
     }
-  // Order 18.7 is no harmonic of the turn: 5e-5 rad, correlated over ten bins of 180, leave 5e-5 sqrt(6 / 18) / 2pi
-  // of a slope.
+  // Order 18.7 is no harmonic of the turn: 3.5e-5 rad rms, alike over some five bins of 180, which leave of a
+  // slope 3.5e-5 sqrt(12 / 36) / (2 pi) = 3.2e-6, and more through the orders that are fitted beside it.
   EXPECT_LT(map.scale.standard_error, 4e-5);
   EXPECT_GT(map.warnings.size(), 0u);  // no stiffness given
   EXPECT_TRUE(std::isnan(map.mean_gap.value));

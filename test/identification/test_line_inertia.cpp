@@ -158,8 +158,8 @@ TEST(LineInertia, ASineThatIsFadedInIsLeftOut) {
 }
 
 TEST(LineInertia, OfADriveByTheMeanMotion) {
-  // Closed form with the elasticity of configuration 2: J1 = 6.3, J2 = 108.3 kg m^2, F_AR = 10.4 Hz, no friction
-  // but 63 N m: V2 = V1 / (1 - (f / F_AR)^2), T = i w (J1 V1 + J2 V2).
+  // Closed form with the elasticity of configuration 2: J1 = 6.3, J2 = 108.3 kg m^2, F_AR = 10.4 Hz, no
+  // friction but 63 N m: V2 = V1 / (1 - (f / F_AR)^2), T = i w (J1 V1 + J2 V2).
   Record record = sine_run({});
   const double w = 2 * M_PI * 1.03, more = 1 / (1 - std::pow(1.03 / 10.4, 2));
   for (const Channel channel : {Channel::motor_velocity, Channel::load_velocity, Channel::motor_torque})
@@ -173,7 +173,8 @@ TEST(LineInertia, OfADriveByTheMeanMotion) {
   }
   LineInertiaOptions options;
   options.frequency = 1.03;
-  EXPECT_NEAR(line_inertia(record, options).inertia.value, 6.3 + more * 108.3, 0.01);  // the motor's motion alone
+  // By the motor's motion alone:
+  EXPECT_NEAR(line_inertia(record, options).inertia.value, 6.3 + more * 108.3, 0.01);
   options.motor_share = 6.3 / 114.6;
   EXPECT_NEAR(line_inertia(record, options).inertia.value, 114.6, 0.01);
   options.motor_share = 0.08;  // not known better than that: (0.08 - 0.055) 1 % of it

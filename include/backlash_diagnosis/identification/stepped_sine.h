@@ -23,12 +23,10 @@ struct SineRuns {
 
 /// Runs of at least four cycles (at most 200, longer ones are cut) whose passages keep to an even step within
 /// five deviations of their own jitter (0.1 to 2 % of a cycle), with half waves of equal height and mean
-/// within 20 %, of which a sine explains 90 % of the
-/// power. So a frequency that steps by a fraction of a percent may share a run with its neighbour, and a
-/// sweep that is slow enough consists of runs. Needs four samples a cycle. White noise may be up to some 10 %
-/// of
-/// the largest amplitude; sines smaller than a tenth of the largest, or than four deviations of it, are not
-/// seen.
+/// within 20 %, of which a sine explains 90 % of the power. So a frequency that steps by a fraction of a
+/// percent may share a run with its neighbour, and a sweep that is slow enough consists of runs. Needs four
+/// samples a cycle. White noise may be up to some 10 % of the largest amplitude; sines smaller than a tenth
+/// of the largest, or than four deviations of the noise, are not seen.
 SineRuns find_sine_runs(const std::vector<double>& torque);
 
 /// Least squares of offset, slope, curvature, cosine and sine over the run without its first fifth (at
