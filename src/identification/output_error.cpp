@@ -18,8 +18,8 @@ constexpr double kLargestDelay = 3;   // samples
 constexpr double kBlock = 1;          // s: the slowest oscillation that a servo record shows
 constexpr double kFarthest = 30;      // times the start or a part of it: no parameter is sought beyond
 constexpr double kRoughCutoff = 15;   // Hz, of the first round: what moves slowly has fewer wrong minima
-// A model that leaves a twentieth of the torque, where the machine is one of its kind, sits in a wrong minimum.
-constexpr double kWrongMinimum = 0.05;
+constexpr double kClean = 2;     // times the noise floor, up to which nothing is missing
+constexpr double kAlike = 0.03;  // relative difference of what two starts leave in the same minimum
 constexpr int kOtherStarts = 8;
 constexpr double kBeside = 0.4;  // of the logarithm of a parameter
 constexpr double kRoughTolerance = 1e-3;
@@ -173,19 +173,20 @@ class Fit {
     }
   }
 
-  /// Of all records, relative.
+  /// What is left of the torque of all records, in units of the noise floor.
   double torque_error() const {
-    double residual = 0, square = 0;
+    double sum = 0, count = 0;
     for (std::size_t r = 0; r < records_.size(); ++r) {
-      const ServoResiduals left = records_[r].residuals(rig_, calibrations_[r]);
-      const std::vector<double> torque = records_[r].acting_torque(calibrations_[r]);
-      for (std::size_t k = 0; k < torque.size(); ++k) {
-        if (!records_[r].counts[k]) continue;
-        residual += left.torque[k] * left.torque[k];
-        square += torque[k] * torque[k];
+      const PreparedServo& record = records_[r];
+      const ServoResiduals left = record.residuals(rig_, calibrations_[r]);
+      const double floor =
+          noise_floors(rig_, record.data, left.load.load, record.cutoff, record.feedback).torque;
+      for (std::size_t k = 0; k < left.torque.size(); ++k) {
+        sum += record.counts[k] ? std::pow(left.torque[k] / floor, 2) : 0;
+        count += record.counts[k];
       }
     }
-    return std::sqrt(residual / square);
+    return std::sqrt(sum / count);
   }
 
   /// What acts half a sample earlier than a held torque is not held.
@@ -248,18 +249,23 @@ Rig beside(const Rig& start, const std::vector<std::string>& names, int number) 
   return rig;
 }
 
-/// The first round, from other starts where it ends in a minimum that cannot be that of the machine.
+/// The first round. Where it leaves more than noise, other starts are tried until two end alike: then that is
+/// the minimum, and the machine has something that the rig does not.
 Fit rough_fit(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings) {
   Fit best(start, records, settings);
-  bool ran = best.try_run(kRoughCutoff, kRoughTolerance);
-  for (int i = 1; i <= kOtherStarts && !(ran && best.torque_error() < kWrongMinimum); ++i) {
-    if (settings.parameters.empty()) break;
+  double least = best.try_run(kRoughCutoff, kRoughTolerance) ? best.torque_error() : INFINITY;
+  if (settings.parameters.empty()) return best;
+  for (int i = 1; i <= kOtherStarts && least > kClean; ++i) {
     Fit other(beside(start, settings.parameters, i), records, settings);
-    if (!other.try_run(kRoughCutoff, kRoughTolerance)) continue;
-    if (!ran || other.torque_error() < best.torque_error()) best = std::move(other);
-    ran = true;
+    const double error = other.try_run(kRoughCutoff, kRoughTolerance) ? other.torque_error() : INFINITY;
+    const bool alike = std::isfinite(error) && std::fabs(error / least - 1) < kAlike;
+    if (error < least) {
+      best = std::move(other);
+      least = error;
+    }
+    if (alike) break;
   }
-  if (!ran) best.run(kRoughCutoff, kRoughTolerance);  // says why
+  if (!std::isfinite(least)) best.run(kRoughCutoff, kRoughTolerance);  // says why
   return best;
 }
 
