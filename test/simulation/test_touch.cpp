@@ -264,7 +264,14 @@ std::map<std::string, ParameterValues> laws_of_the_rig() {
            {{"stiffness", 2.28e8}, {"exponent", 1.5}, {"restitution", 0.8}, {"minimum_speed", 5e-3}}},
           {"jankowski", {{"stiffness", 2.28e8}, {"restitution", 0.8}, {"effective_mass", 0.047}}},
           {"stereomechanical",
-           {{"restitution", 0.8}, {"resting_speed", 2e-3}, {"stiffness", 5e6}, {"damping", 30}}}};
+           {{"restitution", 0.8}, {"resting_speed", 2e-3}, {"stiffness", 5e6}, {"damping", 30}}},
+          {"foundation",
+           {{"stiffness", 2.28e8},
+            {"exponent", 1.5},
+            {"radius", 5e-3},
+            {"viscosity", 2e4},
+            {"thickness", 1e-3},
+            {"share", 0.5}}}};
 }
 
 TEST(Touch, TheWholeRigRunsWithEveryLaw) {
