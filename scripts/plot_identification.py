@@ -32,7 +32,7 @@ def response(axes, detail):
     for key, name in (("resonance", "$F_R$"), ("anti_resonance", "$F_{AR}$")):
         value = detail[key]["value"]
         axes.axvline(value, color="0.6", linewidth=0.8)
-        axes.text(value, max(magnitude), " %s %.1f Hz" % (name, value), fontsize=8, va="top")
+        axes.text(value, 1.3 * min(magnitude), " %s %.1f Hz" % (name, value), fontsize=8)
     axes.set(title="frequency response", xlabel="frequency [Hz]", ylabel="speed / torque [rad/s per N m]")
     axes.legend(loc="lower left")
     other = axes.twinx()

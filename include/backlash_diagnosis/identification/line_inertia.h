@@ -5,7 +5,7 @@
 //
 // T, V complex amplitudes, I [kg m^2] all that turns (below the resonance), c [N m s/rad]. Holds where the
 // speed never reverses: Coulomb friction is then a constant and has no line. In magnitudes
-// I = sqrt(|T|^2 - (c |V|)^2) / (w |V|); (5.4) prints a plus.
+// I = sqrt(|T|^2 - (c |V|)^2) / (w |V|); (5.4) prints a minus in front of it.
 //
 // Of a whole drive T = (i w I1 + c1) V1 + (i w I2 + c2) V2 whatever happens between the teeth: their torque
 // acts on both and cancels. V is then the mean of both speeds weighted with the inertias. The motor's speed
