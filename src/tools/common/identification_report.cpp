@@ -129,7 +129,7 @@ Json details_json(const Identification& found) {
   for (const FrictionDetail& d : found.friction)
     for (const FrictionLine& line : d.lines) json["friction_lines"][d.subject].push_back(line_json(line));
   for (const InertiaDetail& d : found.inertia) {
-    json["line_inertia"][d.subject] = measured(d.combined.inertia);
+    json["line_inertia"][d.subject] = measured(d.combined);
     for (const LineInertia& run : d.runs)
       json["line_inertia"][d.subject]["runs"].push_back({{"frequency", run.frequency},
                                                          {"torque", run.torque},
