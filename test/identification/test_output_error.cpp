@@ -35,7 +35,8 @@ TEST(OutputError, FindsAMachineThirtyPercentAway) {
                                                                      : 0.01;
     EXPECT_NEAR(estimate.value / value, 1, limit) << name << " +- " << estimate.standard_error;
   }
-  EXPECT_NEAR(fit.calibrations[0].torque_delay, -0.5, 0.1);  // this torque is not held between samples
+  EXPECT_FALSE(fit.calibrations[0].held);  // this torque is that of the moment
+  EXPECT_NEAR(fit.calibrations[0].torque_delay, 0, 0.1);
   EXPECT_NEAR(fit.calibrations[0].encoder_offset, 0, 2e-6);
   EXPECT_LT(fit.torque[0].error, 1.3 * fit.torque[0].floor);
   EXPECT_LT(fit.deflection[0].error, 1.5 * fit.deflection[0].floor);
