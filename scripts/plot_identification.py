@@ -25,6 +25,34 @@ def friction(axes, lines):
     axes.legend()
 
 
+def calibration(axes, detail):
+    for trace in detail["traces"]:
+        axes.plot(trace["motor"], trace["difference"], linewidth=0.8, label=os.path.basename(trace["record"]))
+    axes.set(title="position sensors, runs one way", xlabel="motor position [rad]", ylabel="motor - load [rad]")
+    axes.legend(fontsize=7)
+
+
+def inertia(axes, detail):
+    labels = []
+    for subject, found in sorted(detail.items()):
+        for run in found["runs"]:
+            value, error = run["inertia"]["value"], run["inertia"]["standard_error"]
+            axes.errorbar(len(labels), value, yerr=2 * error if error else 0, fmt="o", color=MEASURED)
+            axes.text(len(labels), value, "  %.4g" % value, va="center")
+            labels.append("%s\n%.3g Hz" % (subject, run["frequency"]))
+    axes.set(title="inertia at the line of the excitation", ylabel="inertia [kg m$^2$]", xlim=(-0.5, len(labels)),
+             xticks=range(len(labels)), xticklabels=labels)
+    axes.set_ylim(bottom=0)
+
+
+def phase(axes, detail):
+    frequency, _, measured, _, _, fitted = zip(*detail["points"])
+    axes.semilogx(frequency, [math.degrees(p) for p in measured], ".", color=MEASURED, label="measured")
+    axes.semilogx(frequency, [math.degrees(p) for p in fitted], "-", color=FITTED, label="two inertias")
+    axes.set(title="frequency response, phase", xlabel="frequency [Hz]", ylabel="phase [deg]")
+    axes.legend()
+
+
 def response(axes, detail):
     frequency, magnitude, _, coherence, fitted, _ = zip(*detail["points"])
     axes.loglog(frequency, magnitude, ".", color=MEASURED, label="measured")
@@ -92,8 +120,11 @@ def trace(axes, detail, title, unit):
 
 def panels(details):
     drawn = []
-    for key, draw in (("friction_lines", friction), ("frequency_response", response), ("decay", decay),
-                      ("clearance", clearance), ("gap_map", gap_map)):
+    if details.get("sensor_calibration", {}).get("traces"):
+        drawn.append((calibration, (details["sensor_calibration"],)))
+    for key, draw in (("friction_lines", friction), ("line_inertia", inertia), ("frequency_response", response),
+                      ("frequency_response", phase), ("decay", decay), ("clearance", clearance),
+                      ("gap_map", gap_map)):
         if details.get(key):
             drawn.append((draw, (details[key],)))
     for key, unit in (("torque", "torque [N m]"), ("deflection", "motor - load [rad]")):

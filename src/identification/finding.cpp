@@ -8,13 +8,6 @@
 #include "backlash_diagnosis/identification/rig_parameters.h"
 
 namespace backlash {
-namespace {
-
-/// Relative standard error of what a rig file says, against findings that only tell a sum.
-constexpr double kDeclaredUncertainty = 0.4;
-
-}  // namespace
-
 std::map<std::string, Measured> combine_findings(const std::vector<Finding>& findings, const Rig& rig,
                                                  const std::vector<std::string>& names) {
   const auto index = [&](const std::string& name) {

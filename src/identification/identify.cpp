@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/record/zero_phase.h"
-#include "procedures.h"
+#include "procedures/procedures.h"
 
 namespace backlash {
 namespace {

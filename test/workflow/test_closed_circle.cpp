@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "../../src/identification/procedures.h"
+#include "../../src/identification/procedures/procedures.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/workflow/rig_file.h"
 

@@ -11,6 +11,9 @@
 
 namespace backlash {
 
+/// Relative standard error of what a rig file declares, where findings tell only a sum with it.
+constexpr double kDeclaredUncertainty = 0.4;
+
 /// sum of factor * parameter = measured; parameters are those of servo_parameters(). A system's friction is
 /// {motor_coulomb: 1, load_coulomb: 1}.
 struct Finding {

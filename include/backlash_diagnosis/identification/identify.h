@@ -35,6 +35,12 @@ struct FrictionDetail {
   std::vector<FrictionLine> lines;  // forward, backward, as far as they are there
 };
 
+/// Motor and load position of a run one way, thinned for a plot.
+struct CalibrationTrace {
+  std::string record;
+  std::vector<double> motor, difference;  // rad; motor minus load
+};
+
 struct InertiaDetail {
   std::string subject;
   std::vector<LineInertia> runs;
@@ -70,6 +76,7 @@ struct Identification {
 
   std::optional<SpeedCalibration> speed_calibration;
   std::optional<PositionCalibration> position_calibration;
+  std::vector<CalibrationTrace> calibration_traces;
   std::vector<FrictionDetail> friction;
   std::vector<InertiaDetail> inertia;
   std::optional<ResponseDetail> response;

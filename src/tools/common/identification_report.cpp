@@ -144,6 +144,9 @@ Json details_json(const Identification& found) {
         {"scale", measured(found.position_calibration->scale)},
         {"offset", measured(found.position_calibration->offset)},
         {"play_and_wind_up", measured(found.position_calibration->play_and_wind_up)}};
+  for (const CalibrationTrace& trace : found.calibration_traces)
+    json["sensor_calibration"]["traces"].push_back(
+        {{"record", trace.record}, {"motor", trace.motor}, {"difference", trace.difference}});
   if (found.response) json["frequency_response"] = response_json(*found.response);
   if (found.decay) json["decay"] = decay_json(*found.decay);
   if (found.clearance) json["clearance"] = clearance_json(*found.clearance);

@@ -2,6 +2,8 @@
 // it.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -39,7 +41,33 @@ const std::vector<Procedure>& servo_procedures();
 /// Sets result.rig and result.parameters to what all findings say together.
 void update_from_findings(IdentificationCase& c);
 
+/// The steps, one file each in this folder.
+ProcedureReport run_sensor_calibration(IdentificationCase& c);
+ProcedureReport run_friction_lines(IdentificationCase& c);
+ProcedureReport run_line_inertia(IdentificationCase& c);
+ProcedureReport run_frequency_response(IdentificationCase& c);
+ProcedureReport run_decay(IdentificationCase& c);
+ProcedureReport run_clearance(IdentificationCase& c);
+ProcedureReport run_gap_map(IdentificationCase& c);
 ProcedureReport run_output_error(IdentificationCase& c);
 ProcedureReport run_one_inertia(IdentificationCase& c);
+
+// What the steps share.
+
+std::string plus_minus(const Measured& m, const std::string& unit);
+
+/// With what the procedure's model leaves out, as a share of the value.
+Measured with_model_error(Measured m, double share);
+
+void add_finding(IdentificationCase& c, const std::string& procedure,
+                 std::map<std::string, double> combination, const Measured& measured);
+
+/// A parameter as it is known by now.
+Measured known(const IdentificationCase& c, const std::string& name);
+
+/// Calls `body` on every record that `wanted` accepts and keeps the names of those that it can use; the
+/// reasons of the others make the message of the CannotIdentify where there is none.
+std::vector<std::string> on_each(const IdentificationCase& c, bool (CaseRecord::*wanted)() const,
+                                 const std::function<void(const CaseRecord&)>& body);
 
 }  // namespace backlash

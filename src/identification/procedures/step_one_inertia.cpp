@@ -11,8 +11,7 @@ ChannelTrace trace_of(const OneInertia& found, const Record& record) {
   ChannelTrace trace;
   trace.record = record.name;
   trace.interval = record.sampling_interval();
-  const std::size_t n =
-      std::lround((record.time.back() - record.time.front()) / trace.interval) + 1;
+  const std::size_t n = std::lround((record.time.back() - record.time.front()) / trace.interval) + 1;
   trace.measured.assign(n, 0);
   trace.predicted.assign(n, 0);
   trace.counts.assign(n, 0);

@@ -10,7 +10,7 @@
 namespace backlash {
 namespace {
 
-constexpr double kTellingCutoff = 5;  // Hz, of the deflection
+constexpr double kTellingCutoff = 5;   // Hz, of the deflection
 constexpr double kMostSeconds = 60;    // of one record, and of all
 constexpr double kTellingShare = 0.3;  // of the most telling record, from which another is worth its time
 constexpr double kFewestSeconds = 2;

@@ -1,0 +1,73 @@
+#include "procedures.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/identification/rig_parameters.h"
+
+namespace backlash {
+std::string plus_minus(const Measured& m, const std::string& unit) {
+  char text[96];
+  std::snprintf(text, sizeof text, "%.5g +- %.2g %s", m.value, m.standard_error, unit.c_str());
+  return text;
+}
+
+Measured with_model_error(Measured m, double share) {
+  m.standard_error = std::hypot(m.standard_error, share * m.value);
+  return m;
+}
+
+void add_finding(IdentificationCase& c, const std::string& procedure,
+                 std::map<std::string, double> combination, const Measured& measured) {
+  if (std::isfinite(measured.value) && measured.standard_error > 0)
+    c.result.findings.push_back({procedure, std::move(combination), measured});
+}
+
+Measured known(const IdentificationCase& c, const std::string& name) {
+  const double value = servo_parameter(name).get(c.result.rig);
+  const auto found = c.result.parameters.find(name);
+  return {value,
+          found == c.result.parameters.end() ? kDeclaredUncertainty * value : found->second.standard_error};
+}
+
+std::vector<std::string> on_each(const IdentificationCase& c, bool (CaseRecord::*wanted)() const,
+                                 const std::function<void(const CaseRecord&)>& body) {
+  std::vector<std::string> used, reasons;
+  for (const CaseRecord& record : c.records) {
+    if (!(record.*wanted)()) continue;
+    try {
+      body(record);
+      used.push_back(record.record.name);
+    } catch (const CannotIdentify& error) {
+      const std::string reason = error.what();
+      const bool named = reason.compare(0, record.record.name.size(), record.record.name) == 0;
+      reasons.push_back(named ? reason : record.record.name + ": " + reason);
+    }
+  }
+  if (used.empty()) throw CannotIdentify(reasons.empty() ? "no such record" : joined(reasons));
+  return used;
+}
+
+const std::vector<Procedure>& servo_procedures() {
+  static const std::vector<Procedure> procedures = {{"sensor_calibration", run_sensor_calibration},
+                                                    {"friction_lines", run_friction_lines},
+                                                    {"line_inertia", run_line_inertia},
+                                                    {"frequency_response", run_frequency_response},
+                                                    {"decay", run_decay},
+                                                    {"clearance", run_clearance},
+                                                    {"gap_map", run_gap_map},
+                                                    {"output_error", run_output_error}};
+  return procedures;
+}
+
+void update_from_findings(IdentificationCase& c) {
+  c.result.parameters = combine_findings(c.result.findings, c.declared, c.names);
+  c.result.rig = c.declared;
+  for (const auto& [name, m] : c.result.parameters) {
+    const RigParameter& parameter = servo_parameter(name);
+    if (!parameter.positive || m.value > 0) parameter.set(c.result.rig, m.value);
+  }
+}
+
+}  // namespace backlash

@@ -1,0 +1,53 @@
+// Scale and offset between the sensors of motor and load.
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "procedures.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kSuspicious = 3;          // standard errors
+constexpr std::size_t kTracePoints = 400;  // of a plot
+
+CalibrationTrace thinned(const Record& record) {
+  CalibrationTrace trace{record.name, {}, {}};
+  const auto &motor = record.column(Channel::motor_position), &load = record.column(Channel::load_position);
+  for (std::size_t k = 0; k < motor.size(); k += motor.size() / kTracePoints + 1) {
+    trace.motor.push_back(motor[k]);
+    trace.difference.push_back(motor[k] - load[k]);
+  }
+  return trace;
+}
+
+}  // namespace
+
+ProcedureReport run_sensor_calibration(IdentificationCase& c) {
+  ProcedureReport report{"sensor_calibration", {}, ""};
+  std::vector<Record> one_way;
+  report.records = on_each(c, &CaseRecord::drive, [&](const CaseRecord& r) {
+    calibrate_position({r.record});
+    one_way.push_back(r.record);
+    c.result.calibration_traces.push_back(thinned(r.record));
+  });
+  const PositionCalibration position = calibrate_position(one_way);
+  c.result.position_calibration = position;
+  report.message = "load = " + plus_minus(position.scale, "") + "times motor";
+  if (std::fabs(position.scale.value - 1) > kSuspicious * position.scale.standard_error &&
+      std::fabs(position.scale.value - 1) > 1e-5)
+    c.result.warnings.push_back(
+        "the position sensors differ in scale: load = " + plus_minus(position.scale, "") + "times motor");
+  for (const Record& record : one_way) {
+    if (!record.has(Channel::motor_velocity) || !record.has(Channel::load_velocity)) continue;
+    try {
+      c.result.speed_calibration = calibrate_speed(record);
+      break;
+    } catch (const CannotIdentify&) {  // one of the runs is enough, and none is needed
+    }
+  }
+  return report;
+}
+
+}  // namespace backlash

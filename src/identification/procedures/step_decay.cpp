@@ -1,0 +1,56 @@
+// Mesh damping from the ringing after engagements.
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "procedures.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kDecayModel = 0.01;  // the contact's own damping at the start of a ringing
+
+double relative(const Measured& m) {
+  return m.standard_error / m.value;
+}
+
+/// Torque that jumps by half of its range several times.
+bool is_square(const Record& record) {
+  const std::vector<double>& torque = record.column(Channel::motor_torque);
+  const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
+  int jumps = 0;
+  for (std::size_t k = 1; k < torque.size(); ++k)
+    jumps += std::fabs(torque[k] - torque[k - 1]) > 0.5 * (*high - *low);
+  return jumps >= 3;
+}
+
+}  // namespace
+
+ProcedureReport run_decay(IdentificationCase& c) {
+  ProcedureReport report{"decay", {}, ""};
+  const Rig& rig = c.result.rig;
+  const double motor = rig.motor.inertia, load = rig.link.inertia;
+  DecaySettings settings;
+  settings.stiffness = known(c, "mesh_stiffness");
+  const double reduced = motor * load / (motor + load);
+  settings.reduced_inertia = {
+      reduced, reduced * std::hypot(load / (motor + load) * relative(known(c, "motor_inertia")),
+                                    motor / (motor + load) * relative(known(c, "load_inertia")))};
+  settings.bearing_damping =
+      reduced * reduced *
+      (rig.motor.viscous_damping / (motor * motor) + rig.link.viscous_damping / (load * load));
+  std::vector<DecayIdentification> all;
+  report.records = on_each(c, &CaseRecord::drive, [&](const CaseRecord& r) {
+    if (!is_square(r.record)) throw CannotIdentify("no square wave of torque");
+    all.push_back(identify_decay(r.record, settings));
+  });
+  for (const DecayIdentification& d : all)
+    add_finding(c, report.name, {{"mesh_damping", 1}}, with_model_error(d.damping, kDecayModel));
+  report.message = "damping " + plus_minus(all.front().damping, "N m s/rad") + " from " +
+                   std::to_string(all.front().ringings.size()) + " engagements";
+  c.result.decay = std::move(all.front());
+  return report;
+}
+
+}  // namespace backlash
