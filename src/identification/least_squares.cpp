@@ -1,6 +1,7 @@
 #include "backlash_diagnosis/identification/least_squares.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -116,11 +117,23 @@ Eigen::VectorXd try_residuals(const ResidualFunction& f, const Eigen::VectorXd& 
   }
 }
 
+void for_each_column(Eigen::Index n, bool parallel, const std::function<void(int)>& column) {
+  if (parallel)
+    for_each_in_parallel(int(n), column);
+  else
+    for (int i = 0; i < n; ++i) column(i);
+}
+
+void require_effect(const Eigen::MatrixXd& j, Eigen::Index i) {
+  if (!(j.col(i).norm() > 0))
+    throw CannotIdentify("parameter " + std::to_string(i) + " has no effect on the record");
+}
+
 /// Columns in units of `scale`; a step that is refused is tried the other way.
 Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, const Eigen::VectorXd& r,
                          const Eigen::VectorXd& scale, const NonlinearOptions& options) {
   Eigen::MatrixXd j(r.size(), p.size());
-  const auto column = [&](int i) {
+  for_each_column(p.size(), options.parallel, [&](int i) {
     Eigen::VectorXd moved;
     double h = options.step;
     for (const double sign : {1.0, -1.0}) {
@@ -133,15 +146,22 @@ Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, co
     if (moved.size() != r.size())
       throw CannotIdentify("the model cannot be evaluated beside parameter " + std::to_string(i));
     j.col(i) = (moved - r) / h;
-    if (!(j.col(i).norm() > 0))
-      throw CannotIdentify("parameter " + std::to_string(i) + " has no effect on the record");
-  };
-  const int n = static_cast<int>(p.size());
-  if (options.parallel)
-    for_each_in_parallel(n, column);
-  else
-    for (int i = 0; i < n; ++i) column(i);
+    require_effect(j, i);
+  });
   return j;
+}
+
+double variance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
+  return r.squaredNorm() / std::max<double>(1, double(j.rows() - j.cols()));
+}
+
+/// Of independent rows, with the residuals' own variance.
+Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
+  const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
+  const Eigen::MatrixXd scaled = j * unit.asDiagonal();
+  const Eigen::MatrixXd inverse =
+      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
+  return variance(j, r) * (unit.asDiagonal() * inverse * unit.asDiagonal());
 }
 
 }  // namespace
@@ -179,36 +199,44 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
   LeastSquaresFit fit;
   fit.values = p;
   fit.residuals = r;
-  const double freedom = std::max<double>(1, double(r.size() - p.size()));
-  const double variance = r.squaredNorm() / freedom;
-  const Eigen::MatrixXd normal = j.transpose() * j;
-  fit.covariance = scale.asDiagonal() * normal.ldlt().solve(Eigen::MatrixXd::Identity(p.size(), p.size())) *
-                   scale.asDiagonal() * variance;
-  fit.deviation = std::sqrt(variance);
   fit.jacobian = j * scale.cwiseInverse().asDiagonal();
+  fit.covariance = covariance(fit.jacobian, r);
+  fit.deviation = std::sqrt(variance(fit.jacobian, r));
   return fit;
+}
+
+void widen_jacobian(LeastSquaresFit& fit, const ResidualFunction& residuals, const Eigen::VectorXd& steps,
+                    bool parallel) {
+  for_each_column(fit.values.size(), parallel, [&](int i) {
+    Eigen::VectorXd above = fit.values, below = fit.values;
+    above[i] += steps[i];
+    below[i] -= steps[i];
+    fit.jacobian.col(i) = (residuals(above) - residuals(below)) / (2 * steps[i]);
+    require_effect(fit.jacobian, i);
+  });
+  fit.covariance = covariance(fit.jacobian, fit.residuals);
 }
 
 Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block, Eigen::Index known) {
   const Eigen::MatrixXd& j = fit.jacobian;
+  const Eigen::Index n = j.cols(), end = j.rows() - known;
   const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
-  const Eigen::MatrixXd scaled = j * unit.asDiagonal();
-  Eigen::MatrixXd outer = Eigen::MatrixXd::Zero(j.cols(), j.cols());
+  const Eigen::MatrixXd scaled = j * unit.asDiagonal(), one = Eigen::MatrixXd::Identity(n, n);
+  const Eigen::MatrixXd inverse = (scaled.transpose() * scaled).ldlt().solve(one);
+  Eigen::MatrixXd outer = Eigen::MatrixXd::Zero(n, n);
   double blocks = 0;
-  const Eigen::Index end = j.rows() - known;
   for (Eigen::Index row = 0; row < end; row += block, ++blocks) {
     const Eigen::Index rows = std::min(block, end - row);
-    const Eigen::VectorXd gradient =
-        scaled.middleRows(row, rows).transpose() * fit.residuals.segment(row, rows);
-    outer += gradient * gradient.transpose();
+    const auto part = scaled.middleRows(row, rows);
+    const Eigen::VectorXd gradient = part.transpose() * fit.residuals.segment(row, rows);
+    // As it would be had the block not drawn the fit to itself.
+    const Eigen::VectorXd free = (one - part.transpose() * part * inverse).partialPivLu().solve(gradient);
+    outer += free * free.transpose();
   }
-  if (blocks <= double(j.cols()))
+  if (blocks <= double(n))
     throw CannotIdentify(std::to_string(long(blocks)) +
-                         " stretches of the record cannot tell the errors of " + std::to_string(j.cols()) +
+                         " stretches of the record cannot tell the errors of " + std::to_string(n) +
                          " parameters");
-  const Eigen::MatrixXd inverse =
-      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
-  outer *= blocks / (blocks - double(j.cols()));
   outer += scaled.bottomRows(known).transpose() * scaled.bottomRows(known);
   return unit.asDiagonal() * (inverse * outer * inverse) * unit.asDiagonal();
 }

@@ -20,6 +20,7 @@ constexpr double kFarthest = 30;      // times the start or a part of it: no par
 constexpr double kRoughCutoff = 15;   // Hz, of the first round: what moves slowly has fewer wrong minima
 constexpr double kClean = 2;     // times the noise floor, up to which nothing is missing
 constexpr double kAlike = 0.03;  // relative difference of what two starts leave in the same minimum
+constexpr double kWideStep = 1e-2;  // of the differences that the errors are taken from
 constexpr int kOtherStarts = 8;
 constexpr double kBeside = 0.4;  // of the logarithm of a parameter
 constexpr double kRoughTolerance = 1e-3;
@@ -39,23 +40,25 @@ void append_residuals(const PreparedServo& record, const ServoResiduals& r, cons
                       std::vector<double>& rows) {
   for (std::size_t k = 0; k < record.data.size(); k += stride(record)) {
     rows.push_back(record.counts[k] ? r.torque[k] / weights.torque : 0);
-    rows.push_back(r.deflection[k] / weights.deflection);
+    rows.push_back(record.settled[k] ? r.deflection[k] / weights.deflection : 0);
   }
+}
+
+double rms(const std::vector<double>& values, const std::vector<char>& counts) {
+  double square = 0, count = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    square += counts[k] ? values[k] * values[k] : 0;
+    count += counts[k];
+  }
+  return std::sqrt(square / std::max(1.0, count));
 }
 
 /// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
 Weights weigh(const Rig& rig, const PreparedServo& record, const Calibration& calibration) {
   const ServoResiduals r = record.residuals(rig, calibration);
   const NoiseFloors floor = noise_floors(rig, record.data, r.load.load, record.cutoff, record.feedback);
-  double torque = 0, deflection = 0, count = 0;
-  for (std::size_t k = 0; k < r.torque.size(); ++k) {
-    deflection += r.deflection[k] * r.deflection[k] / double(r.torque.size());
-    if (!record.counts[k]) continue;
-    torque += r.torque[k] * r.torque[k];
-    ++count;
-  }
-  return {std::max(floor.torque, std::sqrt(torque / std::max(1.0, count))),
-          std::max(floor.deflection, std::sqrt(deflection))};
+  return {std::max(floor.torque, rms(r.torque, record.counts)),
+          std::max(floor.deflection, rms(r.deflection, record.settled))};
 }
 
 double misfit(const Finding& finding, const Rig& rig) {
@@ -175,18 +178,15 @@ class Fit {
 
   /// What is left of the torque of all records, in units of the noise floor.
   double torque_error() const {
-    double sum = 0, count = 0;
+    double sum = 0;
     for (std::size_t r = 0; r < records_.size(); ++r) {
       const PreparedServo& record = records_[r];
       const ServoResiduals left = record.residuals(rig_, calibrations_[r]);
       const double floor =
           noise_floors(rig_, record.data, left.load.load, record.cutoff, record.feedback).torque;
-      for (std::size_t k = 0; k < left.torque.size(); ++k) {
-        sum += record.counts[k] ? std::pow(left.torque[k] / floor, 2) : 0;
-        count += record.counts[k];
-      }
+      sum += std::pow(rms(left.torque, record.counts) / floor, 2);
     }
-    return std::sqrt(sum / count);
+    return std::sqrt(sum / double(records_.size()));
   }
 
   /// What acts half a sample earlier than a held torque is not held.
@@ -204,6 +204,8 @@ class Fit {
     const Eigen::Index rows = fit_.residuals.size() - known;
     const Eigen::Index wanted = 2 * std::lround(kBlock / (double(stride(records_[0])) * records_[0].data.interval));
     const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
+    widen_jacobian(fit_, [&](const Eigen::VectorXd& p) { return this->rows(unknowns, p); },
+                   kWideStep * unknowns.scale(), true);
     take_larger(fit_.covariance, block_covariance(fit_, block, known));
     OutputError result;
     result.rig = rig_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/measured.h"
@@ -10,6 +11,8 @@
 
 namespace backlash {
 namespace {
+
+constexpr std::size_t kStart = 10;  // samples
 
 std::vector<double> scaled(const Record& record, Channel channel, double factor) {
   std::vector<double> values = record.column(channel);
@@ -37,6 +40,19 @@ std::vector<double> second_difference(const std::vector<double>& x, double inter
   a.front() = a[1];
   a.back() = a[a.size() - 2];
   return a;
+}
+
+/// Value and slope per sample at the first sample, by a straight line: a filter does not smooth at its ends.
+std::pair<double, double> start_of(const std::vector<double>& x) {
+  const std::size_t n = std::min(kStart, x.size());
+  const double middle = 0.5 * double(n - 1);
+  double mean = 0, moment = 0, square = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    mean += x[k] / double(n);
+    moment += (double(k) - middle) * x[k];
+    square += (double(k) - middle) * (double(k) - middle);
+  }
+  return {mean - middle * moment / square, moment / square};
 }
 
 }  // namespace
@@ -71,6 +87,8 @@ ServoData servo_data(const Record& raw, const Rig& rig) {
   data.load = scaled(record, Channel::load_position, 1);
   data.load_rate =
       low_pass(fast_derivative(data.load, data.interval), data.interval, load_rate_cutoff(data.interval));
+  std::tie(data.first_load, data.first_load_rate) = start_of(data.load);
+  data.first_load_rate /= data.interval;
   return data;
 }
 

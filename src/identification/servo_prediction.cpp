@@ -13,6 +13,7 @@ namespace backlash {
 namespace {
 
 constexpr double kEnds = 3;          // periods of the cutoff at either end, where the filter has not settled
+constexpr double kStarts = 12;       // time constants of the feedback, until the start of the load is forgotten
 constexpr double kSureSpeed = 5;     // standard deviations of the motor speed, from which it has a sign
 constexpr double kRateNoise = 0.95;  // of a five-point difference, position noise over interval
 constexpr long kReach = 2;           // samples to either side that it uses
@@ -47,12 +48,12 @@ std::vector<int> sliding(const ServoData& data) {
   return sure;
 }
 
-/// Over the samples that count (all where `counts` is empty).
+/// Over the samples that count.
 ChannelError relative(const std::vector<double>& measured, const std::vector<double>& predicted,
                       const std::vector<char>& counts, double floor) {
   double n = 0, sum = 0, square = 0, residual = 0;
   for (std::size_t k = 0; k < measured.size(); ++k) {
-    if (!counts.empty() && !counts[k]) continue;
+    if (!counts[k]) continue;
     ++n;
     sum += measured[k];
     square += measured[k] * measured[k];
@@ -69,8 +70,13 @@ PreparedServo::PreparedServo(const ServoData& servo, const OutputErrorSettings& 
   torque_of_moment_ = over_second_difference(data.torque);
   torque_held_ = held_over_second_difference(data.torque);
   const long n = static_cast<long>(data.size()), ends = std::lround(kEnds / (cutoff * data.interval));
+  const long begin = std::max(ends, std::lround(kStarts / (feedback * data.interval)));
   counts.assign(n, 0);
-  for (long k = ends; k < n - ends; ++k) counts[k] = direction[k] != 0;
+  settled.assign(n, 0);
+  for (long k = begin; k < n - ends; ++k) {
+    settled[k] = 1;
+    counts[k] = direction[k] != 0;
+  }
 }
 
 std::vector<double> PreparedServo::acting_torque(const Calibration& calibration) const {
@@ -82,8 +88,8 @@ ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calib
                               &data.motor,
                               &data.motor_rate,
                               &data.load_rate,
-                              data.load.front() - calibration.encoder_offset,
-                              data.load_rate.front()};
+                              data.first_load - calibration.encoder_offset,
+                              data.first_load_rate};
   ServoResiduals r;
   r.load = simulate_driven_load(rig, motion, feedback);
   const double inertia = GearTrain(rig).motor_inertia();
@@ -123,7 +129,7 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const Outpu
   p.torque_floor = floors.torque;
   p.deflection_floor = floors.deflection;
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
-  p.deflection_error = relative(p.measured_deflection, p.deflection, {}, p.deflection_floor);
+  p.deflection_error = relative(p.measured_deflection, p.deflection, prepared.settled, p.deflection_floor);
   p.load = std::move(r.load);
   return p;
 }

@@ -25,7 +25,8 @@ struct PreparedServo {
   const ServoData& data;  // of the caller
   double cutoff, feedback;
   std::vector<int> direction;  // +1, -1: the motor slides that way; 0: dry friction may take any value
-  std::vector<char> counts;    // whether the torque sample counts
+  std::vector<char> settled;   // away from the ends of the record
+  std::vector<char> counts;    // settled, and the motor slides
 
  private:
   std::vector<double> torque_of_moment_, torque_held_;

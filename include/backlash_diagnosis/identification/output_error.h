@@ -27,7 +27,7 @@ struct OutputErrorSettings {
   std::vector<std::string> parameters;  // of servo_parameters(), to be fitted
   std::vector<Finding> findings;        // of other records, which count by their standard errors
   int iterations = 20;
-  double step = 1e-4;
+  double step = 1e-3;                   // of the differences, relative
 };
 
 /// Relative error norm(r) / norm(y - mean(y)), and what noise alone leaves.

@@ -16,6 +16,7 @@ struct ServoData {
   std::vector<double> motor, motor_rate;   // rad, rad/s (five-point difference)
   std::vector<double> motor_acceleration;  // rad/s^2 (second difference)
   std::vector<double> load, load_rate;     // rad, rad/s (low-passed, see load_rate_cutoff)
+  double first_load = 0, first_load_rate = 0;  // rad, rad/s, from a line through the first samples
   std::size_t size() const { return motor.size(); }
 };
 

@@ -10,8 +10,11 @@
 namespace backlash {
 namespace {
 
-constexpr double kTellingCutoff = 5;   // Hz, of the deflection
-constexpr double kMostSeconds = 60;    // of one record, and of all
+// Errors fall with the root of the time, while another motion tells apart what one motion mixes. So the time that
+// a fit may take goes in equal parts to the few records in which the teeth change flanks most.
+constexpr double kTellingCutoff = 5;    // Hz, of the deflection
+constexpr double kMostSeconds = 60;     // of all records
+constexpr std::size_t kMostRecords = 3;
 constexpr double kTellingShare = 0.3;  // of the most telling record, from which another is worth its time
 constexpr double kFewestSeconds = 2;
 
@@ -21,8 +24,8 @@ struct Stretch {
   double telling;        // rad/s, how much the deflection varies
 };
 
-/// The stretch of a record whose deflection varies most: the teeth change flanks there.
-Stretch most_telling(const CaseRecord& r) {
+/// The stretch of a record, at most so long, whose deflection varies most: the teeth change flanks there.
+Stretch most_telling(const CaseRecord& r, double seconds) {
   const double interval = r.record.sampling_interval();
   const auto &motor = r.record.column(Channel::motor_position),
              &load = r.record.column(Channel::load_position);
@@ -33,7 +36,7 @@ Stretch most_telling(const CaseRecord& r) {
   std::vector<double> sum(motor.size(), 0);
   for (std::size_t k = 1; k < sum.size(); ++k)
     sum[k] = sum[k - 1] + std::fabs(deflection[k] - deflection[k - 1]);
-  const std::size_t length = std::min<std::size_t>(motor.size(), std::lround(kMostSeconds / interval));
+  const std::size_t length = std::min<std::size_t>(motor.size(), std::lround(seconds / interval));
   std::size_t best = 0;
   for (std::size_t from = 0; from + length <= motor.size(); ++from)
     if (sum[from + length - 1] - sum[from] > sum[best + length - 1] - sum[best]) best = from;
@@ -50,19 +53,13 @@ std::vector<Stretch> telling_stretches(const IdentificationCase& c) {
   std::vector<Stretch> all;
   for (const CaseRecord& r : c.records)
     if (r.drive() && r.has_load && r.record.time.back() - r.record.time.front() >= kFewestSeconds)
-      all.push_back(most_telling(r));
+      all.push_back(most_telling(r, kMostSeconds / double(kMostRecords)));
   std::sort(all.begin(), all.end(), [](const Stretch& a, const Stretch& b) { return a.telling > b.telling; });
-  std::vector<Stretch> chosen;
-  double seconds = 0;
-  for (const Stretch& s : all) {
-    const double length = double(s.to - s.from) * s.record->record.sampling_interval();
-    if (!chosen.empty() &&
-        (s.telling < kTellingShare * all.front().telling || seconds + length > kMostSeconds))
-      continue;
-    chosen.push_back(s);
-    seconds += length;
-  }
-  return chosen;
+  while (!all.empty() &&
+         (all.size() > kMostRecords || all.back().telling < kTellingShare * all.front().telling))
+    all.pop_back();
+  for (Stretch& s : all) s = most_telling(*s.record, kMostSeconds / double(all.size()));
+  return all;
 }
 
 /// Over all records: norms add up.
