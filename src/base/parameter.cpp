@@ -5,7 +5,9 @@ namespace backlash {
 ParameterValues read_parameters(const YamlReader& yaml, const std::vector<ParameterSpec>& specs) {
   ParameterValues values;
   for (const ParameterSpec& spec : specs) {
-    if (spec.list)
+    if (!spec.choices.empty())
+      values.set_choice(spec.name, yaml.choice(spec.name, spec.choices));
+    else if (spec.list)
       values.set_list(spec.name, yaml.numbers(spec.name, spec.range));
     else
       values[spec.name] = yaml.number(spec.name, spec.range);

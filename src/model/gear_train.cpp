@@ -54,7 +54,8 @@ GearTrain::GearTrain(const Rig& rig)
   join(rig);
   bool dry = false;
   for (const auto& term : terms_) {
-    shaped_ |= term->shapes_flanks();
+    loaded_ |= term->loads_flanks();
+    shaped_ |= term->shapes_flanks() || term->loads_flanks();
     shape_follows_torque_ |= term->shape_follows_torque();
     dry |= term->has_dry_friction();
   }
@@ -118,12 +119,27 @@ double GearTrain::contact_force(const Slots& s) const {
   return variation_ ? force * variation_->factor(lever_ * s.q[kPinion], side) : force;
 }
 
+FlankPoint GearTrain::flank_point(const Slots& s, int side, double mesh_torque) const {
+  return {s.q[kPinion], s.q[kGear], half_gap_ / lever_, mesh_torque, side};
+}
+
 FlankShift GearTrain::shift(const Slots& s, int side, double mesh_torque) const {
   FlankShift sum;
   if (!shaped_) return sum;
-  const FlankPoint point{s.q[kPinion], s.q[kGear], half_gap_ / lever_, mesh_torque, side};
+  const FlankPoint point = flank_point(s, side, mesh_torque);
   for (const auto& term : terms_) term->shape(point, sum);
   return sum;
+}
+
+/// Of a flank that is closed by `penetration` [m], moving at `rate` [m/s].
+double GearTrain::flank_force(const Slots& s, int side, double penetration, double rate, double mesh_torque) const {
+  double force = contact_->force(penetration, rate, impact_speed_);
+  if (variation_) force *= variation_->factor(lever_ * s.q[kPinion], side);
+  if (!loaded_) return force;
+  double torque = lever_ * force;
+  const FlankLoad load{flank_point(s, side, mesh_torque), penetration / lever_, rate / lever_};
+  for (const auto& term : terms_) term->load_flank(load, torque);
+  return std::max(0.0, torque) / lever_;
 }
 
 /// Force >= 0 on the flank of this side [N]. Where its shape follows the torque that it carries both are
@@ -136,8 +152,7 @@ double GearTrain::shaped_force(const Slots& s, int side, FlankShift& at) const {
     const double penetration = x - lever_ * at.opening;
     if (!(penetration > 0)) return 0.0;
     const double rate = w - lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
-    const double f = contact_->force(penetration, rate, impact_speed_);
-    return variation_ ? f * variation_->factor(lever_ * s.q[kPinion], side) : f;
+    return flank_force(s, side, penetration, rate, mesh_torque);
   };
   const double f0 = force(0);
   if (!shape_follows_torque_ || f0 == 0) return f0;
@@ -220,7 +235,7 @@ inline double GearTrain::net_torques(double t, const Slots& s, AppliedTorque app
     torque[kGear] += mesh_torque;
   }
   if (!terms_.empty()) {
-    const Motion motion = motion_of(t, s, mesh_torque);
+    const Motion motion = motion_of(t, s, mesh_torque, applied);
     EndTorques ends;
     for (const auto& term : terms_) term->add(motion, ends);
     torque[kMotor] += ends.motor;
@@ -236,7 +251,7 @@ GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorq
   const Slots s = unpack(state);
   Balance b;
   b.mesh_torque = net_torques(t, s, applied, b.net);
-  if (!dry_ends_.empty()) b.friction = friction(motion_of(t, s, b.mesh_torque));
+  if (!dry_ends_.empty()) b.friction = friction(motion_of(t, s, b.mesh_torque, applied));
   return b;
 }
 
@@ -249,7 +264,7 @@ void GearTrain::derivative(double t, const double* state, AppliedTorque applied,
     rate[dof_ + node] = net[node] / inertia_[node];
   }
   if (dry_ends_.empty()) return;
-  const EndFriction rubbing = friction(motion_of(t, s, mesh_torque));
+  const EndFriction rubbing = friction(motion_of(t, s, mesh_torque, applied));
   for (const DryEnd& end : dry_ends_) {
     const int node = node_[end.slot];
     double& acceleration = rate[dof_ + node];

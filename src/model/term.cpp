@@ -1,6 +1,9 @@
 #include "backlash_diagnosis/model/term.h"
 
+#include <algorithm>
+
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
 #include "terms/terms.h"
 
 namespace backlash {
@@ -13,17 +16,18 @@ const std::vector<TermType>& term_types() {
   return types;
 }
 
-namespace {
-
 const TermType& term_type(const std::string& id) {
   for (const TermType& type : term_types())
     if (type.id == id) return type;
   throw InvalidParameter("id", id, "is not a known term");
 }
 
+namespace {
+
 std::shared_ptr<const Term> created(const TermType& type, const ParameterValues& values) {
   std::unique_ptr<Term> term = type.create(values);
   term->id = type.id;
+  term->values = values;
   return term;
 }
 
@@ -31,16 +35,23 @@ void check(const ParameterSpec& spec, double value) {
   if (!spec.range.contains(value)) throw InvalidParameter(spec.name, value, spec.range.text());
 }
 
+void check_choice(const ParameterSpec& spec, const std::string& value) {
+  if (std::find(spec.choices.begin(), spec.choices.end(), value) != spec.choices.end()) return;
+  throw InvalidParameter(spec.name, value, "must be one of " + joined(spec.choices));
+}
+
 }  // namespace
 
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values) {
   const TermType& type = term_type(id);
   for (const ParameterSpec& spec : type.parameters) {
-    if (!spec.list) {
+    if (!spec.choices.empty()) {
+      check_choice(spec, values.choice(spec.name));
+    } else if (spec.list) {
+      for (const double value : values.list(spec.name)) check(spec, value);
+    } else {
       check(spec, values.at(spec.name));
-      continue;
     }
-    for (const double value : values.list(spec.name)) check(spec, value);
   }
   return created(type, values);
 }

@@ -18,10 +18,11 @@ struct ParameterSpec {
   std::string unit;
   Range range;
   std::string meaning;
-  bool list = false;  // of numbers, each in the range
+  bool list = false;                      // of numbers, each in the range
+  std::vector<std::string> choices = {};  // not empty: one of these words instead of a number
 };
 
-/// Values by name: a number or a list of numbers.
+/// Values by name: a number, a list of numbers or a word.
 class ParameterValues {
  public:
   ParameterValues() = default;
@@ -32,10 +33,13 @@ class ParameterValues {
   double& operator[](const std::string& name) { return numbers_[name]; }
   const std::vector<double>& list(const std::string& name) const { return lists_.at(name); }
   void set_list(const std::string& name, std::vector<double> values) { lists_[name] = std::move(values); }
+  const std::string& choice(const std::string& name) const { return choices_.at(name); }
+  void set_choice(const std::string& name, std::string value) { choices_[name] = std::move(value); }
 
  private:
   std::map<std::string, double> numbers_;
   std::map<std::string, std::vector<double>> lists_;
+  std::map<std::string, std::string> choices_;
 };
 
 /// Reads exactly the parameters of `specs` from `yaml`; BadData for an absent, wrong or out-of-range value.

@@ -68,7 +68,7 @@ class GearTrain {
   double load_inertia() const;
 
   /// Kinetic plus elastic energy (couplings, contact) [J], without terms and without what a flank stores that
-  /// gives way under its torque.
+  /// gives way under its torque or that a term adds to its contact law.
   double energy(const double* state) const;
 
   /// Power that the dampers of motor, couplings and link take out [W]; contact damping is not among them.
@@ -133,13 +133,17 @@ class GearTrain {
   };
 
   Slots unpack(const double* state) const;
-  Motion motion_of(double t, const Slots& s, double mesh_torque) const {
-    return {t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink], mesh_torque};
+  Motion motion_of(double t, const Slots& s, double mesh_torque, AppliedTorque applied) const {
+    const double motor_torque = applied.motor * ratio_;
+    return {t,           s.q[kMotor],  s.w[kMotor], s.q[kLink], s.w[kLink], contact_ ? mesh_torque : motor_torque,
+            motor_torque};
   }
   double net_torques(double t, const Slots& s, AppliedTorque applied, double* net) const;
   Balance balance(double t, const double* state, AppliedTorque applied) const;
   double relative(const Slots& s) const { return lever_ * (s.q[kPinion] - s.q[kGear]) + start_ * half_gap_; }
+  FlankPoint flank_point(const Slots& s, int side, double mesh_torque) const;
   FlankShift shift(const Slots& s, int side, double mesh_torque) const;
+  double flank_force(const Slots& s, int side, double penetration, double rate, double mesh_torque) const;
   double shaped_torques(const Slots& s, double* torque) const;
   double shaped_force(const Slots& s, int side, FlankShift& at) const;
   EndFriction friction(const Motion& motion) const;
@@ -162,7 +166,7 @@ class GearTrain {
   double start_;                          // -, Mesh::start_in_gap
   std::array<double, kSlots> asymmetry_;  // per part, N m s/rad
   EndFriction coulomb_;
-  bool shaped_ = false, shape_follows_torque_ = false;
+  bool shaped_ = false, shape_follows_torque_ = false, loaded_ = false;
   bool braked_ = false;
   std::vector<DryEnd> dry_ends_;
   double impact_speed_ = 0;  // m/s, approach speed at the last touch

@@ -1,10 +1,12 @@
-// An effect is a term of the model: an extra torque on the motor or on the load, dry friction, or another
-// shape of the flanks.
+// An effect is a term of the model: an extra torque on the motor or on the load, dry friction, another shape
+// or another stiffness of the flanks, or a sensor that does not show what it should.
 //
-// A new effect: one file in src/model/terms/ with its equation, and one line in term.cpp.
+// A new effect: one file in src/model/terms/ with its equation, and one line in term.cpp. Where it says what
+// to try (TermSearch), the search for what a model lacks tries it with all the others.
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,12 +16,14 @@ namespace backlash {
 
 /// What a term may depend on; all at the load side of the reduction.
 struct Motion {
-  double time;             // s
-  double motor_position;   // rad
-  double motor_velocity;   // rad/s
-  double load_position;    // rad
-  double load_velocity;    // rad/s
-  double mesh_torque = 0;  // N m, through the teeth, > 0 drives the load forward
+  double time;            // s
+  double motor_position;  // rad
+  double motor_velocity;  // rad/s
+  double load_position;   // rad
+  double load_velocity;   // rad/s
+  // N m, through the teeth, > 0 drives the load forward; of a rigid mesh that of the motor
+  double mesh_torque = 0;
+  double motor_torque = 0;  // N m, that the motor applies
 };
 
 /// Torques on the two ends of the gear train [N m], load-side; positive torque accelerates in positive
@@ -34,6 +38,7 @@ struct EndTorques {
 struct FrictionLimits {
   double forward = 0;
   double backward = 0;
+  double presliding = 0;  // rad, over which friction builds up after a reversal (StickSlip); 0: at once
 };
 
 struct EndFriction {
@@ -56,11 +61,25 @@ struct FlankPoint {
   int side;               // +1: touches where the motor drives forward, -1: the other
 };
 
+/// A flank under load.
+struct FlankLoad {
+  FlankPoint at;
+  double penetration;  // rad at the load, > 0
+  double rate;         // rad/s, of the penetration
+};
+
+/// What sensors and drive make of the machine's own values.
+struct Sensing {
+  double load_position_gain = 1;  // -, shown over true
+  double torque_delay = 0;        // s, the torque acts that much later than its stamp says
+};
+
 class Term {
  public:
   virtual ~Term() = default;
 
-  std::string id;  // in the rig file; set by make_term()
+  std::string id;          // in the rig file; set by make_term()
+  ParameterValues values;  // that it was made of; set by make_term()
 
   /// Adds torques that change smoothly with the motion.
   virtual void add(const Motion&, EndTorques&) const {}
@@ -73,6 +92,42 @@ class Term {
   virtual bool shapes_flanks() const { return false; }
   virtual bool shape_follows_torque() const { return false; }
   virtual void shape(const FlankPoint&, FlankShift&) const {}
+
+  /// Adds to the torque >= 0 with which a flank resists [N m]; the sum of all never pulls.
+  virtual bool loads_flanks() const { return false; }
+  virtual void load_flank(const FlankLoad&, double& /*torque*/) const {}
+
+  virtual void sense(Sensing&) const {}
+
+  /// Whether the load would move otherwise without it. False saves the search a simulation.
+  virtual bool moves_load() const { return true; }
+};
+
+/// The size of the motion in the records at hand, so that a term can tell which values are worth a try. Load
+/// side.
+struct MotionRange {
+  double torque = 0;        // N m, standard deviation of the motor's
+  double speed = 0;         // rad/s, standard deviation of the motor's
+  double deflection = 0;    // rad, standard deviation of motor minus load
+  double from = 0, to = 0;  // rad, where the motor has been
+  double duration = 0;      // s, of the longest record
+  double interval = 0;      // s, between samples
+};
+
+/// A parameter of a term that gives the effect its shape, and the values that are tried.
+struct TermShape {
+  std::string name;
+  std::vector<double> (*values)(const MotionRange&);
+  bool refined;  // the best is then fitted with all others; else (an order) it is one of the values
+};
+
+/// How the search for what a model lacks tries a term: for each combination of its choices and shapes, with a
+/// strength to be fitted.
+struct TermSearch {
+  std::string strength;  // the parameter that is 0 where there is no such effect
+  std::string phase;     // of an effect strength * sin(... + phase), tried in sine and cosine; empty: none
+  double (*typical)(const MotionRange&) = nullptr;  // a strength that would show clearly, > 0
+  std::vector<TermShape> shapes;
 };
 
 /// What the registry knows of a term: its id in the rig file, its parameters, how it is made.
@@ -80,13 +135,17 @@ struct TermType {
   std::string id;
   std::vector<ParameterSpec> parameters;
   std::unique_ptr<Term> (*create)(const ParameterValues&);
+  std::optional<TermSearch> search = std::nullopt;  // none: it is never sought
 };
+
+/// By id; throws InvalidParameter for one that is not in the registry.
+const TermType& term_type(const std::string& id);
 
 /// All terms. There is no second list of effects anywhere.
 const std::vector<TermType>& term_types();
 
-/// One term from its values, which must be all that its type names. Throws InvalidParameter for another id, for
-/// values out of range and for such as do not go together.
+/// One term from its values, which must be all that its type names. Throws InvalidParameter for another id,
+/// for values out of range and for such as do not go together.
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values);
 
 /// Reads one entry of `terms:`: `id: ID` and that term's parameters.
