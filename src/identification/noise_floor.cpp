@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
 
 namespace backlash {
 namespace {
@@ -57,10 +58,12 @@ double contact_value(const Rig& rig, const char* name) {
 NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vector<double>& load,
                          double cutoff, double feedback) {
   const GearTrain train(rig);
+  const bool free = load_moves_freely(rig);
   const double motor_inertia = train.motor_inertia(), load_inertia = train.load_inertia();
   const double k = contact_value(rig, "stiffness"), b = contact_value(rig, "damping");
   const double rate_cutoff = load_rate_cutoff(data.interval);
-  const std::vector<double> load_power = load_noise(data, load);
+  const std::vector<double> load_power =
+      free ? load_noise(data, load) : std::vector<double>(data.size() / 2, 0.0);
   const double lines = double(load_power.size());
   const double motor_power = std::pow(noise_deviation(data.motor), 2) / lines,
                torque_power = std::pow(white_noise(data.torque), 2) / lines;
@@ -68,7 +71,11 @@ NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vecto
   for (std::size_t i = 0; i < load_power.size(); ++i) {
     const double f = 0.5 * (double(i) + 0.5) / (lines * data.interval);
     const double gain = low_pass_gain(f, cutoff, data.interval), power = gain * gain;
-    const Complex s(0, 2 * M_PI * f), z = k + b * s;
+    const Complex s(0, 2 * M_PI * f), z = rig.mesh.rigid ? Complex(0) : k + b * s;
+    if (!free) {
+      torque += power * (torque_power + motor_power * std::norm(motor_inertia * s * s + z));
+      continue;
+    }
     const Complex drawn = load_inertia * feedback * s;
     const Complex d = load_inertia * s * s + drawn + z;
     const Complex drawn_by = drawn * low_pass_gain(f, rate_cutoff, data.interval) / d;

@@ -48,6 +48,12 @@ std::vector<int> sliding(const ServoData& data) {
   return sure;
 }
 
+std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> out(a.size());
+  for (std::size_t k = 0; k < a.size(); ++k) out[k] = a[k] - b[k];
+  return out;
+}
+
 /// Over the samples that count.
 ChannelError relative(const std::vector<double>& measured, const std::vector<double>& predicted,
                       const std::vector<char>& counts, double floor) {
@@ -65,8 +71,8 @@ ChannelError relative(const std::vector<double>& measured, const std::vector<dou
 
 }  // namespace
 
-PreparedServo::PreparedServo(const ServoData& servo, const OutputErrorSettings& settings)
-    : data(servo), cutoff(settings.cutoff), feedback(settings.feedback), direction(sliding(servo)) {
+PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, double load_feedback)
+    : data(servo), cutoff(low_pass_cutoff), feedback(load_feedback), direction(sliding(servo)) {
   torque_of_moment_ = over_second_difference(data.torque);
   torque_held_ = held_over_second_difference(data.torque);
   const long n = static_cast<long>(data.size()), ends = std::lround(kEnds / (cutoff * data.interval));
@@ -79,22 +85,40 @@ PreparedServo::PreparedServo(const ServoData& servo, const OutputErrorSettings& 
   }
 }
 
-std::vector<double> PreparedServo::acting_torque(const Calibration& calibration) const {
-  return delayed(calibration.held ? torque_held_ : torque_of_moment_, calibration.torque_delay);
+std::vector<double> PreparedServo::acting_torque(const Rig& rig, const Calibration& calibration) const {
+  const double delay = calibration.torque_delay + sensing(rig.terms).torque_delay / data.interval;
+  return delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
+}
+
+DrivenLoad PreparedServo::simulate(const Rig& rig, const Calibration& calibration) const {
+  RecordedMotion motion;
+  motion.interval = data.interval;
+  motion.motor = &data.motor;
+  motion.motor_rate = &data.motor_rate;
+  if (!rig.terms.empty()) motion.motor_torque = &data.torque;
+  std::vector<double> changed;
+  if (load_moves_freely(rig)) {
+    const double gain = sensing(rig.terms).load_position_gain;
+    motion.load_rate = &data.load_rate;
+    motion.first_load = (data.first_load - calibration.encoder_offset) / gain;
+    motion.first_load_rate = data.first_load_rate / gain;
+    if (gain == 1) return simulate_driven_load(rig, motion, feedback);
+    changed = data.load_rate;
+    for (double& rate : changed) rate /= gain;
+    motion.load_rate = &changed;
+  } else if (calibration.encoder_offset != 0) {
+    changed = data.motor;
+    for (double& position : changed) position += calibration.encoder_offset;
+    motion.motor = &changed;
+  }
+  return simulate_driven_load(rig, motion, feedback);
 }
 
 ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calibration) const {
-  const RecordedMotion motion{data.interval,
-                              &data.motor,
-                              &data.motor_rate,
-                              &data.load_rate,
-                              data.first_load - calibration.encoder_offset,
-                              data.first_load_rate};
   ServoResiduals r;
-  r.load = simulate_driven_load(rig, motion, feedback);
+  r.load = simulate(rig, calibration);
   const double inertia = GearTrain(rig).motor_inertia();
-  r.torque = acting_torque(calibration);
-  r.deflection.resize(data.size());
+  r.torque = acting_torque(rig, calibration);
   for (std::size_t k = 0; k < data.size(); ++k) {
     const FrictionLimits& f = r.load.motor_friction[k];
     const double friction = direction[k] > 0 ? f.forward : -f.backward;
@@ -102,34 +126,35 @@ ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calib
       r.torque[k] = 0;  // friction takes what balances
     else
       r.torque[k] -= inertia * data.motor_acceleration[k] - r.load.motor_mean[k] + friction;
-    r.deflection[k] = r.load.load[k] + calibration.encoder_offset - data.load[k];
   }
   r.torque = low_pass(r.torque, data.interval, cutoff);
+  if (!load_moves_freely(rig)) return r;
+  const double gain = sensing(rig.terms).load_position_gain;
+  r.deflection.resize(data.size());
+  for (std::size_t k = 0; k < data.size(); ++k)
+    r.deflection[k] = gain * r.load.load[k] + calibration.encoder_offset - data.load[k];
   r.deflection = low_pass(r.deflection, data.interval, cutoff);
   return r;
 }
 
 ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
                               const Calibration& calibration) {
-  const PreparedServo prepared(data, settings);
+  const PreparedServo prepared(data, settings.cutoff, settings.feedback);
   ServoResiduals r = prepared.residuals(rig, calibration);
   ServoPrediction p;
   p.counts = prepared.counts;
-  p.measured_torque = low_pass(prepared.acting_torque(calibration), data.interval, settings.cutoff);
-  p.measured_deflection.resize(data.size());
-  for (std::size_t k = 0; k < data.size(); ++k) p.measured_deflection[k] = data.motor[k] - data.load[k];
-  p.measured_deflection = low_pass(p.measured_deflection, data.interval, settings.cutoff);
-  p.torque.resize(data.size());
-  p.deflection.resize(data.size());
-  for (std::size_t k = 0; k < data.size(); ++k) {
-    p.torque[k] = p.measured_torque[k] - r.torque[k];
-    p.deflection[k] = p.measured_deflection[k] - r.deflection[k];
-  }
+  p.settled = prepared.settled;
   const NoiseFloors floors = noise_floors(rig, data, r.load.load, settings.cutoff, settings.feedback);
   p.torque_floor = floors.torque;
-  p.deflection_floor = floors.deflection;
+  p.measured_torque = low_pass(prepared.acting_torque(rig, calibration), data.interval, settings.cutoff);
+  p.torque = difference(p.measured_torque, r.torque);
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
-  p.deflection_error = relative(p.measured_deflection, p.deflection, prepared.settled, p.deflection_floor);
+  if (!r.deflection.empty()) {
+    p.deflection_floor = floors.deflection;
+    p.measured_deflection = low_pass(difference(data.motor, data.load), data.interval, settings.cutoff);
+    p.deflection = difference(p.measured_deflection, r.deflection);
+    p.deflection_error = relative(p.measured_deflection, p.deflection, p.settled, p.deflection_floor);
+  }
   p.load = std::move(r.load);
   return p;
 }

@@ -7,7 +7,7 @@
 
 namespace backlash {
 
-/// Recorded minus predicted, low-passed.
+/// Recorded minus predicted, low-passed. No deflection where the load has no motion of its own.
 struct ServoResiduals {
   DrivenLoad load;
   std::vector<double> torque, deflection;  // N m, rad
@@ -15,10 +15,10 @@ struct ServoResiduals {
 
 struct PreparedServo {
   /// `data` must outlive it.
-  PreparedServo(const ServoData& data, const OutputErrorSettings& settings);
+  PreparedServo(const ServoData& data, double cutoff, double feedback);
 
   /// What a second difference of the motor position sees of the motor's torque [N m].
-  std::vector<double> acting_torque(const Calibration& calibration) const;
+  std::vector<double> acting_torque(const Rig& rig, const Calibration& calibration) const;
   /// Safe to call from several threads.
   ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
 
@@ -29,6 +29,8 @@ struct PreparedServo {
   std::vector<char> counts;    // settled, and the motor slides
 
  private:
+  DrivenLoad simulate(const Rig& rig, const Calibration& calibration) const;
+
   std::vector<double> torque_of_moment_, torque_held_;
 };
 

@@ -42,6 +42,12 @@ void check_choice(const ParameterSpec& spec, const std::string& value) {
 
 }  // namespace
 
+Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms) {
+  Sensing sum;
+  for (const auto& term : terms) term->sense(sum);
+  return sum;
+}
+
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values) {
   const TermType& type = term_type(id);
   for (const ParameterSpec& spec : type.parameters) {

@@ -38,6 +38,7 @@ Cubic between(const std::vector<double>& y, std::size_t k) {
 /// Motion within one sample.
 struct Segment {
   Cubic motor, motor_rate, load_rate;
+  double motor_torque;
   double interval;
 };
 
@@ -57,6 +58,7 @@ class Load {
  public:
   Load(const Rig& rig, double feedback)
       : train_(rig),
+        ratio_(rig.motor_axis_ratio()),
         inertia_(train_.load_inertia()),
         feedback_(feedback),
         rubs_(train_.friction_event_count() > 0) {}
@@ -101,7 +103,8 @@ class Load {
   Forces forces(const Segment& s, double t, double u, double position, double rate) const {
     const double state[] = {s.motor(u), position, s.motor_rate(u), rate};
     Forces f;
-    f.ends = train_.end_forces(t + u * s.interval, state, 0);
+    f.ends = train_.end_forces(t + u * s.interval, state, s.motor_torque / ratio_);
+    f.ends.motor -= s.motor_torque;
     f.net = f.ends.load + inertia_ * feedback_ * (s.load_rate(u) - rate);
     return f;
   }
@@ -188,36 +191,69 @@ class Load {
   }
 
   GearTrain train_;
+  double ratio_;
   double inertia_, feedback_;
   bool rubs_;
   StickSlip mode_;
 };
 
+/// A load that stands or moves with the motor: torques at either end of a sample and halfway.
+class FixedLoad {
+ public:
+  explicit FixedLoad(const Rig& rig) : train_(rig), ratio_(rig.motor_axis_ratio()), rigid_(rig.mesh.rigid) {}
+
+  double q = 0, w = 0;
+
+  GearTrain::EndForces begin(const Segment& s, double t) {
+    follow(s, 0);
+    return forces(s, t, 0);
+  }
+
+  GearTrain::EndForces step(const Segment& s, double t, Halves& sum) {
+    const GearTrain::EndForces end = forces(s, t, 1);
+    sum.add(0, 1, forces(s, t, 0).motor, forces(s, t, 0.5).motor, end.motor);
+    follow(s, 1);
+    return end;
+  }
+
+ private:
+  void follow(const Segment& s, double u) {
+    if (!rigid_) return;
+    q = s.motor(u);
+    w = s.motor_rate(u);
+  }
+
+  GearTrain::EndForces forces(const Segment& s, double t, double u) const {
+    const double state[] = {s.motor(u), s.motor_rate(u)};
+    GearTrain::EndForces f = train_.end_forces(t + u * s.interval, state, s.motor_torque / ratio_);
+    f.motor -= s.motor_torque;
+    if (!rigid_) return f;
+    f.friction.motor.forward += f.friction.load.forward;
+    f.friction.motor.backward += f.friction.load.backward;
+    return f;
+  }
+
+  GearTrain train_;
+  double ratio_;
+  bool rigid_;
+};
+
 void check(const Rig& rig) {
-  const auto refuse = [](const char* name, const char* value, const char* why) {
-    throw InvalidParameter(name, value, why);
-  };
   if (!rig.input_coupling.rigid || !rig.output_coupling.rigid)
-    refuse("coupling", "flexible", "a load that follows the recorded motor needs rigid couplings");
-  if (rig.link_locked) refuse("link", "locked", "cannot follow the motor");
-  if (rig.mesh.rigid) refuse("mesh", "rigid", "leaves no motion of the load of its own");
-  if (rig.mesh.contact->needs_impact_speed())
-    refuse("contact.law", "with touches",
-           "a load that follows the recorded motor needs a law without impact speed");
+    throw InvalidParameter("coupling", "flexible", "a load that follows the recorded motor needs rigid couplings");
+  if (!rig.mesh.rigid && rig.mesh.contact->needs_impact_speed())
+    throw InvalidParameter("contact.law", "with touches",
+                           "a load that follows the recorded motor needs a law without impact speed");
 }
 
-}  // namespace
-
-DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, double feedback) {
-  check(rig);
+/// Every sample in turn; `Body` is what the load does within one.
+template <typename Body>
+DrivenLoad follow(Body& load, const RecordedMotion& motion) {
   const std::size_t n = motion.motor->size();
   DrivenLoad out;
   for (auto* column : {&out.load, &out.load_rate, &out.mesh_torque, &out.motor_net, &out.motor_mean})
     column->resize(n);
   out.motor_friction.resize(n);
-  Load load(rig, motion.load_rate ? feedback : 0);
-  load.q = motion.first_load;
-  load.w = motion.first_load_rate;
   const auto& q = *motion.motor;
   const auto& w = *motion.motor_rate;
   GearTrain::EndForces f{};
@@ -226,6 +262,7 @@ DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, do
     const Segment segment{{q[k], q[j], motion.interval * w[k], motion.interval * w[j]},
                           between(w, k),
                           motion.load_rate ? between(*motion.load_rate, k) : Cubic{0, 0, 0, 0},
+                          motion.motor_torque ? (*motion.motor_torque)[k] : 0,
                           motion.interval};
     const double t = k * motion.interval;
     if (k == 0) f = load.begin(segment, t);
@@ -243,6 +280,24 @@ DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, do
     out.motor_mean[j] += j + 1 == n ? 2 * half.late : half.late;
   }
   return out;
+}
+
+}  // namespace
+
+bool load_moves_freely(const Rig& rig) {
+  return !rig.mesh.rigid && !rig.link_locked;
+}
+
+DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, double feedback) {
+  check(rig);
+  if (!load_moves_freely(rig)) {
+    FixedLoad load(rig);
+    return follow(load, motion);
+  }
+  Load load(rig, motion.load_rate ? feedback : 0);
+  load.q = motion.first_load;
+  load.w = motion.first_load_rate;
+  return follow(load, motion);
 }
 
 }  // namespace backlash

@@ -6,6 +6,7 @@
 //   D = J_L s^2 + (b + J_L h) s + k,   Z = k + b s
 //   torque      n_M [J_M s^2 + Z (1 - Z / D)] - n_L Z J_L h s F / D
 //   deflection  n_M Z / D - n_L (1 - J_L h s F / D)
+// Where the load stands Z / D is 0, where it moves with the motor Z is; there is no deflection then.
 // A finite resolution of the load is no white noise while the load moves slowly: its error is that of the
 // simulated motion, rounded.
 #pragma once

@@ -49,12 +49,12 @@ struct OutputError {
   std::vector<ChannelError> torque, deflection;  // one per record
 };
 
-/// What a rig predicts for a record.
+/// What a rig predicts for a record; no deflection where the load has no motion of its own.
 struct ServoPrediction {
   DrivenLoad load;
   std::vector<double> torque, measured_torque;          // N m, both low-passed
   std::vector<double> deflection, measured_deflection;  // rad
-  std::vector<char> counts;                             // whether the torque sample counts
+  std::vector<char> settled, counts;                    // whether the sample of deflection and torque counts
   double torque_floor, deflection_floor;  // N m, rad: standard deviation of what noise alone leaves
   ChannelError torque_error, deflection_error;
 };

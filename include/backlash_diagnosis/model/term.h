@@ -128,7 +128,11 @@ struct TermSearch {
   std::string phase;     // of an effect strength * sin(... + phase), tried in sine and cosine; empty: none
   double (*typical)(const MotionRange&) = nullptr;  // a strength that would show clearly, > 0
   std::vector<TermShape> shapes;
+  bool pairs = false;  // also two of it with different values of its one shape
 };
+
+/// What all terms together make of the sensors.
+Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms);
 
 /// What the registry knows of a term: its id in the rig file, its parameters, how it is made.
 struct TermType {

@@ -7,6 +7,9 @@
 // recorded one (k [1/s]), it follows, and what remains between simulated and recorded load tells of the
 // model.
 //
+// Where the link is locked or the mesh rigid the load has no motion of its own: it stands, or moves with the
+// motor, and only the torque on the motor is asked for.
+//
 // Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples. A step is divided
 // where the load comes to rest or breaks away and where teeth touch or part.
 #pragma once
@@ -24,6 +27,8 @@ struct RecordedMotion {
   const std::vector<double>* motor_rate = nullptr;  // rad/s
   const std::vector<double>* load_rate = nullptr;   // rad/s, draws the simulated load; null: it runs free
   double first_load = 0, first_load_rate = 0;       // rad, rad/s: where the load starts
+  // N m of the motor, held from sample to sample, for terms that follow it; null: 0. It does not move anything.
+  const std::vector<double>* motor_torque = nullptr;
 };
 
 struct DrivenLoad {
@@ -39,8 +44,11 @@ struct DrivenLoad {
 /// Typical k [1/s].
 constexpr double kLoadFeedback = 50;
 
-/// Throws InvalidParameter for a rig with flexible couplings, a locked link or a contact law that needs
-/// touches; IntegrationError where the load runs away.
+/// Whether the load has a motion of its own to be simulated.
+bool load_moves_freely(const Rig& rig);
+
+/// Throws InvalidParameter for a rig with flexible couplings or a contact law that needs touches;
+/// IntegrationError where the load runs away.
 DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion,
                                 double feedback = kLoadFeedback);
 

@@ -1,0 +1,32 @@
+#include "fit_parameter.h"
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/model/term.h"
+
+namespace backlash {
+
+FitParameter machine_parameter(const std::string& name, const Rig& rig) {
+  const RigParameter& p = servo_parameter(name);
+  if (const double value = p.get(rig); p.positive && !(value > 0))
+    throw InvalidParameter(name, value, "must be > 0");
+  return {p.name, p.unit, p.positive, 1, p.get, p.set};
+}
+
+FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale) {
+  const std::string id = rig.terms.at(term)->id;
+  for (const ParameterSpec& spec : term_type(id).parameters) {
+    if (spec.name != name) continue;
+    const auto set = [term, name](Rig& changed, double value) {
+      ParameterValues values = changed.terms[term]->values;
+      values[name] = value;
+      changed.terms[term] = make_term(changed.terms[term]->id, values);
+    };
+    const bool positive = spec.range.lower == 0 && spec.range.open_lower;
+    return {name, spec.unit, positive, scale,
+            [term, name](const Rig& r) { return r.terms[term]->values.at(name); }, set};
+  }
+  throw InvalidParameter(name, id, "is not a parameter of this term");
+}
+
+}  // namespace backlash

@@ -1,0 +1,27 @@
+// One number of a rig that a fit may change: of the machine itself or of one of its terms.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/model/rig.h"
+
+namespace backlash {
+
+struct FitParameter {
+  std::string name;  // in reports
+  std::string unit;
+  bool positive;     // > 0: its logarithm is fitted
+  double scale;      // a typical size, of one that is not positive
+  std::function<double(const Rig&)> get;
+  std::function<void(Rig&, double)> set;
+};
+
+/// By its name among servo_parameters(). Throws InvalidParameter for one that must be > 0 and is not.
+FitParameter machine_parameter(const std::string& name, const Rig& rig);
+
+/// A number of the term at this place of rig.terms; `scale` as above.
+FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale);
+
+}  // namespace backlash

@@ -1,0 +1,198 @@
+#include "joint_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/noise_floor.h"
+#include "backlash_diagnosis/identification/rig_parameters.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kFarthest = 30;     // times the start or a part of it: no parameter is sought beyond
+constexpr double kWideStep = 1e-2;   // of the differences that the errors are taken from
+constexpr double kBlock = 1;         // s: the slowest oscillation that a servo record shows
+constexpr double kDefaultGap = 1e-4; // rad, scale of an encoder offset where the rig has no gap
+
+std::size_t stride(const PreparedServo& record) {
+  return std::max(1L, std::lround(0.4 / (record.cutoff * record.data.interval)));
+}
+
+double rms(const std::vector<double>& values, const std::vector<char>& counts) {
+  double square = 0, count = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    square += counts[k] ? values[k] * values[k] : 0;
+    count += counts[k];
+  }
+  return std::sqrt(square / std::max(1.0, count));
+}
+
+double misfit(const Finding& finding, const Rig& rig) {
+  double value = 0;
+  for (const auto& [name, factor] : finding.combination) value += factor * servo_parameter(name).get(rig);
+  return (finding.measured.value - value) / finding.measured.standard_error;
+}
+
+Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records,
+                         const std::vector<Finding>& findings, const Eigen::VectorXd& p) {
+  const Rig rig = unknowns.rig(p);
+  Eigen::VectorXd rows = records.rows(rig, unknowns.calibrations(p));
+  const Eigen::Index own = rows.size();
+  rows.conservativeResize(own + Eigen::Index(findings.size()));
+  for (std::size_t i = 0; i < findings.size(); ++i) rows[own + Eigen::Index(i)] = misfit(findings[i], rig);
+  return rows;
+}
+
+/// The covariance of neighbouring rows is itself an estimate from few blocks and now and then far too small.
+void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
+  const Eigen::VectorXd growth = (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
+  covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
+}
+
+}  // namespace
+
+RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback) {
+  for (const ServoData& d : data) records_.emplace_back(d, cutoff, feedback);
+  weights_.resize(data.size());
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    for (std::size_t k = 0; k < data[r].size(); k += stride(records_[r])) {
+      layout_.push_back({r, false, double(k) * data[r].interval});
+      layout_.push_back({r, true, double(k) * data[r].interval});
+    }
+  }
+}
+
+double RecordSet::row_interval() const {
+  return double(stride(records_[0])) * records_[0].data.interval;
+}
+
+void RecordSet::weigh(const Machine& machine) {
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    const PreparedServo& record = records_[i];
+    const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
+    const NoiseFloors floor =
+        noise_floors(machine.rig, record.data, r.load.load, record.cutoff, record.feedback);
+    weights_[i] = {std::max(floor.torque, rms(r.torque, record.counts)),
+                   std::max(floor.deflection, rms(r.deflection, record.settled))};
+  }
+}
+
+Leftover RecordSet::leftover(const Machine& machine) const {
+  Leftover sum;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    const PreparedServo& record = records_[i];
+    const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
+    const NoiseFloors floor =
+        noise_floors(machine.rig, record.data, r.load.load, record.cutoff, record.feedback);
+    sum.torque += std::pow(rms(r.torque, record.counts) / floor.torque, 2);
+    if (!r.deflection.empty())
+      sum.deflection += std::pow(rms(r.deflection, record.settled) / floor.deflection, 2);
+  }
+  return {std::sqrt(sum.torque / double(records_.size())), std::sqrt(sum.deflection / double(records_.size()))};
+}
+
+Eigen::VectorXd RecordSet::rows(const Rig& rig, const std::vector<Calibration>& calibrations) const {
+  Eigen::VectorXd rows(layout_.size());
+  Eigen::Index next = 0;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    const PreparedServo& record = records_[i];
+    const ServoResiduals r = record.residuals(rig, calibrations[i]);
+    for (std::size_t k = 0; k < record.data.size(); k += stride(record)) {
+      rows[next++] = record.counts[k] ? r.torque[k] / weights_[i].torque : 0;
+      rows[next++] = record.settled[k] && !r.deflection.empty() ? r.deflection[k] / weights_[i].deflection : 0;
+    }
+  }
+  return rows;
+}
+
+Unknowns::Unknowns(const Machine& start) : start_(start), per_record_(start.rig.mesh.rigid ? 1 : 2) {}
+
+Eigen::VectorXd Unknowns::values() const {
+  Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    if (!start_.parameters[i].positive) p[Eigen::Index(i)] = start_.parameters[i].get(start_.rig);
+  for (std::size_t r = 0; r < records(); ++r) {
+    const Calibration& c = start_.calibrations[r];
+    p[first_of(r)] = start_.largest_delay * std::atanh(std::clamp(c.torque_delay / start_.largest_delay, -0.99, 0.99));
+    if (per_record_ > 1) p[first_of(r) + 1] = c.encoder_offset;
+  }
+  return p;
+}
+
+Eigen::VectorXd Unknowns::scale() const {
+  Eigen::VectorXd s = Eigen::VectorXd::Ones(size());
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    if (!start_.parameters[i].positive) s[Eigen::Index(i)] = start_.parameters[i].scale;
+  const double gap = start_.rig.mesh.backlash / start_.rig.mesh.lever();
+  for (std::size_t r = 0; r < records() && per_record_ > 1; ++r)
+    s[first_of(r) + 1] = gap > 0 ? gap : kDefaultGap;
+  return s;
+}
+
+Rig Unknowns::rig(const Eigen::VectorXd& values) const {
+  Rig rig = start_.rig;
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i) {
+    const FitParameter& p = start_.parameters[i];
+    const double value = values[Eigen::Index(i)];
+    if (p.positive && std::fabs(value) > std::log(kFarthest))
+      throw InvalidParameter(p.name, std::exp(value), "of its start: too far");
+    p.set(rig, p.positive ? p.get(start_.rig) * std::exp(value) : value);
+  }
+  return rig;
+}
+
+std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) const {
+  std::vector<Calibration> all = start_.calibrations;
+  for (std::size_t r = 0; r < records(); ++r) {
+    all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
+    if (per_record_ > 1) all[r].encoder_offset = values[first_of(r) + 1];
+  }
+  return all;
+}
+
+Machine Unknowns::machine(const Eigen::VectorXd& values) const {
+  Machine m = start_;
+  m.rig = rig(values);
+  m.calibrations = calibrations(values);
+  return m;
+}
+
+Measured Unknowns::parameter(const LeastSquaresFit& fit, std::size_t i) const {
+  Measured m = fit.parameter(Eigen::Index(i));
+  const FitParameter& p = start_.parameters[i];
+  if (!p.positive) return m;
+  m.value = p.get(start_.rig) * std::exp(m.value);
+  m.standard_error *= m.value;
+  return m;
+}
+
+std::map<std::string, Measured> Unknowns::parameters(const LeastSquaresFit& fit) const {
+  std::map<std::string, Measured> all;
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    all[start_.parameters[i].name] = parameter(fit, i);
+  return all;
+}
+
+MachineFit fit_machine(const Machine& start, const RecordSet& records, const std::vector<Finding>& findings,
+                       const NonlinearOptions& options) {
+  const Unknowns unknowns(start);
+  MachineFit out;
+  out.fit = fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, findings, p); },
+                          unknowns.values(), unknowns.scale(), options);
+  out.machine = unknowns.machine(out.fit.values);
+  return out;
+}
+
+void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records,
+                  const std::vector<Finding>& findings) {
+  const Unknowns unknowns(start);
+  const Eigen::Index known = Eigen::Index(findings.size()), rows = fit.fit.residuals.size() - known;
+  const Eigen::Index wanted = 2 * std::lround(kBlock / records.row_interval());
+  const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
+  widen_jacobian(fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, findings, p); },
+                 kWideStep * unknowns.scale(), true);
+  take_larger(fit.fit.covariance, block_covariance(fit.fit, block, known));
+}
+
+}  // namespace backlash

@@ -1,0 +1,96 @@
+// The unknowns of a machine fitted to several records together (output_error.h says what counts).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/least_squares.h"
+#include "backlash_diagnosis/identification/output_error.h"
+#include "fit_parameter.h"
+#include "servo_prediction.h"
+
+namespace backlash {
+
+/// A rig, what is unknown of it, and what belongs to each record.
+struct Machine {
+  Rig rig;
+  std::vector<FitParameter> parameters;
+  std::vector<Calibration> calibrations;
+  double largest_delay = 3;  // samples; approached, never reached
+};
+
+/// Standard deviation of either residual of one record [N m, rad].
+struct Weights {
+  double torque = 1, deflection = 1;
+};
+
+/// What is left of one channel of all records: root mean square in units of the noise floor.
+struct Leftover {
+  double torque = 0, deflection = 0;
+};
+
+/// Records made ready at one bandwidth, with the weights of their channels. One row per channel and as many
+/// samples as a signal of this bandwidth has independent values: of each record torque and deflection in turn.
+class RecordSet {
+ public:
+  RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback);
+
+  /// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
+  void weigh(const Machine& machine);
+  Leftover leftover(const Machine& machine) const;
+
+  Eigen::VectorXd rows(const Rig& rig, const std::vector<Calibration>& calibrations) const;
+
+  struct Row {
+    std::size_t record;
+    bool deflection;
+    double time;  // s from the start of the record
+  };
+  const std::vector<Row>& layout() const { return layout_; }
+  const std::vector<PreparedServo>& records() const { return records_; }
+  /// s, between the samples of one channel that make rows
+  double row_interval() const;
+
+ private:
+  std::vector<PreparedServo> records_;
+  std::vector<Weights> weights_;
+  std::vector<Row> layout_;
+};
+
+struct MachineFit {
+  Machine machine;
+  LeastSquaresFit fit;  // of the values of Unknowns(start)
+};
+
+/// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
+/// start), then delay and encoder offset of each record, as far as the rig knows them.
+class Unknowns {
+ public:
+  explicit Unknowns(const Machine& start);
+  Eigen::Index size() const { return Eigen::Index(start_.parameters.size() + per_record_ * records()); }
+  Eigen::VectorXd values() const;
+  Eigen::VectorXd scale() const;
+  /// Throws InvalidParameter for what is too far from the start or refused by the rig.
+  Rig rig(const Eigen::VectorXd& values) const;
+  std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
+  Machine machine(const Eigen::VectorXd& values) const;
+  std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const;
+  Measured parameter(const LeastSquaresFit& fit, std::size_t i) const;
+
+ private:
+  std::size_t records() const { return start_.calibrations.size(); }
+  Eigen::Index first_of(std::size_t record) const {
+    return Eigen::Index(start_.parameters.size() + per_record_ * record);
+  }
+  Machine start_;
+  std::size_t per_record_;
+};
+
+MachineFit fit_machine(const Machine& start, const RecordSet& records, const std::vector<Finding>& findings,
+                       const NonlinearOptions& options);
+
+/// Covariance of the fitted values from wide steps and from whole stretches of the records, the larger.
+void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records,
+                  const std::vector<Finding>& findings);
+
+}  // namespace backlash
