@@ -1,0 +1,236 @@
+#include "candidates.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kProbe = 0.02;    // of the typical strength, of the differences that the sensitivities are taken from
+constexpr double kTelling = 1e-3;  // of a column that is left after what the machine itself can explain
+
+double deviation(const std::vector<double>& x) {
+  double sum = 0, square = 0;
+  for (const double v : x) sum += v, square += v * v;
+  const double n = double(x.size()), mean = sum / n;
+  return std::sqrt(std::max(0.0, square / n - mean * mean));
+}
+
+/// All values that one term is tried with, without strength and phase.
+std::vector<ParameterValues> combinations(const TermType& type, const MotionRange& range, bool load_moves) {
+  std::vector<ParameterValues> all(1);
+  const auto extend = [&](const auto& options, const auto& set) {
+    std::vector<ParameterValues> longer;
+    for (const ParameterValues& values : all)
+      for (const auto& option : options) set(longer.emplace_back(values), option);
+    all = std::move(longer);
+  };
+  for (const ParameterSpec& spec : type.parameters) {
+    if (spec.choices.empty()) continue;
+    std::vector<std::string> words = spec.choices;
+    if (!load_moves && spec.name == "body") words = {"motor"};
+    extend(words, [&](ParameterValues& v, const std::string& word) { v.set_choice(spec.name, word); });
+  }
+  for (const TermShape& shape : type.search->shapes)
+    extend(shape.values(range), [&](ParameterValues& v, double value) { v[shape.name] = value; });
+  return all;
+}
+
+/// The directions in which a combination can change the residuals: one, or sine and cosine.
+std::vector<ParameterValues> probes(const TermType& type, const ParameterValues& shape, double strength) {
+  const TermSearch& search = *type.search;
+  std::vector<ParameterValues> all(search.phase.empty() ? 1 : 2, shape);
+  for (ParameterValues& p : all) p[search.strength] = strength;
+  if (all.size() == 1) return all;
+  all[0][search.phase] = 0;
+  all[1][search.phase] = M_PI / 2;
+  return all;
+}
+
+/// Residuals in units of what is left, without what the machine's own parameters can take up.
+class Remainder {
+ public:
+  Remainder(const MachineFit& fit, Eigen::Index rows)
+      : qr_((fit.fit.jacobian.topRows(rows) *
+             fit.fit.jacobian.colwise().norm().cwiseInverse().asDiagonal()).householderQr()),
+        columns_(fit.fit.jacobian.cols()),
+        left_(without(fit.fit.residuals.head(rows))) {}
+
+  Eigen::VectorXd without(const Eigen::VectorXd& column) const {
+    Eigen::VectorXd rotated = qr_.householderQ().transpose() * column;
+    rotated.head(columns_).setZero();
+    return qr_.householderQ() * rotated;
+  }
+  const Eigen::VectorXd& left() const { return left_; }
+
+ private:
+  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
+  Eigen::Index columns_;
+  Eigen::VectorXd left_;
+};
+
+struct Probed {
+  const TermType* type;
+  ParameterValues shape;
+  std::string group;        // kind and choices
+  double strength;          // of the probes
+  Eigen::MatrixXd columns;  // what is left of the sensitivities; none where the machine explains them itself
+};
+
+void probe(Probed& p, const MachineFit& fit, const RecordSet& records, const Remainder& remainder,
+           const Eigen::VectorXd& now) {
+  const std::vector<ParameterValues> all = probes(*p.type, p.shape, p.strength);
+  p.columns.resize(now.size(), Eigen::Index(all.size()));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    Rig rig = fit.machine.rig;
+    rig.terms.push_back(make_term(p.type->id, all[i]));
+    const Eigen::VectorXd change = records.rows(rig, fit.machine.calibrations) - now;
+    Eigen::VectorXd left = remainder.without(change);
+    if (left.norm() < kTelling * change.norm() || change.norm() == 0) left.setZero();
+    p.columns.col(Eigen::Index(i)) = left;
+  }
+}
+
+/// Least squares of -left on the columns; strengths in units of the probes.
+struct Explained {
+  Eigen::VectorXd factors;
+  double gain = 0;
+};
+
+Explained explain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& left) {
+  Explained e;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
+  qr.setThreshold(1e-6);
+  e.factors = qr.solve(-left);
+  e.gain = 1 - (left + columns * e.factors).norm() / left.norm();
+  return e;
+}
+
+/// Strength and phase from the factors of one term's probes; false where the strength cannot be negative.
+bool set_strength(const Probed& p, const double* factors, ParameterValues& values) {
+  const TermSearch& search = *p.type->search;
+  values = p.shape;
+  if (p.columns.cols() == 2) {
+    values[search.strength] = p.strength * std::hypot(factors[0], factors[1]);
+    values[search.phase] = std::atan2(factors[1], factors[0]);
+    return true;
+  }
+  values[search.strength] = p.strength * factors[0];
+  for (const ParameterSpec& spec : p.type->parameters)
+    if (spec.name == search.strength) return spec.range.contains(values.at(search.strength));
+  return false;
+}
+
+Candidate single(const Probed& p, const Remainder& remainder) {
+  Candidate c{p.type->id, {{}}, 0};
+  const Explained e = explain(p.columns, remainder.left());
+  if (set_strength(p, e.factors.data(), c.terms[0])) c.gain = e.gain;
+  return c;
+}
+
+Candidate pair(const Probed& a, const Probed& b, const Remainder& remainder) {
+  Candidate c{a.type->id, {{}, {}}, 0};
+  Eigen::MatrixXd both(a.columns.rows(), a.columns.cols() + b.columns.cols());
+  both << a.columns, b.columns;
+  const Explained e = explain(both, remainder.left());
+  if (set_strength(a, e.factors.data(), c.terms[0]) &&
+      set_strength(b, e.factors.data() + a.columns.cols(), c.terms[1]))
+    c.gain = e.gain;
+  return c;
+}
+
+void keep_better(std::map<std::string, Candidate>& best, const std::string& group, const Candidate& candidate) {
+  const auto [at, first] = best.try_emplace(group, candidate);
+  if (!first && candidate.gain > at->second.gain) at->second = candidate;
+}
+
+std::vector<Probed> all_probes(const Rig& rig, const MotionRange& range) {
+  std::vector<Probed> all;
+  const bool load = load_moves_freely(rig);
+  for (const TermType& type : term_types()) {
+    if (!type.search) continue;
+    const double strength = kProbe * type.search->typical(range);
+    for (const ParameterValues& shape : combinations(type, range, load)) {
+      std::string group = type.id;
+      for (const ParameterSpec& spec : type.parameters)
+        if (!spec.choices.empty()) group += " " + shape.choice(spec.name);
+      all.push_back({&type, shape, group, strength, {}});
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+MotionRange motion_range(const std::vector<ServoData>& records) {
+  MotionRange range;
+  range.from = INFINITY, range.to = -INFINITY;
+  for (const ServoData& d : records) {
+    range.torque = std::max(range.torque, deviation(d.torque));
+    range.speed = std::max(range.speed, deviation(d.motor_rate));
+    std::vector<double> deflection(d.load.size());
+    for (std::size_t k = 0; k < d.load.size(); ++k) deflection[k] = d.motor[k] - d.load[k];
+    if (!deflection.empty()) range.deflection = std::max(range.deflection, deviation(deflection));
+    const auto [low, high] = std::minmax_element(d.motor.begin(), d.motor.end());
+    range.from = std::min(range.from, *low);
+    range.to = std::max(range.to, *high);
+    range.duration = std::max(range.duration, double(d.size()) * d.interval);
+    range.interval = d.interval;
+  }
+  if (range.deflection == 0) range.deflection = 0.01 * (range.to - range.from);
+  return range;
+}
+
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range) {
+  const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
+  const Remainder remainder(fit, now.size());
+  std::vector<Probed> all = all_probes(fit.machine.rig, range);
+  for_each_in_parallel(int(all.size()), [&](int i) {
+    try {
+      probe(all[i], fit, records, remainder, now);
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error&) {  // a load that runs away with it: no candidate
+      all[i].columns.setZero(now.size(), 1);
+    }
+  });
+  std::map<std::string, Candidate> best;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    keep_better(best, all[i].group, single(all[i], remainder));
+    if (!all[i].type->search->pairs) continue;
+    for (std::size_t j = 0; j < i; ++j)
+      if (all[j].group == all[i].group) keep_better(best, all[i].group + " pair", pair(all[j], all[i], remainder));
+  }
+  std::vector<Candidate> sorted;
+  for (const auto& [group, candidate] : best)
+    if (candidate.gain > 0) sorted.push_back(candidate);
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  return sorted;
+}
+
+Machine with_candidate(Machine machine, const Candidate& candidate, const MotionRange& range) {
+  const TermSearch& search = *term_type(candidate.id).search;
+  for (const ParameterValues& values : candidate.terms) {
+    const std::size_t place = machine.rig.terms.size();
+    machine.rig.terms.push_back(make_term(candidate.id, values));
+    const auto fit = [&](const std::string& name, double scale) {
+      machine.parameters.push_back(term_parameter(place, name, machine.rig, scale));
+    };
+    fit(search.strength, search.typical(range));
+    if (!search.phase.empty()) fit(search.phase, 1);
+    for (const TermShape& shape : search.shapes) {
+      if (!shape.refined) continue;
+      const std::vector<double> grid = shape.values(range);
+      fit(shape.name, grid.size() > 1 ? std::fabs(grid[1] - grid[0]) : 1);
+    }
+  }
+  return machine;
+}
+
+}  // namespace backlash

@@ -1,0 +1,29 @@
+// What the search tries: terms of the registry with values, and how much each would explain.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "../joint_fit.h"
+#include "backlash_diagnosis/model/term.h"
+
+namespace backlash {
+
+/// One or two terms of the same kind, with a start for what is fitted.
+struct Candidate {
+  std::string id;
+  std::vector<ParameterValues> terms;
+  double gain = 0;  // predicted: relative decrease of the norm of all residuals
+};
+
+/// The best candidate of each kind and choice, best first. `fit` is the machine as it is fitted now, with the
+/// sensitivities of its residuals; whatever those explain no candidate gets credit for.
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range);
+
+/// The machine with this candidate's terms, whose strengths, phases and refined shapes are fitted as well.
+Machine with_candidate(Machine machine, const Candidate& candidate, const MotionRange& range);
+
+/// Of all records together.
+MotionRange motion_range(const std::vector<ServoData>& records);
+
+}  // namespace backlash
