@@ -1,7 +1,9 @@
 // Teeth that get stiffer, or softer (A < 0), the farther they are pressed together:
 //   added flank torque = A (d / D)^e        A [N m] at the penetration D, d penetration, both [rad at the
-// load], D > 0; that is h d^e with h = A / D^e. A flank never pulls, whatever A. Conservative. e = 3 is the
-// cubic stiffness of Tuttle and Seering (1996, IEEE Trans. Robot. Autom. 12:368), e = 2 its even neighbour.
+// load], D > 0; that is h d^e with h = A / D^e. Softening takes at most half of what the flank bears without
+// it: teeth that gave way altogether would let each other through. Conservative beside a law that is. e = 3
+// is the cubic stiffness of Tuttle and Seering (1996, IEEE Trans. Robot. Autom. 12:368), e = 2 an even one.
+#include <algorithm>
 #include <cmath>
 
 #include "terms.h"
@@ -16,7 +18,8 @@ class MeshHardening : public Term {
       : torque_(torque), penetration_(penetration), exponent_(exponent) {}
   bool loads_flanks() const override { return true; }
   void load_flank(const FlankLoad& load, double& torque) const override {
-    torque += torque_ * std::pow(load.penetration / penetration_, exponent_);
+    const double added = torque_ * std::pow(load.penetration / penetration_, exponent_);
+    torque += std::max(added, -0.5 * std::max(0.0, torque));
   }
 
  private:
