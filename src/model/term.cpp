@@ -9,10 +9,25 @@
 namespace backlash {
 
 const std::vector<TermType>& term_types() {
-  static const std::vector<TermType> types = {
-      backlash_map_term(),           eccentricity_term(),       gravity_term(),
-      radial_compliance_term(),      transmission_error_term(), varying_backlash_term(),
-      varying_reduction_ratio_term()};
+  static const std::vector<TermType> types = {asymmetric_coulomb_term(),
+                                              asymmetric_viscous_term(),
+                                              backlash_term(),
+                                              backlash_map_term(),
+                                              cogging_term(),
+                                              eccentricity_term(),
+                                              friction_drift_term(),
+                                              gravity_term(),
+                                              learned_map_term(),
+                                              load_dependent_friction_term(),
+                                              local_fault_term(),
+                                              mesh_hardening_term(),
+                                              position_dependent_friction_term(),
+                                              quadratic_drag_term(),
+                                              radial_compliance_term(),
+                                              stribeck_term(),
+                                              transmission_error_term(),
+                                              varying_backlash_term(),
+                                              varying_reduction_ratio_term()};
   return types;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "terms.h"
+#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -26,7 +27,8 @@ TermType gravity_term() {
           {{"amplitude", "N m", Range::not_negative(), "A"}, {"phase", "rad", Range::any(), "p"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<Gravity>(p.at("amplitude"), p.at("phase"));
-          }};
+          },
+          TermSearch{"amplitude", "phase", clear_torque, {}}};
 }
 
 }  // namespace backlash

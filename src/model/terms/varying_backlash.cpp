@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "terms.h"
+#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -32,7 +33,8 @@ TermType varying_backlash_term() {
            {"phase", "rad", Range::any(), "p"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<VaryingBacklash>(p.at("amplitude"), p.at("order"), p.at("phase"));
-          }};
+          },
+          TermSearch{"amplitude", "phase", [](const MotionRange&) { return 0.1; }, {orders<12>()}}};
 }
 
 }  // namespace backlash

@@ -4,7 +4,11 @@
 // a [1/(N m)]. Equal tooth counts keep the mean ratio, so over whole turns no gear can do this; over the
 // travel of a sector it tells a residual that is proportional to travel and torque. Valid while
 // |a q_P| times the mesh stiffness [N m/rad] is below 1, and not conservative.
+#include <algorithm>
+#include <cmath>
+
 #include "terms.h"
+#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -23,6 +27,12 @@ class VaryingReductionRatio : public Term {
   double change_;
 };
 
+/// Moves the flanks by a share of the deflection where the torque is large and the motor far out.
+double clear_change(const MotionRange& range) {
+  const double reach = std::max(std::fabs(range.from), std::fabs(range.to));
+  return clear_angle(range) / (range.torque * std::max(reach, range.deflection));
+}
+
 }  // namespace
 
 TermType varying_reduction_ratio_term() {
@@ -30,7 +40,8 @@ TermType varying_reduction_ratio_term() {
           {{"change", "1/(N m)", Range::any(), "a, relative change of the ratio per torque"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<VaryingReductionRatio>(p.at("change"));
-          }};
+          },
+          TermSearch{"change", "", clear_change, {}}};
 }
 
 }  // namespace backlash

@@ -1,0 +1,39 @@
+// Cogging: teeth of the motor's stator pull at its magnets,
+//   motor torque = -A sin(n q + p)        A [N m], q = motor position at the load side, n periods per turn of
+// it, hence periods per motor turn times the reduction ratio. Conservative. Holtz and Springob (1996, IEEE
+// Trans. Ind. Electron. 43) give the cause and the harmonics.
+#include <cmath>
+
+#include "terms.h"
+#include "tries.h"
+
+namespace backlash {
+namespace {
+
+class Cogging : public Term {
+ public:
+  Cogging(double amplitude, double order, double phase)
+      : amplitude_(amplitude), order_(order), phase_(phase) {}
+  bool moves_load() const override { return false; }
+  void add(const Motion& motion, EndTorques& torques) const override {
+    torques.motor -= amplitude_ * std::sin(order_ * motion.motor_position + phase_);
+  }
+
+ private:
+  double amplitude_, order_, phase_;
+};
+
+}  // namespace
+
+TermType cogging_term() {
+  return {"cogging",
+          {{"amplitude", "N m", Range::any(), "A, at the load side"},
+           {"order", "1/rad", Range::positive(), "n, periods per turn of the motor position"},
+           {"phase", "rad", Range::any(), "p"}},
+          [](const ParameterValues& p) -> std::unique_ptr<Term> {
+            return std::make_unique<Cogging>(p.at("amplitude"), p.at("order"), p.at("phase"));
+          },
+          TermSearch{"amplitude", "phase", clear_torque, {orders<80>()}}};
+}
+
+}  // namespace backlash
