@@ -12,7 +12,9 @@ const std::vector<TermType>& term_types() {
   static const std::vector<TermType> types = {
       backlash_map_term(),           eccentricity_term(),       gravity_term(),
       radial_compliance_term(),      transmission_error_term(), varying_backlash_term(),
-      varying_reduction_ratio_term()};
+      varying_reduction_ratio_term(),
+      encoder_scale_term(),
+      delay_term()};
   return types;
 }
 
@@ -54,6 +56,12 @@ std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValu
     }
   }
   return created(type, values);
+}
+
+Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms) {
+  Sensing sum;
+  for (const auto& term : terms) term->sense(sum);
+  return sum;
 }
 
 std::shared_ptr<const Term> read_term(const YamlReader& yaml) {

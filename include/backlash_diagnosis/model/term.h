@@ -148,6 +148,9 @@ const std::vector<TermType>& term_types();
 /// for values out of range and for such as do not go together.
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values);
 
+/// What all of them together make of the machine's own values.
+Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms);
+
 /// Reads one entry of `terms:`: `id: ID` and that term's parameters.
 std::shared_ptr<const Term> read_term(const YamlReader& yaml);
 

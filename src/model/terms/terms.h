@@ -6,7 +6,9 @@
 namespace backlash {
 
 TermType backlash_map_term();
+TermType delay_term();
 TermType eccentricity_term();
+TermType encoder_scale_term();
 TermType gravity_term();
 TermType radial_compliance_term();
 TermType transmission_error_term();
