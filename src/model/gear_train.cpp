@@ -45,7 +45,8 @@ GearTrain::GearTrain(const Rig& rig)
       torque_constant_(rig.torque_constant),
       contact_(rig.mesh.contact),
       variation_(rig.mesh.variation),
-      terms_(rig.terms) {
+      terms_(rig.terms),
+      load_gain_(sensing(rig.terms).load_position_gain) {
   if (rig.mesh.rigid)
     contact_ = nullptr;
   else if (!contact_)
@@ -332,8 +333,8 @@ Observation GearTrain::observe(const double* state, AppliedTorque applied, doubl
   o.sensor_torque = input_.rigid ? none : (spring(input_, twist) + sensed_damping_ * twist_rate) / ratio_;
   o.sensor_twist = input_.rigid ? none : twist * ratio_;
   o.sensor_twist_rate = input_.rigid ? none : twist_rate * ratio_;
-  o.load_position = s.q[kLink];
-  o.load_velocity = s.w[kLink];
+  o.load_position = load_gain_ * s.q[kLink];
+  o.load_velocity = load_gain_ * s.w[kLink];
   o.load_torque = output_.rigid ? none : spring(output_, s.q[kGear] - s.q[kLink]);
   o.motor_current = applied.motor / torque_constant_;
   double rate[kMaxStates];

@@ -14,7 +14,9 @@ const std::vector<TermType>& term_types() {
                                               backlash_term(),
                                               backlash_map_term(),
                                               cogging_term(),
+                                              delay_term(),
                                               eccentricity_term(),
+                                              encoder_scale_term(),
                                               friction_drift_term(),
                                               gravity_term(),
                                               learned_map_term(),
@@ -57,12 +59,6 @@ void check_choice(const ParameterSpec& spec, const std::string& value) {
 
 }  // namespace
 
-Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms) {
-  Sensing sum;
-  for (const auto& term : terms) term->sense(sum);
-  return sum;
-}
-
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values) {
   const TermType& type = term_type(id);
   for (const ParameterSpec& spec : type.parameters) {
@@ -75,6 +71,12 @@ std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValu
     }
   }
   return created(type, values);
+}
+
+Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms) {
+  Sensing sum;
+  for (const auto& term : terms) term->sense(sum);
+  return sum;
 }
 
 std::shared_ptr<const Term> read_term(const YamlReader& yaml) {

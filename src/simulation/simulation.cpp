@@ -1,10 +1,21 @@
 #include "backlash_diagnosis/simulation/simulation.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 
 namespace backlash {
+namespace {
+
+/// `machine` as it would be seen beside the torque of `drive`.
+Observation driven(Observation machine, const Observation& drive) {
+  machine.motor_torque = drive.motor_torque;
+  machine.motor_current = drive.motor_current;
+  return machine;
+}
+
+}  // namespace
 
 SimulationSettings read_simulation_settings(const YamlReader& yaml) {
   SimulationSettings settings;
@@ -17,18 +28,42 @@ SimulationSettings read_simulation_settings(const YamlReader& yaml) {
 Simulation::Simulation(const Rig& rig, const SimulationSettings& settings)
     : plant_(rig, settings.excitation, settings.solver),
       sensors_(settings.sensors),
-      rate_(settings.sensors.sampling_rate) {}
+      rate_(settings.sensors.sampling_rate),
+      delay_(sensing(rig.terms).torque_delay),
+      late_samples_(static_cast<long>(std::ceil(std::fabs(delay_) * rate_))),
+      after_sample_(std::max(0.0, late_samples_ / rate_ - std::fabs(delay_))) {
+  forget();
+}
+
+void Simulation::forget() {
+  past_.assign(late_samples_, plant_.gear_train().observe(plant_.state().data(), AppliedTorque()));
+}
+
+/// Moves on to the next sample, by way of the moment that a later one shows.
+Observation Simulation::observe() {
+  if (late_samples_ > 0 && index_ > 0) {
+    plant_.advance_to((index_ - 1) / rate_ + after_sample_);
+    past_.push_back(plant_.observe());
+  }
+  plant_.advance_to(index_ / rate_);
+  const Observation now = plant_.observe();
+  if (late_samples_ == 0) return now;
+  const Observation before = past_.front();
+  past_.pop_front();
+  return delay_ > 0 ? driven(before, now) : driven(now, before);
+}
 
 Observation Simulation::step() {
-  plant_.advance_to(index_ / rate_);
+  const Observation exact = observe();
   ++index_;
-  return sensors_.measure(plant_.observe());
+  return sensors_.measure(exact);
 }
 
 void Simulation::reset() {
   plant_.reset();
   sensors_.reset();
   index_ = 0;
+  forget();
 }
 
 Record simulate_record(const Rig& rig, const SimulationSettings& settings, double duration, const Progress& progress) {

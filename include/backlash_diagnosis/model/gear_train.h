@@ -33,7 +33,7 @@ struct Observation {
   // says so; NaN if rigid
   double sensor_torque;
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
-  double load_position, load_velocity;
+  double load_position, load_velocity;  // as a load encoder of wrong scale shows them (Sensing)
   double load_torque;  // N m, spring torque of the output coupling; NaN if rigid
   double
       motor_current;  // A, motor_torque / torque constant: an ideal current control; NaN without the constant
@@ -176,6 +176,7 @@ class GearTrain {
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;
+  double load_gain_;  // -, of the load encoder
   static constexpr int kFixed = -1;
 };
 

@@ -131,9 +131,6 @@ struct TermSearch {
   bool pairs = false;  // also two of it with different values of its one shape
 };
 
-/// What all terms together make of the sensors.
-Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms);
-
 /// What the registry knows of a term: its id in the rig file, its parameters, how it is made.
 struct TermType {
   std::string id;
@@ -151,6 +148,9 @@ const std::vector<TermType>& term_types();
 /// One term from its values, which must be all that its type names. Throws InvalidParameter for another id,
 /// for values out of range and for such as do not go together.
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values);
+
+/// What all of them together make of the machine's own values.
+Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms);
 
 /// Reads one entry of `terms:`: `id: ID` and that term's parameters.
 std::shared_ptr<const Term> read_term(const YamlReader& yaml);

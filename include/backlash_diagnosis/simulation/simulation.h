@@ -1,5 +1,11 @@
 // A rig under test: plant, sensors and sampling clock. The simulator node and the command `simulate` step this.
+//
+// Where the torque acts later than its stamp says (Sensing::torque_delay d > 0), a sample of time t holds the torque of t
+// and all else as it was at t - d; where it acts earlier, the torque of t - |d| and all else of t. Both moments are
+// simulated, not interpolated. Before time 0 the rig was at rest without torque.
 #pragma once
+
+#include <deque>
 
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/record/record.h"
@@ -34,9 +40,16 @@ class Simulation {
   void reset();
 
  private:
+  Observation observe();
+  void forget();
+
   Plant plant_;
   SensorModel sensors_;
   double rate_;
+  double delay_;                 // s, Sensing::torque_delay
+  long late_samples_;            // |delay| is so many samples
+  double after_sample_;          // s, less this
+  std::deque<Observation> past_;  // the next late_samples_ as they were |delay| before their stamps
   long index_ = 0;
 };
 
