@@ -16,7 +16,7 @@ constexpr double kBlock = 1;         // s: the slowest oscillation that a servo 
 constexpr double kDefaultGap = 1e-4; // rad, scale of an encoder offset where the rig has no gap
 
 std::size_t stride(const PreparedServo& record) {
-  return std::max(1L, std::lround(0.4 / (record.cutoff * record.data.interval)));
+  return std::max(1L, std::lround(0.4 / (record.cutoff * record.data().interval)));
 }
 
 double rms(const std::vector<double>& values, const std::vector<char>& counts) {
@@ -64,7 +64,7 @@ RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double f
 }
 
 double RecordSet::row_interval() const {
-  return double(stride(records_[0])) * records_[0].data.interval;
+  return double(stride(records_[0])) * records_[0].data().interval;
 }
 
 void RecordSet::weigh(const Machine& machine) {
@@ -72,7 +72,7 @@ void RecordSet::weigh(const Machine& machine) {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data, r.load.load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), r.load.load, record.cutoff, record.feedback);
     weights_[i] = {std::max(floor.torque, rms(r.torque, record.counts)),
                    std::max(floor.deflection, rms(r.deflection, record.settled))};
   }
@@ -84,7 +84,7 @@ Leftover RecordSet::leftover(const Machine& machine) const {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data, r.load.load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), r.load.load, record.cutoff, record.feedback);
     sum.torque += std::pow(rms(r.torque, record.counts) / floor.torque, 2);
     if (!r.deflection.empty())
       sum.deflection += std::pow(rms(r.deflection, record.settled) / floor.deflection, 2);
@@ -98,7 +98,7 @@ Eigen::VectorXd RecordSet::rows(const Rig& rig, const std::vector<Calibration>& 
   for (std::size_t i = 0; i < records_.size(); ++i) {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(rig, calibrations[i]);
-    for (std::size_t k = 0; k < record.data.size(); k += stride(record)) {
+    for (std::size_t k = 0; k < record.data().size(); k += stride(record)) {
       rows[next++] = record.counts[k] ? r.torque[k] / weights_[i].torque : 0;
       rows[next++] = record.settled[k] && !r.deflection.empty() ? r.deflection[k] / weights_[i].deflection : 0;
     }
@@ -106,7 +106,11 @@ Eigen::VectorXd RecordSet::rows(const Rig& rig, const std::vector<Calibration>& 
   return rows;
 }
 
-Unknowns::Unknowns(const Machine& start) : start_(start), per_record_(start.rig.mesh.rigid ? 1 : 2) {}
+Unknowns::Unknowns(const Machine& start)
+    : start_(start),
+      delays_(start.largest_delay > 0),
+      offsets_(!start.rig.mesh.rigid),
+      per_record_(std::size_t(delays_) + std::size_t(offsets_)) {}
 
 Eigen::VectorXd Unknowns::values() const {
   Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
@@ -114,8 +118,10 @@ Eigen::VectorXd Unknowns::values() const {
     if (!start_.parameters[i].positive) p[Eigen::Index(i)] = start_.parameters[i].get(start_.rig);
   for (std::size_t r = 0; r < records(); ++r) {
     const Calibration& c = start_.calibrations[r];
-    p[first_of(r)] = start_.largest_delay * std::atanh(std::clamp(c.torque_delay / start_.largest_delay, -0.99, 0.99));
-    if (per_record_ > 1) p[first_of(r) + 1] = c.encoder_offset;
+    if (delays_)
+      p[first_of(r)] =
+          start_.largest_delay * std::atanh(std::clamp(c.torque_delay / start_.largest_delay, -0.99, 0.99));
+    if (offsets_) p[first_of(r) + delays_] = c.encoder_offset;
   }
   return p;
 }
@@ -125,8 +131,8 @@ Eigen::VectorXd Unknowns::scale() const {
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (!start_.parameters[i].positive) s[Eigen::Index(i)] = start_.parameters[i].scale;
   const double gap = start_.rig.mesh.backlash / start_.rig.mesh.lever();
-  for (std::size_t r = 0; r < records() && per_record_ > 1; ++r)
-    s[first_of(r) + 1] = gap > 0 ? gap : kDefaultGap;
+  for (std::size_t r = 0; r < records() && offsets_; ++r)
+    s[first_of(r) + delays_] = gap > 0 ? gap : kDefaultGap;
   return s;
 }
 
@@ -145,8 +151,9 @@ Rig Unknowns::rig(const Eigen::VectorXd& values) const {
 std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) const {
   std::vector<Calibration> all = start_.calibrations;
   for (std::size_t r = 0; r < records(); ++r) {
-    all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
-    if (per_record_ > 1) all[r].encoder_offset = values[first_of(r) + 1];
+    if (delays_)
+      all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
+    if (offsets_) all[r].encoder_offset = values[first_of(r) + delays_];
   }
   return all;
 }

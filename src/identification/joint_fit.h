@@ -16,7 +16,7 @@ struct Machine {
   Rig rig;
   std::vector<FitParameter> parameters;
   std::vector<Calibration> calibrations;
-  double largest_delay = 3;  // samples; approached, never reached
+  double largest_delay = 3;  // samples; approached, never reached; 0: delays are not fitted
 };
 
 /// Standard deviation of either residual of one record [N m, rad].
@@ -63,7 +63,7 @@ struct MachineFit {
 };
 
 /// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
-/// start), then delay and encoder offset of each record, as far as the rig knows them.
+/// start), then delay and encoder offset of each record, as far as they are unknown.
 class Unknowns {
  public:
   explicit Unknowns(const Machine& start);
@@ -83,6 +83,7 @@ class Unknowns {
     return Eigen::Index(start_.parameters.size() + per_record_ * record);
   }
   Machine start_;
+  bool delays_, offsets_;
   std::size_t per_record_;
 };
 

@@ -72,11 +72,11 @@ ChannelError relative(const std::vector<double>& measured, const std::vector<dou
 }  // namespace
 
 PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, double load_feedback)
-    : data(servo), cutoff(low_pass_cutoff), feedback(load_feedback), direction(sliding(servo)) {
-  torque_of_moment_ = over_second_difference(data.torque);
-  torque_held_ = held_over_second_difference(data.torque);
-  const long n = static_cast<long>(data.size()), ends = std::lround(kEnds / (cutoff * data.interval));
-  const long begin = std::max(ends, std::lround(kStarts / (feedback * data.interval)));
+    : cutoff(low_pass_cutoff), feedback(load_feedback), direction(sliding(servo)), data_(&servo) {
+  torque_of_moment_ = over_second_difference(servo.torque);
+  torque_held_ = held_over_second_difference(servo.torque);
+  const long n = static_cast<long>(servo.size()), ends = std::lround(kEnds / (cutoff * servo.interval));
+  const long begin = std::max(ends, std::lround(kStarts / (feedback * servo.interval)));
   counts.assign(n, 0);
   settled.assign(n, 0);
   for (long k = begin; k < n - ends; ++k) {
@@ -86,28 +86,28 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
 }
 
 std::vector<double> PreparedServo::acting_torque(const Rig& rig, const Calibration& calibration) const {
-  const double delay = calibration.torque_delay + sensing(rig.terms).torque_delay / data.interval;
+  const double delay = calibration.torque_delay + sensing(rig.terms).torque_delay / data().interval;
   return delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
 }
 
 DrivenLoad PreparedServo::simulate(const Rig& rig, const Calibration& calibration) const {
   RecordedMotion motion;
-  motion.interval = data.interval;
-  motion.motor = &data.motor;
-  motion.motor_rate = &data.motor_rate;
-  if (!rig.terms.empty()) motion.motor_torque = &data.torque;
+  motion.interval = data().interval;
+  motion.motor = &data().motor;
+  motion.motor_rate = &data().motor_rate;
+  if (!rig.terms.empty()) motion.motor_torque = &data().torque;
   std::vector<double> changed;
   if (load_moves_freely(rig)) {
     const double gain = sensing(rig.terms).load_position_gain;
-    motion.load_rate = &data.load_rate;
-    motion.first_load = (data.first_load - calibration.encoder_offset) / gain;
-    motion.first_load_rate = data.first_load_rate / gain;
+    motion.load_rate = &data().load_rate;
+    motion.first_load = (data().first_load - calibration.encoder_offset) / gain;
+    motion.first_load_rate = data().first_load_rate / gain;
     if (gain == 1) return simulate_driven_load(rig, motion, feedback);
-    changed = data.load_rate;
+    changed = data().load_rate;
     for (double& rate : changed) rate /= gain;
     motion.load_rate = &changed;
   } else if (calibration.encoder_offset != 0) {
-    changed = data.motor;
+    changed = data().motor;
     for (double& position : changed) position += calibration.encoder_offset;
     motion.motor = &changed;
   }
@@ -119,21 +119,21 @@ ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calib
   r.load = simulate(rig, calibration);
   const double inertia = GearTrain(rig).motor_inertia();
   r.torque = acting_torque(rig, calibration);
-  for (std::size_t k = 0; k < data.size(); ++k) {
+  for (std::size_t k = 0; k < data().size(); ++k) {
     const FrictionLimits& f = r.load.motor_friction[k];
     const double friction = direction[k] > 0 ? f.forward : -f.backward;
     if (direction[k] == 0)
       r.torque[k] = 0;  // friction takes what balances
     else
-      r.torque[k] -= inertia * data.motor_acceleration[k] - r.load.motor_mean[k] + friction;
+      r.torque[k] -= inertia * data().motor_acceleration[k] - r.load.motor_mean[k] + friction;
   }
-  r.torque = low_pass(r.torque, data.interval, cutoff);
+  r.torque = low_pass(r.torque, data().interval, cutoff);
   if (!load_moves_freely(rig)) return r;
   const double gain = sensing(rig.terms).load_position_gain;
-  r.deflection.resize(data.size());
-  for (std::size_t k = 0; k < data.size(); ++k)
-    r.deflection[k] = gain * r.load.load[k] + calibration.encoder_offset - data.load[k];
-  r.deflection = low_pass(r.deflection, data.interval, cutoff);
+  r.deflection.resize(data().size());
+  for (std::size_t k = 0; k < data().size(); ++k)
+    r.deflection[k] = gain * r.load.load[k] + calibration.encoder_offset - data().load[k];
+  r.deflection = low_pass(r.deflection, data().interval, cutoff);
   return r;
 }
 

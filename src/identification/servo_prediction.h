@@ -22,7 +22,7 @@ struct PreparedServo {
   /// Safe to call from several threads.
   ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
 
-  const ServoData& data;  // of the caller
+  const ServoData& data() const { return *data_; }
   double cutoff, feedback;
   std::vector<int> direction;  // +1, -1: the motor slides that way; 0: dry friction may take any value
   std::vector<char> settled;   // away from the ends of the record
@@ -31,6 +31,7 @@ struct PreparedServo {
  private:
   DrivenLoad simulate(const Rig& rig, const Calibration& calibration) const;
 
+  const ServoData* data_;  // of the caller
   std::vector<double> torque_of_moment_, torque_held_;
 };
 

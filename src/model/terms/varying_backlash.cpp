@@ -34,7 +34,7 @@ TermType varying_backlash_term() {
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<VaryingBacklash>(p.at("amplitude"), p.at("order"), p.at("phase"));
           },
-          TermSearch{"amplitude", "phase", [](const MotionRange&) { return 0.1; }, {orders<12>()}}};
+          TermSearch{"amplitude", "phase", [](const MotionRange&) { return 0.1; }, {orders<12>()}, true}};
 }
 
 }  // namespace backlash

@@ -1,0 +1,279 @@
+#include "search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kRoughCutoff = 15;       // Hz, of the first round: what moves slowly has fewer wrong minima
+constexpr double kRoughTolerance = 1e-3;
+constexpr double kFineTolerance = 1e-5;
+constexpr int kIterations = 12;
+constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more is an effect
+constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
+constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
+constexpr double kNearFloor = 2;          // times the floor: what is left is mostly noise
+constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
+constexpr double kWorthTrying = 0.2;      // of the best predicted gain
+constexpr double kAlike = 0.8;            // of the best gain: another name for the same
+constexpr double kMostBlocks = 0.6;       // of the blocks must get better
+constexpr int kOtherStarts = 4;
+constexpr double kBeside = 0.4;           // of the logarithm of a parameter
+constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum
+
+/// Of both channels.
+double size(const Leftover& left) {
+  return std::hypot(left.torque, left.deflection);
+}
+
+NonlinearOptions options(double tolerance) {
+  NonlinearOptions o;
+  o.iterations = kIterations;
+  o.tolerance = tolerance;
+  o.parallel = true;
+  return o;
+}
+
+/// Another start not far away, the same for the same number.
+Machine beside(Machine machine, int number) {
+  std::mt19937 random(static_cast<unsigned>(number));
+  for (const FitParameter& p : machine.parameters) {
+    const double share = double(random()) / double(std::mt19937::max());
+    if (p.positive) p.set(machine.rig, p.get(machine.rig) * std::exp(kBeside * (2 * share - 1)));
+  }
+  return machine;
+}
+
+/// What acts a good part of a sample earlier than a held torque is not held.
+void tell_held(Machine& machine) {
+  for (Calibration& c : machine.calibrations) {
+    if (c.held && c.torque_delay < -kUnheld) {
+      c.held = false;
+      c.torque_delay += 0.5;
+    }
+  }
+}
+
+void limit_delay(Machine& machine) {
+  machine.largest_delay = kLargestDelay;
+  for (Calibration& c : machine.calibrations)
+    c.torque_delay = std::clamp(c.torque_delay, -0.9 * kLargestDelay, 0.9 * kLargestDelay);
+}
+
+}  // namespace
+
+Search::Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff,
+               const TraceSettings& settings, const Progress& progress)
+    : data_(train), cutoff_(cutoff), settings_(settings), progress_(progress), range_(motion_range(train)) {
+  declared_.rig = declared;
+  declared_.calibrations.resize(train.size());
+  for (const std::string& name : parameter_names())
+    declared_.parameters.push_back(machine_parameter(name, declared));
+}
+
+void Search::report(const std::string& phase) const {
+  const double share = (double(effects_.size()) + (stage_ ? 1 : 0)) / double(settings_.most_effects + 1);
+  if (progress_ && !progress_(std::min(1.0, share), phase)) throw Cancelled();
+}
+
+/// All that the rig declares and such records can tell.
+std::vector<std::string> Search::parameter_names() const {
+  const Rig& rig = declared_.rig;
+  std::vector<std::string> names;
+  for (const RigParameter& p : servo_parameters()) {
+    const bool of_mesh = p.name.find("mesh") == 0 || p.name == "backlash_angle";
+    if (p.name == "start_in_gap" || (of_mesh && rig.mesh.rigid)) continue;
+    if (p.name.find("load") == 0 && !load_moves_freely(rig)) continue;
+    if (of_mesh && p.name != "backlash_angle") {
+      const std::string key = p.name.substr(5);
+      if (!rig.mesh.contact_spec.values.has(key)) continue;
+    }
+    if (p.get(rig) != 0) names.push_back(p.name);
+  }
+  return names;
+}
+
+Machine Search::with_effects(const std::vector<Accepted>& effects) const {
+  Machine machine = stage_ ? stage_->fit.machine : base_->fit.machine;
+  machine.rig.terms = declared_.rig.terms;
+  machine.parameters = declared_.parameters;
+  machine.largest_delay = kLargestDelay;
+  for (const Accepted& effect : effects) machine = with_candidate(machine, effect.candidate, range_);
+  return machine;
+}
+
+Stage Search::fit_stage(Machine start, double cutoff, double tolerance) const {
+  RecordSet records(data_, std::min(cutoff, cutoff_), kLoadFeedback);
+  records.weigh(start);
+  MachineFit fit = fit_machine(start, records, {}, options(tolerance));
+  const Leftover left = records.leftover(fit.machine);
+  return {std::move(fit), std::move(start), std::move(records), left};
+}
+
+/// Other starts are tried until two end alike: then that is the minimum, and what is left the machine has and
+/// the rig has not.
+Stage Search::rough_base() const {
+  std::optional<Stage> best;
+  for (int i = 0; i <= kOtherStarts; ++i) {
+    report("fit of the declared machine");
+    try {
+      Stage other = fit_stage(i == 0 ? declared_ : beside(declared_, i), kRoughCutoff, kRoughTolerance);
+      const double least = best ? size(best->leftover) : INFINITY, left = size(other.leftover);
+      if (left < least) best = std::move(other);
+      if (left < kNearFloor || std::fabs(left / least - 1) < kSame) break;
+    } catch (const CannotIdentify&) {
+      if (i == kOtherStarts && !best) throw;
+    }
+  }
+  return std::move(*best);
+}
+
+void Search::fit_base() {
+  Machine machine = rough_base().fit.machine;
+  tell_held(machine);
+  machine = fit_stage(machine, cutoff_, kRoughTolerance).fit.machine;
+  tell_held(machine);
+  limit_delay(machine);
+  base_ = fit_stage(machine, cutoff_, kRoughTolerance);
+  base_ = fit_stage(base_->fit.machine, cutoff_, kFineTolerance);
+  stage_ = base_;
+}
+
+/// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
+std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
+  Trial trial{candidate, with_candidate(stage_->fit.machine, candidate, range_), {}, 0};
+  if (sensing({trial.start.rig.terms.back()}).torque_delay != 0) {  // then calibration is part of the effect
+    trial.start.largest_delay = 0;
+    for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
+  }
+  try {
+    trial.fit = fit_machine(trial.start, stage_->records, {}, options(kRoughTolerance));
+    trial.start = trial.fit.machine;
+    trial.fit = fit_machine(trial.start, stage_->records, {}, options(kFineTolerance));
+  } catch (const CannotIdentify&) {
+    return std::nullopt;
+  }
+  trial.misfit = trial.fit.fit.residuals.norm();
+  const auto& terms = trial.fit.machine.rig.terms;
+  for (std::size_t i = 0; i < candidate.terms.size(); ++i)
+    trial.candidate.terms[i] = terms[terms.size() - candidate.terms.size() + i]->values;
+  return trial;
+}
+
+/// Best first.
+std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& candidates) const {
+  std::vector<Trial> trials;
+  for (std::size_t i = 0; i < std::min(kTrials, candidates.size()); ++i) {
+    if (candidates[i].gain < kWorthTrying * candidates.front().gain) break;
+    report("trying " + candidates[i].id);
+    if (auto trial = tried(candidates[i])) trials.push_back(std::move(*trial));
+  }
+  std::stable_sort(trials.begin(), trials.end(),
+                   [](const Trial& a, const Trial& b) { return a.misfit < b.misfit; });
+  return trials;
+}
+
+/// Sensitivities of a model that lacks an effect may mislead about orders: their neighbours are fitted too.
+Search::Trial Search::best_neighbour(Trial trial) const {
+  const TermSearch& search = *term_type(trial.candidate.id).search;
+  for (bool better = true; better;) {
+    better = false;
+    for (const TermShape& shape : search.shapes) {
+      const std::vector<double> grid = shape.values(range_);
+      if (shape.refined || grid.size() < 2) continue;
+      for (std::size_t t = 0; t < trial.candidate.terms.size(); ++t) {
+        const Trial centre = trial;
+        const auto at = std::find(grid.begin(), grid.end(), centre.candidate.terms[t].at(shape.name)) - grid.begin();
+        for (const long step : {-2L, -1L, 1L, 2L}) {
+          if (at + step < 0 || at + step >= long(grid.size())) continue;
+          report("trying " + trial.candidate.id);
+          Candidate other = centre.candidate;
+          other.terms[t][shape.name] = grid[std::size_t(at + step)];
+          const auto fitted = tried(other);
+          if (!fitted || fitted->misfit >= 0.999 * trial.misfit) continue;
+          trial = *fitted;
+          better = true;
+        }
+      }
+    }
+  }
+  return trial;
+}
+
+bool Search::convinces(const Gain& gain, const Machine& after) const {
+  const Leftover left = stage_->records.leftover(after);
+  const bool clear = (gain.deflection ? left.deflection : left.torque) < kNearFloor;
+  const double least = clear ? settings_.least_gain : settings_.least_gain_unclear;
+  const Evidence& e = gain.evidence;
+  return e.gain_held_out >= least && e.gain_forward >= 0.5 * least && gain.total > 0 &&
+         e.blocks_better >= kMostBlocks * e.blocks;
+}
+
+void Search::adopt(std::vector<Accepted> effects) {
+  Machine machine = with_effects(effects);
+  for (const Accepted& effect : effects)
+    if (effect.candidate.id == "delay") machine.largest_delay = 0;
+  Stage stage = fit_stage(machine, cutoff_, kRoughTolerance);
+  stage = fit_stage(stage.fit.machine, cutoff_, kFineTolerance);
+  std::size_t place = declared_.rig.terms.size();
+  for (Accepted& effect : effects)
+    for (ParameterValues& values : effect.candidate.terms)
+      values = stage.fit.machine.rig.terms[place++]->values;
+  stage_ = std::move(stage);
+  effects_ = std::move(effects);
+}
+
+bool Search::add_one() {
+  const Leftover& left = stage_->leftover;
+  if (left.torque < kAtFloor && left.deflection < kAtFloor) return false;
+  report("screening");
+  const std::vector<Trial> trials = tried_best(screen(stage_->fit, stage_->records, range_));
+  const HeldOut now = held_out(stage_->fit, stage_->start, stage_->records);
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const Trial best = best_neighbour(trials[i]);
+    const Gain gain = compare(now, held_out(best.fit, best.start, stage_->records));
+    if (!convinces(gain, best.fit.machine)) continue;
+    Accepted effect{best.candidate, gain, {}};
+    for (const Trial& other : trials) {
+      if (other.candidate.id == best.candidate.id) continue;
+      const Gain its = compare(now, held_out(other.fit, other.start, stage_->records));
+      if (its.total >= kAlike * gain.total) effect.equivalent_to.push_back(other.candidate.id);
+    }
+    std::vector<Accepted> effects = effects_;
+    effects.push_back(effect);
+    adopt(std::move(effects));
+    return true;
+  }
+  return false;
+}
+
+void Search::add_effects() {
+  while (effects_.size() < settings_.most_effects && add_one()) {
+  }
+}
+
+void Search::drop_superfluous() {
+  for (std::size_t i = 0; effects_.size() > 1 && i < effects_.size();) {
+    report("doing without " + effects_[i].candidate.id);
+    std::vector<Accepted> fewer = effects_;
+    fewer.erase(fewer.begin() + long(i));
+    const Machine start = with_effects(fewer);
+    MachineFit fit = fit_machine(start, stage_->records, {}, options(kRoughTolerance));
+    const Machine again = fit.machine;
+    fit = fit_machine(again, stage_->records, {}, options(kFineTolerance));
+    const Gain gain = compare(held_out(fit, again, stage_->records),
+                              held_out(stage_->fit, stage_->start, stage_->records));
+    if (convinces(gain, stage_->fit.machine))
+      ++i;
+    else
+      adopt(std::move(fewer));
+  }
+}
+
+}  // namespace backlash

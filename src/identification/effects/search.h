@@ -1,0 +1,77 @@
+// The search for named effects: stage after stage, one effect each.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../joint_fit.h"
+#include "backlash_diagnosis/base/progress.h"
+#include "backlash_diagnosis/identification/effect_search.h"
+#include "candidates.h"
+#include "validation.h"
+
+namespace backlash {
+
+/// An effect that was accepted.
+struct Accepted {
+  Candidate candidate;  // with fitted values
+  Gain gain;
+  std::vector<std::string> equivalent_to;
+};
+
+/// A fit at the full bandwidth with all that belongs to it.
+struct Stage {
+  MachineFit fit;
+  Machine start;  // what fit.fit.values belong to
+  RecordSet records;
+  Leftover leftover;
+};
+
+class Search {
+ public:
+  Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff, const TraceSettings& settings,
+         const Progress& progress);
+
+  /// Fits the declared machine.
+  void fit_base();
+  /// Adds named effects until nothing helps.
+  void add_effects();
+  /// Takes out what the others explain as well.
+  void drop_superfluous();
+
+  const Stage& base() const { return *base_; }
+  const Stage& stage() const { return *stage_; }
+  const std::vector<Accepted>& effects() const { return effects_; }
+
+ private:
+  struct Trial {
+    Candidate candidate;
+    Machine start;
+    MachineFit fit;
+    double misfit = 0;  // norm of all residuals
+  };
+
+  void report(const std::string& phase) const;
+  std::vector<std::string> parameter_names() const;
+  Machine with_effects(const std::vector<Accepted>& effects) const;
+  Stage fit_stage(Machine start, double cutoff, double tolerance) const;
+  Stage rough_base() const;
+  std::optional<Trial> tried(const Candidate& candidate) const;
+  std::vector<Trial> tried_best(const std::vector<Candidate>& candidates) const;
+  Trial best_neighbour(Trial trial) const;
+  bool add_one();
+  bool convinces(const Gain& gain, const Machine& after) const;
+  void adopt(std::vector<Accepted> effects);
+
+  const std::vector<ServoData>& data_;
+  double cutoff_;
+  TraceSettings settings_;
+  const Progress& progress_;
+  MotionRange range_;
+  Machine declared_;
+  std::optional<Stage> base_, stage_;
+  std::vector<Accepted> effects_;
+};
+
+}  // namespace backlash

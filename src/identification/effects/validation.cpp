@@ -1,0 +1,103 @@
+#include "validation.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace backlash {
+namespace {
+
+constexpr int kBlocks = 12;
+constexpr double kKnown = 0.6;  // of each record, for the prediction forward in time
+
+double duration(const PreparedServo& record) {
+  return double(record.data().size()) * record.data().interval;
+}
+
+/// The rows that `wanted` accepts.
+template <typename Wanted>
+std::vector<Eigen::Index> rows_where(const RecordSet& records, const Wanted& wanted) {
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < records.layout().size(); ++i)
+    if (wanted(records.layout()[i])) rows.push_back(Eigen::Index(i));
+  return rows;
+}
+
+/// The fit's values had these rows not been there, linear about them.
+Eigen::VectorXd without(const LeastSquaresFit& fit, const Eigen::MatrixXd& normal,
+                        const std::vector<Eigen::Index>& rows) {
+  const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
+  const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd rest = unit.asDiagonal() * (normal - j.transpose() * j) * unit.asDiagonal();
+  rest.diagonal().array() += 1e-10;  // what only these rows tell stays where it is
+  return unit.asDiagonal() * rest.ldlt().solve(unit.asDiagonal() * (j.transpose() * fit.residuals(rows)));
+}
+
+void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& r,
+                 double& torque, double& deflection) {
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    (records.layout()[std::size_t(rows[i])].deflection ? deflection : torque) += r[Eigen::Index(i)] * r[Eigen::Index(i)];
+}
+
+double sum(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+double gain(double before, double after) {
+  return before > 0 ? 1 - std::sqrt(after / before) : 0;
+}
+
+}  // namespace
+
+HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records) {
+  const LeastSquaresFit& f = fit.fit;
+  const Eigen::MatrixXd normal = f.jacobian.transpose() * f.jacobian;
+  HeldOut out;
+  const auto everything = rows_where(records, [](const RecordSet::Row&) { return true; });
+  add_squares(records, everything, f.residuals(everything), out.torque_train, out.deflection_train);
+  for (int b = 0; b < kBlocks; ++b) {
+    const auto rows = rows_where(records, [&](const RecordSet::Row& row) {
+      return int(kBlocks * row.time / duration(records.records()[row.record])) == b;
+    });
+    const Eigen::VectorXd change = without(f, normal, rows);
+    double torque = 0, deflection = 0;
+    add_squares(records, rows, f.residuals(rows) + f.jacobian(rows, Eigen::all) * change, torque, deflection);
+    out.torque.push_back(torque);
+    out.deflection.push_back(deflection);
+  }
+  const auto late = rows_where(records, [&](const RecordSet::Row& row) {
+    return row.time > kKnown * duration(records.records()[row.record]);
+  });
+  const Eigen::VectorXd change = without(f, normal, late);
+  Eigen::VectorXd r = f.residuals(late) + f.jacobian(late, Eigen::all) * change;
+  try {
+    const Machine earlier = Unknowns(start).machine(f.values + change);
+    r = records.rows(earlier.rig, earlier.calibrations)(late);
+  } catch (const Error&) {  // the linear step leads out of what a rig may be; the linear prediction stands
+  }
+  add_squares(records, late, r, out.torque_forward, out.deflection_forward);
+  return out;
+}
+
+Gain compare(const HeldOut& a, const HeldOut& b) {
+  Gain g;
+  const double torque = gain(sum(a.torque), sum(b.torque)), deflection = gain(sum(a.deflection), sum(b.deflection));
+  g.deflection = deflection > torque;
+  const std::vector<double>&before = g.deflection ? a.deflection : a.torque,
+      &after = g.deflection ? b.deflection : b.torque;
+  Evidence& e = g.evidence;
+  e.gain_held_out = std::max(torque, deflection);
+  e.gain = g.deflection ? gain(a.deflection_train, b.deflection_train) : gain(a.torque_train, b.torque_train);
+  e.gain_forward =
+      g.deflection ? gain(a.deflection_forward, b.deflection_forward) : gain(a.torque_forward, b.torque_forward);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (before[i] == 0) continue;
+    ++e.blocks;
+    e.blocks_better += after[i] < before[i];
+  }
+  g.total = gain(sum(a.torque) + sum(a.deflection), sum(b.torque) + sum(b.deflection));
+  return g;
+}
+
+}  // namespace backlash

@@ -1,0 +1,28 @@
+// Whether an effect helps where the fit has not seen the record.
+#pragma once
+
+#include "../joint_fit.h"
+#include "backlash_diagnosis/identification/effect_search.h"
+
+namespace backlash {
+
+/// Norms of the residuals of one fit, each block of the records predicted by what the other blocks say
+/// (linear about the fit), and the last two fifths predicted by the first three (simulated).
+struct HeldOut {
+  std::vector<double> torque, deflection;  // squares, per block
+  double torque_forward = 0, deflection_forward = 0;
+  double torque_train = 0, deflection_train = 0;
+};
+
+/// `start` is what the fit's values belong to. Both fits to be compared must have the same weights.
+HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records);
+
+/// What the second fit has gained on the first, of the channel that gains most.
+struct Gain {
+  bool deflection = false;  // the channel
+  Evidence evidence;
+  double total = 0;  // held out, both channels together
+};
+Gain compare(const HeldOut& without, const HeldOut& with);
+
+}  // namespace backlash
