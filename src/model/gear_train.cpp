@@ -61,8 +61,9 @@ GearTrain::GearTrain(const Rig& rig)
     dry |= term->has_dry_friction();
   }
   const auto rubs = [](const FrictionLimits& f) { return f.forward > 0 || f.backward > 0; };
-  if (dry || rubs(coulomb_.motor)) dry_ends_.push_back({kMotor, {}});
-  if ((dry || rubs(coulomb_.load)) && node_[kLink] != kFixed) dry_ends_.push_back({kLink, {}});
+  const bool load_rubs = (dry || rubs(coulomb_.load)) && node_[kLink] != kFixed;
+  if (dry || rubs(coulomb_.motor) || (load_rubs && one_body())) dry_ends_.push_back({kMotor, {}});
+  if (load_rubs && !one_body()) dry_ends_.push_back({kLink, {}});
 }
 
 void GearTrain::brake_motor() {
@@ -196,6 +197,12 @@ double GearTrain::shaped_torques(const Slots& s, double* torque) const {
 EndFriction GearTrain::friction(const Motion& motion) const {
   EndFriction sum = coulomb_;
   for (const auto& term : terms_) term->add_friction(motion, sum);
+  if (one_body()) {  // it sticks by both
+    sum.motor.forward += sum.load.forward;
+    sum.motor.backward += sum.load.backward;
+    sum.motor.presliding = std::max(sum.motor.presliding, sum.load.presliding);
+    sum.load = {};
+  }
   for (FrictionLimits* limits : {&sum.motor, &sum.load}) {
     limits->forward = std::max(0.0, limits->forward);
     limits->backward = std::max(0.0, limits->backward);

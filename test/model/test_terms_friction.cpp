@@ -162,6 +162,19 @@ TEST(EndTermsInMotion, AsymmetricCoulombHoldsByDirection) {
   EXPECT_NEAR(moved(rig, 0, 3, -0.61).first, -0.01, kClose);
 }
 
+// Friction of motor and load on one body: it sticks up to their sum.
+TEST(EndTermsInMotion, OneBodySticksByTheFrictionOfBothEnds) {
+  Rig rig = one_body("id: asymmetric_coulomb, torque: 0.3", "load", 0.5);
+  rig.motor.coulomb_friction = 1;
+  for (const double below : {1.2, 1.79, -1.1, -1.19}) EXPECT_EQ(moved(rig, 0, 3, below).first, 0) << below;
+  EXPECT_NEAR(moved(rig, 0, 3, 1.9).first, 0.1, kClose);
+  EXPECT_NEAR(moved(rig, 0, 3, -1.4).first, -0.2, kClose);
+  EXPECT_NEAR(moved(rig, 1, 1).first, 1 - 1.8 / 3, kClose);
+  EXPECT_EQ(moved(rig, 1, 2).first, 0);
+  rig.terms = {term("id: stribeck, torque: -0.8, speed: 1e6, exponent: 1, body: load")};  // takes of both
+  EXPECT_NEAR(moved(rig, 1, 1).first, 1 - 0.7 / 3, 1e-6);                                 // speed / 1e6
+}
+
 TEST(EndTermsInMotion, CoastingByStribeckFriction) {
   for (const char* body : {"motor", "load"})
     for (const double s : {1.0, -1.0}) {  // J w' = -s A exp(-|w| / ws): exp(|w| / ws) falls evenly

@@ -60,7 +60,7 @@ class GearTrain {
   struct EndForces {
     double motor, load;  // N m, sum of all other torques
     double mesh_torque;  // N m, through the teeth, > 0 drives the load forward
-    EndFriction friction;
+    EndFriction friction;  // where both ends are one body, all of it at the motor
   };
   EndForces end_forces(double t, const double* state, AppliedTorque applied) const;
   /// kg m^2 of all that moves with the motor and with the link (infinite where it is fixed); load-side.
@@ -132,6 +132,7 @@ class GearTrain {
     double position = 0;  // rad, where it sticks
   };
 
+  bool one_body() const { return node_[kLink] == node_[kMotor]; }
   Slots unpack(const double* state) const;
   Motion motion_of(double t, const Slots& s, double mesh_torque, AppliedTorque applied) const {
     const double motor_torque = applied.motor * ratio_;

@@ -1,7 +1,7 @@
 // Drag of turbulent air or oil (windage, churning):
 //   torque = -A w |w|        A [N m s^2/rad^2], w speed of the body
-// A < 0 with a viscous friction beside it: friction that grows less than the speed, as the constant-speed
-// runs of Yumrukcal (2013, Table B.1) show. The quadratic form is that of any body in turbulent flow.
+// A < 0 beside a viscous friction: friction that grows less than the speed, as the rig of Yumrukcal (2013,
+// Table B.3) seems to have going forward. The quadratic form is that of any body in turbulent flow.
 #include <cmath>
 
 #include "end_of_train.h"
