@@ -24,7 +24,7 @@ class SpeedControl {
 
  private:
   static constexpr double kGain = 4800;         // N m s/rad
-  static constexpr double kIntegralTime = 0.1;  // s
+  static constexpr double kIntegralTime = 0.3;  // s
   static constexpr double kLimit = 2440;        // N m
   double integral_ = 0;
 };
@@ -47,23 +47,24 @@ Reference draw_reference(const std::string& kind, bool dither, Random& random) {
     const double size = random.uniform(0.93, 1.07), pace = random.uniform(0.93, 1.07);
     return Tone{amplitude * size, frequency * pace, random.phase(), square};
   };
+  Reference reference;
+  Tone faster;
   if (kind == "steps") {
-    Reference reference{{tone(0.56, 0.1125), tone(0.224, 0.469)}, {}};
-    if (dither) reference.speed.push_back(tone(0.105, 1.3, true));
-    return reference;
+    reference.speed = {tone(0.56, 0.1125), tone(0.224, 0.469)};
+    faster = tone(0.105, 1.3, true);
+  } else if (kind == "sines") {
+    reference.speed = {tone(0.306, 0.07), tone(0.304, 0.23)};
+    faster = tone(0.125, 1.9);
+  } else if (kind == "reversals") {
+    reference.speed = {tone(0.46, 0.15, true)};
+    faster = tone(0.158, 0.9);
+  } else {
+    throw std::invalid_argument("no such motion: " + kind);
   }
-  if (kind == "sines") {
-    Reference reference{{tone(0.306, 0.07), tone(0.304, 0.23)}, {}};
-    if (!dither) return reference;
-    reference.speed.push_back(tone(0.125, 1.9));
-    reference.torque.push_back(tone(22, 7));
-    return reference;
+  if (dither) {
+    reference.speed.push_back(faster);
+    reference.torque = {tone(22, 7), tone(9, 17)};
   }
-  if (kind != "reversals") throw std::invalid_argument("no such motion: " + kind);
-  Reference reference{{tone(0.46, 0.15, true)}, {}};
-  if (!dither) return reference;
-  reference.speed.push_back(tone(0.158, 0.9));
-  reference.torque.push_back(tone(90, 2.7));
   return reference;
 }
 

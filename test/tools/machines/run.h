@@ -21,8 +21,9 @@ struct Reference {
 };
 
 /// The kinds of motion of the records in undeclared/: `steps` (training: two slow sines and a square wave of
-/// 1.3 Hz), `sines` (slow sines, a faster one, a torque ripple) and `reversals` (a square wave of 0.15 Hz
-/// that drives the torque to its limit, and a faster sine). Without dither only the slow parts remain.
+/// 1.3 Hz), `sines` (two slow sines and one of 1.9 Hz) and `reversals` (a square wave of 0.15 Hz that drives
+/// the torque to its limit, and 0.9 Hz), all with a torque of 7 and 17 Hz. Without dither only the slow parts
+/// remain.
 Reference draw_reference(const std::string& kind, bool dither, Random& random);
 
 struct Travel {
