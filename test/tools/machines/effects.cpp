@@ -43,7 +43,7 @@ Json stribeck(Random& random, const Circumstances&, Machine& machine) {
 Json quadratic_drag(Random& random, const Circumstances&, Machine& machine) {
   const bool at_motor = random.chance(0.5);
   double& drag = (at_motor ? machine.motor : machine.load).friction.quadratic;
-  drag = random.uniform(70, 200);
+  drag = random.uniform(50, 140);
   return {{at_motor ? "motor friction" : "load friction", "+ A*w*abs(w)"}, {"A", drag}};
 }
 
@@ -78,7 +78,7 @@ Json cogging(Random& random, const Circumstances&, Machine& machine) {
 }
 
 Json transmission_error(Random& random, const Circumstances&, Machine& machine) {
-  machine.mesh.transmission_error = draw_wave(random, 2.5e-5, 8e-5, 6, 60);
+  machine.mesh.transmission_error = draw_wave(random, 4e-5, 8e-5, 6, 60);
   return describe("mesh displacement", "+ A*sin(n*q+p), q = load position [rad]",
                   machine.mesh.transmission_error);
 }
