@@ -153,7 +153,8 @@ def judge(case, truth, outcome, report):
                   unexplained=report.get("unexplained"))
     result["worse"] = any(c["after"] > SAME_ERROR * c["before"] for c in report["channels"].values())
     if result["outside"]:
-        met = report["verdict"] == "unexplained" or reduced(report["channels"][worst_channel(report["channels"])])
+        channel = report["channels"][worst_channel(report["channels"])]
+        met = report["verdict"] == "unexplained" or (report["verdict"] == "effect_found" and reduced(channel))
         result["score"] = "met" if met else "wrong"
         return result
     verdict_fits = report["verdict"] == ("effect_found" if found else "nothing_missing")
