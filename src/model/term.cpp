@@ -14,7 +14,8 @@ const std::vector<TermType>& term_types() {
       radial_compliance_term(),      transmission_error_term(), varying_backlash_term(),
       varying_reduction_ratio_term(),
       encoder_scale_term(),
-      delay_term()};
+      delay_term(),
+      presliding_term()};
   return types;
 }
 

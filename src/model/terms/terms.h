@@ -10,6 +10,7 @@ TermType delay_term();
 TermType eccentricity_term();
 TermType encoder_scale_term();
 TermType gravity_term();
+TermType presliding_term();
 TermType radial_compliance_term();
 TermType transmission_error_term();
 TermType varying_backlash_term();
