@@ -54,12 +54,15 @@ GearTrain::GearTrain(const Rig& rig)
   set_backlash(rig.mesh.backlash);
   join(rig);
   bool dry = false;
+  EndFriction at_rest;
   for (const auto& term : terms_) {
     loaded_ |= term->loads_flanks();
     shaped_ |= term->shapes_flanks() || term->loads_flanks();
     shape_follows_torque_ |= term->shape_follows_torque();
     dry |= term->has_dry_friction();
+    term->add_friction({}, at_rest);
   }
+  presliding_ = at_rest.motor.presliding > 0 || at_rest.load.presliding > 0;
   const auto rubs = [](const FrictionLimits& f) { return f.forward > 0 || f.backward > 0; };
   const bool load_rubs = (dry || rubs(coulomb_.load)) && node_[kLink] != kFixed;
   if (dry || rubs(coulomb_.motor) || (load_rubs && one_body())) dry_ends_.push_back({kMotor, {}});
@@ -207,7 +210,7 @@ EndFriction GearTrain::friction(const Motion& motion) const {
     limits->forward = std::max(0.0, limits->forward);
     limits->backward = std::max(0.0, limits->backward);
   }
-  if (braked_) sum.motor.forward = sum.motor.backward = std::numeric_limits<double>::infinity();
+  if (braked_) sum.motor = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   return sum;
 }
 
@@ -279,7 +282,7 @@ void GearTrain::derivative(double t, const double* state, AppliedTorque applied,
     if (end.mode.stuck())
       acceleration = rate[node] = 0;
     else
-      acceleration += end.mode.torque(limits(end, rubbing)) / inertia_[node];
+      acceleration += end.mode.torque(limits(end, rubbing), state[node]) / inertia_[node];
   }
 }
 
@@ -301,7 +304,7 @@ void GearTrain::begin_friction(double t, double* state, AppliedTorque applied) {
   for (DryEnd& end : dry_ends_) {
     const Balance b = balance(t, state, applied);  // anew: the end before may have been stopped
     const int node = node_[end.slot];
-    end.mode.begin(b.net[node], state[dof_ + node], limits(end, b.friction));
+    end.mode.begin(b.net[node], state[dof_ + node], limits(end, b.friction), state[node]);
     end.position = state[node];
   }
 }
@@ -311,10 +314,23 @@ bool GearTrain::update_friction(double t, double* state, AppliedTorque applied) 
   for (DryEnd& end : dry_ends_) {
     const Balance b = balance(t, state, applied);
     const int node = node_[end.slot];
-    changed |= end.mode.update(b.net[node], state[dof_ + node], limits(end, b.friction));
+    changed |= end.mode.update(b.net[node], state[dof_ + node], limits(end, b.friction), state[node]);
     end.position = state[node];
   }
   return changed;
+}
+
+double GearTrain::presliding_time(double t, const double* state, AppliedTorque applied) const {
+  double shortest = std::numeric_limits<double>::infinity();
+  if (!presliding_) return shortest;
+  const Balance b = balance(t, state, applied);
+  for (const DryEnd& end : dry_ends_) {
+    const FrictionLimits& friction = limits(end, b.friction);
+    const double highest = friction.forward + friction.backward;  // stiffness times distance
+    if (!end.mode.stuck() && friction.presliding > 0 && highest > 0)
+      shortest = std::min(shortest, std::sqrt(inertia_[node_[end.slot]] * friction.presliding / highest));
+  }
+  return shortest;
 }
 
 void GearTrain::hold(double* state) const {

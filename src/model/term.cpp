@@ -24,6 +24,7 @@ const std::vector<TermType>& term_types() {
                                               local_fault_term(),
                                               mesh_hardening_term(),
                                               position_dependent_friction_term(),
+                                              presliding_term(),
                                               quadratic_drag_term(),
                                               radial_compliance_term(),
                                               stribeck_term(),

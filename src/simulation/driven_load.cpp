@@ -67,7 +67,7 @@ class Load {
 
   GearTrain::EndForces begin(const Segment& s, double t) {
     const Forces f = forces(s, t, 0, q, w);
-    mode_.begin(f.net, w, f.ends.friction.load);
+    mode_.begin(f.net, w, f.ends.friction.load, q);
     return f.ends;
   }
 
@@ -88,11 +88,9 @@ class Load {
   static constexpr int kHalvings = 10;  // of a sample, that place an event
   struct Forces {
     GearTrain::EndForces ends;
-    double net;  // N m on the load, without dry friction
+    double net;       // N m on the load, without dry friction
+    double position;  // rad, of the load
     int side() const { return (ends.mesh_torque > 0) - (ends.mesh_torque < 0); }
-    bool holds() const {
-      return net < ends.friction.load.forward && -net < ends.friction.load.backward;
-    }
   };
   struct Move {
     double q, w;
@@ -100,16 +98,25 @@ class Load {
     double motor_torque;  // halfway
   };
 
+  bool holds(const Forces& f) const {
+    const FrictionLimits& friction = f.ends.friction.load;
+    if (friction.presliding > 0) return mode_.event(f.net, 0, friction) < 0;
+    return f.net < friction.forward && -f.net < friction.backward;
+  }
+
   Forces forces(const Segment& s, double t, double u, double position, double rate) const {
     const double state[] = {s.motor(u), position, s.motor_rate(u), rate};
     Forces f;
     f.ends = train_.end_forces(t + u * s.interval, state, s.motor_torque / ratio_);
     f.ends.motor -= s.motor_torque;
     f.net = f.ends.load + inertia_ * feedback_ * (s.load_rate(u) - rate);
+    f.position = position;
     return f;
   }
 
-  double acceleration(const Forces& f) const { return (f.net + mode_.torque(f.ends.friction.load)) / inertia_; }
+  double acceleration(const Forces& f) const {
+    return (f.net + mode_.torque(f.ends.friction.load, f.position)) / inertia_;
+  }
 
   /// Classical Runge-Kutta from u to v.
   Move moved(const Segment& s, double t, double u, double v, const Forces& f) const {
@@ -169,7 +176,7 @@ class Load {
 
   double hold(const Segment& s, double t, double u, Forces& f, bool divide, Halves& sum) {
     const auto at = [&](double v) { return forces(s, t, v, q, 0); };
-    const auto changes = [&](const Forces& end) { return end.side() != f.side() || !end.holds(); };
+    const auto changes = [&](const Forces& end) { return end.side() != f.side() || !holds(end); };
     double before = 1, after = 1;
     if (divide && changes(at(1))) std::tie(before, after) = bracket(u, 1, [&](double v) { return changes(at(v)); });
     const Forces end = at(before);
@@ -183,9 +190,10 @@ class Load {
 
   /// The moment of the change itself.
   void cross(const Segment& s, double t, double before, double after, const Forces& from, Forces& f, Halves& sum) {
-    if (mode_.direction() * w <= 0) w = 0;
+    const bool sticks = !(from.ends.friction.load.presliding > 0);
+    if (sticks && mode_.direction() * w <= 0) w = 0;
     f = forces(s, t, after, q, w);
-    if (w == 0) mode_.begin(f.net, w, f.ends.friction.load);
+    mode_.update(f.net, w, f.ends.friction.load, q);
     const double mean = 0.5 * (from.ends.motor + f.ends.motor);
     sum.add(before, after, mean, mean, mean);
   }

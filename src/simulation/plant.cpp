@@ -103,14 +103,16 @@ bool Plant::update_modes(int event) {
 // much torque, and one that slides stops only where a step ends with its speed reversed. A hundred steps per
 // period see all but the last 0.05 percent of a peak.
 void Plant::restart() {
-  const double longest = gear_train_.friction_event_count() > 0 ? excitation_->shortest_period(segment_) / 100
-                                                                : std::numeric_limits<double>::infinity();
+  double longest = std::numeric_limits<double>::infinity();
+  if (gear_train_.friction_event_count() > 0)
+    longest = std::min(excitation_->shortest_period(segment_) / 100,
+                       gear_train_.presliding_time(time_, state_.data(), applied_torque()));
   integrator_.restart(time_, state_.data(), excitation_->segment_end(segment_), longest);
 }
 
-/// Starts from a state that did not come about by motion.
+/// Starts from a state in which contact did not come about by motion.
 void Plant::begin() {
-  gear_train_.begin_friction(time_, state_.data(), applied_torque());  // a brake stops it before it touches
+  gear_train_.update_friction(time_, state_.data(), applied_torque());  // a brake stops it before it touches
   if (gear_train_.needs_touches()) {
     gear_train_.begin_contact(state_.data());
     gear_train_.update_friction(time_, state_.data(), applied_torque());
@@ -164,6 +166,7 @@ bool Plant::set_torque(double torque) {
 
 void Plant::set_state(const State& state) {
   state_ = state;
+  gear_train_.begin_friction(time_, state_.data(), applied_torque());
   begin();
 }
 

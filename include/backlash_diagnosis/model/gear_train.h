@@ -99,12 +99,16 @@ class GearTrain {
   double impact_speed() const { return impact_speed_; }  // m/s at the last touch, 0 if there was none
 
   /// Dry friction: like touches, whoever moves the train tells it where the mode of a body changes.
-  /// begin_friction() where state or torque did not come about by motion; update_friction() wherever one of
-  /// the friction_event_count() values rises through 0. True from the latter: integration must start again.
+  /// begin_friction() where the state did not come about by motion (it forgets where bodies turned last);
+  /// update_friction() wherever the torque jumps or one of the friction_event_count() values rises through 0.
+  /// True from the latter: integration must start again.
   int friction_event_count() const { return static_cast<int>(dry_ends_.size()); }
   void friction_events(double t, const double* state, AppliedTorque applied, double* values) const;
   void begin_friction(double t, double* state, AppliedTorque applied);
   bool update_friction(double t, double* state, AppliedTorque applied);
+  /// Time [s] in which the fastest body on the spring of presliding friction swings by 1 rad of its period;
+  /// infinite where none moves. Steps above it pass over turns of a motion that is smaller than the solver's tolerance.
+  double presliding_time(double t, const double* state, AppliedTorque applied) const;
   /// Puts each body that sticks where it came to rest: a solver's interpolation moves it by roundings.
   void hold(double* state) const;
   bool any_stuck() const;
@@ -169,6 +173,7 @@ class GearTrain {
   EndFriction coulomb_;
   bool shaped_ = false, shape_follows_torque_ = false, loaded_ = false;
   bool braked_ = false;
+  bool presliding_ = false;  // either end has a presliding distance, which does not change
   std::vector<DryEnd> dry_ends_;
   double impact_speed_ = 0;  // m/s, approach speed at the last touch
   double acting_gap_;        // where the force begins: half_gap_, or infinite between touches

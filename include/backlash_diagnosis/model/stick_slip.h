@@ -6,8 +6,12 @@
 // A body that slides comes to rest where its speed crosses zero; there and wherever the torque jumps it is
 // decided anew. Infinite friction is a brake: it stops a body at once (Karnopp 1985, ASME J. Dyn. Syst. Meas.
 // Control 107:100, with the zero of the speed found as an event instead of his interval of speeds).
+//
+// Where friction has a presliding distance (Presliding) it goes on from what it is where the speed crosses
+// zero. Such a body sticks only where it is at rest with all torques in balance to a millionth of its friction.
 #pragma once
 
+#include "backlash_diagnosis/model/presliding.h"
 #include "backlash_diagnosis/model/term.h"
 
 namespace backlash {
@@ -17,8 +21,10 @@ class StickSlip {
   bool stuck() const { return direction_ == 0; }
   int direction() const { return direction_; }  // +1, 0, -1
 
-  /// Friction on the body [N m] while it slides; a stuck one is held by whoever moves it.
-  double torque(const FrictionLimits& limits) const {
+  /// Friction on the body [N m] while it slides; a stuck one is held by whoever moves it. Here and below the
+  /// position [rad] counts only with presliding.
+  double torque(const FrictionLimits& limits, double position = 0) const {
+    if (limits.presliding > 0) return -memory_.friction(direction_, limits, position);
     return direction_ == 0 ? 0 : direction_ > 0 ? -limits.forward : limits.backward;
   }
 
@@ -27,15 +33,17 @@ class StickSlip {
 
   /// Decides the mode from the body's speed [rad/s] and sets a speed that has just crossed zero to zero. True
   /// where mode or speed have changed.
-  bool update(double net, double& speed, const FrictionLimits& limits);
+  bool update(double net, double& speed, const FrictionLimits& limits, double position = 0);
 
-  /// The mode of a body that did not come here by motion.
-  void begin(double net, double& speed, const FrictionLimits& limits);
+  /// The mode of a body that did not come here by motion. With presliding, friction begins without load.
+  void begin(double net, double& speed, const FrictionLimits& limits, double position = 0);
 
  private:
   void decide(double net, const FrictionLimits& limits);
+  bool turn(double net, double& speed, const FrictionLimits& limits, double position);
 
   int direction_ = 0;
+  Presliding memory_;
 };
 
 }  // namespace backlash

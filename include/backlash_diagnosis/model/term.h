@@ -38,7 +38,8 @@ struct EndTorques {
 struct FrictionLimits {
   double forward = 0;
   double backward = 0;
-  double presliding = 0;  // rad, over which friction builds up after a reversal (StickSlip); 0: at once
+  // rad, over which friction builds up after a reversal (Presliding), the same at all times; 0: at once
+  double presliding = 0;
 };
 
 struct EndFriction {

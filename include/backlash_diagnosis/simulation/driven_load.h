@@ -11,7 +11,7 @@
 // motor, and only the torque on the motor is asked for.
 //
 // Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples. A step is divided
-// where the load comes to rest or breaks away and where teeth touch or part.
+// where the load comes to rest, turns round or breaks away and where teeth touch or part.
 #pragma once
 
 #include <vector>

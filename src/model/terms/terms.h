@@ -21,6 +21,7 @@ TermType local_fault_term();
 TermType mesh_hardening_term();
 TermType position_dependent_friction_term();
 TermType quadratic_drag_term();
+TermType presliding_term();
 TermType radial_compliance_term();
 TermType stribeck_term();
 TermType transmission_error_term();

@@ -1,0 +1,42 @@
+// Dry friction that builds up over a short path after each reversal, by the law of Dahl (1968, Aerospace
+// Corp. TOR-0158(3107-18)-1, exponent 1), in closed form:
+//
+//   dF/dx = (F_c - F) / x_s        F = F_c - (F_c - F_0) exp(-x / x_s)
+//
+// x [rad] path since the reversal, F against the present motion, F_0 its value at the reversal, F_c what it
+// tends to, x_s the presliding distance. Continuous, independent of rate; a body at rest is held by it as by
+// a spring of at most 2 F_c / x_s, from rest without load F_c / x_s. Where F_c changes on the way (other
+// terms) the present one counts, as if it had been so since the reversal.
+#pragma once
+
+#include <vector>
+
+#include "backlash_diagnosis/model/term.h"
+
+namespace backlash {
+
+/// What friction remembers: where the body turned last, and what it was there.
+class Presliding {
+ public:
+  explicit Presliding(double position = 0, double friction = 0) : position_(position), friction_(friction) {}
+
+  /// Friction [N m], > 0 against forward motion, at `position` [rad] on the way in this direction (+1, -1;
+  /// 0: as it was at the turn). Needs limits.presliding > 0.
+  double friction(int direction, const FrictionLimits& limits, double position) const;
+
+ private:
+  double position_, friction_;
+};
+
+/// The same along a recorded motion: friction [N m] of each sample, > 0 against forward motion, from a start
+/// without load. Limits without presliding give Coulomb friction.
+///
+/// A rate [rad/s] counts by its sign (0: as before); with the interval [s] also as the speed that tells where
+/// between two samples the body turned, without (0) it turned at the sample before. Noise dithers friction
+/// away: both columns are to be smooth to within a small part of x_s. Columns of equal length, or
+/// InvalidParameter.
+std::vector<double> presliding_friction(const std::vector<double>& positions,
+                                        const std::vector<FrictionLimits>& limits,
+                                        const std::vector<double>& rates, double interval = 0);
+
+}  // namespace backlash
