@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/model/presliding.h"
 #include "backlash_diagnosis/record/zero_phase.h"
 
 namespace backlash {
@@ -119,13 +120,13 @@ ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calib
   r.load = simulate(rig, calibration);
   const double inertia = GearTrain(rig).motor_inertia();
   r.torque = acting_torque(rig, calibration);
+  const std::vector<double> friction =
+      presliding_friction(data().motor, r.load.motor_friction, data().motor_rate, data().interval);
   for (std::size_t k = 0; k < data().size(); ++k) {
-    const FrictionLimits& f = r.load.motor_friction[k];
-    const double friction = direction[k] > 0 ? f.forward : -f.backward;
     if (direction[k] == 0)
       r.torque[k] = 0;  // friction takes what balances
     else
-      r.torque[k] -= inertia * data().motor_acceleration[k] - r.load.motor_mean[k] + friction;
+      r.torque[k] -= inertia * data().motor_acceleration[k] - r.load.motor_mean[k] + friction[k];
   }
   r.torque = low_pass(r.torque, data().interval, cutoff);
   if (!load_moves_freely(rig)) return r;
