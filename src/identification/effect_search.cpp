@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
-constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
+constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
 
 double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
   const double highest = kHighestCutoff / data.front().interval;
@@ -30,23 +30,151 @@ ServoData data_of(const Record& record, const Rig& rig) {
   return data;
 }
 
-/// What a machine says of the test record, with the record's own calibration.
-ServoPrediction predicted(Machine machine, const ServoData& test, double cutoff) {
-  const std::vector<ServoData> data = {test};
+/// What a machine says of a record that it was not fitted to, with the record's own calibration.
+ServoPrediction predicted(Machine machine, const ServoData& record, double cutoff) {
+  const std::vector<ServoData> data = {record};
   const Calibration like = machine.calibrations.front();
   machine.parameters.clear();
   machine.calibrations = {like};
   NonlinearOptions options;
   options.parallel = true;
-  for (const double band : {std::min(15.0, cutoff), cutoff}) {
-    if (machine.largest_delay == 0 && machine.rig.mesh.rigid) break;  // nothing to calibrate
+  for (const double band : {std::min(kCalibrationCutoff, cutoff), cutoff}) {
+    if (Unknowns(machine).size() == 0) break;
     RecordSet records(data, band, kLoadFeedback);
     records.weigh(machine);
     machine = fit_machine(machine, records, {}, options).machine;
   }
   OutputErrorSettings settings;
   settings.cutoff = cutoff;
-  return predict_servo(machine.rig, test, settings, machine.calibrations.front());
+  return predict_servo(machine.rig, record, settings, machine.calibrations.front());
+}
+
+/// All training records together, as fitted.
+ChannelError train_error(const Machine& machine, const std::vector<ServoData>& data, double cutoff,
+                         ChannelError ServoPrediction::*channel) {
+  double error = 0;
+  OutputErrorSettings settings;
+  settings.cutoff = cutoff;
+  for (std::size_t i = 0; i < data.size(); ++i)
+    error += std::pow((predict_servo(machine.rig, data[i], settings, machine.calibrations[i]).*channel).error, 2);
+  return {std::sqrt(error / double(data.size())), 0};
+}
+
+struct Numbers {
+  std::map<std::string, Measured> machine;
+  std::vector<Measured> effects;  // in the order of the effects' fitted parameters
+};
+
+/// Values with standard errors of a stage of which the first `declared` parameters are the machine's.
+Numbers numbers(const Stage& stage, std::size_t declared) {
+  MachineFit fit = stage.fit;
+  judge_errors(fit, stage.start, stage.records, {});
+  const Unknowns unknowns(stage.start);
+  Numbers out;
+  for (std::size_t i = 0; i < stage.start.parameters.size(); ++i) {
+    const Measured m = unknowns.parameter(fit.fit, i);
+    if (i < declared)
+      out.machine[stage.start.parameters[i].name] = m;
+    else
+      out.effects.push_back(m);
+  }
+  return out;
+}
+
+/// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0.
+void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted, FoundEffect& effect) {
+  const TermType& type = term_type(term.id);
+  const TermSearch& search = *type.search;
+  std::map<std::string, Measured> found;
+  const auto take = [&](const std::string& name) {
+    found[name] = fitted.front();
+    fitted.erase(fitted.begin());
+  };
+  take(search.strength);
+  if (!search.phase.empty()) take(search.phase);
+  for (const TermShape& shape : search.shapes)
+    if (shape.refined) take(shape.name);
+  for (const ParameterSpec& spec : type.parameters) {
+    if (!spec.choices.empty()) {
+      effect.words[spec.name + suffix] = term.values.choice(spec.name);
+      continue;
+    }
+    const auto at = found.find(spec.name);
+    const Measured m = at != found.end() ? at->second : Measured{term.values.at(spec.name), 0};
+    effect.parameters.push_back({spec.name + suffix, spec.unit, m});
+  }
+}
+
+/// One step per effect; a second term of the same kind belongs to the step of the first.
+std::vector<FoundEffect> found_effects(const Search& search, std::vector<Measured> fitted,
+                                       const std::vector<ServoPrediction>& on_test, std::size_t declared_terms) {
+  std::vector<FoundEffect> all;
+  const auto error = [](const ServoPrediction& p, const std::string& channel) {
+    return channel == "torque" ? p.torque_error.error : p.deflection_error.error;
+  };
+  std::size_t place = declared_terms;
+  for (std::size_t i = 0; i < search.effects().size(); ++i) {
+    const Accepted& accepted = search.effects()[i];
+    auto step = std::find_if(all.begin(), all.end(),
+                             [&](const FoundEffect& e) { return e.id == accepted.candidate.id; });
+    if (step == all.end()) {
+      FoundEffect e;
+      e.id = accepted.candidate.id;
+      e.channel = accepted.gain.deflection ? "deflection" : "torque";
+      e.evidence = accepted.gain.evidence;
+      e.equivalent_to = accepted.equivalent_to;
+      e.test_error_before = error(on_test[i], e.channel);
+      step = all.insert(all.end(), e);
+    }
+    step->test_error_after = error(on_test[i + 1], step->channel);
+    for (std::size_t t = 0; t < accepted.candidate.terms.size(); ++t, ++place) {
+      step->terms.push_back(place);
+      const std::size_t number = step->terms.size();
+      describe(*search.stage().fit.machine.rig.terms[place], number > 1 ? "_" + std::to_string(number) : "",
+               fitted, *step);
+    }
+  }
+  return all;
+}
+
+TraceSeries series(const ServoData& data, const ServoPrediction& before, const ServoPrediction& after) {
+  TraceSeries s;
+  for (std::size_t k = 0; k < data.size(); ++k) s.time.push_back(double(k) * data.interval);
+  s.motor_position = data.motor;
+  s.motor_velocity = data.motor_rate;
+  s.torque_counts = after.counts;
+  s.deflection_counts = after.settled;
+  s.torque = after.measured_torque;
+  s.torque_before = before.torque;
+  s.torque_after = after.torque;
+  s.deflection = after.measured_deflection;
+  s.deflection_before = before.deflection;
+  s.deflection_after = after.deflection;
+  return s;
+}
+
+void require_same_rate(const std::vector<ServoData>& data, const ServoData& test) {
+  for (const ServoData& d : data)
+    if (std::fabs(d.interval / test.interval - 1) > 0.01)
+      throw CannotIdentify("records sampled every " + std::to_string(d.interval) + " s and every " +
+                           std::to_string(test.interval) + " s cannot be compared");
+}
+
+void warn_of_range(const std::vector<ServoData>& train, const ServoData& test, Trace& trace) {
+  const MotionRange known = motion_range(train), asked = motion_range({test});
+  const double slack = 0.1 * (known.to - known.from);
+  char text[160];
+  if (asked.from < known.from - slack || asked.to > known.to + slack) {
+    std::snprintf(text, sizeof text, "the test record moves from %.3g to %.3g rad, the training records from %.3g to %.3g",
+                  asked.from, asked.to, known.from, known.to);
+    trace.warnings.push_back(text);
+  }
+  if (asked.speed > 1.5 * known.speed || asked.torque > 1.5 * known.torque) {
+    std::snprintf(text, sizeof text, "the test record is faster or stronger than the training records: "
+                  "speed %.3g against %.3g rad/s, torque %.3g against %.3g N m (standard deviations)",
+                  asked.speed, known.speed, asked.torque, known.torque);
+    trace.warnings.push_back(text);
+  }
 }
 
 }  // namespace
@@ -54,32 +182,38 @@ ServoPrediction predicted(Machine machine, const ServoData& test, double cutoff)
 Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Record& test,
                      const TraceSettings& settings, const Progress& progress) {
   const Rig declared = load_side(raw);
+  if (train.empty()) throw CannotIdentify("no training record");
   std::vector<ServoData> data;
   for (const Record& record : train) data.push_back(data_of(record, raw));
   const ServoData unseen = data_of(test, raw);
+  require_same_rate(data, unseen);
   Trace trace;
   trace.cutoff = settings.cutoff > 0 ? settings.cutoff : default_cutoff(declared, data);
   Search search(declared, data, trace.cutoff, settings, progress);
-  search.fit_base();
-  search.add_effects();
-  search.drop_superfluous();
-  trace.base = search.base().fit.machine.rig;
-  trace.augmented = search.stage().fit.machine.rig;
-  const ServoPrediction before = predicted(search.base().fit.machine, unseen, trace.cutoff),
-                        after = predicted(search.stage().fit.machine, unseen, trace.cutoff);
-  trace.channels["torque"] = {before.torque_error.error, after.torque_error.error, after.torque_error.floor};
-  if (!after.deflection.empty())
-    trace.channels["deflection"] = {before.deflection_error.error, after.deflection_error.error,
-                                    after.deflection_error.floor};
-  for (const Accepted& a : search.effects()) {
-    FoundEffect e;
-    e.id = a.candidate.id;
-    e.channel = a.gain.deflection ? "deflection" : "torque";
-    e.evidence = a.gain.evidence;
-    e.equivalent_to = a.equivalent_to;
-    trace.steps.push_back(e);
-  }
+  search.run();
+
+  const Machine &base = search.base().fit.machine, &last = search.stage().fit.machine;
+  std::vector<ServoPrediction> on_test = {predicted(base, unseen, trace.cutoff)};
+  for (const Accepted& effect : search.effects()) on_test.push_back(predicted(effect.after, unseen, trace.cutoff));
+  const ServoPrediction &before = on_test.front(), &after = on_test.back();
+  trace.base = base.rig;
+  trace.augmented = last.rig;
+  const auto channel = [&](const std::string& name, ChannelError ServoPrediction::*of) {
+    trace.channels[name] = {(before.*of).error, (after.*of).error, (after.*of).floor,
+                            train_error(base, data, trace.cutoff, of).error,
+                            train_error(last, data, trace.cutoff, of).error};
+  };
+  channel("torque", &ServoPrediction::torque_error);
+  if (!after.deflection.empty()) channel("deflection", &ServoPrediction::deflection_error);
+  const std::size_t own = base.parameters.size();
+  trace.base_parameters = numbers(search.base(), own).machine;
+  const Numbers found = numbers(search.stage(), own);
+  trace.parameters = found.machine;
+  for (const FitParameter& p : base.parameters) trace.units[p.name] = p.unit;
+  trace.steps = found_effects(search, found.effects, on_test, declared.terms.size());
   if (!trace.steps.empty()) trace.verdict = TraceVerdict::effect_found;
+  trace.series = series(unseen, before, after);
+  warn_of_range(data, unseen, trace);
   return trace;
 }
 

@@ -19,6 +19,8 @@ constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more
 constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
 constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
 constexpr double kNearFloor = 2;          // times the floor: what is left is mostly noise
+constexpr double kClearlyRight = 1.3;     // times the floor: no other order needs to be tried
+constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate to be fitted
 constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
 constexpr double kWorthTrying = 0.2;      // of the best predicted gain
 constexpr double kAlike = 0.8;            // of the best gain: another name for the same
@@ -75,6 +77,12 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
   declared_.calibrations.resize(train.size());
   for (const std::string& name : parameter_names())
     declared_.parameters.push_back(machine_parameter(name, declared));
+}
+
+void Search::run() {
+  fit_base();
+  add_effects();
+  drop_superfluous();
 }
 
 void Search::report(const std::string& phase) const {
@@ -170,7 +178,8 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
 std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& candidates) const {
   std::vector<Trial> trials;
   for (std::size_t i = 0; i < std::min(kTrials, candidates.size()); ++i) {
-    if (candidates[i].gain < kWorthTrying * candidates.front().gain) break;
+    if (candidates[i].gain < std::max(kWorthTrying * candidates.front().gain, kLeastPredicted * settings_.least_gain))
+      break;
     report("trying " + candidates[i].id);
     if (auto trial = tried(candidates[i])) trials.push_back(std::move(*trial));
   }
@@ -179,8 +188,11 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
   return trials;
 }
 
-/// Sensitivities of a model that lacks an effect may mislead about orders: their neighbours are fitted too.
+/// Sensitivities of a model that lacks an effect may mislead about orders: their neighbours are fitted too,
+/// unless what is left is noise.
 Search::Trial Search::best_neighbour(Trial trial) const {
+  const Leftover left = stage_->records.leftover(trial.fit.machine);
+  if (left.torque < kClearlyRight && left.deflection < kClearlyRight) return trial;
   const TermSearch& search = *term_type(trial.candidate.id).search;
   for (bool better = true; better;) {
     better = false;
@@ -225,6 +237,7 @@ void Search::adopt(std::vector<Accepted> effects) {
   for (Accepted& effect : effects)
     for (ParameterValues& values : effect.candidate.terms)
       values = stage.fit.machine.rig.terms[place++]->values;
+  effects.back().after = stage.fit.machine;
   stage_ = std::move(stage);
   effects_ = std::move(effects);
 }
@@ -239,7 +252,7 @@ bool Search::add_one() {
     const Trial best = best_neighbour(trials[i]);
     const Gain gain = compare(now, held_out(best.fit, best.start, stage_->records));
     if (!convinces(gain, best.fit.machine)) continue;
-    Accepted effect{best.candidate, gain, {}};
+    Accepted effect{best.candidate, gain, {}, {}};
     for (const Trial& other : trials) {
       if (other.candidate.id == best.candidate.id) continue;
       const Gain its = compare(now, held_out(other.fit, other.start, stage_->records));
@@ -272,7 +285,23 @@ void Search::drop_superfluous() {
     if (convinces(gain, stage_->fit.machine))
       ++i;
     else
-      adopt(std::move(fewer));
+      drop(i);
+  }
+}
+
+/// What came after it is fitted again, one by one.
+void Search::drop(std::size_t effect) {
+  std::vector<Accepted> rest(effects_.begin() + long(effect) + 1, effects_.end());
+  effects_.resize(effect);
+  stage_ = base_;
+  if (effect > 0) {
+    std::vector<Accepted> before = effects_;
+    adopt(std::move(before));
+  }
+  for (const Accepted& one : rest) {
+    std::vector<Accepted> more = effects_;
+    more.push_back(one);
+    adopt(std::move(more));
   }
 }
 

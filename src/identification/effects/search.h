@@ -18,6 +18,7 @@ struct Accepted {
   Candidate candidate;  // with fitted values
   Gain gain;
   std::vector<std::string> equivalent_to;
+  Machine after;  // fitted with this effect and those before it
 };
 
 /// A fit at the full bandwidth with all that belongs to it.
@@ -33,12 +34,7 @@ class Search {
   Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff, const TraceSettings& settings,
          const Progress& progress);
 
-  /// Fits the declared machine.
-  void fit_base();
-  /// Adds named effects until nothing helps.
-  void add_effects();
-  /// Takes out what the others explain as well.
-  void drop_superfluous();
+  void run();
 
   const Stage& base() const { return *base_; }
   const Stage& stage() const { return *stage_; }
@@ -52,6 +48,13 @@ class Search {
     double misfit = 0;  // norm of all residuals
   };
 
+  /// Fits the declared machine.
+  void fit_base();
+  /// Adds named effects until nothing helps.
+  void add_effects();
+  /// Takes out what the others explain as well.
+  void drop_superfluous();
+
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
   Machine with_effects(const std::vector<Accepted>& effects) const;
@@ -63,6 +66,7 @@ class Search {
   bool add_one();
   bool convinces(const Gain& gain, const Machine& after) const;
   void adopt(std::vector<Accepted> effects);
+  void drop(std::size_t effect);
 
   const std::vector<ServoData>& data_;
   double cutoff_;
