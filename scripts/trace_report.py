@@ -46,7 +46,7 @@ class Data:
 
     def words(self, channel):
         force = "force" if self.linear else "torque"
-        return {"torque": force, "deflection": "motor - load"}.get(channel, channel)
+        return {"torque": force, "deflection": "deflection (motor - load)"}.get(channel, channel)
 
     def label(self, coordinate):
         name = NAMES[coordinate]
@@ -68,7 +68,7 @@ def edges_of(x, bins):
 
 def binned(x, y, bins=BINS):
     """Middle, mean and count of bins of x; None where there are too few different values."""
-    edges = edges_of(x, bins)
+    edges = edges_of(x, bins) if len(x) else []
     if len(edges) < 4:
         return None
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
@@ -77,6 +77,12 @@ def binned(x, y, bins=BINS):
     middle = np.bincount(place, x, len(edges) - 1)[used] / count[used]
     mean = np.bincount(place, y, len(edges) - 1)[used] / count[used]
     return middle, mean, count[used]
+
+
+def broken(x, y):
+    """The line with a gap where x has one: there are no samples between."""
+    wide = np.flatnonzero(np.diff(x) > 0.15 * (x[-1] - x[0])) + 1
+    return np.insert(x, wide, np.nan), np.insert(y, wide, np.nan)
 
 
 def spectrum(position, residual, turn):
@@ -102,11 +108,11 @@ def scatter(axes, data, coordinate, residuals):
     x = data.coordinates[coordinate][0]
     for key, colour, z in (("before", BEFORE, 1), ("after", AFTER, 2)):
         use = np.isfinite(residuals[key])
-        axes.plot(x[use], residuals[key][use], ".", color=colour, markersize=1, alpha=0.35, zorder=z,
-                  markeredgewidth=0, rasterized=True)
+        axes.plot(x[use], residuals[key][use], ".", color=colour, markersize=2.2, alpha=0.5, zorder=z,
+                  markeredgewidth=0)
         means = binned(x[use], residuals[key][use])
         if means is not None:
-            axes.plot(means[0], means[1], "-", color="#4d5a66" if key == "before" else "#0b3c66", linewidth=1.6,
+            axes.plot(*broken(means[0], means[1]), "-", color="#4d5a66" if key == "before" else "#0b3c66", linewidth=1.6,
                       zorder=z + 2, label="mean, " + key)
     axes.set_xlabel(data.label(coordinate))
 
@@ -149,13 +155,11 @@ def explained(x, y):
 
 
 def followed(data, values):
-    """The coordinate that a contribution follows, and how well; at the first that is good enough."""
+    """The coordinate that a contribution follows, and how well. Time explains all that is slow: it comes last."""
     shares = {name: explained(x, values) for name, (x, _) in data.coordinates.items() if np.isfinite(x).all()}
-    best = max(shares, key=shares.get)
-    for name in ("motor_velocity", "load_velocity", "motor_position", "load_position", "mesh_torque",
-                 "motor_torque"):  # time explains everything that is slow
-        if shares.get(name, 0) > SMOOTH:
-            return name, shares[name]
+    best = max((name for name in shares if name != "time"), key=shares.get)
+    if shares[best] < SMOOTH and shares["time"] > shares[best]:
+        best = "time"
     return best, shares[best]
 
 
@@ -178,32 +182,39 @@ def learned_curve(axes, term, data):
     axes.set_ylabel("%s [%s]" % ("displacement of the mesh" if gap else force + " on the " + term["acts_on"], unit))
 
 
-def draw_contribution(axes, contribution, data):
-    values = np.array(contribution["values"], float)
-    name, share = followed(data, values)
+def draw_contributions(axes, contributions, data):
+    """Of one unit, over what the first of them follows."""
+    name, share = followed(data, np.array(contributions[0]["values"], float))
     x = data.coordinates[name][0]
-    if name == "time":
-        axes.plot(x, values, "-", color=AFTER, linewidth=0.8)
-    elif share > 0.999:  # a curve
-        order = np.argsort(x, kind="stable")
-        axes.plot(x[order], values[order], "-", color=AFTER, linewidth=1.2)
-    else:
-        axes.plot(x, values, ".", color=AFTER, markersize=1.5, alpha=0.4, markeredgewidth=0)
+    order = np.argsort(x, kind="stable")
+    for c, colour, style in zip(contributions, (AFTER, "#d98200"), ("-", "--")):
+        values = np.array(c["values"], float)
+        if share > 0.99 or name == "time":  # a curve
+            axes.plot(x[order], values[order], style, color=colour, linewidth=1.2, label=c["quantity"])
+        else:
+            axes.plot(x, values, ".", color=colour, markersize=2, alpha=0.5, markeredgewidth=0, label=c["quantity"])
     axes.set_xlabel(data.label(name))
-    axes.set_ylabel("%s [%s]" % (contribution["quantity"], contribution["unit"]))
+    unit = contributions[0]["unit"]
+    if len(contributions) == 1:
+        axes.set_ylabel("%s [%s]" % (contributions[0]["quantity"], unit))
+    else:
+        axes.set_ylabel("contribution [%s]" % unit)
+        axes.margins(y=0.15)
+        axes.legend(loc="upper right", markerscale=4)
 
 
 def effect_figure(data, step, contributions):
     maps = [t for t in step["terms"] if t["id"] == "learned_map"]
-    count = len(maps) or len(contributions)
+    units = sorted({c["unit"] for c in contributions})
+    count = len(maps) or len(units)
     if count == 0:
         return ""
-    figure, grid = plt.subplots(1, count, figsize=(4.8 * count, 3), layout="constrained", squeeze=False)
+    figure, grid = plt.subplots(1, count, figsize=(5.6 * count, 3.2), layout="constrained", squeeze=False)
     for i, axes in enumerate(grid.flat):
         if maps:
             learned_curve(axes, maps[i], data)
         else:
-            draw_contribution(axes, contributions[i], data)
+            draw_contributions(axes, [c for c in contributions if c["unit"] == units[i]], data)
     return picture(figure, "What %s adds" % step["effect"])
 
 

@@ -47,7 +47,8 @@ Result to_result(const TraceDone& done) {
 
 TraceServer::TraceServer(const ros::NodeHandle& handle, const std::string& name, FindRig find_rig)
     : find_rig_(std::move(find_rig)),
-      server_(std::make_unique<Server>(handle, name, [this](const auto& goal) { execute(goal); }, false)) {
+      server_(std::make_unique<Server>(
+          handle, name, [this](const auto& goal) { execute(goal); }, false)) {
   server_->start();
 }
 

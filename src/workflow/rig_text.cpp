@@ -65,8 +65,7 @@ void write_servo(RigText& text, const FittedMachine& found, double ratio) {
   if (has("load_inertia"))
     text.set("gear_train.link.inertia", rig.link.inertia, found.comment("load_inertia"));
   for (const char* name : {"mesh_stiffness", "mesh_damping"})
-    if (has(name))
-      text.set(servo_parameter(name).key, servo_parameter(name).get(rig), found.comment(name));
+    if (has(name)) text.set(servo_parameter(name).key, servo_parameter(name).get(rig), found.comment(name));
   if (has("backlash_angle")) {
     text.set_backlash(rig, found.comment("backlash_angle"));
     if (rig.mesh.start_in_gap != 0)

@@ -37,8 +37,8 @@ std::vector<Contribution> contributions(const Rig& augmented, const std::vector<
                     angle = axis_unit("rad", linear);
   std::vector<Contribution> all = {{torque + " on the motor", unit, {}},
                                    {torque + " on the load", unit, {}},
-                                   {"forward flank moved away by", angle, {}},
-                                   {"backward flank moved away by", angle, {}}};
+                                   {"opening of the forward flank", angle, {}},
+                                   {"opening of the backward flank", angle, {}}};
   if (series.load_position.empty() || series.load_velocity.empty() || series.mesh_torque.empty()) return {};
   const double half_gap = augmented.mesh.rigid ? 0 : 0.5 * augmented.mesh.backlash / augmented.mesh.lever();
   for (std::size_t k = 0; k < series.time.size(); ++k) {
@@ -58,7 +58,8 @@ std::vector<Contribution> contributions(const Rig& augmented, const std::vector<
     }
     for (int i = 0; i < 4; ++i) all[std::size_t(i)].values.push_back(sum[i]);
   }
-  all.erase(std::remove_if(all.begin(), all.end(), [](const Contribution& c) { return !changes(c); }), all.end());
+  all.erase(std::remove_if(all.begin(), all.end(), [](const Contribution& c) { return !changes(c); }),
+            all.end());
   return all;
 }
 

@@ -63,7 +63,8 @@ Json step_json(const FoundEffect& e, const Trace& trace) {
   json["choices"] = Json::object();
   for (const auto& [name, word] : e.words) json["choices"][name] = word;
   json["terms"] = Json::array();
-  for (const std::size_t place : e.terms) json["terms"].push_back(term_json(*trace.augmented.terms.at(place)));
+  for (const std::size_t place : e.terms)
+    json["terms"].push_back(term_json(*trace.augmented.terms.at(place)));
   return json;
 }
 
@@ -72,7 +73,8 @@ std::string dumped(const Json& json, int indent) {
 }
 
 /// Every `stride`-th value with seven digits, as many as a plot can show.
-Json column(const std::vector<double>& values, std::size_t stride, const std::vector<char>* counts = nullptr) {
+Json column(const std::vector<double>& values, std::size_t stride,
+            const std::vector<char>* counts = nullptr) {
   Json json = Json::array();
   for (std::size_t k = 0; k < values.size(); k += stride) {
     char text[32];
@@ -89,8 +91,9 @@ std::size_t stride_of(const TraceSeries& s, double cutoff) {
   return std::max({std::size_t{1}, std::size_t(enough), s.time.size() / kMostSamples + 1});
 }
 
-Json channel_series(const std::string& unit, const std::vector<double>& measured, const std::vector<double>& before,
-                    const std::vector<double>& after, const std::vector<char>& counts, std::size_t stride) {
+Json channel_series(const std::string& unit, const std::vector<double>& measured,
+                    const std::vector<double>& before, const std::vector<double>& after,
+                    const std::vector<char>& counts, std::size_t stride) {
   return {{"unit", unit},
           {"measured", column(measured, stride)},
           {"before", column(before, stride, &counts)},
@@ -119,7 +122,8 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
                               {"train_after", number(c.train_after)}};
   for (const FoundEffect& e : trace.steps) json["steps"].push_back(step_json(e, trace));
   if (trace.unexplained)
-    json["unexplained"] = {{"channel", trace.unexplained->channel}, {"signature", trace.unexplained->signature}};
+    json["unexplained"] = {{"channel", trace.unexplained->channel},
+                           {"signature", trace.unexplained->signature}};
   json["base_parameters"] = machine_json(trace.base_parameters, trace);
   json["parameters"] = machine_json(trace.parameters, trace);
   json["warnings"] = trace.warnings;
@@ -147,8 +151,8 @@ std::string trace_series_json(const Trace& trace) {
     json["channels"]["torque"] =
         channel_series(torque, s.torque, s.torque_before, s.torque_after, s.torque_counts, stride);
   if (!s.deflection.empty())
-    json["channels"]["deflection"] = channel_series(angle, s.deflection, s.deflection_before, s.deflection_after,
-                                                    s.deflection_counts, stride);
+    json["channels"]["deflection"] = channel_series(angle, s.deflection, s.deflection_before,
+                                                    s.deflection_after, s.deflection_counts, stride);
   json["steps"] = Json::array();
   for (const FoundEffect& e : trace.steps) {
     Json step = {{"effect", e.id}, {"contributions", Json::array()}};

@@ -73,10 +73,9 @@ std::string effect_row(const FoundEffect& e, bool linear) {
     parameters += html_text(p.name) + " = " +
                   tag("span", value_text(p.measured, axis_unit(p.unit, linear)), "class=\"number\"") + "<br>";
   const Evidence& v = e.evidence;
-  const std::string evidence =
-      "training records " + percent(v.gain) + "<br>blocks left out " + percent(v.gain_held_out) + ", " +
-      std::to_string(v.blocks_better) + " of " + std::to_string(v.blocks) + " better<br>last part " +
-      percent(v.gain_forward);
+  const std::string evidence = "training records " + percent(v.gain) + "<br>blocks left out " +
+                               percent(v.gain_held_out) + ", " + std::to_string(v.blocks_better) + " of " +
+                               std::to_string(v.blocks) + " better<br>last part " + percent(v.gain_forward);
   const std::string alike = e.equivalent_to.empty() ? "none" : joined(e.equivalent_to);
   return tag("tr", cell(name) + cell(parameters) +
                        cell(html_text(e.channel) + "<br>" + percent(e.test_error_before) + " &rarr; " +
@@ -87,11 +86,12 @@ std::string effect_row(const FoundEffect& e, bool linear) {
 
 std::string effects_section(const Trace& trace) {
   if (trace.steps.empty()) return "";
-  std::string rows =
-      heads({"effect", "parameters", "error on the test record", "residual smaller by", "would explain the same"});
+  std::string rows = heads(
+      {"effect", "parameters", "error on the test record", "residual smaller by", "would explain the same"});
   for (const FoundEffect& e : trace.steps) rows += effect_row(e, trace.augmented.linear);
   return tag("h2", "Effects that were added") + "\n" + tag("table", rows) +
-         "\n<p class=\"small\">&plusmn; one standard error; without one: chosen among values, or not known.</p>\n";
+         "\n<p class=\"small\">&plusmn; one standard error; without one: chosen among values, or not "
+         "known.</p>\n";
 }
 
 std::string machine_section(const Trace& trace) {
@@ -146,14 +146,15 @@ std::string trace_page(const Trace& trace, const TraceInputs& inputs, const std:
   for (const auto& [name, channel] : trace.channels) errors += bars(name, channel);
   char cutoff[32];
   std::snprintf(cutoff, sizeof cutoff, "%.4g Hz", trace.cutoff);
-  const std::string records = "Rig " + html_text(inputs.rig) + "; trained on " + html_text(joined(inputs.train)) +
-                              "; tested on " + html_text(inputs.test) + ".";
-  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n" + tag("title", title) + "\n" +
-         tag("style", kStyle) + "\n</head>\n<body>\n" + tag("h1", title) + "\n" +
-         tag("p", html_text(verdict_sentence(trace)), "class=\"verdict " + to_string(trace.verdict) + "\"") + "\n" +
-         tag("p", records, "class=\"small\"") + "\n" + tag("h2", "Before and after, on the test record") + "\n" +
-         tag("table", errors, "class=\"bars\"") +
-         "\n<p class=\"small\">Relative error norm(r) / norm(y - mean(y)) of signals low-passed at " + cutoff +
+  const std::string records = "Rig " + html_text(inputs.rig) + "; trained on " +
+                              html_text(joined(inputs.train)) + "; tested on " + html_text(inputs.test) + ".";
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n" + tag("title", title) +
+         "\n" + tag("style", kStyle) + "\n</head>\n<body>\n" + tag("h1", title) + "\n" +
+         tag("p", html_text(verdict_sentence(trace)), "class=\"verdict " + to_string(trace.verdict) + "\"") +
+         "\n" + tag("p", records, "class=\"small\"") + "\n" +
+         tag("h2", "Before and after, on the test record") + "\n" + tag("table", errors, "class=\"bars\"") +
+         "\n<p class=\"small\">Relative error norm(r) / norm(y - mean(y)) of signals low-passed at " +
+         cutoff +
          "; before: the declared model, fitted; after: with all effects, fitted; noise alone: what a perfect "
          "model would leave.</p>\n" +
          effects_section(trace) + remarks_section(trace) + tag("h2", "Plots") + "\n" + plots +

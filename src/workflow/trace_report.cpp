@@ -27,13 +27,14 @@ std::string row(const char* format, const std::string& a, const std::string& b, 
 std::string effect_text(const FoundEffect& e, bool linear) {
   std::string text = "  " + e.id;
   for (const auto& [name, word] : e.words) text += " (" + name + ": " + word + ")";
-  text += ", " + e.channel + " error " + percent(e.test_error_before) + " -> " + percent(e.test_error_after) + "\n";
+  text += ", " + e.channel + " error " + percent(e.test_error_before) + " -> " + percent(e.test_error_after) +
+          "\n";
   for (const EffectParameter& p : e.parameters)
     text += row("    %-24s %s %s%s\n", p.name, with_error(p.measured), axis_unit(p.unit, linear), "");
   const Evidence& v = e.evidence;
   text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
-          percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) + " of " +
-          std::to_string(v.blocks) + " better), " + percent(v.gain_forward) + " on the last part\n";
+          percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
+          " of " + std::to_string(v.blocks) + " better), " + percent(v.gain_forward) + " on the last part\n";
   if (!e.equivalent_to.empty()) text += "    would explain the same: " + joined(e.equivalent_to) + "\n";
   return text;
 }
@@ -62,9 +63,12 @@ std::string with_error(const Measured& m) {
 
 std::string to_string(TraceVerdict verdict) {
   switch (verdict) {
-    case TraceVerdict::effect_found: return "effect_found";
-    case TraceVerdict::nothing_missing: return "nothing_missing";
-    case TraceVerdict::unexplained: break;
+    case TraceVerdict::effect_found:
+      return "effect_found";
+    case TraceVerdict::nothing_missing:
+      return "nothing_missing";
+    case TraceVerdict::unexplained:
+      break;
   }
   return "unexplained";
 }
@@ -74,8 +78,9 @@ std::string verdict_sentence(const Trace& trace) {
   for (const FoundEffect& e : trace.steps)
     effects.push_back(e.id == "learned_map" ? "an effect without a name, learned as a map" : e.id);
   for (const auto& [name, c] : trace.channels)
-    errors.push_back(name + (effects.empty() ? " " + percent(c.after)
-                                             : " from " + percent(c.before) + " to " + percent(c.after)) +
+    errors.push_back(name +
+                     (effects.empty() ? " " + percent(c.after)
+                                      : " from " + percent(c.before) + " to " + percent(c.after)) +
                      " (noise alone: " + percent(c.floor) + ")");
   std::string text;
   if (!effects.empty())

@@ -1,9 +1,12 @@
 #include "backlash_diagnosis/workflow/traced_rig.h"
 
+#include <filesystem>
+#include <iomanip>
 #include <sstream>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/yaml_edit.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/model/axis_unit.h"
@@ -86,6 +89,16 @@ std::string with_entries(const std::string& text, const std::string& name, const
   return out;
 }
 
+/// A list of test runs that stands in a file beside the declared one is found from anywhere.
+std::string with_whole_path(const std::string& text, const std::string& name) {
+  const YamlReader yaml = YamlReader::from_text(text, name);
+  if (!yaml.has("test_runs") || !yaml.is_text("test_runs")) return text;
+  const std::filesystem::path beside = std::filesystem::absolute(name).parent_path();
+  std::ostringstream path;
+  path << std::quoted((beside / yaml.text("test_runs")).lexically_normal().string());
+  return with_yaml_value(text, name, "test_runs", path.str());
+}
+
 }  // namespace
 
 std::string traced_rig_text(const RigFile& declared, const Trace& trace) {
@@ -93,7 +106,7 @@ std::string traced_rig_text(const RigFile& declared, const Trace& trace) {
   for (const auto& [name, unit] : trace.units) units[name] = axis_unit(unit, declared.rig.linear);
   RigText machine(declared);
   write_servo(machine, {trace.augmented, trace.parameters, units}, declared.rig.motor_axis_ratio());
-  std::string text = machine.text();
+  std::string text = with_whole_path(machine.text(), declared.source);
   const Lines entries = new_entries(declared.rig, trace.augmented);
   if (!entries.empty()) text = with_entries(text, declared.source, entries);
   rig_file_from_text(text, declared.source);  // what is written can be read

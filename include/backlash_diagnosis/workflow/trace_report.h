@@ -1,5 +1,5 @@
-// What the search for missing effects has found, in words and as JSON. Values are those of the load side of the
-// reduction; units are those of a linear axis where the rig is one.
+// What the search for missing effects has found, in words and as JSON. Values are those of the load side of
+// the reduction; units are those of a linear axis where the rig is one.
 #pragma once
 
 #include <string>
@@ -30,14 +30,15 @@ std::string trace_summary(const Trace& trace);
 /// not known is null.
 std::string trace_report_json(const Trace& trace, const TraceInputs& inputs);
 
-/// For plots: the test record as both models have it and what each step adds to it. As many samples as signals
-/// of this bandwidth need.
+/// For plots: the test record as both models have it and what each step adds to it. As many samples as
+/// signals of this bandwidth need.
 std::string trace_series_json(const Trace& trace);
 
 /// 0.0123 -> "1.23 %"
 std::string percent(double share);
 
-/// A value as people read it, with its standard error where that is known: "12.3 +- 0.4"; "15" for a fixed one.
+/// A value as people read it, with its standard error where that is known: "12.3 +- 0.4"; "15" for a fixed
+/// one.
 std::string with_error(const Measured& measured);
 
 }  // namespace backlash
