@@ -42,7 +42,7 @@ ServoPrediction predicted(Machine machine, const ServoData& record, double cutof
     if (Unknowns(machine).size() == 0) break;
     RecordSet records(data, band, kLoadFeedback);
     records.weigh(machine);
-    machine = fit_machine(machine, records, {}, options).machine;
+    machine = fit_machine(machine, records, options).machine;
   }
   OutputErrorSettings settings;
   settings.cutoff = cutoff;
@@ -68,7 +68,7 @@ struct Numbers {
 /// Values with standard errors of a stage of which the first `declared` parameters are the machine's.
 Numbers numbers(const Stage& stage, std::size_t declared) {
   MachineFit fit = stage.fit;
-  judge_errors(fit, stage.start, stage.records, {});
+  judge_errors(fit, stage.start, stage.records);
   const Unknowns unknowns(stage.start);
   Numbers out;
   for (std::size_t i = 0; i < stage.start.parameters.size(); ++i) {
@@ -163,7 +163,7 @@ void require_same_rate(const std::vector<ServoData>& data, const ServoData& test
 void warn_of_range(const std::vector<ServoData>& train, const ServoData& test, Trace& trace) {
   const MotionRange known = motion_range(train), asked = motion_range({test});
   const double slack = 0.1 * (known.to - known.from);
-  char text[160];
+  char text[256];
   if (asked.from < known.from - slack || asked.to > known.to + slack) {
     std::snprintf(text, sizeof text, "the test record moves from %.3g to %.3g rad, the training records from %.3g to %.3g",
                   asked.from, asked.to, known.from, known.to);

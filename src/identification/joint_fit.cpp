@@ -5,7 +5,6 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
 
 namespace backlash {
 namespace {
@@ -28,19 +27,13 @@ double rms(const std::vector<double>& values, const std::vector<char>& counts) {
   return std::sqrt(square / std::max(1.0, count));
 }
 
-double misfit(const Finding& finding, const Rig& rig) {
-  double value = 0;
-  for (const auto& [name, factor] : finding.combination) value += factor * servo_parameter(name).get(rig);
-  return (finding.measured.value - value) / finding.measured.standard_error;
-}
-
-Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records,
-                         const std::vector<Finding>& findings, const Eigen::VectorXd& p) {
-  const Rig rig = unknowns.rig(p);
-  Eigen::VectorXd rows = records.rows(rig, unknowns.calibrations(p));
+Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
+  const Machine machine = unknowns.machine(p);
+  Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
   const Eigen::Index own = rows.size();
-  rows.conservativeResize(own + Eigen::Index(findings.size()));
-  for (std::size_t i = 0; i < findings.size(); ++i) rows[own + Eigen::Index(i)] = misfit(findings[i], rig);
+  rows.conservativeResize(own + Eigen::Index(machine.beliefs.size()));
+  for (std::size_t i = 0; i < machine.beliefs.size(); ++i)
+    rows[own + Eigen::Index(i)] = machine.beliefs[i](machine.rig);
   return rows;
 }
 
@@ -181,23 +174,21 @@ std::map<std::string, Measured> Unknowns::parameters(const LeastSquaresFit& fit)
   return all;
 }
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records, const std::vector<Finding>& findings,
-                       const NonlinearOptions& options) {
+MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options) {
   const Unknowns unknowns(start);
   MachineFit out;
-  out.fit = fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, findings, p); },
+  out.fit = fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
                           unknowns.values(), unknowns.scale(), options);
   out.machine = unknowns.machine(out.fit.values);
   return out;
 }
 
-void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records,
-                  const std::vector<Finding>& findings) {
+void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records) {
   const Unknowns unknowns(start);
-  const Eigen::Index known = Eigen::Index(findings.size()), rows = fit.fit.residuals.size() - known;
+  const Eigen::Index known = Eigen::Index(start.beliefs.size()), rows = fit.fit.residuals.size() - known;
   const Eigen::Index wanted = 2 * std::lround(kBlock / records.row_interval());
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
-  widen_jacobian(fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, findings, p); },
+  widen_jacobian(fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
                  kWideStep * unknowns.scale(), true);
   take_larger(fit.fit.covariance, block_covariance(fit.fit, block, known));
 }

@@ -119,7 +119,7 @@ Machine Search::with_effects(const std::vector<Accepted>& effects) const {
 Stage Search::fit_stage(Machine start, double cutoff, double tolerance) const {
   RecordSet records(data_, std::min(cutoff, cutoff_), kLoadFeedback);
   records.weigh(start);
-  MachineFit fit = fit_machine(start, records, {}, options(tolerance));
+  MachineFit fit = fit_machine(start, records, options(tolerance));
   const Leftover left = records.leftover(fit.machine);
   return {std::move(fit), std::move(start), std::move(records), left};
 }
@@ -161,9 +161,9 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
     for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
   }
   try {
-    trial.fit = fit_machine(trial.start, stage_->records, {}, options(kRoughTolerance));
+    trial.fit = fit_machine(trial.start, stage_->records, options(kRoughTolerance));
     trial.start = trial.fit.machine;
-    trial.fit = fit_machine(trial.start, stage_->records, {}, options(kFineTolerance));
+    trial.fit = fit_machine(trial.start, stage_->records, options(kFineTolerance));
   } catch (const CannotIdentify&) {
     return std::nullopt;
   }
@@ -277,9 +277,9 @@ void Search::drop_superfluous() {
     std::vector<Accepted> fewer = effects_;
     fewer.erase(fewer.begin() + long(i));
     const Machine start = with_effects(fewer);
-    MachineFit fit = fit_machine(start, stage_->records, {}, options(kRoughTolerance));
+    MachineFit fit = fit_machine(start, stage_->records, options(kRoughTolerance));
     const Machine again = fit.machine;
-    fit = fit_machine(again, stage_->records, {}, options(kFineTolerance));
+    fit = fit_machine(again, stage_->records, options(kFineTolerance));
     const Gain gain = compare(held_out(fit, again, stage_->records),
                               held_out(stage_->fit, stage_->start, stage_->records));
     if (convinces(gain, stage_->fit.machine))
