@@ -7,12 +7,14 @@
 #include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "effects/search.h"
+#include "effects/signature.h"
 
 namespace backlash {
 namespace {
 
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
+constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
 
 double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
@@ -81,9 +83,27 @@ Numbers numbers(const Stage& stage, std::size_t declared) {
   return out;
 }
 
+/// Of a learned map: where its coordinate reaches and how large it gets.
+void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
+  for (const char* word : {"acts_on", "coordinate"}) effect.words[word] = term.values.choice(word);
+  effect.curve_x = term.values.list("points");
+  effect.curve_y = term.values.list("values");
+  const std::string& x = effect.words["coordinate"];
+  const bool angle = x.find("position") != std::string::npos, speed = x.find("velocity") != std::string::npos;
+  const char* unit = angle ? "rad" : speed ? "rad/s" : x == "time" ? "s" : "N m";
+  const auto largest = std::max_element(effect.curve_y.begin(), effect.curve_y.end(),
+                                        [](double a, double b) { return std::fabs(a) < std::fabs(b); });
+  const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
+  effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
+                       {x + "_to", unit, {effect.curve_x.back(), 0}},
+                       {"largest", effect.words["acts_on"] == "gap" ? "rad" : "N m", at_largest}};
+  fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
+}
+
 /// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0.
 void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted, FoundEffect& effect) {
   const TermType& type = term_type(term.id);
+  if (!type.search) return describe_map(term, fitted, effect);
   const TermSearch& search = *type.search;
   std::map<std::string, Measured> found;
   const auto take = [&](const std::string& name) {
@@ -123,6 +143,7 @@ std::vector<FoundEffect> found_effects(const Search& search, std::vector<Measure
       e.channel = accepted.gain.deflection ? "deflection" : "torque";
       e.evidence = accepted.gain.evidence;
       e.equivalent_to = accepted.equivalent_to;
+      e.nearest = accepted.nearest;
       e.test_error_before = error(on_test[i], e.channel);
       step = all.insert(all.end(), e);
     }
@@ -211,7 +232,11 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   trace.parameters = found.machine;
   for (const FitParameter& p : base.parameters) trace.units[p.name] = p.unit;
   trace.steps = found_effects(search, found.effects, on_test, declared.terms.size());
-  if (!trace.steps.empty()) trace.verdict = TraceVerdict::effect_found;
+  trace.unexplained = signature(last, search.stage().records, kUnexplained);
+  if (!trace.steps.empty())
+    trace.verdict = TraceVerdict::effect_found;
+  else if (trace.unexplained)
+    trace.verdict = TraceVerdict::unexplained;
   trace.series = series(unseen, before, after);
   warn_of_range(data, unseen, trace);
   return trace;

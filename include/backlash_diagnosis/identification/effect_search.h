@@ -50,7 +50,9 @@ struct FoundEffect {
   std::string channel;              // that gains most
   std::vector<std::size_t> terms;   // places in the augmented rig's terms
   std::map<std::string, std::string> words;  // choices of the term: body, ...
-  std::vector<EffectParameter> parameters;
+  std::vector<EffectParameter> parameters;   // of a learned map: range and size of its curve
+  std::vector<double> curve_x, curve_y;      // of a learned map, in the units of its coordinate and its torque or angle
+  std::vector<std::string> nearest;          // of a learned map: ids that explain part of the same
   Evidence evidence;
   double test_error_before = 0, test_error_after = 0;  // of the channel
   std::vector<std::string> equivalent_to;  // ids that reach most of the gain

@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "learned.h"
 
 namespace backlash {
 namespace {
@@ -25,6 +26,11 @@ constexpr std::size_t kTrials = 6;        // candidates that are fitted with the
 constexpr double kWorthTrying = 0.2;      // of the best predicted gain
 constexpr double kAlike = 0.8;            // of the best gain: another name for the same
 constexpr double kMostBlocks = 0.6;       // of the blocks must get better
+constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
+constexpr double kHalf = 0.5;             // of a residual: an effect that explains less may stand in for another
+constexpr std::size_t kMapTrials = 2;
+constexpr std::size_t kNearest = 3;
+const char* const kLearned = "learned_map";
 constexpr int kOtherStarts = 4;
 constexpr double kBeside = 0.4;           // of the logarithm of a parameter
 constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum
@@ -83,6 +89,8 @@ void Search::run() {
   fit_base();
   add_effects();
   drop_superfluous();
+  add_learned();
+  drop_stand_ins();
 }
 
 void Search::report(const std::string& phase) const {
@@ -112,8 +120,13 @@ Machine Search::with_effects(const std::vector<Accepted>& effects) const {
   machine.rig.terms = declared_.rig.terms;
   machine.parameters = declared_.parameters;
   machine.largest_delay = kLargestDelay;
-  for (const Accepted& effect : effects) machine = with_candidate(machine, effect.candidate, range_);
+  for (const Accepted& effect : effects) machine = extended(machine, effect.candidate);
   return machine;
+}
+
+Machine Search::extended(Machine machine, const Candidate& candidate) const {
+  if (candidate.id != kLearned) return with_candidate(std::move(machine), candidate, range_);
+  return with_map(std::move(machine), {candidate.terms.front(), candidate.smoothness, 0}, range_);
 }
 
 Stage Search::fit_stage(Machine start, double cutoff, double tolerance) const {
@@ -155,7 +168,7 @@ void Search::fit_base() {
 
 /// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
 std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
-  Trial trial{candidate, with_candidate(stage_->fit.machine, candidate, range_), {}, 0};
+  Trial trial{candidate, extended(stage_->fit.machine, candidate), {}, 0};
   if (sensing({trial.start.rig.terms.back()}).torque_delay != 0) {  // then calibration is part of the effect
     trial.start.largest_delay = 0;
     for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
@@ -252,7 +265,7 @@ bool Search::add_one() {
     const Trial best = best_neighbour(trials[i]);
     const Gain gain = compare(now, held_out(best.fit, best.start, stage_->records));
     if (!convinces(gain, best.fit.machine)) continue;
-    Accepted effect{best.candidate, gain, {}, {}};
+    Accepted effect{best.candidate, gain, {}, {}, {}};
     for (const Trial& other : trials) {
       if (other.candidate.id == best.candidate.id) continue;
       const Gain its = compare(now, held_out(other.fit, other.start, stage_->records));
@@ -264,6 +277,53 @@ bool Search::add_one() {
     return true;
   }
   return false;
+}
+
+bool Search::add_map() {
+  report("learning maps");
+  const std::vector<LearnedCandidate> maps = learn_maps(stage_->fit, stage_->records, range_);
+  const HeldOut now = held_out(stage_->fit, stage_->start, stage_->records);
+  for (std::size_t i = 0; i < std::min(kMapTrials, maps.size()); ++i) {
+    if (maps[i].gain < kLeastPredicted * settings_.least_gain_unclear) break;
+    const auto trial = tried({kLearned, {maps[i].values}, maps[i].gain, maps[i].smoothness});
+    if (!trial) continue;
+    const Gain gain = compare(now, held_out(trial->fit, trial->start, stage_->records));
+    if (gain.evidence.gain_held_out < settings_.least_gain_unclear || !convinces(gain, trial->fit.machine)) continue;
+    Accepted effect{trial->candidate, gain, {}, {}, {}};
+    for (const Candidate& named : screen(stage_->fit, stage_->records, range_))
+      if (effect.nearest.size() < kNearest) effect.nearest.push_back(named.id);
+    std::vector<Accepted> effects = effects_;
+    effects.push_back(effect);
+    adopt(std::move(effects));
+    return true;
+  }
+  return false;
+}
+
+/// Tried without the effects that explain less than half of their residual, which may be stand-ins, then with
+/// named effects on top; the better of both remains.
+void Search::add_learned() {
+  const double before = size(stage_->leftover);
+  if (stage_->leftover.torque < kSomethingLeft && stage_->leftover.deflection < kSomethingLeft) return;
+  const std::vector<Accepted> named = effects_;
+  const Stage stage = *stage_;
+  for (std::size_t i = effects_.size(); i-- > 0;)
+    if (effects_[i].gain.evidence.gain < kHalf) drop(i);
+  if (add_map()) {
+    add_effects();
+    drop_superfluous();
+    if (size(stage_->leftover) < (1 - settings_.least_gain_unclear) * before) return;
+  }
+  effects_ = named;
+  stage_ = stage;
+}
+
+void Search::drop_stand_ins() {
+  const Leftover &left = stage_->leftover, &first = base_->leftover;
+  if (effects_.empty() || std::max(left.torque, left.deflection) < kNearFloor) return;
+  if (size(left) < kHalf * size(first)) return;
+  effects_.clear();
+  stage_ = base_;
 }
 
 void Search::add_effects() {
