@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "effects/independence.h"
 #include "effects/search.h"
 #include "effects/signature.h"
 
@@ -14,6 +15,7 @@ namespace {
 
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
+constexpr int kLags = 25;                 // to either side, of the test for independence
 constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
 
@@ -174,6 +176,33 @@ TraceSeries series(const ServoData& data, const ServoPrediction& before, const S
   return s;
 }
 
+/// Every so many samples: as many as the low-passed residual has independent values.
+std::vector<Independence> independence(const TraceSeries& s, const ServoData& data, double cutoff) {
+  const auto stride = std::size_t(std::max(1L, std::lround(0.4 / (cutoff * data.interval))));
+  const auto thinned = [&](const std::vector<double>& x) {
+    std::vector<double> out;
+    for (std::size_t k = 0; k < x.size(); k += stride) out.push_back(x[k]);
+    return out;
+  };
+  const auto residual = [&](const std::vector<double>& y, const std::vector<double>& p, const std::vector<char>& counts) {
+    std::vector<double> r(y.size());
+    for (std::size_t k = 0; k < y.size(); ++k) r[k] = counts[k] ? y[k] - p[k] : 0;
+    return thinned(r);
+  };
+  std::vector<Independence> all;
+  const std::pair<const char*, std::vector<double>> inputs[] = {{"motor_torque", thinned(s.torque)},
+                                                               {"motor_velocity", thinned(data.motor_rate)}};
+  for (const auto& [name, input] : inputs) {
+    const auto share = [&](const std::vector<double>& r) { return share_outside_band(r, input, kLags); };
+    all.push_back({"torque", name, share(residual(s.torque, s.torque_before, s.torque_counts)),
+                   share(residual(s.torque, s.torque_after, s.torque_counts))});
+    if (!s.deflection.empty())
+      all.push_back({"deflection", name, share(residual(s.deflection, s.deflection_before, s.deflection_counts)),
+                     share(residual(s.deflection, s.deflection_after, s.deflection_counts))});
+  }
+  return all;
+}
+
 void require_same_rate(const std::vector<ServoData>& data, const ServoData& test) {
   for (const ServoData& d : data)
     if (std::fabs(d.interval / test.interval - 1) > 0.01)
@@ -238,6 +267,7 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   else if (trace.unexplained)
     trace.verdict = TraceVerdict::unexplained;
   trace.series = series(unseen, before, after);
+  trace.independence = independence(trace.series, unseen, trace.cutoff);
   warn_of_range(data, unseen, trace);
   return trace;
 }

@@ -63,6 +63,13 @@ struct TraceChannel {
   double train_before = 0, train_after = 0;
 };
 
+/// Share of lags at which the residual of a channel correlates with an input beyond the 99 % band of
+/// independence (about 0.01 where nothing is missing), on the test record.
+struct Independence {
+  std::string channel, input;
+  double before = 0, after = 0;
+};
+
 /// What no effect explains.
 struct Unexplained {
   std::string channel, signature;
@@ -85,6 +92,7 @@ struct Trace {
   std::map<std::string, Measured> base_parameters, parameters;  // of the machine, without and with effects
   std::map<std::string, std::string> units;
   std::map<std::string, TraceChannel> channels;
+  std::vector<Independence> independence;
   std::vector<FoundEffect> steps;
   std::optional<Unexplained> unexplained;
   std::vector<std::string> warnings;

@@ -48,6 +48,18 @@ NonlinearOptions options(double tolerance) {
   return o;
 }
 
+/// A fit, or none where the model cannot be fitted or followed.
+template <typename Fit>
+auto attempted(const Fit& fit) -> std::optional<decltype(fit())> {
+  try {
+    return fit();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 /// Another start not far away, the same for the same number.
 Machine beside(Machine machine, int number) {
   std::mt19937 random(static_cast<unsigned>(number));
@@ -173,13 +185,12 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
     trial.start.largest_delay = 0;
     for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
   }
-  try {
-    trial.fit = fit_machine(trial.start, stage_->records, options(kRoughTolerance));
-    trial.start = trial.fit.machine;
-    trial.fit = fit_machine(trial.start, stage_->records, options(kFineTolerance));
-  } catch (const CannotIdentify&) {
-    return std::nullopt;
-  }
+  const auto fit = attempted([&] {
+    trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance)).machine;
+    return fit_machine(trial.start, stage_->records, options(kFineTolerance));
+  });
+  if (!fit) return std::nullopt;
+  trial.fit = *fit;
   trial.misfit = trial.fit.fit.residuals.norm();
   const auto& terms = trial.fit.machine.rig.terms;
   for (std::size_t i = 0; i < candidate.terms.size(); ++i)
@@ -240,12 +251,15 @@ bool Search::convinces(const Gain& gain, const Machine& after) const {
          e.blocks_better >= kMostBlocks * e.blocks;
 }
 
-void Search::adopt(std::vector<Accepted> effects) {
+bool Search::adopt(std::vector<Accepted> effects) {
   Machine machine = with_effects(effects);
   for (const Accepted& effect : effects)
     if (effect.candidate.id == "delay") machine.largest_delay = 0;
-  Stage stage = fit_stage(machine, cutoff_, kRoughTolerance);
-  stage = fit_stage(stage.fit.machine, cutoff_, kFineTolerance);
+  std::optional<Stage> fitted = attempted([&] {
+    return fit_stage(fit_stage(machine, cutoff_, kRoughTolerance).fit.machine, cutoff_, kFineTolerance);
+  });
+  if (!fitted) return false;
+  Stage& stage = *fitted;
   std::size_t place = declared_.rig.terms.size();
   for (Accepted& effect : effects)
     for (ParameterValues& values : effect.candidate.terms)
@@ -253,6 +267,7 @@ void Search::adopt(std::vector<Accepted> effects) {
   effects.back().after = stage.fit.machine;
   stage_ = std::move(stage);
   effects_ = std::move(effects);
+  return true;
 }
 
 bool Search::add_one() {
@@ -273,8 +288,7 @@ bool Search::add_one() {
     }
     std::vector<Accepted> effects = effects_;
     effects.push_back(effect);
-    adopt(std::move(effects));
-    return true;
+    if (adopt(std::move(effects))) return true;
   }
   return false;
 }
@@ -294,8 +308,7 @@ bool Search::add_map() {
       if (effect.nearest.size() < kNearest) effect.nearest.push_back(named.id);
     std::vector<Accepted> effects = effects_;
     effects.push_back(effect);
-    adopt(std::move(effects));
-    return true;
+    if (adopt(std::move(effects))) return true;
   }
   return false;
 }
@@ -337,12 +350,15 @@ void Search::drop_superfluous() {
     std::vector<Accepted> fewer = effects_;
     fewer.erase(fewer.begin() + long(i));
     const Machine start = with_effects(fewer);
-    MachineFit fit = fit_machine(start, stage_->records, options(kRoughTolerance));
-    const Machine again = fit.machine;
-    fit = fit_machine(again, stage_->records, options(kFineTolerance));
-    const Gain gain = compare(held_out(fit, again, stage_->records),
-                              held_out(stage_->fit, stage_->start, stage_->records));
-    if (convinces(gain, stage_->fit.machine))
+    Machine again;
+    const auto fit = attempted([&] {
+      again = fit_machine(start, stage_->records, options(kRoughTolerance)).machine;
+      return fit_machine(again, stage_->records, options(kFineTolerance));
+    });
+    const bool needed = !fit || convinces(compare(held_out(*fit, again, stage_->records),
+                                                  held_out(stage_->fit, stage_->start, stage_->records)),
+                                          stage_->fit.machine);
+    if (needed)
       ++i;
     else
       drop(i);

@@ -73,7 +73,8 @@ class Search {
   bool add_map();
   Machine extended(Machine machine, const Candidate& candidate) const;
   bool convinces(const Gain& gain, const Machine& after) const;
-  void adopt(std::vector<Accepted> effects);
+  /// Fits with these effects at their own weights; false, and nothing changes, where that fails.
+  bool adopt(std::vector<Accepted> effects);
   void drop(std::size_t effect);
 
   const std::vector<ServoData>& data_;
