@@ -12,6 +12,7 @@ namespace {
 constexpr double kFarthest = 30;     // times the start or a part of it: no parameter is sought beyond
 constexpr double kWideStep = 1e-2;   // of the differences that the errors are taken from
 constexpr double kBlock = 1;         // s: the slowest oscillation that a servo record shows
+constexpr double kSaturated = 3;     // where tanh no longer moves: 0.995 of the largest delay
 constexpr double kDefaultGap = 1e-4; // rad, scale of an encoder offset where the rig has no gap
 
 std::size_t stride(const PreparedServo& record) {
@@ -144,8 +145,11 @@ Rig Unknowns::rig(const Eigen::VectorXd& values) const {
 std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) const {
   std::vector<Calibration> all = start_.calibrations;
   for (std::size_t r = 0; r < records(); ++r) {
-    if (delays_)
-      all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
+    if (delays_) {
+      const double share = values[first_of(r)] / start_.largest_delay;
+      if (std::fabs(share) > kSaturated) throw InvalidParameter("torque_delay", share, "beyond calibration");
+      all[r].torque_delay = start_.largest_delay * std::tanh(share);
+    }
     if (offsets_) all[r].encoder_offset = values[first_of(r) + delays_];
   }
   return all;
