@@ -131,6 +131,7 @@ Machine Search::with_effects(const std::vector<Accepted>& effects) const {
   Machine machine = stage_ ? stage_->fit.machine : base_->fit.machine;
   machine.rig.terms = declared_.rig.terms;
   machine.parameters = declared_.parameters;
+  machine.beliefs = declared_.beliefs;
   machine.largest_delay = kLargestDelay;
   for (const Accepted& effect : effects) machine = extended(machine, effect.candidate);
   return machine;
