@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <random>
 
 #include "backlash_diagnosis/base/error.h"
@@ -205,7 +206,9 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
   for (std::size_t i = 0; i < std::min(kTrials, candidates.size()); ++i) {
     if (candidates[i].gain < std::max(kWorthTrying * candidates.front().gain, kLeastPredicted * settings_.least_gain))
       break;
-    report("trying " + candidates[i].id);
+    char text[96];
+    std::snprintf(text, sizeof text, "trying %s (predicted gain %.3g)", candidates[i].id.c_str(), candidates[i].gain);
+    report(text);
     if (auto trial = tried(candidates[i])) trials.push_back(std::move(*trial));
   }
   std::stable_sort(trials.begin(), trials.end(),
@@ -274,7 +277,10 @@ bool Search::adopt(std::vector<Accepted> effects) {
 bool Search::add_one() {
   const Leftover& left = stage_->leftover;
   if (left.torque < kAtFloor && left.deflection < kAtFloor) return false;
-  report("screening");
+  char text[96];
+  std::snprintf(text, sizeof text, "screening (torque %.3g, deflection %.3g times the noise floor)", left.torque,
+                left.deflection);
+  report(text);
   const std::vector<Trial> trials = tried_best(screen(stage_->fit, stage_->records, range_));
   const HeldOut now = held_out(stage_->fit, stage_->start, stage_->records);
   for (std::size_t i = 0; i < trials.size(); ++i) {
