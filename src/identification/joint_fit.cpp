@@ -66,7 +66,7 @@ void RecordSet::weigh(const Machine& machine) {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load.load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
     weights_[i] = {std::max(floor.torque, rms(r.torque, record.counts)),
                    std::max(floor.deflection, rms(r.deflection, record.settled))};
   }
@@ -78,7 +78,7 @@ Leftover RecordSet::leftover(const Machine& machine) const {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load.load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
     sum.torque += std::pow(rms(r.torque, record.counts) / floor.torque, 2);
     if (!r.deflection.empty())
       sum.deflection += std::pow(rms(r.deflection, record.settled) / floor.deflection, 2);
