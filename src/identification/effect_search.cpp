@@ -6,13 +6,17 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "effects/independence.h"
 #include "effects/search.h"
+#include "effects/signature.h"
 
 namespace backlash {
 namespace {
 
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
+constexpr int kLags = 25;                 // to either side, of the test for independence
+constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
 
 double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
@@ -42,7 +46,7 @@ ServoPrediction predicted(Machine machine, const ServoData& record, double cutof
     if (Unknowns(machine).size() == 0) break;
     RecordSet records(data, band, kLoadFeedback);
     records.weigh(machine);
-    machine = fit_machine(machine, records, {}, options).machine;
+    machine = fit_machine(machine, records, options).machine;
   }
   OutputErrorSettings settings;
   settings.cutoff = cutoff;
@@ -68,7 +72,7 @@ struct Numbers {
 /// Values with standard errors of a stage of which the first `declared` parameters are the machine's.
 Numbers numbers(const Stage& stage, std::size_t declared) {
   MachineFit fit = stage.fit;
-  judge_errors(fit, stage.start, stage.records, {});
+  judge_errors(fit, stage.start, stage.records);
   const Unknowns unknowns(stage.start);
   Numbers out;
   for (std::size_t i = 0; i < stage.start.parameters.size(); ++i) {
@@ -81,9 +85,27 @@ Numbers numbers(const Stage& stage, std::size_t declared) {
   return out;
 }
 
+/// Of a learned map: where its coordinate reaches and how large it gets.
+void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
+  for (const char* word : {"acts_on", "coordinate"}) effect.words[word] = term.values.choice(word);
+  effect.curve_x = term.values.list("points");
+  effect.curve_y = term.values.list("values");
+  const std::string& x = effect.words["coordinate"];
+  const bool angle = x.find("position") != std::string::npos, speed = x.find("velocity") != std::string::npos;
+  const char* unit = angle ? "rad" : speed ? "rad/s" : x == "time" ? "s" : "N m";
+  const auto largest = std::max_element(effect.curve_y.begin(), effect.curve_y.end(),
+                                        [](double a, double b) { return std::fabs(a) < std::fabs(b); });
+  const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
+  effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
+                       {x + "_to", unit, {effect.curve_x.back(), 0}},
+                       {"largest", effect.words["acts_on"] == "gap" ? "rad" : "N m", at_largest}};
+  fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
+}
+
 /// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0.
 void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted, FoundEffect& effect) {
   const TermType& type = term_type(term.id);
+  if (!type.search) return describe_map(term, fitted, effect);
   const TermSearch& search = *type.search;
   std::map<std::string, Measured> found;
   const auto take = [&](const std::string& name) {
@@ -123,6 +145,7 @@ std::vector<FoundEffect> found_effects(const Search& search, std::vector<Measure
       e.channel = accepted.gain.deflection ? "deflection" : "torque";
       e.evidence = accepted.gain.evidence;
       e.equivalent_to = accepted.equivalent_to;
+      e.nearest = accepted.nearest;
       e.test_error_before = error(on_test[i], e.channel);
       step = all.insert(all.end(), e);
     }
@@ -157,6 +180,33 @@ TraceSeries series(const ServoData& data, const ServoPrediction& before, const S
   return s;
 }
 
+/// Every so many samples: as many as the low-passed residual has independent values.
+std::vector<Independence> independence(const TraceSeries& s, const ServoData& data, double cutoff) {
+  const auto stride = std::size_t(std::max(1L, std::lround(0.4 / (cutoff * data.interval))));
+  const auto thinned = [&](const std::vector<double>& x) {
+    std::vector<double> out;
+    for (std::size_t k = 0; k < x.size(); k += stride) out.push_back(x[k]);
+    return out;
+  };
+  const auto residual = [&](const std::vector<double>& y, const std::vector<double>& p, const std::vector<char>& counts) {
+    std::vector<double> r(y.size());
+    for (std::size_t k = 0; k < y.size(); ++k) r[k] = counts[k] ? y[k] - p[k] : 0;
+    return thinned(r);
+  };
+  std::vector<Independence> all;
+  const std::pair<const char*, std::vector<double>> inputs[] = {{"motor_torque", thinned(s.torque)},
+                                                               {"motor_velocity", thinned(data.motor_rate)}};
+  for (const auto& [name, input] : inputs) {
+    const auto share = [&](const std::vector<double>& r) { return share_outside_band(r, input, kLags); };
+    all.push_back({"torque", name, share(residual(s.torque, s.torque_before, s.torque_counts)),
+                   share(residual(s.torque, s.torque_after, s.torque_counts))});
+    if (!s.deflection.empty())
+      all.push_back({"deflection", name, share(residual(s.deflection, s.deflection_before, s.deflection_counts)),
+                     share(residual(s.deflection, s.deflection_after, s.deflection_counts))});
+  }
+  return all;
+}
+
 void require_same_rate(const std::vector<ServoData>& data, const ServoData& test) {
   for (const ServoData& d : data)
     if (std::fabs(d.interval / test.interval - 1) > 0.01)
@@ -167,7 +217,7 @@ void require_same_rate(const std::vector<ServoData>& data, const ServoData& test
 void warn_of_range(const std::vector<ServoData>& train, const ServoData& test, Trace& trace) {
   const MotionRange known = motion_range(train), asked = motion_range({test});
   const double slack = 0.1 * (known.to - known.from);
-  char text[160];
+  char text[256];
   if (asked.from < known.from - slack || asked.to > known.to + slack) {
     std::snprintf(text, sizeof text, "the test record moves from %.3g to %.3g rad, the training records from %.3g to %.3g",
                   asked.from, asked.to, known.from, known.to);
@@ -215,8 +265,13 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   trace.parameters = found.machine;
   for (const FitParameter& p : base.parameters) trace.units[p.name] = p.unit;
   trace.steps = found_effects(search, found.effects, on_test, declared.terms.size());
-  if (!trace.steps.empty()) trace.verdict = TraceVerdict::effect_found;
+  trace.unexplained = signature(last, search.stage().records, kUnexplained);
+  if (!trace.steps.empty())
+    trace.verdict = TraceVerdict::effect_found;
+  else if (trace.unexplained)
+    trace.verdict = TraceVerdict::unexplained;
   trace.series = series(unseen, before, after);
+  trace.independence = independence(trace.series, unseen, trace.cutoff);
   warn_of_range(data, unseen, trace);
   return trace;
 }

@@ -29,4 +29,16 @@ FitParameter term_parameter(std::size_t term, const std::string& name, const Rig
   throw InvalidParameter(name, id, "is not a parameter of this term");
 }
 
+FitParameter list_parameter(std::size_t term, const std::string& name, std::size_t index, double scale) {
+  const auto set = [term, name, index](Rig& changed, double value) {
+    ParameterValues values = changed.terms[term]->values;
+    std::vector<double> list = values.list(name);
+    list[index] = value;
+    values.set_list(name, list);
+    changed.terms[term] = make_term(changed.terms[term]->id, values);
+  };
+  return {name, "", false, scale,
+          [term, name, index](const Rig& rig) { return rig.terms[term]->values.list(name)[index]; }, set};
+}
+
 }  // namespace backlash

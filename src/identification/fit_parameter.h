@@ -24,4 +24,7 @@ FitParameter machine_parameter(const std::string& name, const Rig& rig);
 /// A number of the term at this place of rig.terms; `scale` as above.
 FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale);
 
+/// Entry `index` of a list of that term.
+FitParameter list_parameter(std::size_t term, const std::string& name, std::size_t index, double scale);
+
 }  // namespace backlash

@@ -5,7 +5,6 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
 
 namespace backlash {
 namespace {
@@ -13,6 +12,7 @@ namespace {
 constexpr double kFarthest = 30;     // times the start or a part of it: no parameter is sought beyond
 constexpr double kWideStep = 1e-2;   // of the differences that the errors are taken from
 constexpr double kBlock = 1;         // s: the slowest oscillation that a servo record shows
+constexpr double kSaturated = 3;     // where tanh no longer moves: 0.995 of the largest delay
 constexpr double kDefaultGap = 1e-4; // rad, scale of an encoder offset where the rig has no gap
 
 std::size_t stride(const PreparedServo& record) {
@@ -28,19 +28,13 @@ double rms(const std::vector<double>& values, const std::vector<char>& counts) {
   return std::sqrt(square / std::max(1.0, count));
 }
 
-double misfit(const Finding& finding, const Rig& rig) {
-  double value = 0;
-  for (const auto& [name, factor] : finding.combination) value += factor * servo_parameter(name).get(rig);
-  return (finding.measured.value - value) / finding.measured.standard_error;
-}
-
-Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records,
-                         const std::vector<Finding>& findings, const Eigen::VectorXd& p) {
-  const Rig rig = unknowns.rig(p);
-  Eigen::VectorXd rows = records.rows(rig, unknowns.calibrations(p));
+Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
+  const Machine machine = unknowns.machine(p);
+  Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
   const Eigen::Index own = rows.size();
-  rows.conservativeResize(own + Eigen::Index(findings.size()));
-  for (std::size_t i = 0; i < findings.size(); ++i) rows[own + Eigen::Index(i)] = misfit(findings[i], rig);
+  rows.conservativeResize(own + Eigen::Index(machine.beliefs.size()));
+  for (std::size_t i = 0; i < machine.beliefs.size(); ++i)
+    rows[own + Eigen::Index(i)] = machine.beliefs[i](machine.rig);
   return rows;
 }
 
@@ -72,7 +66,7 @@ void RecordSet::weigh(const Machine& machine) {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load.load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
     weights_[i] = {std::max(floor.torque, rms(r.torque, record.counts)),
                    std::max(floor.deflection, rms(r.deflection, record.settled))};
   }
@@ -84,7 +78,7 @@ Leftover RecordSet::leftover(const Machine& machine) const {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load.load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
     sum.torque += std::pow(rms(r.torque, record.counts) / floor.torque, 2);
     if (!r.deflection.empty())
       sum.deflection += std::pow(rms(r.deflection, record.settled) / floor.deflection, 2);
@@ -151,8 +145,11 @@ Rig Unknowns::rig(const Eigen::VectorXd& values) const {
 std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) const {
   std::vector<Calibration> all = start_.calibrations;
   for (std::size_t r = 0; r < records(); ++r) {
-    if (delays_)
-      all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
+    if (delays_) {
+      const double share = values[first_of(r)] / start_.largest_delay;
+      if (std::fabs(share) > kSaturated) throw InvalidParameter("torque_delay", share, "beyond calibration");
+      all[r].torque_delay = start_.largest_delay * std::tanh(share);
+    }
     if (offsets_) all[r].encoder_offset = values[first_of(r) + delays_];
   }
   return all;
@@ -181,23 +178,21 @@ std::map<std::string, Measured> Unknowns::parameters(const LeastSquaresFit& fit)
   return all;
 }
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records, const std::vector<Finding>& findings,
-                       const NonlinearOptions& options) {
+MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options) {
   const Unknowns unknowns(start);
   MachineFit out;
-  out.fit = fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, findings, p); },
+  out.fit = fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
                           unknowns.values(), unknowns.scale(), options);
   out.machine = unknowns.machine(out.fit.values);
   return out;
 }
 
-void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records,
-                  const std::vector<Finding>& findings) {
+void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records) {
   const Unknowns unknowns(start);
-  const Eigen::Index known = Eigen::Index(findings.size()), rows = fit.fit.residuals.size() - known;
+  const Eigen::Index known = Eigen::Index(start.beliefs.size()), rows = fit.fit.residuals.size() - known;
   const Eigen::Index wanted = 2 * std::lround(kBlock / records.row_interval());
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
-  widen_jacobian(fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, findings, p); },
+  widen_jacobian(fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
                  kWideStep * unknowns.scale(), true);
   take_larger(fit.fit.covariance, block_covariance(fit.fit, block, known));
 }

@@ -1,6 +1,7 @@
 // The unknowns of a machine fitted to several records together (output_error.h says what counts).
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@ struct Machine {
   Rig rig;
   std::vector<FitParameter> parameters;
   std::vector<Calibration> calibrations;
+  /// What is known of the rig beside the records: one more row each, in standard deviations.
+  std::vector<std::function<double(const Rig&)>> beliefs = {};
   double largest_delay = 3;  // samples; approached, never reached; 0: delays are not fitted
 };
 
@@ -87,11 +90,9 @@ class Unknowns {
   std::size_t per_record_;
 };
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records, const std::vector<Finding>& findings,
-                       const NonlinearOptions& options);
+MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options);
 
 /// Covariance of the fitted values from wide steps and from whole stretches of the records, the larger.
-void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records,
-                  const std::vector<Finding>& findings);
+void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
 }  // namespace backlash

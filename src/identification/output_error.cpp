@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "backlash_diagnosis/identification/rig_parameters.h"
 #include "joint_fit.h"
 
 namespace backlash {
@@ -16,6 +17,14 @@ constexpr int kOtherStarts = 8;
 constexpr double kBeside = 0.4;  // of the logarithm of a parameter
 constexpr double kRoughTolerance = 1e-3;
 
+std::function<double(const Rig&)> belief(const Finding& finding) {
+  return [finding](const Rig& rig) {
+    double value = 0;
+    for (const auto& [name, factor] : finding.combination) value += factor * servo_parameter(name).get(rig);
+    return (finding.measured.value - value) / finding.measured.standard_error;
+  };
+}
+
 /// The fit of all records, round after round.
 class Rounds {
  public:
@@ -25,6 +34,7 @@ class Rounds {
     machine_.calibrations.resize(records.size());
     for (const std::string& name : settings.parameters)
       machine_.parameters.push_back(machine_parameter(name, start));
+    for (const Finding& finding : settings.findings) machine_.beliefs.push_back(belief(finding));
   }
 
   /// Weighs with the present rig and fits.
@@ -37,7 +47,7 @@ class Rounds {
     options.tolerance = tolerance;
     options.parallel = true;
     start_ = machine_;
-    fit_ = fit_machine(start_, records, settings_.findings, options);
+    fit_ = fit_machine(start_, records, options);
     machine_ = fit_.machine;
     torque_error_ = records.leftover(machine_).torque;
   }
@@ -65,7 +75,7 @@ class Rounds {
   OutputError result() {
     RecordSet records(*data_, settings_.cutoff, settings_.feedback);
     records.weigh(start_);
-    judge_errors(fit_, start_, records, settings_.findings);
+    judge_errors(fit_, start_, records);
     OutputError result;
     result.rig = machine_.rig;
     result.parameters = Unknowns(start_).parameters(fit_.fit);

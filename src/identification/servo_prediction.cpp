@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <list>
+#include <mutex>
 
 #include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
@@ -70,10 +72,87 @@ ChannelError relative(const std::vector<double>& measured, const std::vector<dou
   return {std::sqrt(residual) / spread, floor * std::sqrt(n) / spread};
 }
 
+/// How a rig's load is driven by a record.
+struct Drive {
+  RecordedMotion motion;
+  double gain = 1;              // of the load encoder
+  std::vector<double> changed;  // column that is not as recorded
+
+  Drive(const ServoData& data, const Rig& rig, const Calibration& calibration) {
+    motion.interval = data.interval;
+    motion.motor = &data.motor;
+    motion.motor_rate = &data.motor_rate;
+    if (!rig.terms.empty()) motion.motor_torque = &data.torque;
+    if (load_moves_freely(rig)) {
+      gain = sensing(rig.terms).load_position_gain;
+      motion.load_rate = &data.load_rate;
+      motion.first_load = (data.first_load - calibration.encoder_offset) / gain;
+      motion.first_load_rate = data.first_load_rate / gain;
+      if (gain == 1) return;
+      changed = data.load_rate;
+      for (double& rate : changed) rate /= gain;
+      motion.load_rate = &changed;
+    } else if (calibration.encoder_offset != 0) {
+      changed = data.motor;
+      for (double& position : changed) position += calibration.encoder_offset;
+      motion.motor = &changed;
+    }
+  }
+  Drive(const Drive&) = delete;  // points into itself
+};
+
+struct SimulatedLoad {
+  Rig rig;
+  double gain, offset;
+  DrivenLoad motion;
+  std::vector<double> deflection;  // simulated load minus recorded, without offset, low-passed; see Drive
+};
+
 }  // namespace
 
+/// The last loads that were simulated, the last that was asked for first.
+class SimulatedLoads {
+ public:
+  std::shared_ptr<const SimulatedLoad> get(const PreparedServo& record, const Drive& drive, const Rig& rig,
+                                           const Calibration& calibration) {
+    if (auto known = find(rig, drive.gain, calibration.encoder_offset)) return known;
+    auto made = std::make_shared<SimulatedLoad>();
+    made->rig = rig;
+    made->gain = drive.gain;
+    made->offset = calibration.encoder_offset;
+    made->motion = simulate_driven_load(rig, drive.motion, record.feedback);
+    if (load_moves_freely(rig)) {
+      const ServoData& data = record.data();
+      std::vector<double> difference(data.size());
+      for (std::size_t k = 0; k < data.size(); ++k)
+        difference[k] = drive.gain * made->motion.load[k] - data.load[k];
+      made->deflection = low_pass(difference, data.interval, record.cutoff);
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    kept_.push_front(made);
+    if (kept_.size() > kKept) kept_.pop_back();
+    return made;
+  }
+
+ private:
+  static constexpr std::size_t kKept = 8;  // that a Jacobian's columns come upon the load of its centre again
+
+  std::shared_ptr<const SimulatedLoad> find(const Rig& rig, double gain, double offset) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (auto at = kept_.begin(); at != kept_.end(); ++at) {
+      if ((*at)->gain != gain || (*at)->offset != offset || !moves_same_load((*at)->rig, rig)) continue;
+      kept_.splice(kept_.begin(), kept_, at);
+      return kept_.front();
+    }
+    return nullptr;
+  }
+
+  std::mutex mutex_;
+  std::list<std::shared_ptr<const SimulatedLoad>> kept_;
+};
+
 PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, double load_feedback)
-    : cutoff(low_pass_cutoff), feedback(load_feedback), direction(sliding(servo)), data_(&servo) {
+    : cutoff(low_pass_cutoff), feedback(load_feedback), direction(sliding(servo)), data_(&servo), loads_(std::make_shared<SimulatedLoads>()) {
   torque_of_moment_ = over_second_difference(servo.torque);
   torque_held_ = held_over_second_difference(servo.torque);
   const long n = static_cast<long>(servo.size()), ends = std::lround(kEnds / (cutoff * servo.interval));
@@ -91,50 +170,25 @@ std::vector<double> PreparedServo::acting_torque(const Rig& rig, const Calibrati
   return delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
 }
 
-DrivenLoad PreparedServo::simulate(const Rig& rig, const Calibration& calibration) const {
-  RecordedMotion motion;
-  motion.interval = data().interval;
-  motion.motor = &data().motor;
-  motion.motor_rate = &data().motor_rate;
-  if (!rig.terms.empty()) motion.motor_torque = &data().torque;
-  std::vector<double> changed;
-  if (load_moves_freely(rig)) {
-    const double gain = sensing(rig.terms).load_position_gain;
-    motion.load_rate = &data().load_rate;
-    motion.first_load = (data().first_load - calibration.encoder_offset) / gain;
-    motion.first_load_rate = data().first_load_rate / gain;
-    if (gain == 1) return simulate_driven_load(rig, motion, feedback);
-    changed = data().load_rate;
-    for (double& rate : changed) rate /= gain;
-    motion.load_rate = &changed;
-  } else if (calibration.encoder_offset != 0) {
-    changed = data().motor;
-    for (double& position : changed) position += calibration.encoder_offset;
-    motion.motor = &changed;
-  }
-  return simulate_driven_load(rig, motion, feedback);
-}
-
 ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calibration) const {
-  ServoResiduals r;
-  r.load = simulate(rig, calibration);
+  const Drive drive(data(), rig, calibration);
+  const auto load = loads_->get(*this, drive, rig, calibration);
+  const MotorTorques motor = motor_torques(rig, drive.motion, load->motion);
   const double inertia = GearTrain(rig).motor_inertia();
+  ServoResiduals r;
+  r.load = {load, &load->motion};
   r.torque = acting_torque(rig, calibration);
   const std::vector<double> friction =
-      presliding_friction(data().motor, r.load.motor_friction, data().motor_rate, data().interval);
+      presliding_friction(data().motor, motor.friction, data().motor_rate, data().interval);
   for (std::size_t k = 0; k < data().size(); ++k) {
     if (direction[k] == 0)
       r.torque[k] = 0;  // friction takes what balances
     else
-      r.torque[k] -= inertia * data().motor_acceleration[k] - r.load.motor_mean[k] + friction[k];
+      r.torque[k] -= inertia * data().motor_acceleration[k] - motor.mean[k] + friction[k];
   }
   r.torque = low_pass(r.torque, data().interval, cutoff);
-  if (!load_moves_freely(rig)) return r;
-  const double gain = sensing(rig.terms).load_position_gain;
-  r.deflection.resize(data().size());
-  for (std::size_t k = 0; k < data().size(); ++k)
-    r.deflection[k] = gain * r.load.load[k] + calibration.encoder_offset - data().load[k];
-  r.deflection = low_pass(r.deflection, data().interval, cutoff);
+  r.deflection = load->deflection;
+  for (double& value : r.deflection) value += calibration.encoder_offset;
   return r;
 }
 
@@ -145,7 +199,7 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const Outpu
   ServoPrediction p;
   p.counts = prepared.counts;
   p.settled = prepared.settled;
-  const NoiseFloors floors = noise_floors(rig, data, r.load.load, settings.cutoff, settings.feedback);
+  const NoiseFloors floors = noise_floors(rig, data, r.load->load, settings.cutoff, settings.feedback);
   p.torque_floor = floors.torque;
   p.measured_torque = low_pass(prepared.acting_torque(rig, calibration), data.interval, settings.cutoff);
   p.torque = difference(p.measured_torque, r.torque);
@@ -156,7 +210,7 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const Outpu
     p.deflection = difference(p.measured_deflection, r.deflection);
     p.deflection_error = relative(p.measured_deflection, p.deflection, p.settled, p.deflection_floor);
   }
-  p.load = std::move(r.load);
+  p.load = *r.load;
   return p;
 }
 

@@ -1,6 +1,7 @@
 // A record made ready for many predictions by rigs that differ in their parameters.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "backlash_diagnosis/identification/output_error.h"
@@ -9,9 +10,11 @@ namespace backlash {
 
 /// Recorded minus predicted, low-passed. No deflection where the load has no motion of its own.
 struct ServoResiduals {
-  DrivenLoad load;
+  std::shared_ptr<const DrivenLoad> load;
   std::vector<double> torque, deflection;  // N m, rad
 };
+
+class SimulatedLoads;
 
 struct PreparedServo {
   /// `data` must outlive it.
@@ -19,7 +22,8 @@ struct PreparedServo {
 
   /// What a second difference of the motor position sees of the motor's torque [N m].
   std::vector<double> acting_torque(const Rig& rig, const Calibration& calibration) const;
-  /// Safe to call from several threads.
+  /// Safe to call from several threads. The last loads are kept: where a rig differs from one of them only in
+  /// what moves no load, nothing is simulated.
   ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
 
   const ServoData& data() const { return *data_; }
@@ -29,10 +33,9 @@ struct PreparedServo {
   std::vector<char> counts;    // settled, and the motor slides
 
  private:
-  DrivenLoad simulate(const Rig& rig, const Calibration& calibration) const;
-
   const ServoData* data_;  // of the caller
   std::vector<double> torque_of_moment_, torque_held_;
+  std::shared_ptr<SimulatedLoads> loads_;
 };
 
 }  // namespace backlash

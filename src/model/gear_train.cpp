@@ -61,6 +61,8 @@ GearTrain::GearTrain(const Rig& rig)
     shape_follows_torque_ |= term->shape_follows_torque();
     dry |= term->has_dry_friction();
     term->add_friction({}, at_rest);
+    if (term->shapes_flanks()) flank_terms_.push_back(term.get());
+    if (term->moves_load()) load_terms_.push_back(term.get());
   }
   presliding_ = at_rest.motor.presliding > 0 || at_rest.load.presliding > 0;
   const auto rubs = [](const FrictionLimits& f) { return f.forward > 0 || f.backward > 0; };
@@ -113,7 +115,7 @@ GearTrain::Slots GearTrain::unpack(const double* state) const {
   return s;
 }
 
-double GearTrain::contact_force(const Slots& s) const {
+inline double GearTrain::contact_force(const Slots& s) const {
   if (!contact_) return 0;
   const double x = relative(s);
   const double penetration = std::fabs(x) - acting_gap_;
@@ -132,7 +134,7 @@ FlankShift GearTrain::shift(const Slots& s, int side, double mesh_torque) const 
   FlankShift sum;
   if (!shaped_) return sum;
   const FlankPoint point = flank_point(s, side, mesh_torque);
-  for (const auto& term : terms_) term->shape(point, sum);
+  for (const Term* term : flank_terms_) term->shape(point, sum);
   return sum;
 }
 
@@ -290,6 +292,50 @@ GearTrain::EndForces GearTrain::end_forces(double t, const double* state, Applie
   const Balance b = balance(t, state, applied);
   const double load = node_[kLink] == kFixed ? 0 : b.net[node_[kLink]];
   return {b.net[node_[kMotor]], load, b.mesh_torque, b.friction};
+}
+
+GearTrain::LoadForces GearTrain::load_forces(Motion motion) const {
+  const double q = motion.motor_position, w = motion.motor_velocity, v = motion.load_velocity;
+  const Slots s{{q, q, motion.load_position, motion.load_position}, {w, w, v, v}};
+  double torque[kSlots] = {};
+  LoadForces f;
+  if (shaped_) {
+    f.mesh_torque = shaped_torques(s, torque);
+  } else {
+    f.mesh_torque = torque[kGear] = lever_ * contact_force(s);
+    torque[kPinion] = -f.mesh_torque;
+  }
+  f.mesh_on_motor = torque[kPinion];
+  f.net = torque[kGear] - (damping_[kGear] + damping_[kLink]) * v -
+          (asymmetry_[kGear] + asymmetry_[kLink]) * std::fabs(v);
+  f.friction = coulomb_.load;
+  if (load_terms_.empty()) return f;
+  motion.mesh_torque = f.mesh_torque;
+  EndTorques ends;
+  EndFriction rubs{{}, f.friction};
+  for (const Term* term : load_terms_) {
+    term->add(motion, ends);
+    term->add_friction(motion, rubs);
+  }
+  f.net += ends.load;
+  f.friction = rubs.load;
+  f.friction.forward = std::max(0.0, f.friction.forward);
+  f.friction.backward = std::max(0.0, f.friction.backward);
+  return f;
+}
+
+GearTrain::MotorForces GearTrain::motor_forces(const Motion& motion) const {
+  const double w = motion.motor_velocity;
+  double damping = damping_[kMotor] + damping_[kPinion], asymmetry = asymmetry_[kMotor] + asymmetry_[kPinion];
+  EndTorques ends;
+  for (const auto& term : terms_) term->add(motion, ends);
+  double net = ends.motor;
+  if (one_body()) {
+    damping += damping_[kGear] + damping_[kLink];
+    asymmetry += asymmetry_[kGear] + asymmetry_[kLink];
+    net += ends.load;
+  }
+  return {net - damping * w - asymmetry * std::fabs(w), friction(motion).motor};
 }
 
 void GearTrain::friction_events(double t, const double* state, AppliedTorque applied, double* values) const {

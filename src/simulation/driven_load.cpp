@@ -35,11 +35,25 @@ Cubic between(const std::vector<double>& y, std::size_t k) {
   return {y[k], y[j], slope(k), slope(j)};
 }
 
+/// What is recorded at one moment.
+struct Moment {
+  double time;
+  double motor, motor_rate, load_rate;
+  double motor_torque;
+};
+
 /// Motion within one sample.
 struct Segment {
   Cubic motor, motor_rate, load_rate;
   double motor_torque;
-  double interval;
+  double start, interval;
+
+  Moment at(double u) const {
+    const double t = start + u * interval;
+    if (u == 0) return {t, motor.y0, motor_rate.y0, load_rate.y0, motor_torque};
+    if (u == 1) return {t, motor.y1, motor_rate.y1, load_rate.y1, motor_torque};
+    return {t, motor(u), motor_rate(u), load_rate(u), motor_torque};
+  }
 };
 
 /// Integrals over one sample with the weights 1 - u and u.
@@ -54,83 +68,86 @@ struct Halves {
   }
 };
 
+std::vector<const Term*> load_terms(const Rig& rig) {
+  std::vector<const Term*> terms;
+  for (const auto& term : rig.terms)
+    if (term->moves_load()) terms.push_back(term.get());
+  return terms;
+}
+
 class Load {
  public:
   Load(const Rig& rig, double feedback)
       : train_(rig),
-        ratio_(rig.motor_axis_ratio()),
         inertia_(train_.load_inertia()),
         feedback_(feedback),
-        rubs_(train_.friction_event_count() > 0) {}
+        rubs_(train_.friction_event_count() > 0),
+        terms_(!load_terms(rig).empty()) {}
 
   double q = 0, w = 0;
 
-  GearTrain::EndForces begin(const Segment& s, double t) {
-    const Forces f = forces(s, t, 0, q, w);
-    mode_.begin(f.net, w, f.ends.friction.load, q);
-    return f.ends;
+  double begin(const Segment& s) {
+    last_ = forces(s.at(0), q, w);
+    mode_.begin(last_.net, w, last_.friction, q);
+    return last_.mesh_torque;
   }
 
   /// One sample, in pieces that end where the load comes to rest or breaks away and where teeth touch or
-  /// part. `sum` gathers the torque on the motor; returns the forces at the end.
-  GearTrain::EndForces step(const Segment& s, double t, Halves& sum) {
+  /// part. `sum` gathers the mesh torque on the motor; returns that through the teeth at the end.
+  double step(const Segment& s, Halves& sum) {
     double u = 0;
-    Forces f = forces(s, t, 0, q, w);
+    if (terms_) last_ = forces(s.at(0), q, w);  // the motor torque that they may follow has jumped
+    Forces f = last_;
     for (int piece = 0; u < 1; ++piece) {
       const bool divide = piece < kMostPieces;
-      u = mode_.stuck() ? hold(s, t, u, f, divide, sum) : slide(s, t, u, f, divide, sum);
+      u = mode_.stuck() ? hold(s, u, f, divide, sum) : slide(s, u, f, divide, sum);
     }
-    return f.ends;
+    last_ = f;
+    return f.mesh_torque;
   }
 
  private:
   static constexpr int kMostPieces = 30;
   static constexpr int kHalvings = 10;  // of a sample, that place an event
-  struct Forces {
-    GearTrain::EndForces ends;
-    double net;       // N m on the load, without dry friction
-    double position;  // rad, of the load
-    int side() const { return (ends.mesh_torque > 0) - (ends.mesh_torque < 0); }
+  struct Forces : GearTrain::LoadForces {  // net with what draws the load
+    double position;                       // rad, of the load
+    int side() const { return (mesh_torque > 0) - (mesh_torque < 0); }
   };
   struct Move {
     double q, w;
-    int side;            // that touches halfway
-    double motor_torque;  // halfway
+    int side;              // that touches halfway
+    double mesh_on_motor;  // N m, halfway
+    Forces end;
   };
 
   bool holds(const Forces& f) const {
-    const FrictionLimits& friction = f.ends.friction.load;
-    if (friction.presliding > 0) return mode_.event(f.net, 0, friction) < 0;
-    return f.net < friction.forward && -f.net < friction.backward;
+    if (f.friction.presliding > 0) return mode_.event(f.net, 0, f.friction) < 0;
+    return f.net < f.friction.forward && -f.net < f.friction.backward;
   }
 
-  Forces forces(const Segment& s, double t, double u, double position, double rate) const {
-    const double state[] = {s.motor(u), position, s.motor_rate(u), rate};
-    Forces f;
-    f.ends = train_.end_forces(t + u * s.interval, state, s.motor_torque / ratio_);
-    f.ends.motor -= s.motor_torque;
-    f.net = f.ends.load + inertia_ * feedback_ * (s.load_rate(u) - rate);
-    f.position = position;
+  Forces forces(const Moment& m, double position, double rate) const {
+    Forces f{train_.load_forces({m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque}), position};
+    f.net += inertia_ * feedback_ * (m.load_rate - rate);
     return f;
   }
 
   double acceleration(const Forces& f) const {
-    return (f.net + mode_.torque(f.ends.friction.load, f.position)) / inertia_;
+    return (f.net + mode_.torque(f.friction, f.position)) / inertia_;
   }
 
   /// Classical Runge-Kutta from u to v.
-  Move moved(const Segment& s, double t, double u, double v, const Forces& f) const {
-    const double h = (v - u) * s.interval, m = 0.5 * (u + v);
-    const double a1 = acceleration(f);
-    const double w2 = w + 0.5 * h * a1;
-    const Forces early = forces(s, t, m, q + 0.5 * h * w, w2);
+  Move moved(const Segment& s, double u, double v, const Forces& f) const {
+    const double h = (v - u) * s.interval;
+    const Moment middle = s.at(0.5 * (u + v)), end = s.at(v);
+    const double a1 = acceleration(f), w2 = w + 0.5 * h * a1;
+    const Forces early = forces(middle, q + 0.5 * h * w, w2);
     const double a2 = acceleration(early), w3 = w + 0.5 * h * a2;
-    const Forces late = forces(s, t, m, q + 0.5 * h * w2, w3);
+    const Forces late = forces(middle, q + 0.5 * h * w2, w3);
     const double a3 = acceleration(late), w4 = w + h * a3;
-    const double a4 = acceleration(forces(s, t, v, q + h * w3, w4));
+    const double a4 = acceleration(forces(end, q + h * w3, w4));
+    const double to_q = q + h / 6 * (w + 2 * w2 + 2 * w3 + w4), to_w = w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
     // Halfway the first estimate of the position lags by h^2 a / 8, the second leads by as much.
-    return {q + h / 6 * (w + 2 * w2 + 2 * w3 + w4), w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), late.side(),
-            0.5 * (early.ends.motor + late.ends.motor)};
+    return {to_q, to_w, late.side(), 0.5 * (early.mesh_on_motor + late.mesh_on_motor), forces(end, to_q, to_w)};
   }
 
   /// The first change between u and v, known to lie there: last moment before and first after it.
@@ -141,109 +158,85 @@ class Load {
     return {before, after};
   }
 
-  double slide(const Segment& s, double t, double u, Forces& f, bool divide, Halves& sum) {
-    const auto changes = [&](const Move& to, const Forces& end) {
-      return end.side() != f.side() || (rubs_ && mode_.direction() * to.w < 0);
+  double slide(const Segment& s, double u, Forces& f, bool divide, Halves& sum) {
+    const auto changes = [&](const Move& to) {
+      return to.end.side() != f.side() || (rubs_ && mode_.direction() * to.w < 0);
     };
     double v = 1;
-    Move to = moved(s, t, u, v, f);
-    Forces end = forces(s, t, v, to.q, to.w);
-    if (divide && to.side != f.side() && !changes(to, end)) {  // touched and left within
+    Move to = moved(s, u, v, f);
+    if (divide && to.side != f.side() && !changes(to)) {  // touched and left within
       v = 0.5 * (u + v);
-      to = moved(s, t, u, v, f);
-      end = forces(s, t, v, to.q, to.w);
+      to = moved(s, u, v, f);
     }
-    if (!divide || !changes(to, end)) {
-      sum.add(u, v, f.ends.motor, to.motor_torque, end.ends.motor);
+    if (!divide || !changes(to)) {
+      sum.add(u, v, f.mesh_on_motor, to.mesh_on_motor, to.end.mesh_on_motor);
       q = to.q;
       w = to.w;
-      f = end;
+      f = to.end;
       return v;
     }
-    const auto [before, after] = bracket(u, v, [&](double at) {
-      const Move there = moved(s, t, u, at, f);
-      return changes(there, forces(s, t, at, there.q, there.w));
-    });
-    to = moved(s, t, u, before, f);
-    end = forces(s, t, before, to.q, to.w);
-    sum.add(u, before, f.ends.motor, to.motor_torque, end.ends.motor);
+    const auto [before, after] = bracket(u, v, [&](double at) { return changes(moved(s, u, at, f)); });
+    to = moved(s, u, before, f);
+    sum.add(u, before, f.mesh_on_motor, to.mesh_on_motor, to.end.mesh_on_motor);
     const double h = (after - before) * s.interval;
     q = to.q + h * to.w;
-    w = to.w + h * acceleration(end);
-    cross(s, t, before, after, end, f, sum);
+    w = to.w + h * acceleration(to.end);
+    cross(s, before, after, to.end, f, sum);
     return after;
   }
 
-  double hold(const Segment& s, double t, double u, Forces& f, bool divide, Halves& sum) {
-    const auto at = [&](double v) { return forces(s, t, v, q, 0); };
+  double hold(const Segment& s, double u, Forces& f, bool divide, Halves& sum) {
+    const auto at = [&](double v) { return forces(s.at(v), q, 0); };
     const auto changes = [&](const Forces& end) { return end.side() != f.side() || !holds(end); };
     double before = 1, after = 1;
     if (divide && changes(at(1))) std::tie(before, after) = bracket(u, 1, [&](double v) { return changes(at(v)); });
     const Forces end = at(before);
-    sum.add(u, before, f.ends.motor, at(0.5 * (u + before)).ends.motor, end.ends.motor);
+    sum.add(u, before, f.mesh_on_motor, at(0.5 * (u + before)).mesh_on_motor, end.mesh_on_motor);
     if (before == after)
       f = end;
     else
-      cross(s, t, before, after, end, f, sum);
+      cross(s, before, after, end, f, sum);
     return after;
   }
 
   /// The moment of the change itself.
-  void cross(const Segment& s, double t, double before, double after, const Forces& from, Forces& f, Halves& sum) {
-    const bool sticks = !(from.ends.friction.load.presliding > 0);
+  void cross(const Segment& s, double before, double after, const Forces& from, Forces& f, Halves& sum) {
+    const bool sticks = !(from.friction.presliding > 0);
     if (sticks && mode_.direction() * w <= 0) w = 0;
-    f = forces(s, t, after, q, w);
-    mode_.update(f.net, w, f.ends.friction.load, q);
-    const double mean = 0.5 * (from.ends.motor + f.ends.motor);
+    f = forces(s.at(after), q, w);
+    mode_.update(f.net, w, f.friction, q);
+    const double mean = 0.5 * (from.mesh_on_motor + f.mesh_on_motor);
     sum.add(before, after, mean, mean, mean);
   }
 
   GearTrain train_;
-  double ratio_;
   double inertia_, feedback_;
-  bool rubs_;
+  bool rubs_, terms_;
   StickSlip mode_;
+  Forces last_{};  // at the end of the sample before
 };
 
-/// A load that stands or moves with the motor: torques at either end of a sample and halfway.
-class FixedLoad {
+/// A load that stands.
+class LockedLoad {
  public:
-  explicit FixedLoad(const Rig& rig) : train_(rig), ratio_(rig.motor_axis_ratio()), rigid_(rig.mesh.rigid) {}
+  explicit LockedLoad(const Rig& rig) : train_(rig) {}
 
   double q = 0, w = 0;
 
-  GearTrain::EndForces begin(const Segment& s, double t) {
-    follow(s, 0);
-    return forces(s, t, 0);
-  }
+  double begin(const Segment& s) { return forces(s.at(0)).mesh_torque; }
 
-  GearTrain::EndForces step(const Segment& s, double t, Halves& sum) {
-    const GearTrain::EndForces end = forces(s, t, 1);
-    sum.add(0, 1, forces(s, t, 0).motor, forces(s, t, 0.5).motor, end.motor);
-    follow(s, 1);
-    return end;
+  double step(const Segment& s, Halves& sum) {
+    const GearTrain::LoadForces end = forces(s.at(1));
+    sum.add(0, 1, forces(s.at(0)).mesh_on_motor, forces(s.at(0.5)).mesh_on_motor, end.mesh_on_motor);
+    return end.mesh_torque;
   }
 
  private:
-  void follow(const Segment& s, double u) {
-    if (!rigid_) return;
-    q = s.motor(u);
-    w = s.motor_rate(u);
-  }
-
-  GearTrain::EndForces forces(const Segment& s, double t, double u) const {
-    const double state[] = {s.motor(u), s.motor_rate(u)};
-    GearTrain::EndForces f = train_.end_forces(t + u * s.interval, state, s.motor_torque / ratio_);
-    f.motor -= s.motor_torque;
-    if (!rigid_) return f;
-    f.friction.motor.forward += f.friction.load.forward;
-    f.friction.motor.backward += f.friction.load.backward;
-    return f;
+  GearTrain::LoadForces forces(const Moment& m) const {
+    return train_.load_forces({m.time, m.motor, m.motor_rate, 0, 0, 0, m.motor_torque});
   }
 
   GearTrain train_;
-  double ratio_;
-  bool rigid_;
 };
 
 void check(const Rig& rig) {
@@ -259,38 +252,63 @@ template <typename Body>
 DrivenLoad follow(Body& load, const RecordedMotion& motion) {
   const std::size_t n = motion.motor->size();
   DrivenLoad out;
-  for (auto* column : {&out.load, &out.load_rate, &out.mesh_torque, &out.motor_net, &out.motor_mean})
-    column->resize(n);
-  out.motor_friction.resize(n);
+  for (auto* column : {&out.load, &out.load_rate, &out.mesh_torque, &out.mesh_on_motor}) column->resize(n);
   const auto& q = *motion.motor;
   const auto& w = *motion.motor_rate;
-  GearTrain::EndForces f{};
+  double mesh_torque = 0;
   for (std::size_t k = 0; k < n; ++k) {
     const std::size_t j = std::min(k + 1, n - 1);
     const Segment segment{{q[k], q[j], motion.interval * w[k], motion.interval * w[j]},
                           between(w, k),
                           motion.load_rate ? between(*motion.load_rate, k) : Cubic{0, 0, 0, 0},
                           motion.motor_torque ? (*motion.motor_torque)[k] : 0,
+                          double(k) * motion.interval,
                           motion.interval};
-    const double t = k * motion.interval;
-    if (k == 0) f = load.begin(segment, t);
+    if (k == 0) mesh_torque = load.begin(segment);
     out.load[k] = load.q;
     out.load_rate[k] = load.w;
-    out.mesh_torque[k] = f.mesh_torque;
-    out.motor_net[k] = f.motor;
-    out.motor_friction[k] = f.friction.motor;
+    out.mesh_torque[k] = mesh_torque;
     if (!(std::fabs(load.w) < kFarthest))
-      throw IntegrationError("the load runs away at t = " + std::to_string(t) + " s");
+      throw IntegrationError("the load runs away at t = " + std::to_string(segment.start) + " s");
     if (j == k) break;
     Halves half;
-    f = load.step(segment, t, half);
-    out.motor_mean[k] += k == 0 ? 2 * half.early : half.early;
-    out.motor_mean[j] += j + 1 == n ? 2 * half.late : half.late;
+    mesh_torque = load.step(segment, half);
+    out.mesh_on_motor[k] += k == 0 ? 2 * half.early : half.early;
+    out.mesh_on_motor[j] += j + 1 == n ? 2 * half.late : half.late;
   }
   return out;
 }
 
+/// The parts of a rig that a load feels, one by one; the motor's and what sensors show are not among them.
+bool same_body(const Body& a, const Body& b) {
+  return a.inertia == b.inertia && a.viscous_damping == b.viscous_damping &&
+         a.viscous_asymmetry == b.viscous_asymmetry && a.coulomb_friction == b.coulomb_friction &&
+         a.coulomb_asymmetry == b.coulomb_asymmetry;
+}
+
+bool same_contact(const Mesh& a, const Mesh& b) {
+  if (a.contact == b.contact) return true;
+  return !a.contact_spec.law.empty() && a.contact_spec.law == b.contact_spec.law &&
+         a.contact_spec.values == b.contact_spec.values;
+}
+
+bool same_mesh(const Mesh& a, const Mesh& b) {
+  return a.rigid == b.rigid && a.backlash == b.backlash && a.lever() == b.lever() &&
+         a.start_in_gap == b.start_in_gap && same_contact(a, b) && a.variation == b.variation;
+}
+
+bool same_term(const Term* a, const Term* b) {
+  return a == b || (!a->id.empty() && a->id == b->id && a->values == b->values);
+}
+
 }  // namespace
+
+bool moves_same_load(const Rig& a, const Rig& b) {
+  const std::vector<const Term*> terms = load_terms(a), others = load_terms(b);
+  return std::equal(terms.begin(), terms.end(), others.begin(), others.end(), same_term) &&
+         same_body(a.gear, b.gear) && same_body(a.link, b.link) && same_mesh(a.mesh, b.mesh) &&
+         a.output_coupling.inertia == b.output_coupling.inertia && a.link_locked == b.link_locked;
+}
 
 bool load_moves_freely(const Rig& rig) {
   return !rig.mesh.rigid && !rig.link_locked;
@@ -298,14 +316,43 @@ bool load_moves_freely(const Rig& rig) {
 
 DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, double feedback) {
   check(rig);
-  if (!load_moves_freely(rig)) {
-    FixedLoad load(rig);
+  if (rig.mesh.rigid) {
+    const std::vector<double> none(motion.motor->size(), 0.0);
+    return {*motion.motor, *motion.motor_rate, none, none};
+  }
+  if (rig.link_locked) {
+    LockedLoad load(rig);
     return follow(load, motion);
   }
   Load load(rig, motion.load_rate ? feedback : 0);
   load.q = motion.first_load;
   load.w = motion.first_load_rate;
   return follow(load, motion);
+}
+
+MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const DrivenLoad& load) {
+  const GearTrain train(rig);
+  const std::size_t n = motion.motor->size();
+  const auto held = [&](std::size_t k) { return motion.motor_torque ? (*motion.motor_torque)[k] : 0.0; };
+  const auto forces = [&](std::size_t k, double torque) {
+    const double mesh_torque = rig.mesh.rigid ? torque : load.mesh_torque[k];
+    return train.motor_forces({double(k) * motion.interval, (*motion.motor)[k], (*motion.motor_rate)[k],
+                               load.load[k], load.load_rate[k], mesh_torque, torque});
+  };
+  MotorTorques out{load.mesh_on_motor, std::vector<FrictionLimits>(n)};
+  // Of each sample with the torque held before it and after it. Each interval's triangular weights give 1/2 of
+  // the mean, by Simpson's weights (1 + 5) / 12 if what is held does not jump within.
+  for (std::size_t k = 0; k < n; ++k) {
+    const double first = held(k == 0 ? 0 : k - 1), second = held(k);
+    const GearTrain::MotorForces after = forces(k, second);
+    const GearTrain::MotorForces before = first == second ? after : forces(k, first);
+    out.mean[k] += 5.0 / 12 * (before.net + after.net);
+    out.mean[k == 0 ? 0 : k - 1] += before.net / 12;
+    out.mean[k + 1 == n ? k : k + 1] += after.net / 12;
+    out.friction[k] = {0.5 * (before.friction.forward + after.friction.forward),
+                       0.5 * (before.friction.backward + after.friction.backward), after.friction.presliding};
+  }
+  return out;
 }
 
 }  // namespace backlash

@@ -36,6 +36,10 @@ class ParameterValues {
   const std::string& choice(const std::string& name) const { return choices_.at(name); }
   void set_choice(const std::string& name, std::string value) { choices_[name] = std::move(value); }
 
+  friend bool operator==(const ParameterValues& a, const ParameterValues& b) {
+    return a.numbers_ == b.numbers_ && a.lists_ == b.lists_ && a.choices_ == b.choices_;
+  }
+
  private:
   std::map<std::string, double> numbers_;
   std::map<std::string, std::vector<double>> lists_;

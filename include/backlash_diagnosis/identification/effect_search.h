@@ -50,7 +50,9 @@ struct FoundEffect {
   std::string channel;              // that gains most
   std::vector<std::size_t> terms;   // places in the augmented rig's terms
   std::map<std::string, std::string> words;  // choices of the term: body, ...
-  std::vector<EffectParameter> parameters;
+  std::vector<EffectParameter> parameters;   // of a learned map: range and size of its curve
+  std::vector<double> curve_x, curve_y;      // of a learned map, in the units of its coordinate and its torque or angle
+  std::vector<std::string> nearest;          // of a learned map: ids that explain part of the same
   Evidence evidence;
   double test_error_before = 0, test_error_after = 0;  // of the channel
   std::vector<std::string> equivalent_to;  // ids that reach most of the gain
@@ -59,6 +61,13 @@ struct FoundEffect {
 struct TraceChannel {
   double before = 0, after = 0, floor = 0;  // relative, on the test record
   double train_before = 0, train_after = 0;
+};
+
+/// Share of lags at which the residual of a channel correlates with an input beyond the 99 % band of
+/// independence (about 0.01 where nothing is missing), on the test record.
+struct Independence {
+  std::string channel, input;
+  double before = 0, after = 0;
 };
 
 /// What no effect explains.
@@ -86,6 +95,7 @@ struct Trace {
   std::map<std::string, Measured> base_parameters, parameters;  // of the machine, without and with effects
   std::map<std::string, std::string> units;
   std::map<std::string, TraceChannel> channels;
+  std::vector<Independence> independence;
   std::vector<FoundEffect> steps;
   std::optional<Unexplained> unexplained;
   std::vector<std::string> warnings;

@@ -56,13 +56,31 @@ class GearTrain {
   /// `t` [s] matters only to terms that depend on time.
   Observation observe(const double* state, AppliedTorque applied, double t = 0) const;
 
-  /// What moves the two ends, without their dry friction: for a load that follows a recorded motor.
+  /// What moves the two ends, without their dry friction.
   struct EndForces {
     double motor, load;  // N m, sum of all other torques
     double mesh_torque;  // N m, through the teeth, > 0 drives the load forward
     EndFriction friction;  // where both ends are one body, all of it at the motor
   };
   EndForces end_forces(double t, const double* state, AppliedTorque applied) const;
+  /// The same for a load that follows a recorded motor, apart: what acts on the load, with only those terms
+  /// that move it, of a train with rigid couplings and a mesh that gives way. The mesh torque in `motion`
+  /// does not count.
+  struct LoadForces {
+    double net;            // N m on the link, without dry friction
+    double mesh_torque;    // N m, through the teeth, > 0 drives the load forward
+    double mesh_on_motor;  // N m, of the teeth; its negative unless terms shape the flanks
+    FrictionLimits friction;
+  };
+  LoadForces load_forces(Motion motion) const;
+
+  /// What acts on the motor with rigid couplings beside mesh and motor torque; where the link is one body with
+  /// it, on both.
+  struct MotorForces {
+    double net;  // N m, without dry friction
+    FrictionLimits friction;
+  };
+  MotorForces motor_forces(const Motion& motion) const;
   /// kg m^2 of all that moves with the motor and with the link (infinite where it is fixed); load-side.
   double motor_inertia() const { return inertia_[node_[kMotor]]; }
   double load_inertia() const;
@@ -182,6 +200,7 @@ class GearTrain {
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;
+  std::vector<const Term*> flank_terms_, load_terms_;  // of terms_, that shape flanks and that move the load
   double load_gain_;  // -, of the load encoder
   static constexpr int kFixed = -1;
 };

@@ -27,18 +27,23 @@ struct RecordedMotion {
   const std::vector<double>* motor_rate = nullptr;  // rad/s
   const std::vector<double>* load_rate = nullptr;   // rad/s, draws the simulated load; null: it runs free
   double first_load = 0, first_load_rate = 0;       // rad, rad/s: where the load starts
-  // N m of the motor, held from sample to sample, for terms that follow it; null: 0. It does not move anything.
+  // N m of the motor, load-side, held from sample to sample, for terms that follow it; null: 0. It does not
+  // move anything.
   const std::vector<double>* motor_torque = nullptr;
 };
 
 struct DrivenLoad {
   std::vector<double> load, load_rate;  // rad, rad/s
-  std::vector<double> mesh_torque;      // N m, through the teeth
-  std::vector<double> motor_net;        // N m on the motor, all but its torque, inertia and dry friction
-  /// Mean of motor_net about each sample, weighted 1 - |t| / interval: what a second difference of the motor
-  /// position sees. At the ends over one interval.
-  std::vector<double> motor_mean;
-  std::vector<FrictionLimits> motor_friction;  // its dry friction
+  std::vector<double> mesh_torque;      // N m, through the teeth; 0 of a rigid mesh
+  /// N m, of the teeth on the motor: mean about each sample, weighted 1 - |t| / interval, which is what a
+  /// second difference of the motor position sees. At the ends over one interval.
+  std::vector<double> mesh_on_motor;
+};
+
+/// All that acts on the motor but its torque and inertia.
+struct MotorTorques {
+  std::vector<double> mean;  // N m, with the mesh, without dry friction; weighted as above
+  std::vector<FrictionLimits> friction;
 };
 
 /// Typical k [1/s].
@@ -51,5 +56,12 @@ bool load_moves_freely(const Rig& rig);
 /// IntegrationError where the load runs away.
 DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion,
                                 double feedback = kLoadFeedback);
+
+/// Whether the loads of both rigs move alike with the same motor.
+bool moves_same_load(const Rig& a, const Rig& b);
+
+/// Beside a load that has been simulated with this motion, by a rig that may differ in what does not move the
+/// load.
+MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const DrivenLoad& load);
 
 }  // namespace backlash

@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "remainder.h"
 
 namespace backlash {
 namespace {
@@ -51,28 +52,6 @@ std::vector<ParameterValues> probes(const TermType& type, const ParameterValues&
   all[1][search.phase] = M_PI / 2;
   return all;
 }
-
-/// Residuals in units of what is left, without what the machine's own parameters can take up.
-class Remainder {
- public:
-  Remainder(const MachineFit& fit, Eigen::Index rows)
-      : qr_((fit.fit.jacobian.topRows(rows) *
-             fit.fit.jacobian.colwise().norm().cwiseInverse().asDiagonal()).householderQr()),
-        columns_(fit.fit.jacobian.cols()),
-        left_(without(fit.fit.residuals.head(rows))) {}
-
-  Eigen::VectorXd without(const Eigen::VectorXd& column) const {
-    Eigen::VectorXd rotated = qr_.householderQ().transpose() * column;
-    rotated.head(columns_).setZero();
-    return qr_.householderQ() * rotated;
-  }
-  const Eigen::VectorXd& left() const { return left_; }
-
- private:
-  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
-  Eigen::Index columns_;
-  Eigen::VectorXd left_;
-};
 
 struct Probed {
   const TermType* type;
@@ -127,14 +106,14 @@ bool set_strength(const Probed& p, const double* factors, ParameterValues& value
 }
 
 Candidate single(const Probed& p, const Remainder& remainder) {
-  Candidate c{p.type->id, {{}}, 0};
+  Candidate c{p.type->id, {{}}, 0, 0};
   const Explained e = explain(p.columns, remainder.left());
   if (set_strength(p, e.factors.data(), c.terms[0])) c.gain = e.gain;
   return c;
 }
 
 Candidate pair(const Probed& a, const Probed& b, const Remainder& remainder) {
-  Candidate c{a.type->id, {{}, {}}, 0};
+  Candidate c{a.type->id, {{}, {}}, 0, 0};
   Eigen::MatrixXd both(a.columns.rows(), a.columns.cols() + b.columns.cols());
   both << a.columns, b.columns;
   const Explained e = explain(both, remainder.left());

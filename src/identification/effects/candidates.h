@@ -14,6 +14,7 @@ struct Candidate {
   std::string id;
   std::vector<ParameterValues> terms;
   double gain = 0;  // predicted: relative decrease of the norm of all residuals
+  double smoothness = 0;  // of a learned map, see learned.h
 };
 
 /// The best candidate of each kind and choice, best first. `fit` is the machine as it is fitted now, with the

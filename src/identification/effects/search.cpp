@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <random>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "learned.h"
 
 namespace backlash {
 namespace {
@@ -25,6 +27,11 @@ constexpr std::size_t kTrials = 6;        // candidates that are fitted with the
 constexpr double kWorthTrying = 0.2;      // of the best predicted gain
 constexpr double kAlike = 0.8;            // of the best gain: another name for the same
 constexpr double kMostBlocks = 0.6;       // of the blocks must get better
+constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
+constexpr double kHalf = 0.5;             // of a residual: an effect that explains less may stand in for another
+constexpr std::size_t kMapTrials = 2;
+constexpr std::size_t kNearest = 3;
+const char* const kLearned = "learned_map";
 constexpr int kOtherStarts = 4;
 constexpr double kBeside = 0.4;           // of the logarithm of a parameter
 constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum
@@ -40,6 +47,18 @@ NonlinearOptions options(double tolerance) {
   o.tolerance = tolerance;
   o.parallel = true;
   return o;
+}
+
+/// A fit, or none where the model cannot be fitted or followed.
+template <typename Fit>
+auto attempted(const Fit& fit) -> std::optional<decltype(fit())> {
+  try {
+    return fit();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
 }
 
 /// Another start not far away, the same for the same number.
@@ -83,6 +102,8 @@ void Search::run() {
   fit_base();
   add_effects();
   drop_superfluous();
+  add_learned();
+  drop_stand_ins();
 }
 
 void Search::report(const std::string& phase) const {
@@ -111,15 +132,21 @@ Machine Search::with_effects(const std::vector<Accepted>& effects) const {
   Machine machine = stage_ ? stage_->fit.machine : base_->fit.machine;
   machine.rig.terms = declared_.rig.terms;
   machine.parameters = declared_.parameters;
+  machine.beliefs = declared_.beliefs;
   machine.largest_delay = kLargestDelay;
-  for (const Accepted& effect : effects) machine = with_candidate(machine, effect.candidate, range_);
+  for (const Accepted& effect : effects) machine = extended(machine, effect.candidate);
   return machine;
+}
+
+Machine Search::extended(Machine machine, const Candidate& candidate) const {
+  if (candidate.id != kLearned) return with_candidate(std::move(machine), candidate, range_);
+  return with_map(std::move(machine), {candidate.terms.front(), candidate.smoothness, 0}, range_);
 }
 
 Stage Search::fit_stage(Machine start, double cutoff, double tolerance) const {
   RecordSet records(data_, std::min(cutoff, cutoff_), kLoadFeedback);
   records.weigh(start);
-  MachineFit fit = fit_machine(start, records, {}, options(tolerance));
+  MachineFit fit = fit_machine(start, records, options(tolerance));
   const Leftover left = records.leftover(fit.machine);
   return {std::move(fit), std::move(start), std::move(records), left};
 }
@@ -155,18 +182,17 @@ void Search::fit_base() {
 
 /// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
 std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
-  Trial trial{candidate, with_candidate(stage_->fit.machine, candidate, range_), {}, 0};
+  Trial trial{candidate, extended(stage_->fit.machine, candidate), {}, 0};
   if (sensing({trial.start.rig.terms.back()}).torque_delay != 0) {  // then calibration is part of the effect
     trial.start.largest_delay = 0;
     for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
   }
-  try {
-    trial.fit = fit_machine(trial.start, stage_->records, {}, options(kRoughTolerance));
-    trial.start = trial.fit.machine;
-    trial.fit = fit_machine(trial.start, stage_->records, {}, options(kFineTolerance));
-  } catch (const CannotIdentify&) {
-    return std::nullopt;
-  }
+  const auto fit = attempted([&] {
+    trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance)).machine;
+    return fit_machine(trial.start, stage_->records, options(kFineTolerance));
+  });
+  if (!fit) return std::nullopt;
+  trial.fit = *fit;
   trial.misfit = trial.fit.fit.residuals.norm();
   const auto& terms = trial.fit.machine.rig.terms;
   for (std::size_t i = 0; i < candidate.terms.size(); ++i)
@@ -180,7 +206,9 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
   for (std::size_t i = 0; i < std::min(kTrials, candidates.size()); ++i) {
     if (candidates[i].gain < std::max(kWorthTrying * candidates.front().gain, kLeastPredicted * settings_.least_gain))
       break;
-    report("trying " + candidates[i].id);
+    char text[96];
+    std::snprintf(text, sizeof text, "trying %s (predicted gain %.3g)", candidates[i].id.c_str(), candidates[i].gain);
+    report(text);
     if (auto trial = tried(candidates[i])) trials.push_back(std::move(*trial));
   }
   std::stable_sort(trials.begin(), trials.end(),
@@ -227,12 +255,15 @@ bool Search::convinces(const Gain& gain, const Machine& after) const {
          e.blocks_better >= kMostBlocks * e.blocks;
 }
 
-void Search::adopt(std::vector<Accepted> effects) {
+bool Search::adopt(std::vector<Accepted> effects) {
   Machine machine = with_effects(effects);
   for (const Accepted& effect : effects)
     if (effect.candidate.id == "delay") machine.largest_delay = 0;
-  Stage stage = fit_stage(machine, cutoff_, kRoughTolerance);
-  stage = fit_stage(stage.fit.machine, cutoff_, kFineTolerance);
+  std::optional<Stage> fitted = attempted([&] {
+    return fit_stage(fit_stage(machine, cutoff_, kRoughTolerance).fit.machine, cutoff_, kFineTolerance);
+  });
+  if (!fitted) return false;
+  Stage& stage = *fitted;
   std::size_t place = declared_.rig.terms.size();
   for (Accepted& effect : effects)
     for (ParameterValues& values : effect.candidate.terms)
@@ -240,19 +271,23 @@ void Search::adopt(std::vector<Accepted> effects) {
   effects.back().after = stage.fit.machine;
   stage_ = std::move(stage);
   effects_ = std::move(effects);
+  return true;
 }
 
 bool Search::add_one() {
   const Leftover& left = stage_->leftover;
   if (left.torque < kAtFloor && left.deflection < kAtFloor) return false;
-  report("screening");
+  char text[96];
+  std::snprintf(text, sizeof text, "screening (torque %.3g, deflection %.3g times the noise floor)", left.torque,
+                left.deflection);
+  report(text);
   const std::vector<Trial> trials = tried_best(screen(stage_->fit, stage_->records, range_));
   const HeldOut now = held_out(stage_->fit, stage_->start, stage_->records);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const Trial best = best_neighbour(trials[i]);
     const Gain gain = compare(now, held_out(best.fit, best.start, stage_->records));
     if (!convinces(gain, best.fit.machine)) continue;
-    Accepted effect{best.candidate, gain, {}, {}};
+    Accepted effect{best.candidate, gain, {}, {}, {}};
     for (const Trial& other : trials) {
       if (other.candidate.id == best.candidate.id) continue;
       const Gain its = compare(now, held_out(other.fit, other.start, stage_->records));
@@ -260,10 +295,55 @@ bool Search::add_one() {
     }
     std::vector<Accepted> effects = effects_;
     effects.push_back(effect);
-    adopt(std::move(effects));
-    return true;
+    if (adopt(std::move(effects))) return true;
   }
   return false;
+}
+
+bool Search::add_map() {
+  report("learning maps");
+  const std::vector<LearnedCandidate> maps = learn_maps(stage_->fit, stage_->records, range_);
+  const HeldOut now = held_out(stage_->fit, stage_->start, stage_->records);
+  for (std::size_t i = 0; i < std::min(kMapTrials, maps.size()); ++i) {
+    if (maps[i].gain < kLeastPredicted * settings_.least_gain_unclear) break;
+    const auto trial = tried({kLearned, {maps[i].values}, maps[i].gain, maps[i].smoothness});
+    if (!trial) continue;
+    const Gain gain = compare(now, held_out(trial->fit, trial->start, stage_->records));
+    if (gain.evidence.gain_held_out < settings_.least_gain_unclear || !convinces(gain, trial->fit.machine)) continue;
+    Accepted effect{trial->candidate, gain, {}, {}, {}};
+    for (const Candidate& named : screen(stage_->fit, stage_->records, range_))
+      if (effect.nearest.size() < kNearest) effect.nearest.push_back(named.id);
+    std::vector<Accepted> effects = effects_;
+    effects.push_back(effect);
+    if (adopt(std::move(effects))) return true;
+  }
+  return false;
+}
+
+/// Tried without the effects that explain less than half of their residual, which may be stand-ins, then with
+/// named effects on top; the better of both remains.
+void Search::add_learned() {
+  const double before = size(stage_->leftover);
+  if (stage_->leftover.torque < kSomethingLeft && stage_->leftover.deflection < kSomethingLeft) return;
+  const std::vector<Accepted> named = effects_;
+  const Stage stage = *stage_;
+  for (std::size_t i = effects_.size(); i-- > 0;)
+    if (effects_[i].gain.evidence.gain < kHalf) drop(i);
+  if (add_map()) {
+    add_effects();
+    drop_superfluous();
+    if (size(stage_->leftover) < (1 - settings_.least_gain_unclear) * before) return;
+  }
+  effects_ = named;
+  stage_ = stage;
+}
+
+void Search::drop_stand_ins() {
+  const Leftover &left = stage_->leftover, &first = base_->leftover;
+  if (effects_.empty() || std::max(left.torque, left.deflection) < kNearFloor) return;
+  if (size(left) < kHalf * size(first)) return;
+  effects_.clear();
+  stage_ = base_;
 }
 
 void Search::add_effects() {
@@ -277,12 +357,15 @@ void Search::drop_superfluous() {
     std::vector<Accepted> fewer = effects_;
     fewer.erase(fewer.begin() + long(i));
     const Machine start = with_effects(fewer);
-    MachineFit fit = fit_machine(start, stage_->records, {}, options(kRoughTolerance));
-    const Machine again = fit.machine;
-    fit = fit_machine(again, stage_->records, {}, options(kFineTolerance));
-    const Gain gain = compare(held_out(fit, again, stage_->records),
-                              held_out(stage_->fit, stage_->start, stage_->records));
-    if (convinces(gain, stage_->fit.machine))
+    Machine again;
+    const auto fit = attempted([&] {
+      again = fit_machine(start, stage_->records, options(kRoughTolerance)).machine;
+      return fit_machine(again, stage_->records, options(kFineTolerance));
+    });
+    const bool needed = !fit || convinces(compare(held_out(*fit, again, stage_->records),
+                                                  held_out(stage_->fit, stage_->start, stage_->records)),
+                                          stage_->fit.machine);
+    if (needed)
       ++i;
     else
       drop(i);

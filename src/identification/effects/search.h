@@ -18,6 +18,7 @@ struct Accepted {
   Candidate candidate;  // with fitted values
   Gain gain;
   std::vector<std::string> equivalent_to;
+  std::vector<std::string> nearest;  // of a learned map: named effects that explain part of the same
   Machine after;  // fitted with this effect and those before it
 };
 
@@ -55,6 +56,11 @@ class Search {
   /// Takes out what the others explain as well.
   void drop_superfluous();
 
+  /// Where named effects leave much: what a learned map makes of it.
+  void add_learned();
+  /// Named effects that leave more than they explain may be stand-ins for what has no name.
+  void drop_stand_ins();
+
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
   Machine with_effects(const std::vector<Accepted>& effects) const;
@@ -64,8 +70,11 @@ class Search {
   std::vector<Trial> tried_best(const std::vector<Candidate>& candidates) const;
   Trial best_neighbour(Trial trial) const;
   bool add_one();
+  bool add_map();
+  Machine extended(Machine machine, const Candidate& candidate) const;
   bool convinces(const Gain& gain, const Machine& after) const;
-  void adopt(std::vector<Accepted> effects);
+  /// Fits with these effects at their own weights; false, and nothing changes, where that fails.
+  bool adopt(std::vector<Accepted> effects);
   void drop(std::size_t effect);
 
   const std::vector<ServoData>& data_;

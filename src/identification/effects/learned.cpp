@@ -1,0 +1,204 @@
+#include "learned.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
+#include "remainder.h"
+
+namespace backlash {
+namespace {
+
+constexpr int kPoints = 32;
+constexpr double kTail = 0.002;   // of the samples, beyond the outer points
+constexpr double kProbe = 0.05;   // of a strength that would show clearly
+constexpr double kShowing = 0.05; // of the torque: such a strength
+constexpr double kGapShowing = 0.1;  // of the deflection
+constexpr int kBlocks = 12;
+constexpr double kRidge = 1e-6;   // of the mean squared sensitivity: decides what nothing else does
+
+struct MapKind {
+  const char *acts_on, *coordinate;
+  bool needs_load;
+};
+
+// Motor and load position differ by the deflection only, and so do the speeds.
+constexpr MapKind kKinds[] = {
+    {"motor", "motor_position", false}, {"motor", "motor_velocity", false}, {"motor", "motor_torque", false},
+    {"motor", "mesh_torque", true},     {"motor", "time", false},           {"load", "load_position", true},
+    {"load", "load_velocity", true},    {"load", "mesh_torque", true},      {"load", "time", true},
+    {"gap", "load_position", true},     {"gap", "mesh_torque", true},
+};
+
+std::vector<double> coordinate(const std::string& name, const RecordSet& records, const Machine& machine) {
+  std::vector<double> all;
+  for (std::size_t i = 0; i < records.records().size(); ++i) {
+    const ServoData& d = records.records()[i].data();
+    const auto take = [&](const std::vector<double>& x) { all.insert(all.end(), x.begin(), x.end()); };
+    if (name == "motor_position") take(d.motor);
+    if (name == "motor_velocity") take(d.motor_rate);
+    if (name == "motor_torque") take(d.torque);
+    if (name == "load_position") take(d.load);
+    if (name == "load_velocity") take(d.load_rate);
+    if (name == "mesh_torque")
+      take(records.records()[i].residuals(machine.rig, machine.calibrations[i]).load.mesh_torque);
+    if (name == "time")
+      for (std::size_t k = 0; k < d.size(); ++k) all.push_back(double(k) * d.interval);
+  }
+  return all;
+}
+
+/// Evenly spaced over what the records cover.
+std::vector<double> points_over(std::vector<double> values) {
+  const auto at = [&](double share) {
+    const auto place = values.begin() + long(share * double(values.size() - 1));
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+  };
+  const double low = at(kTail), high = at(1 - kTail);
+  std::vector<double> points;
+  if (!(high > low)) return points;
+  for (int i = 0; i < kPoints; ++i) points.push_back(low + (high - low) * i / (kPoints - 1));
+  return points;
+}
+
+double clear_strength(const std::string& acts_on, const MotionRange& range) {
+  return acts_on == "gap" ? kGapShowing * range.deflection : kShowing * range.torque;
+}
+
+ParameterValues map_values(const MapKind& kind, const std::vector<double>& points, std::vector<double> values) {
+  ParameterValues p;
+  p.set_choice("acts_on", kind.acts_on);
+  p.set_choice("coordinate", kind.coordinate);
+  p.set_list("points", points);
+  p.set_list("values", std::move(values));
+  return p;
+}
+
+/// What is left of the sensitivities to each value of a map.
+Eigen::MatrixXd columns(const MapKind& kind, const std::vector<double>& points, double step, const MachineFit& fit,
+                        const RecordSet& records, const Remainder& remainder, const Eigen::VectorXd& now) {
+  Eigen::MatrixXd all(now.size(), kPoints);
+  for_each_in_parallel(kPoints, [&](int i) {
+    std::vector<double> values(kPoints, 0.0);
+    values[i] = step;
+    Rig rig = fit.machine.rig;
+    rig.terms.push_back(make_term("learned_map", map_values(kind, points, values)));
+    try {
+      all.col(i) = remainder.without(records.rows(rig, fit.machine.calibrations) - now) / step;
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Error&) {
+      all.col(i).setZero();
+    }
+  });
+  return all;
+}
+
+/// Least squares in blocks, each of which can be left out.
+struct Blocks {
+  std::vector<Eigen::MatrixXd> normal;
+  std::vector<Eigen::VectorXd> gradient;
+  std::vector<double> square;
+};
+
+Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const RecordSet& records) {
+  Blocks b;
+  b.normal.assign(kBlocks, Eigen::MatrixXd::Zero(c.cols(), c.cols()));
+  b.gradient.assign(kBlocks, Eigen::VectorXd::Zero(c.cols()));
+  b.square.assign(kBlocks, 0);
+  for (Eigen::Index i = 0; i < c.rows(); ++i) {
+    const RecordSet::Row& row = records.layout()[std::size_t(i)];
+    const ServoData& d = records.records()[row.record].data();
+    const auto at = std::min<std::size_t>(kBlocks - 1, std::size_t(kBlocks * row.time / (double(d.size()) * d.interval)));
+    b.normal[at].noalias() += c.row(i).transpose() * c.row(i);
+    b.gradient[at] -= c.row(i).transpose() * left[i];
+    b.square[at] += left[i] * left[i];
+  }
+  return b;
+}
+
+Eigen::MatrixXd roughness() {
+  Eigen::MatrixXd d = Eigen::MatrixXd::Zero(kPoints - 2, kPoints);
+  for (int i = 0; i + 2 < kPoints; ++i) d(i, i) = 1, d(i, i + 1) = -2, d(i, i + 2) = 1;
+  return d.transpose() * d;
+}
+
+/// Squared norm of what is left in blocks that the map did not see.
+double held_out_square(const Blocks& b, const Eigen::MatrixXd& all, const Eigen::VectorXd& gradient,
+                       const Eigen::MatrixXd& belief) {
+  double sum = 0;
+  for (int k = 0; k < kBlocks; ++k) {
+    const Eigen::VectorXd v = (all - b.normal[k] + belief).ldlt().solve(gradient - b.gradient[k]);
+    sum += b.square[k] - 2 * v.dot(b.gradient[k]) + v.dot(b.normal[k] * v);
+  }
+  return sum;
+}
+
+LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, const Eigen::MatrixXd& c,
+                       const Eigen::VectorXd& left, const RecordSet& records) {
+  const Blocks blocks = in_blocks(c, left, records);
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(kPoints, kPoints);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(kPoints);
+  for (int k = 0; k < kBlocks; ++k) all += blocks.normal[k], gradient += blocks.gradient[k];
+  const double mean = all.trace() / kPoints;
+  LearnedCandidate best;
+  if (!(mean > 0)) return best;
+  const Eigen::MatrixXd rough = roughness(), ridge = kRidge * mean * Eigen::MatrixXd::Identity(kPoints, kPoints);
+  double least = INFINITY;
+  for (double weight = 1e-4 * mean; weight < 1e5 * mean; weight *= 10) {
+    const Eigen::MatrixXd belief = weight * rough + ridge;
+    const double square = held_out_square(blocks, all, gradient, belief);
+    if (!(square < least)) continue;
+    least = square;
+    const Eigen::VectorXd v = (all + belief).ldlt().solve(gradient);
+    best.values = map_values(kind, points, {v.begin(), v.end()});
+    best.smoothness = weight;
+    best.gain = 1 - std::sqrt(std::max(0.0, square)) / left.norm();
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
+                                         const MotionRange& range) {
+  const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
+  const Remainder remainder(fit, now.size());
+  std::vector<LearnedCandidate> all;
+  for (const MapKind& kind : kKinds) {
+    if (kind.needs_load && !load_moves_freely(fit.machine.rig)) continue;
+    const std::vector<double> points = points_over(coordinate(kind.coordinate, records, fit.machine));
+    if (points.empty()) continue;
+    const double step = kProbe * clear_strength(kind.acts_on, range);
+    const LearnedCandidate one =
+        learn(kind, points, columns(kind, points, step, fit, records, remainder, now), remainder.left(), records);
+    if (one.gain > 0) all.push_back(one);
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const LearnedCandidate& a, const LearnedCandidate& b) { return a.gain > b.gain; });
+  return all;
+}
+
+Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range) {
+  const std::size_t place = machine.rig.terms.size();
+  machine.rig.terms.push_back(make_term("learned_map", candidate.values));
+  const double scale = clear_strength(candidate.values.choice("acts_on"), range);
+  for (std::size_t i = 0; i < kPoints; ++i)
+    machine.parameters.push_back(list_parameter(place, "values", i, scale));
+  const double root = std::sqrt(candidate.smoothness), ridge = std::sqrt(kRidge * candidate.smoothness);
+  for (std::size_t i = 0; i < kPoints; ++i) {
+    machine.beliefs.push_back([=](const Rig& rig) { return ridge * rig.terms[place]->values.list("values")[i]; });
+    if (i + 2 < kPoints)
+      machine.beliefs.push_back([=](const Rig& rig) {
+        const std::vector<double>& v = rig.terms[place]->values.list("values");
+        return root * (v[i] - 2 * v[i + 1] + v[i + 2]);
+      });
+  }
+  return machine;
+}
+
+}  // namespace backlash

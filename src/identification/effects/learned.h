@@ -1,0 +1,24 @@
+// Where no named effect explains a residual: a smooth map over the coordinate that it follows best.
+#pragma once
+
+#include "../joint_fit.h"
+#include "backlash_diagnosis/model/term.h"
+
+namespace backlash {
+
+/// A learned_map term, and how much it explains of blocks that it was not fitted to.
+struct LearnedCandidate {
+  ParameterValues values;
+  double smoothness = 0;  // weight of the squared second differences of its values, in units of the rows
+  double gain = 0;        // held out: relative decrease of the norm of all residuals
+};
+
+/// A map over every coordinate, best first: values by least squares on what the machine's own parameters leave,
+/// as smooth as cross-validation over blocks of the records says.
+std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
+                                         const MotionRange& range);
+
+/// The machine with this map, whose values are fitted as well, held as smooth as they are.
+Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range);
+
+}  // namespace backlash

@@ -1,0 +1,14 @@
+// What a residual that nothing explains looks like: which channel, how large, what it follows.
+#pragma once
+
+#include <optional>
+
+#include "../joint_fit.h"
+#include "backlash_diagnosis/identification/effect_search.h"
+
+namespace backlash {
+
+/// Of the channel that stays farthest above its floor; none where both are below `clear` times theirs.
+std::optional<Unexplained> signature(const Machine& machine, const RecordSet& records, double clear);
+
+}  // namespace backlash
