@@ -60,6 +60,7 @@ Json step_json(const FoundEffect& e, const Trace& trace) {
                       {"blocks_better", v.blocks_better},
                       {"blocks", v.blocks}};
   json["equivalent_to"] = e.equivalent_to;
+  if (!e.nearest.empty()) json["nearest"] = e.nearest;
   json["choices"] = Json::object();
   for (const auto& [name, word] : e.words) json["choices"][name] = word;
   json["terms"] = Json::array();
@@ -124,6 +125,12 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
   if (trace.unexplained)
     json["unexplained"] = {{"channel", trace.unexplained->channel},
                            {"signature", trace.unexplained->signature}};
+  json["independence"] = Json::array();
+  for (const Independence& i : trace.independence)
+    json["independence"].push_back({{"channel", i.channel},
+                                    {"input", i.input},
+                                    {"before", number(i.before)},
+                                    {"after", number(i.after)}});
   json["base_parameters"] = machine_json(trace.base_parameters, trace);
   json["parameters"] = machine_json(trace.parameters, trace);
   json["warnings"] = trace.warnings;

@@ -68,6 +68,7 @@ std::string bars(const std::string& name, const TraceChannel& c) {
 
 std::string effect_row(const FoundEffect& e, bool linear) {
   std::string name = tag("b", html_text(e.id)), parameters;
+  if (e.id == "learned_map") name += "<br>" + html_text(effect_name(e)) + "; shape as plotted";
   for (const auto& [key, word] : e.words) name += "<br>" + html_text(key + ": " + word);
   for (const EffectParameter& p : e.parameters)
     parameters += html_text(p.name) + " = " +
@@ -76,7 +77,8 @@ std::string effect_row(const FoundEffect& e, bool linear) {
   const std::string evidence = "training records " + percent(v.gain) + "<br>blocks left out " +
                                percent(v.gain_held_out) + ", " + std::to_string(v.blocks_better) + " of " +
                                std::to_string(v.blocks) + " better<br>last part " + percent(v.gain_forward);
-  const std::string alike = e.equivalent_to.empty() ? "none" : joined(e.equivalent_to);
+  std::string alike = e.equivalent_to.empty() ? "none" : joined(e.equivalent_to);
+  if (!e.nearest.empty()) alike += "; nearest named effects: " + joined(e.nearest);
   return tag("tr", cell(name) + cell(parameters) +
                        cell(html_text(e.channel) + "<br>" + percent(e.test_error_before) + " &rarr; " +
                             percent(e.test_error_after)) +
@@ -92,6 +94,19 @@ std::string effects_section(const Trace& trace) {
   return tag("h2", "Effects that were added") + "\n" + tag("table", rows) +
          "\n<p class=\"small\">&plusmn; one standard error; without one: chosen among values, or not "
          "known.</p>\n";
+}
+
+std::string independence_section(const Trace& trace) {
+  if (trace.independence.empty()) return "";
+  std::string rows = heads({"residual of", "against", "before", "after"});
+  for (const Independence& i : trace.independence)
+    rows += tag("tr", cell(html_text(i.channel)) + cell(html_text(i.input)) +
+                          cell(percent(i.before), "number") + cell(percent(i.after), "number")) +
+            "\n";
+  return tag("h2", "Does the residual still follow an input?") + "\n" + tag("table", rows) +
+         "\n<p class=\"small\">Share of lags at which the correlation leaves the 99 % band of independence; "
+         "1 % by "
+         "chance.</p>\n";
 }
 
 std::string machine_section(const Trace& trace) {
@@ -158,8 +173,8 @@ std::string trace_page(const Trace& trace, const TraceInputs& inputs, const std:
          "; before: the declared model, fitted; after: with all effects, fitted; noise alone: what a perfect "
          "model would leave.</p>\n" +
          effects_section(trace) + remarks_section(trace) + tag("h2", "Plots") + "\n" + plots +
-         machine_section(trace) + "<p class=\"small\">trace_residual (backlash_diagnosis) " + version() +
-         "</p>\n</body>\n</html>\n";
+         independence_section(trace) + machine_section(trace) +
+         "<p class=\"small\">trace_residual (backlash_diagnosis) " + version() + "</p>\n</body>\n</html>\n";
 }
 
 }  // namespace backlash

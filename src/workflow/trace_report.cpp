@@ -35,11 +35,18 @@ std::string effect_text(const FoundEffect& e, bool linear) {
   text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
           percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
           " of " + std::to_string(v.blocks) + " better), " + percent(v.gain_forward) + " on the last part\n";
+  if (!e.nearest.empty()) text += "    nearest named effects: " + joined(e.nearest) + "\n";
   if (!e.equivalent_to.empty()) text += "    would explain the same: " + joined(e.equivalent_to) + "\n";
   return text;
 }
 
 }  // namespace
+
+std::string effect_name(const FoundEffect& e) {
+  const auto coordinate = e.words.find("coordinate");
+  if (e.id != "learned_map" || coordinate == e.words.end()) return e.id;
+  return "a function of " + coordinate->second + " that is not one of the named effects";
+}
 
 std::string percent(double share) {
   if (!std::isfinite(share)) return "unknown";
@@ -75,8 +82,7 @@ std::string to_string(TraceVerdict verdict) {
 
 std::string verdict_sentence(const Trace& trace) {
   std::vector<std::string> effects, errors;
-  for (const FoundEffect& e : trace.steps)
-    effects.push_back(e.id == "learned_map" ? "an effect without a name, learned as a map" : e.id);
+  for (const FoundEffect& e : trace.steps) effects.push_back(effect_name(e));
   for (const auto& [name, c] : trace.channels)
     errors.push_back(name +
                      (effects.empty() ? " " + percent(c.after)
@@ -89,9 +95,9 @@ std::string verdict_sentence(const Trace& trace) {
   if (trace.verdict == TraceVerdict::nothing_missing)
     text = "Nothing is missing: the declared model, fitted, has these errors on the test record: " +
            listed(errors) + ".";
-  if (trace.verdict == TraceVerdict::unexplained) {
+  if (trace.verdict == TraceVerdict::unexplained || trace.unexplained) {
     text += effects.empty() ? "Something is missing" : " Something more is missing";
-    text += " that none of the known effects explains";
+    text += " that no effect explains";
     if (trace.unexplained) text += ", in " + trace.unexplained->channel + ": " + trace.unexplained->signature;
     text += effects.empty() ? ". Errors on the test record: " + listed(errors) + "." : ".";
   }
@@ -106,6 +112,11 @@ std::string trace_summary(const Trace& trace) {
   text += row(columns, "channel", "before", "after", "noise alone");
   for (const auto& [name, c] : trace.channels)
     text += row(columns, name, percent(c.before), percent(c.after), percent(c.floor));
+  if (!trace.independence.empty())
+    text += "\nshare of lags at which the residual still follows an input (0.01 by chance)\n" +
+            row("  %-12s %-18s %10s %10s\n", "channel", "input", "before", "after");
+  for (const Independence& i : trace.independence)
+    text += row("  %-12s %-18s %10s %10s\n", i.channel, i.input, percent(i.before), percent(i.after));
   if (!trace.steps.empty()) text += "\neffects that were added\n";
   for (const FoundEffect& e : trace.steps) text += effect_text(e, linear);
   if (trace.unexplained)

@@ -71,6 +71,7 @@ Trace trace() {
   e.test_error_after = 0.004;
   e.equivalent_to = {"asymmetric_viscous"};
   t.steps = {e};
+  t.independence = {{"torque", "motor_velocity", 0.61, 0.012}};
   t.warnings = {"b.csv: 3 gaps"};
   t.series = series();
   return t;
@@ -104,6 +105,8 @@ TEST(TraceReport, JsonIsTheContract) {
   EXPECT_TRUE(json["unexplained"].is_null());
   EXPECT_EQ(json["parameters"]["motor_inertia"]["standard_error"], 0.0123);
   EXPECT_EQ(json["base_parameters"]["motor_inertia"]["value"], 6.2);
+  EXPECT_EQ(json["independence"][0]["input"], "motor_velocity");
+  EXPECT_EQ(json["independence"][0]["after"], 0.012);
   EXPECT_EQ(json["warnings"], Json{"b.csv: 3 gaps"});
 }
 
@@ -169,6 +172,18 @@ TEST(TraceReport, DryFrictionOpposesMotion) {
   EXPECT_NEAR(both["values"][1].get<double>(), -3 * std::sin(q + 0.2) - 1.5, 1e-5);
 }
 
+TEST(TraceReport, ALearnedMapIsSaidToBeOne) {
+  Trace t = trace();
+  t.steps[0].id = "learned_map";
+  t.steps[0].words = {{"acts_on", "motor"}, {"coordinate", "motor_torque"}};
+  t.steps[0].nearest = {"cogging"};
+  EXPECT_NE(verdict_sentence(t).find("lacks a function of motor_torque that is not one of the named effects"),
+            std::string::npos);
+  EXPECT_NE(trace_summary(t).find("nearest named effects: cogging"), std::string::npos);
+  EXPECT_NE(trace_page(t, kInputs, "").find("nearest named effects: cogging"), std::string::npos);
+  EXPECT_EQ(Json::parse(trace_report_json(t, kInputs))["steps"][0]["nearest"], Json{"cogging"});
+}
+
 TEST(TraceReport, NumbersHaveAsManyDigitsAsTheirErrorLeaves) {
   EXPECT_EQ(with_error({6.31234, 0.0123}), "6.312 +- 0.012");
   EXPECT_EQ(with_error({0.001, 20}), "0.001 +- 20");
@@ -180,10 +195,10 @@ TEST(TraceReport, NumbersHaveAsManyDigitsAsTheirErrorLeaves) {
 
 TEST(TraceReport, PageHoldsEverythingAndAsksForNothing) {
   const std::string page = trace_page(trace(), kInputs, "<p>the plots</p>");
-  for (const char* part :
-       {"a &lt; b &amp; &quot;c&quot;", "b&lt;i&gt;.csv", "quadratic_drag", "body: motor", "2 N m s^2/rad^2",
-        "5 % &rarr; 0.4 %", "11 of 12 better", "asymmetric_viscous", "6.312 &plusmn; 0.012 kg m^2",
-        "<p>the plots</p>", "b.csv: 3 gaps", "noise alone", "class=\"verdict effect_found\""})
+  for (const char* part : {"a &lt; b &amp; &quot;c&quot;", "b&lt;i&gt;.csv", "quadratic_drag", "body: motor",
+                           "2 N m s^2/rad^2", "5 % &rarr; 0.4 %", "11 of 12 better", "asymmetric_viscous",
+                           "6.312 &plusmn; 0.012 kg m^2", "<p>the plots</p>", "b.csv: 3 gaps", "noise alone",
+                           "61 %", "1.2 %", "class=\"verdict effect_found\""})
     EXPECT_NE(page.find(part), std::string::npos) << part;
   for (const char* part : {"http:", "https:", "<script", "<link", "nan", "url("})
     EXPECT_EQ(page.find(part), std::string::npos) << part;

@@ -34,6 +34,9 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs);
 /// signals of this bandwidth need.
 std::string trace_series_json(const Trace& trace);
 
+/// The id, or of a learned map what it is a function of.
+std::string effect_name(const FoundEffect& effect);
+
 /// 0.0123 -> "1.23 %"
 std::string percent(double share);
 
