@@ -34,7 +34,7 @@ Samples samples(const Machine& machine, const RecordSet& records, bool deflectio
       s.residual.push_back(channel[k]);
       s.fold.push_back(int(std::min<std::size_t>(kFolds - 1, kFolds * k / d.size())));
       const double values[] = {d.motor[k],  d.motor_rate[k],       d.motor_acceleration[k],
-                               d.torque[k], r.load.mesh_torque[k], double(k) * d.interval};
+                               d.torque[k], r.load->mesh_torque[k], double(k) * d.interval};
       for (std::size_t c = 0; c < s.coordinates.size(); ++c) s.coordinates[c].second.push_back(values[c]);
     }
   }
