@@ -97,11 +97,16 @@ class TraceResidualTest(unittest.TestCase):
         self.assertFalse(os.path.exists(self.path("cancelled")))
 
     def test_wrong_goals_are_answered_with_the_reason(self):
+        motor_only = self.path("motor.csv")
+        with open(self.path("train.csv")) as stream:
+            record = stream.read()
+        with open(motor_only, "w") as stream:  # its load encoder is gone
+            stream.write(record.replace("load_position", "reference_position", 1))
         for changes, words in (
                 ({"train": []}, "train"), ({"test": ""}, "test"), ({"out": ""}, "out"),
                 ({"train": [self.path("none.csv")]}, "none.csv"), ({"rig": "/none.yaml"}, "/none.yaml"),
                 ({"joint": "elbow"}, "elbow"), ({"cutoff": -1.0}, "cutoff"), ({"cutoff": float("nan")}, "cutoff"),
-                ({"rig": rig_path("two_inertia_servo")}, "load_position"),
+                ({"rig": rig_path("two_inertia_servo"), "train": [motor_only]}, "load_position"),
                 ({"out": self.path("test.csv")}, "test.csv")):
             self.client.send_goal(self.goal(**changes))
             result = self.result()

@@ -126,7 +126,8 @@ TEST_F(TraceResidual, NamesTheEffectThatAServoLacks) {
   EXPECT_NEAR(amplitude.at("value").get<double>(), 60, 4 * amplitude.at("standard_error").get<double>());
   for (const char* channel : {"torque", "deflection"}) {
     const Json& errors = result.at("channels").at(channel);
-    EXPECT_LT(errors.at("after").get<double>(), 1.1 * errors.at("floor").get<double>()) << channel;
+    // Both are estimates from some 700 independent values: 3 % each; and the fit is not perfect.
+    EXPECT_LT(errors.at("after").get<double>(), 1.2 * errors.at("floor").get<double>()) << channel;
     EXPECT_GT(errors.at("before").get<double>(), 5 * errors.at("after").get<double>()) << channel;
   }
   done("simulate out/rig.yaml --duration 0.1 --out again.csv");
@@ -141,6 +142,14 @@ TEST_F(TraceResidual, WithoutMatplotlibThePageSaysWhyItHasNoPlots) {
   EXPECT_EQ(read("out/report.html").find("<img"), std::string::npos);
 }
 
+/// The record with its load encoder gone.
+std::string without_load(const std::string& csv) {
+  const std::string with = "load_", without = "reference_";  // another column, of no use here
+  const std::size_t at = csv.find(with);
+  EXPECT_NE(at, std::string::npos);
+  return csv.substr(0, at) + without + csv.substr(at + with.size());
+}
+
 TEST_F(TraceResidual, Refusals) {
   emps_records("");
   const std::string head = read("test.csv").substr(0, 400);
@@ -149,6 +158,7 @@ TEST_F(TraceResidual, Refusals) {
   write("text.csv", "no record\n");
   record("emps", "", 40, 3, "--duration 12 --sample-rate 100", "slow.csv");
   write("bad.yaml", "schema_version: 1\nname: 3\n");
+  write("motor.csv", without_load(read("train.csv")));
   const std::size_t before = files();
   const auto line = [](const std::string& rig, const std::string& train, const std::string& test,
                        const std::string& out = "out") {
@@ -156,7 +166,7 @@ TEST_F(TraceResidual, Refusals) {
   };
   const std::vector<std::tuple<std::string, int, std::string>> cases = {
       {"trace_residual --rig emps.yaml --test test.csv --out out", 64, "missing --train"},
-      {"trace_residual --rig emps.yaml --train --test test.csv --out out", 64, "train"},
+      {"trace_residual --rig emps.yaml --train --test test.csv --out out", 64, "missing --test"},
       {kEmps + " --cutoff 0", 64, "cutoff"},
       {line("emps.yaml", "train.txt", "test.csv"), 64, "train.txt"},
       {line("none.yaml", "train.csv", "test.csv"), 66, "none.yaml"},
@@ -169,7 +179,7 @@ TEST_F(TraceResidual, Refusals) {
       {line("emps.yaml", "short.csv", "test.csv"), 65, "short"},
       {line("emps.yaml", "train.csv", "short.csv"), 65, "short"},
       {line("emps.yaml", "train.csv", "slow.csv"), 65, "sampled"},
-      {line("two_inertia_servo.yaml", "train.csv", "test.csv"), 65, "load_position"},
+      {line("two_inertia_servo.yaml", "motor.csv", "test.csv"), 65, "load_position"},
       {line("emps.yaml", "train.csv", "test.csv", "test.csv"), 73, "test.csv"},
       {line("emps.yaml", "train.csv", "test.csv", "/proc/none"), 73, "/proc/none"},
   };
