@@ -85,6 +85,11 @@ Numbers numbers(const Stage& stage, std::size_t declared) {
   return out;
 }
 
+const char* map_unit(const std::string& acts_on) {
+  if (acts_on == "motor" || acts_on == "load") return "N m";
+  return acts_on.find("stiffness") != std::string::npos ? "-" : "rad";
+}
+
 /// Of a learned map: where its coordinate reaches and how large it gets.
 void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
   for (const char* word : {"acts_on", "coordinate"}) effect.words[word] = term.values.choice(word);
@@ -98,7 +103,7 @@ void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& 
   const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
   effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
                        {x + "_to", unit, {effect.curve_x.back(), 0}},
-                       {"largest", effect.words["acts_on"] == "gap" ? "rad" : "N m", at_largest}};
+                       {"largest", map_unit(effect.words["acts_on"]), at_largest}};
   fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
 }
 

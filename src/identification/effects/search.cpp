@@ -329,7 +329,9 @@ void Search::add_learned() {
   const Stage stage = *stage_;
   for (std::size_t i = effects_.size(); i-- > 0;)
     if (effects_[i].gain.evidence.gain < kHalf) drop(i);
-  if (add_map()) {
+  bool helped = false;
+  while (effects_.size() < settings_.most_effects && add_map()) helped = true;
+  if (helped) {
     add_effects();
     drop_superfluous();
     if (size(stage_->leftover) < (1 - settings_.least_gain_unclear) * before) return;
