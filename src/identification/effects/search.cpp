@@ -16,7 +16,7 @@ namespace {
 constexpr double kRoughCutoff = 15;       // Hz, of the first round: what moves slowly has fewer wrong minima
 constexpr double kRoughTolerance = 1e-3;
 constexpr double kFineTolerance = 1e-5;
-constexpr int kIterations = 12;
+constexpr int kIterations = 12, kMapIterations = 3;
 constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more is an effect
 constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
 constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
@@ -41,9 +41,10 @@ double size(const Leftover& left) {
   return std::hypot(left.torque, left.deflection);
 }
 
-NonlinearOptions options(double tolerance) {
+/// A map has many values, in which the residuals are nearly linear.
+NonlinearOptions options(double tolerance, bool with_map = false) {
   NonlinearOptions o;
-  o.iterations = kIterations;
+  o.iterations = with_map ? kMapIterations : kIterations;
   o.tolerance = tolerance;
   o.parallel = true;
   return o;
@@ -146,7 +147,7 @@ Machine Search::extended(Machine machine, const Candidate& candidate) const {
 Stage Search::fit_stage(Machine start, double cutoff, double tolerance) const {
   RecordSet records(data_, std::min(cutoff, cutoff_), kLoadFeedback);
   records.weigh(start);
-  MachineFit fit = fit_machine(start, records, options(tolerance));
+  MachineFit fit = fit_machine(start, records, options(tolerance, !start.beliefs.empty()));
   const Leftover left = records.leftover(fit.machine);
   return {std::move(fit), std::move(start), std::move(records), left};
 }
@@ -188,8 +189,9 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
     for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
   }
   const auto fit = attempted([&] {
-    trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance)).machine;
-    return fit_machine(trial.start, stage_->records, options(kFineTolerance));
+    const bool map = !trial.start.beliefs.empty();
+    trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance, map)).machine;
+    return fit_machine(trial.start, stage_->records, options(kFineTolerance, map));
   });
   if (!fit) return std::nullopt;
   trial.fit = *fit;
