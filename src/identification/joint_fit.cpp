@@ -5,6 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
+#include "backlash_diagnosis/record/zero_phase.h"
 
 namespace backlash {
 namespace {
@@ -12,6 +13,7 @@ namespace {
 constexpr double kFarthest = 30;     // times the start or a part of it: no parameter is sought beyond
 constexpr double kWideStep = 1e-2;   // of the differences that the errors are taken from
 constexpr double kBlock = 1;         // s: the slowest oscillation that a servo record shows
+constexpr double kNegligible = 2e-3; // of a signal: no floor is lower, no model need be better
 constexpr double kSaturated = 3;     // where tanh no longer moves: 0.995 of the largest delay
 constexpr double kDefaultGap = 1e-4; // rad, scale of an encoder offset where the rig has no gap
 
@@ -26,6 +28,17 @@ double rms(const std::vector<double>& values, const std::vector<char>& counts) {
     count += counts[k];
   }
   return std::sqrt(square / std::max(1.0, count));
+}
+
+/// Standard deviation.
+double spread(std::vector<double> values, const std::vector<char>& counts) {
+  double sum = 0, count = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    sum += counts[k] ? values[k] : 0;
+    count += counts[k];
+  }
+  for (double& value : values) value -= sum / std::max(1.0, count);
+  return rms(values, counts);
 }
 
 Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
@@ -47,7 +60,15 @@ void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
 }  // namespace
 
 RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback) {
-  for (const ServoData& d : data) records_.emplace_back(d, cutoff, feedback);
+  for (const ServoData& d : data) {
+    records_.emplace_back(d, cutoff, feedback);
+    const PreparedServo& record = records_.back();
+    spreads_.push_back({spread(low_pass(d.torque, d.interval, cutoff), record.counts), 0});
+    if (d.load.empty()) continue;
+    std::vector<double> deflection(d.size());
+    for (std::size_t k = 0; k < d.size(); ++k) deflection[k] = d.motor[k] - d.load[k];
+    spreads_.back().deflection = spread(low_pass(deflection, d.interval, cutoff), record.settled);
+  }
   weights_.resize(data.size());
   for (std::size_t r = 0; r < records_.size(); ++r) {
     for (std::size_t k = 0; k < data[r].size(); k += stride(records_[r])) {
@@ -79,9 +100,11 @@ Leftover RecordSet::leftover(const Machine& machine) const {
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
         noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
-    sum.torque += std::pow(rms(r.torque, record.counts) / floor.torque, 2);
-    if (!r.deflection.empty())
-      sum.deflection += std::pow(rms(r.deflection, record.settled) / floor.deflection, 2);
+    const double torque = std::max(floor.torque, kNegligible * spreads_[i].torque);
+    sum.torque += std::pow(rms(r.torque, record.counts) / torque, 2);
+    if (r.deflection.empty()) continue;
+    const double deflection = std::max(floor.deflection, kNegligible * spreads_[i].deflection);
+    sum.deflection += std::pow(rms(r.deflection, record.settled) / deflection, 2);
   }
   return {std::sqrt(sum.torque / double(records_.size())), std::sqrt(sum.deflection / double(records_.size()))};
 }

@@ -27,7 +27,8 @@ struct Weights {
   double torque = 1, deflection = 1;
 };
 
-/// What is left of one channel of all records: root mean square in units of the noise floor.
+/// What is left of one channel of all records: root mean square in units of the noise floor, or of a
+/// negligible part of the signal where that is more.
 struct Leftover {
   double torque = 0, deflection = 0;
 };
@@ -56,7 +57,7 @@ class RecordSet {
 
  private:
   std::vector<PreparedServo> records_;
-  std::vector<Weights> weights_;
+  std::vector<Weights> weights_, spreads_;
   std::vector<Row> layout_;
 };
 

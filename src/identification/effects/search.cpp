@@ -95,8 +95,16 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
     : data_(train), cutoff_(cutoff), settings_(settings), progress_(progress), range_(motion_range(train)) {
   declared_.rig = declared;
   declared_.calibrations.resize(train.size());
-  for (const std::string& name : parameter_names())
-    declared_.parameters.push_back(machine_parameter(name, declared));
+  for (const std::string& name : parameter_names()) {
+    FitParameter p = machine_parameter(name, declared);
+    // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
+    const bool friction = name.find("viscous") != std::string::npos || name.find("coulomb") != std::string::npos;
+    if (p.positive && friction) {
+      p.positive = false;
+      p.scale = p.get(declared);
+    }
+    declared_.parameters.push_back(p);
+  }
 }
 
 void Search::run() {
