@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
+constexpr double kPeriods = 100;          // in the record: friction has more to say than a slow motion
 constexpr int kLags = 25;                 // to either side, of the test for independence
 constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
@@ -23,7 +24,8 @@ double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
   const double highest = kHighestCutoff / data.front().interval;
   if (load_moves_freely(rig)) return std::min(kTwoInertiaCutoff, highest);
   double widest = 0;
-  for (const ServoData& d : data) widest = std::max(widest, motion_bandwidth(d.motor, d.interval));
+  for (const ServoData& d : data)
+    widest = std::max({widest, motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
   return std::min(widest, highest);
 }
 

@@ -26,9 +26,10 @@ struct MapKind {
   bool needs_load;
 };
 
-// Motor and load position differ by the deflection only, and so do the speeds.
+// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque itself
+// would explain everything.
 constexpr MapKind kKinds[] = {
-    {"motor", "motor_position", false}, {"motor", "motor_velocity", false}, {"motor", "motor_torque", false},
+    {"motor", "motor_position", false}, {"motor", "motor_velocity", false}, {"motor", "motor_torque", true},
     {"motor", "mesh_torque", true},     {"motor", "time", false},           {"load", "load_position", true},
     {"load", "load_velocity", true},    {"load", "mesh_torque", true},      {"load", "time", true},
     {"gap", "load_position", true},     {"gap", "mesh_torque", true},

@@ -26,6 +26,7 @@ constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate 
 constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
 constexpr double kWorthTrying = 0.2;      // of the best predicted gain
 constexpr double kAlike = 0.8;            // of the best gain: another name for the same
+constexpr double kTie = 0.005;            // of the misfit: then the term with the fewest shapes, gravity before cogging
 constexpr double kMostBlocks = 0.6;       // of the blocks must get better
 constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
 constexpr double kHalf = 0.5;             // of a residual: an effect that explains less may stand in for another
@@ -223,6 +224,11 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
   }
   std::stable_sort(trials.begin(), trials.end(),
                    [](const Trial& a, const Trial& b) { return a.misfit < b.misfit; });
+  const auto shapes = [](const Trial& t) { return term_type(t.candidate.id).search->shapes.size(); };
+  const auto tied = std::find_if(trials.begin(), trials.end(), [&](const Trial& t) {
+    return t.misfit > (1 + kTie) * trials.front().misfit;
+  });
+  std::stable_sort(trials.begin(), tied, [&](const Trial& a, const Trial& b) { return shapes(a) < shapes(b); });
   return trials;
 }
 
@@ -350,7 +356,10 @@ void Search::add_learned() {
   stage_ = stage;
 }
 
+/// Friction of a machine with one channel is never quite what a term says, and its residual never at the floor;
+/// there what was found stands, and what remains is told beside it.
 void Search::drop_stand_ins() {
+  if (!load_moves_freely(declared_.rig)) return;
   const Leftover &left = stage_->leftover, &first = base_->leftover;
   if (effects_.empty() || std::max(left.torque, left.deflection) < kNearFloor) return;
   if (size(left) < kHalf * size(first)) return;
