@@ -172,6 +172,10 @@ TraceSeries series(const ServoData& data, const ServoPrediction& before, const S
   for (std::size_t k = 0; k < data.size(); ++k) s.time.push_back(double(k) * data.interval);
   s.motor_position = data.motor;
   s.motor_velocity = data.motor_rate;
+  s.motor_torque = data.torque;
+  s.load_position = after.load.load;
+  s.load_velocity = after.load.load_rate;
+  s.mesh_torque = after.load.mesh_torque;
   s.torque_counts = after.counts;
   s.deflection_counts = after.settled;
   s.torque = after.measured_torque;

@@ -53,6 +53,11 @@ void DiagnoserNode::advertise() {
   curve_server_ = std::make_unique<CurveServer>(
       private_handle_, "build_curve", [this](const auto& goal) { on_build_curve(goal); }, false);
   curve_server_->start();
+  trace_server_ = std::make_unique<TraceServer>(
+      private_handle_, "trace_residual", [this](const std::string& joint, std::string& why) -> const RigFile* {
+        const JointMonitor* monitor = find(joint, why);
+        return monitor ? &monitor->rig() : nullptr;
+      });
 }
 
 void DiagnoserNode::run() {

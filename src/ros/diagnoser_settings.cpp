@@ -59,8 +59,9 @@ publishes
   /diagnostics             diagnostic_msgs/DiagnosticArray
 services
   ~diagnose  ~set_baseline  ~get_curve
-action
-  ~build_curve
+actions
+  ~build_curve             backlash_diagnosis/BuildCurve
+  ~trace_residual          backlash_diagnosis/TraceResidual: what the rig's model lacks, from records
 )";
 }
 

@@ -52,6 +52,23 @@ TEST(CommandLine, AnOptionWithoutValueIsGivenOrNot) {
   EXPECT_NE(complaint({"oak", "--length", "1", "--dry=yes"}).find("--dry"), std::string::npos);
 }
 
+TEST(CommandLine, AnOptionWithDotsTakesSeveralValues) {
+  Command c = command();
+  c.positional.clear();
+  c.options.push_back({"sort", "NAME...", "of wood", true});
+  const auto sorts = [&c](const std::vector<std::string>& words) {
+    return parse_arguments(c, words).texts("sort");
+  };
+  using Sorts = std::vector<std::string>;
+  EXPECT_EQ(sorts({"--sort", "oak", "ash", "--length", "1"}), (Sorts{"oak", "ash"}));
+  EXPECT_EQ(sorts({"--sort", "oak", "--length", "1", "--sort", "ash"}), (Sorts{"oak", "ash"}));
+  EXPECT_EQ(sorts({"--length", "1", "--sort=oak"}), Sorts{"oak"});
+  EXPECT_THROW(sorts({"--length", "1"}), UsageError);
+  EXPECT_THROW(sorts({"--length", "1", "--sort"}), UsageError);
+  EXPECT_THROW(sorts({"--length", "1", "--sort", "oak", ""}), UsageError);
+  EXPECT_NE(help_text(c).find("--sort NAME..."), std::string::npos);
+}
+
 TEST(CommandLine, ComplaintsNameOptionValueAndLimit) {
   const std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>> cases = {
       {{"--length", "1"}, {"WOOD"}},

@@ -78,6 +78,9 @@ struct Unexplained {
 /// The test record as both models have it, for plots. Signals of channels are low-passed.
 struct TraceSeries {
   std::vector<double> time, motor_position, motor_velocity;  // s, rad, rad/s
+  std::vector<double> motor_torque;                          // N m, as recorded
+  // rad, rad/s, N m, as the augmented model has them: what its terms depend on
+  std::vector<double> load_position, load_velocity, mesh_torque;
   std::vector<char> torque_counts, deflection_counts;
   std::vector<double> torque, torque_before, torque_after;              // measured, predicted
   std::vector<double> deflection, deflection_before, deflection_after;  // empty without load encoder

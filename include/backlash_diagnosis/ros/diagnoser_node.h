@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/ros/joint_monitor.h"
+#include "backlash_diagnosis/ros/trace_server.h"
 
 namespace backlash {
 
@@ -69,6 +70,7 @@ class DiagnoserNode {
   ros::Publisher distributions_, estimates_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<CurveServer> curve_server_;
+  std::unique_ptr<TraceServer> trace_server_;
   diagnostic_updater::Updater updater_;
 };
 

@@ -25,6 +25,12 @@ const std::string kCommonExitCodes =
     "  70  internal error\n"
     "  73  cannot write\n";
 
+/// Whether "RECORD..." and not "RECORD".
+bool has_dots(const std::string& value) {
+  const std::string dots = "...";
+  return value.size() > dots.size() && value.compare(value.size() - dots.size(), dots.size(), dots) == 0;
+}
+
 [[noreturn]] void fail_option(const std::string& option, const std::string& value,
                               const std::string& reason) {
   throw UsageError("--" + option + " = '" + printable(value) + "': " + reason);
@@ -35,6 +41,9 @@ po::options_description described(const Command& command) {
   for (const Option& option : command.options) {
     if (option.value.empty())
       all.add_options()(option.name.c_str(), "");
+    else if (has_dots(option.value))
+      all.add_options()(option.name.c_str(), po::value<std::vector<std::string>>()->multitoken()->composing(),
+                        "");
     else
       all.add_options()(option.name.c_str(), po::value<std::string>(), "");
   }
@@ -70,10 +79,19 @@ std::string spelling(const Option& option) {
 }
 
 bool takes_more(const Command& command) {
-  const std::string dots = "...";
-  if (command.positional.empty()) return false;
-  const std::string& last = command.positional.back();
-  return last.size() > dots.size() && last.compare(last.size() - dots.size(), dots.size(), dots) == 0;
+  return !command.positional.empty() && has_dots(command.positional.back());
+}
+
+std::vector<std::string> values_of(const Option& option, const po::variable_value& given) {
+  if (option.value.empty()) return {""};
+  std::vector<std::string> values;
+  if (has_dots(option.value))
+    values = given.as<std::vector<std::string>>();
+  else
+    values = {given.as<std::string>()};
+  for (const std::string& value : values)
+    if (value.empty()) throw UsageError("--" + option.name + " is empty");
+  return values;
 }
 
 std::string usage_line(const Command& command) {
@@ -113,7 +131,11 @@ int answer(const Command& command, const std::vector<std::string>& words, int (*
 
 std::string Arguments::text(const std::string& option) const {
   const auto found = options_.find(option);
-  return found == options_.end() ? "" : found->second;
+  return found == options_.end() ? "" : found->second.front();
+}
+
+const std::vector<std::string>& Arguments::texts(const std::string& option) const {
+  return options_.at(option);
 }
 
 double Arguments::number(const std::string& option, double absent, const Range& range) const {
@@ -161,15 +183,12 @@ Arguments parse_arguments(const Command& command, const std::vector<std::string>
   for (std::size_t i = 0; i < positional.size(); ++i)
     if (positional[i].empty())
       throw UsageError(command.positional[std::min(i, command.positional.size() - 1)] + " is empty");
-  std::map<std::string, std::string> options;
+  std::map<std::string, std::vector<std::string>> options;
   for (const Option& option : command.options) {
-    if (given.count(option.name)) {
-      options[option.name] = option.value.empty() ? "" : given[option.name].as<std::string>();
-      if (!option.value.empty() && options[option.name].empty())
-        throw UsageError("--" + option.name + " is empty");
-    } else if (option.required) {
+    if (given.count(option.name))
+      options[option.name] = values_of(option, given[option.name]);
+    else if (option.required)
       throw UsageError("missing " + spelling(option));
-    }
   }
   return {std::move(positional), std::move(options)};
 }

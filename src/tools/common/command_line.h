@@ -17,7 +17,8 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// "--name VALUE", with a help text that states unit and default; "--name" alone where `value` is empty.
+/// "--name VALUE", with a help text that states unit and default; "--name" alone where `value` is empty,
+/// "--name A B C" where it ends in dots ("RECORD...").
 struct Option {
   std::string name, value, help;
   bool required = false;
@@ -36,20 +37,21 @@ struct Command {
 /// What the user wrote. The readers throw UsageError naming option, value and limit.
 class Arguments {
  public:
-  Arguments(std::vector<std::string> positional, std::map<std::string, std::string> options)
+  Arguments(std::vector<std::string> positional, std::map<std::string, std::vector<std::string>> options)
       : positional_(std::move(positional)), options_(std::move(options)) {}
 
   const std::string& positional(std::size_t i) const { return positional_.at(i); }
   const std::vector<std::string>& positionals() const { return positional_; }
   bool has(const std::string& option) const { return options_.count(option) > 0; }
   std::string text(const std::string& option) const;  ///< empty where absent, never where a value is given
+  const std::vector<std::string>& texts(const std::string& option) const;  ///< of a required option
   double number(const std::string& option, double absent, const Range& range) const;
   std::uint64_t integer(const std::string& option, std::uint64_t absent, std::uint64_t lower,
                         std::uint64_t upper) const;
 
  private:
   std::vector<std::string> positional_;
-  std::map<std::string, std::string> options_;
+  std::map<std::string, std::vector<std::string>> options_;
 };
 
 /// Throws UsageError. --help and --version are the business of run_command.

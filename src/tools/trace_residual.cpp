@@ -1,0 +1,89 @@
+// Says what the model of a machine lacks, from records of it.
+#include <filesystem>
+#include <iostream>
+
+#include "backlash_diagnosis/ros/trace_job.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/progress_bar.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+Command command() {
+  Command c;
+  c.name = "trace_residual";
+  c.summary =
+      "Says whether the declared model of a machine lacks something, what, and how much smaller the error on "
+      "an "
+      "unseen record becomes with it; writes a report and the rig with the effect added.";
+  c.options = {
+      {"rig", "RIG.yaml", "the machine as declared: structure, and values to start from (within some 40 %)",
+       true},
+      {"train", "RECORD...", "records (.csv or .bag) that the model is fitted to", true},
+      {"test", "RECORD", "another record of the same machine, on which errors are given", true},
+      {"out", "DIR",
+       "folder for report.json, report.html, rig.yaml and series.json; made where it is missing", true},
+      {"cutoff", "HZ",
+       "low-pass of all residuals [Hz]; default: 60 for two inertias, else the bandwidth of the motion"},
+  };
+  c.notes =
+      "Two inertias with a mesh between them need motor_torque, motor_position and load_position; one "
+      "inertia "
+      "(mesh: rigid) and a locked link need motor_torque and motor_position. All records must be sampled at "
+      "the "
+      "same rate. DIR/rig.yaml can be simulated at once. All parameters are those of the load side of the "
+      "reduction.";
+  c.examples = {
+      "trace_residual --rig config/two_inertia_servo.yaml --train run1.csv run2.csv --test run3.csv "
+      "--out report",
+      "trace_residual --rig config/emps.yaml --train emps_train.csv --test emps_validation.csv --out report "
+      "--cutoff 40"};
+  c.exit_codes =
+      "  0   done: nothing is missing, or the effects that are were found and added\n"
+      "  3   something is missing that no effect explains\n";
+  return c;
+}
+
+TraceJob job_of(const Arguments& arguments) {
+  TraceJob job;
+  job.train = arguments.texts("train");
+  job.test = arguments.text("test");
+  job.folder = arguments.text("out");
+  job.settings.cutoff = arguments.number("cutoff", 0, Range::positive());
+  std::vector<std::string> inputs = job.train;
+  inputs.insert(inputs.end(), {job.test, arguments.text("rig")});
+  for (const std::string& record : job.train) check_record_path(record);
+  check_record_path(job.test);
+  if (std::filesystem::is_directory(job.folder)) {
+    const TraceFiles files = trace_files(job.folder);
+    for (const std::string& file : {files.report, files.series, files.rig, files.page})
+      check_output(file, inputs);
+  }
+  job.rig = load_rig_file(arguments.text("rig"));
+  return job;
+}
+
+int trace(const Arguments& arguments) {
+  const TraceJob job = job_of(arguments);
+  TraceDone done;
+  try {
+    ProgressBar bar;
+    done = run_trace(job, bar.progress());
+  } catch (const CannotIdentify& error) {
+    std::cerr << "trace_residual: " << error.what() << '\n';
+    return kBadData;
+  }
+  std::cout << trace_summary(done.trace) << "\nreport: " << done.files.page << ", " << done.files.report
+            << "\nrig with what was found: " << done.files.rig << '\n';
+  return done.trace.verdict == TraceVerdict::unexplained ? kInconclusive : kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, trace);
+}

@@ -1,0 +1,66 @@
+#include "trace_contributions.h"
+
+#include <algorithm>
+
+#include "backlash_diagnosis/model/axis_unit.h"
+
+namespace backlash {
+namespace {
+
+/// Torque of dry friction at this speed.
+double friction(const FrictionLimits& limits, double speed) {
+  if (speed == 0) return 0;
+  return speed > 0 ? -limits.forward : limits.backward;
+}
+
+double opening(const Term& term, const Motion& m, double half_gap, int side) {
+  FlankShift shift;
+  term.shape({m.motor_position, m.load_position, half_gap, m.mesh_torque, side}, shift);
+  return shift.opening;
+}
+
+Motion motion(const TraceSeries& s, std::size_t k) {
+  return {s.time[k],          s.motor_position[k], s.motor_velocity[k], s.load_position[k],
+          s.load_velocity[k], s.mesh_torque[k],    s.motor_torque[k]};
+}
+
+bool changes(const Contribution& c) {
+  return std::any_of(c.values.begin(), c.values.end(), [&](double v) { return v != c.values.front(); });
+}
+
+}  // namespace
+
+std::vector<Contribution> contributions(const Rig& augmented, const std::vector<std::size_t>& terms,
+                                        const TraceSeries& series) {
+  const bool linear = augmented.linear;
+  const std::string torque = linear ? "force" : "torque", unit = axis_unit("N m", linear),
+                    angle = axis_unit("rad", linear);
+  std::vector<Contribution> all = {{torque + " on the motor", unit, {}},
+                                   {torque + " on the load", unit, {}},
+                                   {"opening of the forward flank", angle, {}},
+                                   {"opening of the backward flank", angle, {}}};
+  if (series.load_position.empty() || series.load_velocity.empty() || series.mesh_torque.empty()) return {};
+  const double half_gap = augmented.mesh.rigid ? 0 : 0.5 * augmented.mesh.backlash / augmented.mesh.lever();
+  for (std::size_t k = 0; k < series.time.size(); ++k) {
+    const Motion m = motion(series, k);
+    double sum[4] = {};
+    for (const std::size_t place : terms) {
+      const Term& term = *augmented.terms.at(place);
+      EndTorques ends;
+      EndFriction dry;
+      term.add(m, ends);
+      term.add_friction(m, dry);
+      sum[0] += ends.motor + friction(dry.motor, m.motor_velocity);
+      sum[1] += ends.load + friction(dry.load, m.load_velocity);
+      if (!term.shapes_flanks()) continue;
+      sum[2] += opening(term, m, half_gap, 1);
+      sum[3] += opening(term, m, half_gap, -1);
+    }
+    for (int i = 0; i < 4; ++i) all[std::size_t(i)].values.push_back(sum[i]);
+  }
+  all.erase(std::remove_if(all.begin(), all.end(), [](const Contribution& c) { return !changes(c); }),
+            all.end());
+  return all;
+}
+
+}  // namespace backlash
