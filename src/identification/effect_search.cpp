@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
+constexpr double kPeriods = 100;          // in the record: friction has more to say than a slow motion
 constexpr int kLags = 25;                 // to either side, of the test for independence
 constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
@@ -23,7 +24,8 @@ double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
   const double highest = kHighestCutoff / data.front().interval;
   if (load_moves_freely(rig)) return std::min(kTwoInertiaCutoff, highest);
   double widest = 0;
-  for (const ServoData& d : data) widest = std::max(widest, motion_bandwidth(d.motor, d.interval));
+  for (const ServoData& d : data)
+    widest = std::max({widest, motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
   return std::min(widest, highest);
 }
 
@@ -85,6 +87,11 @@ Numbers numbers(const Stage& stage, std::size_t declared) {
   return out;
 }
 
+const char* map_unit(const std::string& acts_on) {
+  if (acts_on == "motor" || acts_on == "load") return "N m";
+  return acts_on.find("stiffness") != std::string::npos ? "-" : "rad";
+}
+
 /// Of a learned map: where its coordinate reaches and how large it gets.
 void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
   for (const char* word : {"acts_on", "coordinate"}) effect.words[word] = term.values.choice(word);
@@ -98,7 +105,7 @@ void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& 
   const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
   effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
                        {x + "_to", unit, {effect.curve_x.back(), 0}},
-                       {"largest", effect.words["acts_on"] == "gap" ? "rad" : "N m", at_largest}};
+                       {"largest", map_unit(effect.words["acts_on"]), at_largest}};
   fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
 }
 

@@ -5,14 +5,17 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/noise_floor.h"
+#include "backlash_diagnosis/record/zero_phase.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kFarthest = 30;     // times the start or a part of it: no parameter is sought beyond
+constexpr double kFarthest = 30;     // times the start or a part of it: approached, never reached
 constexpr double kWideStep = 1e-2;   // of the differences that the errors are taken from
 constexpr double kBlock = 1;         // s: the slowest oscillation that a servo record shows
+constexpr double kNegligible = 2e-3; // of a signal: no floor is lower, no model need be better
 constexpr double kSaturated = 3;     // where tanh no longer moves: 0.995 of the largest delay
+constexpr double kVague = 30;        // times the scale: what is believed of a parameter before any record
 constexpr double kDefaultGap = 1e-4; // rad, scale of an encoder offset where the rig has no gap
 
 std::size_t stride(const PreparedServo& record) {
@@ -28,14 +31,32 @@ double rms(const std::vector<double>& values, const std::vector<char>& counts) {
   return std::sqrt(square / std::max(1.0, count));
 }
 
+/// Standard deviation.
+double spread(std::vector<double> values, const std::vector<char>& counts) {
+  double sum = 0, count = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    sum += counts[k] ? values[k] : 0;
+    count += counts[k];
+  }
+  for (double& value : values) value -= sum / std::max(1.0, count);
+  return rms(values, counts);
+}
+
 Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
   const Machine machine = unknowns.machine(p);
   Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
   const Eigen::Index own = rows.size();
-  rows.conservativeResize(own + Eigen::Index(machine.beliefs.size()));
+  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.beliefs.size()));
+  rows.segment(own, unknowns.size()) = unknowns.beliefs(p);
   for (std::size_t i = 0; i < machine.beliefs.size(); ++i)
-    rows[own + Eigen::Index(i)] = machine.beliefs[i](machine.rig);
+    rows[own + unknowns.size() + Eigen::Index(i)] = machine.beliefs[i](machine.rig);
   return rows;
+}
+
+/// A logarithm that approaches kFarthest either way.
+double limited(double logarithm) {
+  const double most = std::log(kFarthest);
+  return most * std::tanh(logarithm / most);
 }
 
 /// The covariance of neighbouring rows is itself an estimate from few blocks and now and then far too small.
@@ -47,7 +68,15 @@ void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
 }  // namespace
 
 RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback) {
-  for (const ServoData& d : data) records_.emplace_back(d, cutoff, feedback);
+  for (const ServoData& d : data) {
+    records_.emplace_back(d, cutoff, feedback);
+    const PreparedServo& record = records_.back();
+    spreads_.push_back({spread(low_pass(d.torque, d.interval, cutoff), record.counts), 0});
+    if (d.load.empty()) continue;
+    std::vector<double> deflection(d.size());
+    for (std::size_t k = 0; k < d.size(); ++k) deflection[k] = d.motor[k] - d.load[k];
+    spreads_.back().deflection = spread(low_pass(deflection, d.interval, cutoff), record.settled);
+  }
   weights_.resize(data.size());
   for (std::size_t r = 0; r < records_.size(); ++r) {
     for (std::size_t k = 0; k < data[r].size(); k += stride(records_[r])) {
@@ -79,9 +108,11 @@ Leftover RecordSet::leftover(const Machine& machine) const {
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
         noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
-    sum.torque += std::pow(rms(r.torque, record.counts) / floor.torque, 2);
-    if (!r.deflection.empty())
-      sum.deflection += std::pow(rms(r.deflection, record.settled) / floor.deflection, 2);
+    const double torque = std::max(floor.torque, kNegligible * spreads_[i].torque);
+    sum.torque += std::pow(rms(r.torque, record.counts) / torque, 2);
+    if (r.deflection.empty()) continue;
+    const double deflection = std::max(floor.deflection, kNegligible * spreads_[i].deflection);
+    sum.deflection += std::pow(rms(r.deflection, record.settled) / deflection, 2);
   }
   return {std::sqrt(sum.torque / double(records_.size())), std::sqrt(sum.deflection / double(records_.size()))};
 }
@@ -135,9 +166,7 @@ Rig Unknowns::rig(const Eigen::VectorXd& values) const {
   for (std::size_t i = 0; i < start_.parameters.size(); ++i) {
     const FitParameter& p = start_.parameters[i];
     const double value = values[Eigen::Index(i)];
-    if (p.positive && std::fabs(value) > std::log(kFarthest))
-      throw InvalidParameter(p.name, std::exp(value), "of its start: too far");
-    p.set(rig, p.positive ? p.get(start_.rig) * std::exp(value) : value);
+    p.set(rig, p.positive ? p.get(start_.rig) * std::exp(limited(value)) : value);
   }
   return rig;
 }
@@ -146,13 +175,19 @@ std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) c
   std::vector<Calibration> all = start_.calibrations;
   for (std::size_t r = 0; r < records(); ++r) {
     if (delays_) {
-      const double share = values[first_of(r)] / start_.largest_delay;
-      if (std::fabs(share) > kSaturated) throw InvalidParameter("torque_delay", share, "beyond calibration");
-      all[r].torque_delay = start_.largest_delay * std::tanh(share);
+      all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
     }
     if (offsets_) all[r].encoder_offset = values[first_of(r) + delays_];
   }
   return all;
+}
+
+Eigen::VectorXd Unknowns::beliefs(const Eigen::VectorXd& values) const {
+  Eigen::VectorXd sigma = kVague * scale();
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    if (start_.parameters[i].positive) sigma[Eigen::Index(i)] = std::log(kFarthest);
+  for (std::size_t r = 0; r < records() && delays_; ++r) sigma[first_of(r)] = start_.largest_delay;
+  return (values - this->values()).cwiseQuotient(sigma);
 }
 
 Machine Unknowns::machine(const Eigen::VectorXd& values) const {
@@ -166,8 +201,9 @@ Measured Unknowns::parameter(const LeastSquaresFit& fit, std::size_t i) const {
   Measured m = fit.parameter(Eigen::Index(i));
   const FitParameter& p = start_.parameters[i];
   if (!p.positive) return m;
-  m.value = p.get(start_.rig) * std::exp(m.value);
-  m.standard_error *= m.value;
+  const double slope = 1 - std::pow(limited(m.value) / std::log(kFarthest), 2);
+  m.value = p.get(start_.rig) * std::exp(limited(m.value));
+  m.standard_error *= m.value * slope;
   return m;
 }
 
@@ -189,7 +225,7 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records, const Non
 
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records) {
   const Unknowns unknowns(start);
-  const Eigen::Index known = Eigen::Index(start.beliefs.size()), rows = fit.fit.residuals.size() - known;
+  const Eigen::Index known = unknowns.size() + Eigen::Index(start.beliefs.size()), rows = fit.fit.residuals.size() - known;
   const Eigen::Index wanted = 2 * std::lround(kBlock / records.row_interval());
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
   widen_jacobian(fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },

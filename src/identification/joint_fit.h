@@ -27,7 +27,8 @@ struct Weights {
   double torque = 1, deflection = 1;
 };
 
-/// What is left of one channel of all records: root mean square in units of the noise floor.
+/// What is left of one channel of all records: root mean square in units of the noise floor, or of a
+/// negligible part of the signal where that is more.
 struct Leftover {
   double torque = 0, deflection = 0;
 };
@@ -56,7 +57,7 @@ class RecordSet {
 
  private:
   std::vector<PreparedServo> records_;
-  std::vector<Weights> weights_;
+  std::vector<Weights> weights_, spreads_;
   std::vector<Row> layout_;
 };
 
@@ -73,9 +74,11 @@ class Unknowns {
   Eigen::Index size() const { return Eigen::Index(start_.parameters.size() + per_record_ * records()); }
   Eigen::VectorXd values() const;
   Eigen::VectorXd scale() const;
-  /// Throws InvalidParameter for what is too far from the start or refused by the rig.
+  /// Throws InvalidParameter for what is refused by the rig.
   Rig rig(const Eigen::VectorXd& values) const;
   std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
+  /// One row per value: vaguely, it is not far from its start. So what the records do not tell stays there.
+  Eigen::VectorXd beliefs(const Eigen::VectorXd& values) const;
   Machine machine(const Eigen::VectorXd& values) const;
   std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const;
   Measured parameter(const LeastSquaresFit& fit, std::size_t i) const;

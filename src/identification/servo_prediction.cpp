@@ -152,7 +152,11 @@ class SimulatedLoads {
 };
 
 PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, double load_feedback)
-    : cutoff(low_pass_cutoff), feedback(load_feedback), direction(sliding(servo)), data_(&servo), loads_(std::make_shared<SimulatedLoads>()) {
+    : cutoff(low_pass_cutoff),
+      feedback(load_feedback),
+      direction(sliding(servo)),
+      data_(&servo),
+      loads_(std::make_shared<SimulatedLoads>()) {
   torque_of_moment_ = over_second_difference(servo.torque);
   torque_held_ = held_over_second_difference(servo.torque);
   const long n = static_cast<long>(servo.size()), ends = std::lround(kEnds / (cutoff * servo.interval));

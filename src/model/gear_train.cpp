@@ -149,17 +149,23 @@ double GearTrain::flank_force(const Slots& s, int side, double penetration, doub
   return std::max(0.0, torque) / lever_;
 }
 
-/// Force >= 0 on the flank of this side [N]. Where its shape follows the torque that it carries both are
+/// Force >= 0 on the flank of this side [N], shifted as given.
+inline double GearTrain::shifted_force(const Slots& s, int side, const FlankShift& at,
+                                       double mesh_torque) const {
+  const double penetration = side * relative(s) - acting_gap_ - lever_ * at.opening;
+  if (!(penetration > 0)) return 0;
+  const double rate = side * lever_ * (s.w[kPinion] - s.w[kGear]) -
+                      lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
+  return flank_force(s, side, penetration, rate, mesh_torque);
+}
+
+/// The same wherever the flank is. Where its shape follows the torque that it carries both are
 /// found together, between no torque and one that the flank does not bear, by the Illinois method. Infinite
 /// where the flank advances faster with the torque than the teeth give way.
 double GearTrain::shaped_force(const Slots& s, int side, FlankShift& at) const {
-  const double x = side * relative(s) - acting_gap_, w = side * lever_ * (s.w[kPinion] - s.w[kGear]);
   const auto force = [&](double mesh_torque) {
     at = shift(s, side, mesh_torque);
-    const double penetration = x - lever_ * at.opening;
-    if (!(penetration > 0)) return 0.0;
-    const double rate = w - lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
-    return flank_force(s, side, penetration, rate, mesh_torque);
+    return shifted_force(s, side, at, mesh_torque);
   };
   const double f0 = force(0);
   if (!shape_follows_torque_ || f0 == 0) return f0;
@@ -185,6 +191,12 @@ double GearTrain::shaped_force(const Slots& s, int side, FlankShift& at) const {
   return t / lever_;
 }
 
+/// Adds what a flank does to pinion and gear under its torque >= 0.
+inline void GearTrain::press(int side, const FlankShift& at, double flank_torque, double* torque) {
+  torque[kPinion] -= flank_torque * (side - at.motor_slope);
+  torque[kGear] += flank_torque * (side + at.load_slope);
+}
+
 /// Adds what both flanks do to pinion and gear and returns the mesh torque. A gap that a term closes
 /// altogether presses both flanks.
 double GearTrain::shaped_torques(const Slots& s, double* torque) const {
@@ -192,8 +204,7 @@ double GearTrain::shaped_torques(const Slots& s, double* torque) const {
   for (const int side : {1, -1}) {
     FlankShift at;
     const double t = lever_ * shaped_force(s, side, at);
-    torque[kPinion] -= t * (side - at.motor_slope);
-    torque[kGear] += t * (side + at.load_slope);
+    press(side, at, t, torque);
     mesh_torque += side * t;
   }
   return mesh_torque;
@@ -294,34 +305,62 @@ GearTrain::EndForces GearTrain::end_forces(double t, const double* state, Applie
   return {b.net[node_[kMotor]], load, b.mesh_torque, b.friction};
 }
 
-GearTrain::LoadForces GearTrain::load_forces(Motion motion) const {
-  const double q = motion.motor_position, w = motion.motor_velocity, v = motion.load_velocity;
-  const Slots s{{q, q, motion.load_position, motion.load_position}, {w, w, v, v}};
-  double torque[kSlots] = {};
-  LoadForces f;
-  if (shaped_) {
-    f.mesh_torque = shaped_torques(s, torque);
-  } else {
-    f.mesh_torque = torque[kGear] = lever_ * contact_force(s);
-    torque[kPinion] = -f.mesh_torque;
-  }
-  f.mesh_on_motor = torque[kPinion];
-  f.net = torque[kGear] - (damping_[kGear] + damping_[kLink]) * v -
-          (asymmetry_[kGear] + asymmetry_[kLink]) * std::fabs(v);
-  f.friction = coulomb_.load;
-  if (load_terms_.empty()) return f;
-  motion.mesh_torque = f.mesh_torque;
+inline GearTrain::Slots GearTrain::ends(const Motion& m) {
+  return {{m.motor_position, m.motor_position, m.load_position, m.load_position},
+          {m.motor_velocity, m.motor_velocity, m.load_velocity, m.load_velocity}};
+}
+
+/// With the torques of the mesh on pinion and gear.
+inline GearTrain::LoadForces GearTrain::with_load_terms(const Motion& motion, double mesh_torque,
+                                                        const double* torque) const {
+  const double v = motion.load_velocity;
+  const double net = torque[kGear] - (damping_[kGear] + damping_[kLink]) * v -
+                     (asymmetry_[kGear] + asymmetry_[kLink]) * std::fabs(v);
+  if (load_terms_.empty()) return {net, mesh_torque, torque[kPinion], coulomb_.load};
+  Motion with_mesh = motion;
+  with_mesh.mesh_torque = mesh_torque;
   EndTorques ends;
-  EndFriction rubs{{}, f.friction};
+  EndFriction rubs{{}, coulomb_.load};
   for (const Term* term : load_terms_) {
-    term->add(motion, ends);
-    term->add_friction(motion, rubs);
+    term->add(with_mesh, ends);
+    term->add_friction(with_mesh, rubs);
   }
-  f.net += ends.load;
-  f.friction = rubs.load;
-  f.friction.forward = std::max(0.0, f.friction.forward);
-  f.friction.backward = std::max(0.0, f.friction.backward);
-  return f;
+  rubs.load.forward = std::max(0.0, rubs.load.forward);
+  rubs.load.backward = std::max(0.0, rubs.load.backward);
+  return {net + ends.load, mesh_torque, torque[kPinion], rubs.load};
+}
+
+GearTrain::LoadForces GearTrain::load_forces(const Motion& motion) const {
+  const Slots s = ends(motion);
+  double torque[kSlots] = {};
+  if (shaped_) {
+    const double mesh_torque = shaped_torques(s, torque);
+    return with_load_terms(motion, mesh_torque, torque);
+  }
+  torque[kGear] = lever_ * contact_force(s);
+  torque[kPinion] = -torque[kGear];
+  return with_load_terms(motion, torque[kGear], torque);
+}
+
+GearTrain::Flanks GearTrain::flanks(double motor_position, double load_position) const {
+  Motion motion{};
+  motion.motor_position = motor_position;
+  motion.load_position = load_position;
+  const Slots s = ends(motion);
+  return {shift(s, kForward, 0), shift(s, kReverse, 0)};
+}
+
+GearTrain::LoadForces GearTrain::load_forces(const Motion& motion, const Flanks& flanks) const {
+  const Slots s = ends(motion);
+  double torque[kSlots] = {}, mesh_torque = 0;
+  for (const int side : {1, -1}) {
+    const FlankShift& at = flanks[side > 0 ? 0 : 1];
+    const double t = lever_ * shifted_force(s, side, at, 0);
+    if (t == 0) continue;
+    press(side, at, t, torque);
+    mesh_torque += side * t;
+  }
+  return with_load_terms(motion, mesh_torque, torque);
 }
 
 GearTrain::MotorForces GearTrain::motor_forces(const Motion& motion) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -82,7 +83,8 @@ class Load {
         inertia_(train_.load_inertia()),
         feedback_(feedback),
         rubs_(train_.friction_event_count() > 0),
-        terms_(!load_terms(rig).empty()) {}
+        terms_(!load_terms(rig).empty()),
+        shaped_(train_.flanks_shift_with_position()) {}
 
   double q = 0, w = 0;
 
@@ -96,7 +98,7 @@ class Load {
   /// part. `sum` gathers the mesh torque on the motor; returns that through the teeth at the end.
   double step(const Segment& s, Halves& sum) {
     double u = 0;
-    if (terms_) last_ = forces(s.at(0), q, w);  // the motor torque that they may follow has jumped
+    if (terms_) last_ = forces(s.at(0), q, w, flanks_);  // the motor torque that they may follow has jumped
     Forces f = last_;
     for (int piece = 0; u < 1; ++piece) {
       const bool divide = piece < kMostPieces;
@@ -109,6 +111,7 @@ class Load {
  private:
   static constexpr int kMostPieces = 30;
   static constexpr int kHalvings = 10;  // of a sample, that place an event
+  using Flanks = std::optional<GearTrain::Flanks>;
   struct Forces : GearTrain::LoadForces {  // net with what draws the load
     double position;                       // rad, of the load
     int side() const { return (mesh_torque > 0) - (mesh_torque < 0); }
@@ -118,6 +121,7 @@ class Load {
     int side;              // that touches halfway
     double mesh_on_motor;  // N m, halfway
     Forces end;
+    Flanks flanks;  // at the end
   };
 
   bool holds(const Forces& f) const {
@@ -125,8 +129,10 @@ class Load {
     return f.net < f.friction.forward && -f.net < f.friction.backward;
   }
 
-  Forces forces(const Moment& m, double position, double rate) const {
-    Forces f{train_.load_forces({m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque}), position};
+  /// `flanks`: where they are at nearly this position; else they are asked.
+  Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
+    const Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque};
+    Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position};
     f.net += inertia_ * feedback_ * (m.load_rate - rate);
     return f;
   }
@@ -135,19 +141,31 @@ class Load {
     return (f.net + mode_.torque(f.friction, f.position)) / inertia_;
   }
 
-  /// Classical Runge-Kutta from u to v.
+  /// Classical Runge-Kutta from u to v. Flanks are looked up twice only, halfway and at the end, where the
+  /// load will be to within h^3: their shape hardly changes over less.
   Move moved(const Segment& s, double u, double v, const Forces& f) const {
     const double h = (v - u) * s.interval;
     const Moment middle = s.at(0.5 * (u + v)), end = s.at(v);
     const double a1 = acceleration(f), w2 = w + 0.5 * h * a1;
-    const Forces early = forces(middle, q + 0.5 * h * w, w2);
+    Flanks halfway, beyond;
+    if (shaped_) {
+      halfway = train_.flanks(middle.motor, q + 0.25 * h * (w + w2));
+      beyond = train_.flanks(end.motor, q + h * w2);
+    }
+    const Forces early = forces(middle, q + 0.5 * h * w, w2, halfway);
     const double a2 = acceleration(early), w3 = w + 0.5 * h * a2;
-    const Forces late = forces(middle, q + 0.5 * h * w2, w3);
+    const Forces late = forces(middle, q + 0.5 * h * w2, w3, halfway);
     const double a3 = acceleration(late), w4 = w + h * a3;
-    const double a4 = acceleration(forces(end, q + h * w3, w4));
-    const double to_q = q + h / 6 * (w + 2 * w2 + 2 * w3 + w4), to_w = w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+    const double a4 = acceleration(forces(end, q + h * w3, w4, beyond));
+    const double to_q = q + h / 6 * (w + 2 * w2 + 2 * w3 + w4),
+                 to_w = w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
     // Halfway the first estimate of the position lags by h^2 a / 8, the second leads by as much.
-    return {to_q, to_w, late.side(), 0.5 * (early.mesh_on_motor + late.mesh_on_motor), forces(end, to_q, to_w)};
+    return {to_q,
+            to_w,
+            late.side(),
+            0.5 * (early.mesh_on_motor + late.mesh_on_motor),
+            forces(end, to_q, to_w, beyond),
+            beyond};
   }
 
   /// The first change between u and v, known to lie there: last moment before and first after it.
@@ -173,6 +191,7 @@ class Load {
       q = to.q;
       w = to.w;
       f = to.end;
+      flanks_ = to.flanks;
       return v;
     }
     const auto [before, after] = bracket(u, v, [&](double at) { return changes(moved(s, u, at, f)); });
@@ -192,15 +211,18 @@ class Load {
     if (divide && changes(at(1))) std::tie(before, after) = bracket(u, 1, [&](double v) { return changes(at(v)); });
     const Forces end = at(before);
     sum.add(u, before, f.mesh_on_motor, at(0.5 * (u + before)).mesh_on_motor, end.mesh_on_motor);
-    if (before == after)
+    if (before == after) {
       f = end;
-    else
+      flanks_.reset();
+    } else {
       cross(s, before, after, end, f, sum);
+    }
     return after;
   }
 
   /// The moment of the change itself.
   void cross(const Segment& s, double before, double after, const Forces& from, Forces& f, Halves& sum) {
+    flanks_.reset();
     const bool sticks = !(from.friction.presliding > 0);
     if (sticks && mode_.direction() * w <= 0) w = 0;
     f = forces(s.at(after), q, w);
@@ -211,9 +233,10 @@ class Load {
 
   GearTrain train_;
   double inertia_, feedback_;
-  bool rubs_, terms_;
+  bool rubs_, terms_, shaped_;
   StickSlip mode_;
   Forces last_{};  // at the end of the sample before
+  Flanks flanks_;  // there, if known
 };
 
 /// A load that stands.
@@ -340,8 +363,8 @@ MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const D
                                load.load[k], load.load_rate[k], mesh_torque, torque});
   };
   MotorTorques out{load.mesh_on_motor, std::vector<FrictionLimits>(n)};
-  // Of each sample with the torque held before it and after it. Each interval's triangular weights give 1/2 of
-  // the mean, by Simpson's weights (1 + 5) / 12 if what is held does not jump within.
+  // Of each sample with the torque held before it and after it. Each interval's triangular weights give 1/2
+  // of the mean, by Simpson's weights (1 + 5) / 12 if what is held does not jump within.
   for (std::size_t k = 0; k < n; ++k) {
     const double first = held(k == 0 ? 0 : k - 1), second = held(k);
     const GearTrain::MotorForces after = forces(k, second);

@@ -118,7 +118,65 @@ TEST(DrivenLoad, TermsSeeTheRecordedTorque) {
   const std::vector<double> still(4, 0.0), torque = {0, 100, 300, 300};
   const RecordedMotion motion{1e-3, &still, &still, nullptr, 0, 0, &torque};
   // Held from sample to sample, and the mean over the intervals on either side of the sample.
-  EXPECT_NEAR(motor_torques(rig, motion, simulate_driven_load(rig, motion)).mean[2], 0.11 * 0.5 * (100 + 300), 1e-9);
+  EXPECT_NEAR(motor_torques(rig, motion, simulate_driven_load(rig, motion)).mean[2], 0.11 * 0.5 * (100 + 300),
+              1e-9);
+}
+
+// Flanks are looked up less often than forces.
+TEST(DrivenLoad, RepeatsATrainWithShapedFlanks) {
+  Rig rig = other_servo();
+  const auto error = make_term("transmission_error", {{"amplitude", 1e-4}, {"order", 60}, {"phase", 0.3}});
+  rig.terms = {error};
+  const Record record = simulate_record(rig, test::servo_run(3, false), 5);
+  const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
+  EXPECT_LT(worst(driven.load, record.column(Channel::load_position)), 2e-5);  // as without
+  struct Always : Term {  // says that it follows the torque: then flanks are looked up with every force
+    std::shared_ptr<const Term> error;
+    bool shapes_flanks() const override { return true; }
+    bool shape_follows_torque() const override { return true; }
+    void shape(const FlankPoint& at, FlankShift& shift) const override { error->shape(at, shift); }
+  };
+  const auto always = std::make_shared<Always>();
+  always->error = error;
+  rig.terms = {always};
+  // Where the flanks are looked up is wrong by h^3 / 12 times the rate of acceleration, 1e4 rad/s^3 after a
+  // touch: 1e-6 rad, of which they move A n = 6e-3, for some samples.
+  EXPECT_LT(worst(driven.load, simulate_driven_load(rig, motion_of(record)).load), 2e-8);
+  rig.terms.clear();
+  const DrivenLoad without = simulate_driven_load(rig, motion_of(record));
+  EXPECT_GT(worst(without.load, record.column(Channel::load_position)), 8e-5);
+}
+
+// With a load that is simulated by one rig and a motor that another one says: as if both were one.
+TEST(DrivenLoad, WhatMovesNoLoadNeedsNoSimulation) {
+  const Rig rig = other_servo();
+  Rig motor = rig, load = rig;
+  motor.motor.viscous_damping += 3;
+  motor.terms.push_back(make_term("cogging", {{"amplitude", 5}, {"order", 40}, {"phase", 0}}));
+  motor.mesh.contact = make_contact_law(rig.mesh.contact_spec.law, rig.mesh.contact_spec.values);
+  load.link.viscous_damping += 1;
+  EXPECT_TRUE(moves_same_load(rig, motor));
+  EXPECT_FALSE(moves_same_load(rig, load));
+  load = rig;
+  load.mesh.backlash *= 1.001;
+  EXPECT_FALSE(moves_same_load(rig, load));
+  load = rig;
+  load.terms.push_back(make_term("gravity", {{"amplitude", 5}, {"phase", 0}}));
+  EXPECT_FALSE(moves_same_load(rig, load));
+  const Record record = simulate_record(rig, test::servo_run(3, false), 2);
+  const RecordedMotion motion = motion_of(record);
+  const DrivenLoad followed = simulate_driven_load(rig, motion), same = simulate_driven_load(motor, motion);
+  EXPECT_EQ(followed.load, same.load);
+  const MotorTorques torques = motor_torques(motor, motion, followed);
+  // About a sample, of sin(n q) with q = w t: the mean over triangular weights is sinc^2 of half the phase.
+  const std::size_t k = 700;
+  const double w = record.column(Channel::motor_velocity)[k], half = 0.5 * 40 * w * motion.interval;
+  const double cogging =
+      5 * std::sin(40 * record.column(Channel::motor_position)[k]) * std::pow(std::sin(half) / half, 2);
+  const double viscous = (rig.motor.viscous_damping + 3) * w;
+  // acceleration of some 10 rad/s^2 changes the speed within a sample by 0.01 rad/s, its mean by 1/12 of the
+  // change of that
+  EXPECT_NEAR(torques.mean[k], followed.mesh_on_motor[k] - viscous - cogging, 0.02);
 }
 
 TEST(DrivenLoad, RefusesOtherTrains) {

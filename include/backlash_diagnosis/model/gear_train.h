@@ -72,10 +72,17 @@ class GearTrain {
     double mesh_on_motor;  // N m, of the teeth; its negative unless terms shape the flanks
     FrictionLimits friction;
   };
-  LoadForces load_forces(Motion motion) const;
+  LoadForces load_forces(const Motion& motion) const;
 
-  /// What acts on the motor with rigid couplings beside mesh and motor torque; where the link is one body with
-  /// it, on both.
+  /// The shift of either flank at these positions, forward flank first; for whoever asks for forces several
+  /// times where it hardly changes. Only if terms act on the flanks and none shapes them by the torque.
+  using Flanks = std::array<FlankShift, 2>;
+  bool flanks_shift_with_position() const { return shaped_ && !shape_follows_torque_; }
+  Flanks flanks(double motor_position, double load_position) const;
+  LoadForces load_forces(const Motion& motion, const Flanks& flanks) const;
+
+  /// What acts on the motor with rigid couplings beside mesh and motor torque; where the link is one body
+  /// with it, on both.
   struct MotorForces {
     double net;  // N m, without dry friction
     FrictionLimits friction;
@@ -169,6 +176,10 @@ class GearTrain {
   double flank_force(const Slots& s, int side, double penetration, double rate, double mesh_torque) const;
   double shaped_torques(const Slots& s, double* torque) const;
   double shaped_force(const Slots& s, int side, FlankShift& at) const;
+  double shifted_force(const Slots& s, int side, const FlankShift& at, double mesh_torque) const;
+  static void press(int side, const FlankShift& at, double flank_torque, double* torque);
+  static Slots ends(const Motion& motion);
+  LoadForces with_load_terms(const Motion& motion, double mesh_torque, const double* torque) const;
   EndFriction friction(const Motion& motion) const;
   const FrictionLimits& limits(const DryEnd& end, const EndFriction& friction) const;
   double penetration(const Slots& s, Flank flank) const;

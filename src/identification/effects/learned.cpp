@@ -12,11 +12,12 @@
 namespace backlash {
 namespace {
 
-constexpr int kPoints = 32;
+constexpr int kPoints = 40;
 constexpr double kTail = 0.002;   // of the samples, beyond the outer points
 constexpr double kProbe = 0.05;   // of a strength that would show clearly
 constexpr double kShowing = 0.05; // of the torque: such a strength
 constexpr double kGapShowing = 0.1;  // of the deflection
+constexpr double kStiffnessShowing = 0.1;
 constexpr int kBlocks = 12;
 constexpr double kRidge = 1e-6;   // of the mean squared sensitivity: decides what nothing else does
 
@@ -25,12 +26,15 @@ struct MapKind {
   bool needs_load;
 };
 
-// Motor and load position differ by the deflection only, and so do the speeds.
+// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque itself
+// would explain everything.
 constexpr MapKind kKinds[] = {
-    {"motor", "motor_position", false}, {"motor", "motor_velocity", false}, {"motor", "motor_torque", false},
+    {"motor", "motor_position", false}, {"motor", "motor_velocity", false}, {"motor", "motor_torque", true},
     {"motor", "mesh_torque", true},     {"motor", "time", false},           {"load", "load_position", true},
     {"load", "load_velocity", true},    {"load", "mesh_torque", true},      {"load", "time", true},
     {"gap", "load_position", true},     {"gap", "mesh_torque", true},
+    {"forward_flank", "load_position", true},     {"backward_flank", "load_position", true},
+    {"forward_stiffness", "load_position", true}, {"backward_stiffness", "load_position", true},
 };
 
 std::vector<double> coordinate(const std::string& name, const RecordSet& records, const Machine& machine) {
@@ -66,7 +70,9 @@ std::vector<double> points_over(std::vector<double> values) {
 }
 
 double clear_strength(const std::string& acts_on, const MotionRange& range) {
-  return acts_on == "gap" ? kGapShowing * range.deflection : kShowing * range.torque;
+  if (acts_on == "motor" || acts_on == "load") return kShowing * range.torque;
+  const bool stiffness = acts_on.find("stiffness") != std::string::npos;
+  return stiffness ? kStiffnessShowing : kGapShowing * range.deflection;
 }
 
 ParameterValues map_values(const MapKind& kind, const std::vector<double>& points, std::vector<double> values) {

@@ -16,7 +16,7 @@ namespace {
 constexpr double kRoughCutoff = 15;       // Hz, of the first round: what moves slowly has fewer wrong minima
 constexpr double kRoughTolerance = 1e-3;
 constexpr double kFineTolerance = 1e-5;
-constexpr int kIterations = 12;
+constexpr int kIterations = 12, kMapIterations = 3;
 constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more is an effect
 constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
 constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
@@ -26,6 +26,7 @@ constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate 
 constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
 constexpr double kWorthTrying = 0.2;      // of the best predicted gain
 constexpr double kAlike = 0.8;            // of the best gain: another name for the same
+constexpr double kTie = 0.005;            // of the misfit: then the term with the fewest shapes, gravity before cogging
 constexpr double kMostBlocks = 0.6;       // of the blocks must get better
 constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
 constexpr double kHalf = 0.5;             // of a residual: an effect that explains less may stand in for another
@@ -41,9 +42,10 @@ double size(const Leftover& left) {
   return std::hypot(left.torque, left.deflection);
 }
 
-NonlinearOptions options(double tolerance) {
+/// A map has many values, in which the residuals are nearly linear.
+NonlinearOptions options(double tolerance, bool with_map = false) {
   NonlinearOptions o;
-  o.iterations = kIterations;
+  o.iterations = with_map ? kMapIterations : kIterations;
   o.tolerance = tolerance;
   o.parallel = true;
   return o;
@@ -94,8 +96,16 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
     : data_(train), cutoff_(cutoff), settings_(settings), progress_(progress), range_(motion_range(train)) {
   declared_.rig = declared;
   declared_.calibrations.resize(train.size());
-  for (const std::string& name : parameter_names())
-    declared_.parameters.push_back(machine_parameter(name, declared));
+  for (const std::string& name : parameter_names()) {
+    FitParameter p = machine_parameter(name, declared);
+    // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
+    const bool friction = name.find("viscous") != std::string::npos || name.find("coulomb") != std::string::npos;
+    if (p.positive && friction) {
+      p.positive = false;
+      p.scale = p.get(declared);
+    }
+    declared_.parameters.push_back(p);
+  }
 }
 
 void Search::run() {
@@ -146,7 +156,7 @@ Machine Search::extended(Machine machine, const Candidate& candidate) const {
 Stage Search::fit_stage(Machine start, double cutoff, double tolerance) const {
   RecordSet records(data_, std::min(cutoff, cutoff_), kLoadFeedback);
   records.weigh(start);
-  MachineFit fit = fit_machine(start, records, options(tolerance));
+  MachineFit fit = fit_machine(start, records, options(tolerance, !start.beliefs.empty()));
   const Leftover left = records.leftover(fit.machine);
   return {std::move(fit), std::move(start), std::move(records), left};
 }
@@ -188,8 +198,9 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
     for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
   }
   const auto fit = attempted([&] {
-    trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance)).machine;
-    return fit_machine(trial.start, stage_->records, options(kFineTolerance));
+    const bool map = !trial.start.beliefs.empty();
+    trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance, map)).machine;
+    return fit_machine(trial.start, stage_->records, options(kFineTolerance, map));
   });
   if (!fit) return std::nullopt;
   trial.fit = *fit;
@@ -213,6 +224,11 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
   }
   std::stable_sort(trials.begin(), trials.end(),
                    [](const Trial& a, const Trial& b) { return a.misfit < b.misfit; });
+  const auto shapes = [](const Trial& t) { return term_type(t.candidate.id).search->shapes.size(); };
+  const auto tied = std::find_if(trials.begin(), trials.end(), [&](const Trial& t) {
+    return t.misfit > (1 + kTie) * trials.front().misfit;
+  });
+  std::stable_sort(trials.begin(), tied, [&](const Trial& a, const Trial& b) { return shapes(a) < shapes(b); });
   return trials;
 }
 
@@ -329,7 +345,9 @@ void Search::add_learned() {
   const Stage stage = *stage_;
   for (std::size_t i = effects_.size(); i-- > 0;)
     if (effects_[i].gain.evidence.gain < kHalf) drop(i);
-  if (add_map()) {
+  bool helped = false;
+  while (effects_.size() < settings_.most_effects && add_map()) helped = true;
+  if (helped) {
     add_effects();
     drop_superfluous();
     if (size(stage_->leftover) < (1 - settings_.least_gain_unclear) * before) return;
@@ -338,7 +356,10 @@ void Search::add_learned() {
   stage_ = stage;
 }
 
+/// Friction of a machine with one channel is never quite what a term says, and its residual never at the floor;
+/// there what was found stands, and what remains is told beside it.
 void Search::drop_stand_ins() {
+  if (!load_moves_freely(declared_.rig)) return;
   const Leftover &left = stage_->leftover, &first = base_->leftover;
   if (effects_.empty() || std::max(left.torque, left.deflection) < kNearFloor) return;
   if (size(left) < kHalf * size(first)) return;

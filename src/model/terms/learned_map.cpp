@@ -2,6 +2,8 @@
 //   acts_on motor, load:  torque f on that end [N m]
 //   acts_on gap:          the mesh is displaced by f [rad at the load], x = q_P - q_G + f: both flanks move
 //                         together as by a transmission error
+//   forward_flank, backward_flank:          that flank is farther away by f [rad at the load]
+//   forward_stiffness, backward_stiffness:  that flank bears (1 + f) times its torque, f > -1
 // Between its points f is the cubic of Catmull and Rom (1974): the slope at a point is that from its
 // neighbour before to that after, 0 at the first and last. Beyond these f is constant. So f has no corners
 // and is linear in its values. A gap that follows a position is conservative, and moves both ends through its
@@ -104,7 +106,11 @@ class LearnedTorque : public Term {
 class LearnedGap : public Term {
  public:
   explicit LearnedGap(const ParameterValues& p)
-      : coordinate_(coordinate_of(p)), curve_(p.list("points"), p.list("values")) {
+      : forward_(p.choice("acts_on") != "backward_flank"),
+        backward_(p.choice("acts_on") != "forward_flank"),
+        displaces_(p.choice("acts_on") == "gap"),
+        coordinate_(coordinate_of(p)),
+        curve_(p.list("points"), p.list("values")) {
     if (coordinate_ != Coordinate::motor_position && coordinate_ != Coordinate::load_position &&
         coordinate_ != Coordinate::mesh_torque)
       throw InvalidParameter("coordinate", p.choice("coordinate"),
@@ -113,16 +119,43 @@ class LearnedGap : public Term {
   bool shapes_flanks() const override { return true; }
   bool shape_follows_torque() const override { return coordinate_ == Coordinate::mesh_torque; }
   void shape(const FlankPoint& at, FlankShift& shift) const override {
+    if (!(at.side > 0 ? forward_ : backward_)) return;
+    const int opens = displaces_ ? -at.side : 1;
     const bool of_motor = coordinate_ == Coordinate::motor_position;
     const Curve::Point f = curve_.at(shape_follows_torque() ? at.mesh_torque
                                      : of_motor             ? at.motor_position
                                                             : at.load_position);
-    shift.opening -= at.side * f.value;
-    if (!shape_follows_torque()) (of_motor ? shift.motor_slope : shift.load_slope) -= at.side * f.slope;
+    shift.opening += opens * f.value;
+    if (!shape_follows_torque()) (of_motor ? shift.motor_slope : shift.load_slope) += opens * f.slope;
   }
 
  private:
+  bool forward_, backward_, displaces_;
   Coordinate coordinate_;
+  Curve curve_;
+};
+
+class LearnedStiffness : public Term {
+ public:
+  explicit LearnedStiffness(const ParameterValues& p)
+      : side_(p.choice("acts_on") == "forward_stiffness" ? 1 : -1),
+        of_motor_(coordinate_of(p) == Coordinate::motor_position),
+        curve_(p.list("points"), p.list("values")) {
+    if (!of_motor_ && coordinate_of(p) != Coordinate::load_position)
+      throw InvalidParameter("coordinate", p.choice("coordinate"),
+                             "a stiffness follows motor_position or load_position");
+    for (const double value : p.list("values"))
+      if (!(value > -1)) throw InvalidParameter("values", value, "a stiffness stays above 0: must be > -1");
+  }
+  bool loads_flanks() const override { return true; }
+  void load_flank(const FlankLoad& load, double& torque) const override {
+    if (load.at.side == side_)
+      torque *= std::max(0.0, 1 + curve_.at(of_motor_ ? load.at.motor_position : load.at.load_position).value);
+  }
+
+ private:
+  int side_;
+  bool of_motor_;
   Curve curve_;
 };
 
@@ -138,14 +171,18 @@ void check(const std::vector<double>& points, const std::vector<double>& values)
 
 TermType learned_map_term() {
   return {"learned_map",
-          {{"acts_on", "-", Range::any(), "what it is added to", false, {"motor", "load", "gap"}},
+          {{"acts_on", "-", Range::any(), "what it is added to", false,
+            {"motor", "load", "gap", "forward_flank", "backward_flank", "forward_stiffness", "backward_stiffness"}},
            {"coordinate", "-", Range::any(), "x", false, coordinates()},
            {"points", "rad, rad/s, N m or s", Range::any(), "of x, increasing", true},
-           {"values", "N m, of the gap rad", Range::any(), "f at each point", true}},
+           {"values", "N m, of a gap or flank rad, of a stiffness -", Range::any(), "f at each point", true}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             check(p.list("points"), p.list("values"));
-            if (p.choice("acts_on") == "gap") return std::make_unique<LearnedGap>(p);
-            return std::make_unique<LearnedTorque>(p);
+            const std::string& on = p.choice("acts_on");
+            if (on == "motor" || on == "load") return std::make_unique<LearnedTorque>(p);
+            if (on == "forward_stiffness" || on == "backward_stiffness")
+              return std::make_unique<LearnedStiffness>(p);
+            return std::make_unique<LearnedGap>(p);
           }};
 }
 
