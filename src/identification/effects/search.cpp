@@ -83,10 +83,20 @@ void tell_held(Machine& machine) {
   }
 }
 
+/// Beyond calibration a delay is an effect: then as much as is calibration stays, and is fitted no more, so that
+/// the effect can be seen.
 void limit_delay(Machine& machine) {
   machine.largest_delay = kLargestDelay;
-  for (Calibration& c : machine.calibrations)
-    c.torque_delay = std::clamp(c.torque_delay, -0.9 * kLargestDelay, 0.9 * kLargestDelay);
+  for (Calibration& c : machine.calibrations) {
+    if (std::fabs(c.torque_delay) > kLargestDelay) machine.largest_delay = 0;
+    c.torque_delay = std::clamp(c.torque_delay, -kLargestDelay, kLargestDelay);
+  }
+}
+
+/// Where delay is an effect calibration is part of it.
+void without_calibration(Machine& machine) {
+  machine.largest_delay = 0;
+  for (Calibration& c : machine.calibrations) c.torque_delay = 0;
 }
 
 }  // namespace
@@ -143,7 +153,7 @@ Machine Search::with_effects(const std::vector<Accepted>& effects) const {
   machine.rig.terms = declared_.rig.terms;
   machine.parameters = declared_.parameters;
   machine.beliefs = declared_.beliefs;
-  machine.largest_delay = kLargestDelay;
+  machine.largest_delay = base_->fit.machine.largest_delay;
   for (const Accepted& effect : effects) machine = extended(machine, effect.candidate);
   return machine;
 }
@@ -193,10 +203,7 @@ void Search::fit_base() {
 /// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
 std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
   Trial trial{candidate, extended(stage_->fit.machine, candidate), {}, 0};
-  if (sensing({trial.start.rig.terms.back()}).torque_delay != 0) {  // then calibration is part of the effect
-    trial.start.largest_delay = 0;
-    for (Calibration& c : trial.start.calibrations) c.torque_delay = 0;
-  }
+  if (candidate.id == "delay") without_calibration(trial.start);
   const auto fit = attempted([&] {
     const bool map = !trial.start.beliefs.empty();
     trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance, map)).machine;
@@ -274,7 +281,7 @@ bool Search::convinces(const Gain& gain, const Machine& after) const {
 bool Search::adopt(std::vector<Accepted> effects) {
   Machine machine = with_effects(effects);
   for (const Accepted& effect : effects)
-    if (effect.candidate.id == "delay") machine.largest_delay = 0;
+    if (effect.candidate.id == "delay") without_calibration(machine);
   std::optional<Stage> fitted = attempted([&] {
     return fit_stage(fit_stage(machine, cutoff_, kRoughTolerance).fit.machine, cutoff_, kFineTolerance);
   });
