@@ -19,7 +19,7 @@ shift $(($# > 0))
 install_dependencies
 echo "Building in ${WS}"
 build
-build "${PACKAGE}_make_machine"
+build "${PACKAGE}_test_machine"
 executables=${WS}/devel/lib/${PACKAGE}
 python3 "${REPO}/test/tools/confusion_table.py" --trace "${executables}/trace_residual" \
   --make "${executables}/make_machine" --keep "${out}" "$@"
