@@ -106,6 +106,11 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
     : data_(train), cutoff_(cutoff), settings_(settings), progress_(progress), range_(motion_range(train)) {
   declared_.rig = declared;
   declared_.calibrations.resize(train.size());
+  if (declared.link_locked)  // play and the wind-up of both sides are about the middle of the travel
+    for (std::size_t i = 0; i < train.size(); ++i) {
+      const auto [low, high] = std::minmax_element(train[i].motor.begin(), train[i].motor.end());
+      declared_.calibrations[i].encoder_offset = -0.5 * (*low + *high);
+    }
   for (const std::string& name : parameter_names()) {
     FitParameter p = machine_parameter(name, declared);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
@@ -350,7 +355,7 @@ void Search::add_learned() {
   if (stage_->leftover.torque < kSomethingLeft && stage_->leftover.deflection < kSomethingLeft) return;
   const std::vector<Accepted> named = effects_;
   const Stage stage = *stage_;
-  for (std::size_t i = effects_.size(); i-- > 0;)
+  for (std::size_t i = effects_.size(); load_moves_freely(declared_.rig) && i-- > 0;)
     if (effects_[i].gain.evidence.gain < kHalf) drop(i);
   bool helped = false;
   while (effects_.size() < settings_.most_effects && add_map()) helped = true;
