@@ -106,11 +106,7 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
     : data_(train), cutoff_(cutoff), settings_(settings), progress_(progress), range_(motion_range(train)) {
   declared_.rig = declared;
   declared_.calibrations.resize(train.size());
-  if (declared.link_locked)  // play and the wind-up of both sides are about the middle of the travel
-    for (std::size_t i = 0; i < train.size(); ++i) {
-      const auto [low, high] = std::minmax_element(train[i].motor.begin(), train[i].motor.end());
-      declared_.calibrations[i].encoder_offset = -0.5 * (*low + *high);
-    }
+  if (declared.link_locked) start_in_travel();
   for (const std::string& name : parameter_names()) {
     FitParameter p = machine_parameter(name, declared);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
@@ -120,6 +116,16 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
       p.scale = p.get(declared);
     }
     declared_.parameters.push_back(p);
+  }
+}
+
+/// Play and the wind-up of both sides are about the middle of the travel, and both flanks must have touched.
+void Search::start_in_travel() {
+  double& gap = declared_.rig.mesh.backlash;
+  for (std::size_t i = 0; i < data_.size(); ++i) {
+    const auto [low, high] = std::minmax_element(data_[i].motor.begin(), data_[i].motor.end());
+    declared_.calibrations[i].encoder_offset = -0.5 * (*low + *high);
+    gap = std::min(gap, 0.5 * (*high - *low) * declared_.rig.mesh.lever());
   }
 }
 
