@@ -83,6 +83,16 @@ void tell_held(Machine& machine) {
   }
 }
 
+/// What seemed not to be held, because the delay had to stand in for an effect, may be.
+void tell_held_again(Machine& machine) {
+  for (Calibration& c : machine.calibrations) {
+    if (!c.held && c.torque_delay > kUnheld) {
+      c.held = true;
+      c.torque_delay -= 0.5;
+    }
+  }
+}
+
 /// Beyond calibration a delay is an effect: then as much as is calibration stays, and is fitted no more, so that
 /// the effect can be seen.
 void limit_delay(Machine& machine) {
@@ -294,7 +304,9 @@ bool Search::adopt(std::vector<Accepted> effects) {
   for (const Accepted& effect : effects)
     if (effect.candidate.id == "delay") without_calibration(machine);
   std::optional<Stage> fitted = attempted([&] {
-    return fit_stage(fit_stage(machine, cutoff_, kRoughTolerance).fit.machine, cutoff_, kFineTolerance);
+    Machine fitted = fit_stage(machine, cutoff_, kRoughTolerance).fit.machine;
+    if (fitted.largest_delay > 0) tell_held_again(fitted);
+    return fit_stage(fitted, cutoff_, kFineTolerance);
   });
   if (!fitted) return false;
   Stage& stage = *fitted;
