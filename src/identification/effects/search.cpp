@@ -121,7 +121,7 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
     FitParameter p = machine_parameter(name, declared);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
     const bool friction = name.find("viscous") != std::string::npos || name.find("coulomb") != std::string::npos;
-    if (p.positive && friction) {
+    if (p.positive && friction && !declared.link_locked) {  // there damping is hardly told and stays where it is
       p.positive = false;
       p.scale = p.get(declared);
     }
