@@ -16,6 +16,8 @@ namespace {
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
 constexpr double kPeriods = 100;          // in the record: friction has more to say than a slow motion
+constexpr double kSureSpeed = 5;          // standard deviations of the motor speed's noise
+constexpr double kLeastMoving = 0.05;     // of the samples
 constexpr int kLags = 25;                 // to either side, of the test for independence
 constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
@@ -33,6 +35,12 @@ ServoData data_of(const Record& record, const Rig& rig) {
   ServoData data = servo_data(record, rig);
   if (load_moves_freely(rig) && data.load.empty())
     throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");
+  const double sure = kSureSpeed * data.rate_noise;
+  const auto moving = std::count_if(data.motor_rate.begin(), data.motor_rate.end(),
+                                    [&](double rate) { return std::fabs(rate) > sure; });
+  if (double(moving) < kLeastMoving * double(data.size()))
+    throw CannotIdentify(record.name + " moves too slowly: its speed stands out of the noise of the encoder in " +
+                         std::to_string(100 * moving / long(data.size())) + " % of the samples");
   return data;
 }
 

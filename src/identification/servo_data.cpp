@@ -5,14 +5,22 @@
 #include <tuple>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/bandwidth.h"
 #include "backlash_diagnosis/identification/measured.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/record/zero_phase.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
 
 namespace backlash {
 namespace {
 
-constexpr std::size_t kStart = 10;  // samples
+constexpr std::size_t kStart = 10;        // samples
+constexpr std::size_t kLeastToTell = 64;  // samples, for the noise of a position
+constexpr double kRateNoise = 0.95;       // of a five-point difference of white noise of deviation 1, per sample
+constexpr double kClear = 0.02;           // of the speed: noise that does not hide its direction
+constexpr double kWidestBand = 0.2;       // of the sampling rate
+constexpr double kNarrower = 0.9;
+constexpr double kLeastPeriods = 10;      // of the band, in the record: below, nothing is smoothed
 
 std::vector<double> scaled(const Record& record, Channel channel, double factor) {
   std::vector<double> values = record.column(channel);
@@ -55,6 +63,35 @@ std::pair<double, double> start_of(const std::vector<double>& x) {
   return {mean - middle * moment / square, moment / square};
 }
 
+double root_mean_square(const std::vector<double>& x) {
+  double square = 0;
+  for (const double v : x) square += v * v;
+  return std::sqrt(square / double(x.size()));
+}
+
+/// Standard deviation of the derivative of white noise of deviation 1 after a low-pass: 2 pi f integrated up
+/// to the cutoff.
+double rate_of_noise(double cutoff, double interval) {
+  return 2 * M_PI * cutoff * std::sqrt(2 * cutoff * interval / 3);
+}
+
+/// In bands ever narrower, because of a machine that mostly stands the rate is itself noise.
+void smooth_slow_motion(ServoData& data) {
+  if (data.rate_noise <= kClear * root_mean_square(data.motor_rate)) return;
+  const double position = data.rate_noise * data.interval / kRateNoise;
+  const double narrowest = kLeastPeriods / (double(data.size()) * data.interval);
+  for (double band = kWidestBand / data.interval; band > narrowest; band *= kNarrower) {
+    const std::vector<double> smooth = low_pass(data.motor, data.interval, band);
+    const std::vector<double> rate = fast_derivative(smooth, data.interval);
+    const double noise = position * rate_of_noise(band, data.interval);
+    if (noise > kClear * root_mean_square(rate)) continue;
+    data.motor = smooth;
+    data.motor_rate = rate;
+    data.rate_noise = noise;
+    return;
+  }
+}
+
 }  // namespace
 
 double load_rate_cutoff(double interval) {
@@ -82,6 +119,12 @@ ServoData servo_data(const Record& raw, const Rig& rig) {
   data.torque = scaled(record, Channel::motor_torque, ratio);
   data.motor = scaled(record, Channel::motor_position, 1 / ratio);
   data.motor_rate = fast_derivative(data.motor, data.interval);
+  if (data.size() >= kLeastToTell) data.rate_noise = kRateNoise * position_noise(data.motor) / data.interval;
+  if (!load_moves_freely(rig)) {
+    const double rounding = resolution(data.motor) / std::sqrt(12.0);  // of a slow motion not white
+    data.rate_noise = std::max(data.rate_noise, kRateNoise * rounding / data.interval);
+    smooth_slow_motion(data);
+  }
   data.motor_acceleration = second_difference(data.motor, data.interval);
   if (!record.has(Channel::load_position)) return data;
   data.load = scaled(record, Channel::load_position, 1);

@@ -18,7 +18,6 @@ namespace {
 constexpr double kEnds = 3;          // periods of the cutoff at either end, where the filter has not settled
 constexpr double kStarts = 12;       // time constants of the feedback, until the start of the load is forgotten
 constexpr double kSureSpeed = 5;     // standard deviations of the motor speed, from which it has a sign
-constexpr double kRateNoise = 0.95;  // of a five-point difference, position noise over interval
 constexpr long kReach = 2;           // samples to either side that it uses
 
 // A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
@@ -39,7 +38,7 @@ std::vector<double> held_over_second_difference(const std::vector<double>& x) {
 /// +1 or -1 where the motor slides that way over both intervals about the sample and all that its rate was
 /// taken from; 0 where it may stand or turn round, where dry friction takes any value.
 std::vector<int> sliding(const ServoData& data) {
-  const double slowest = kSureSpeed * kRateNoise * position_noise(data.motor) / data.interval;
+  const double slowest = kSureSpeed * data.rate_noise;
   const long n = static_cast<long>(data.size());
   std::vector<int> direction(n), sure(n);
   for (long k = 0; k < n; ++k) direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);

@@ -27,10 +27,10 @@ struct MapKind {
 };
 
 // Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque itself
-// would explain everything.
+// would explain everything, and so would time where the torque is commanded in ramps.
 constexpr MapKind kKinds[] = {
     {"motor", "motor_position", false}, {"motor", "motor_velocity", false}, {"motor", "motor_torque", true},
-    {"motor", "mesh_torque", true},     {"motor", "time", false},           {"load", "load_position", true},
+    {"motor", "mesh_torque", true},     {"motor", "time", true},           {"load", "load_position", true},
     {"load", "load_velocity", true},    {"load", "mesh_torque", true},      {"load", "time", true},
     {"gap", "load_position", true},     {"gap", "mesh_torque", true},
     {"forward_flank", "load_position", true},     {"backward_flank", "load_position", true},

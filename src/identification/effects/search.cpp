@@ -83,6 +83,16 @@ void tell_held(Machine& machine) {
   }
 }
 
+/// What seemed not to be held, because the delay had to stand in for an effect, may be.
+void tell_held_again(Machine& machine) {
+  for (Calibration& c : machine.calibrations) {
+    if (!c.held && c.torque_delay > kUnheld) {
+      c.held = true;
+      c.torque_delay -= 0.5;
+    }
+  }
+}
+
 /// Beyond calibration a delay is an effect: then as much as is calibration stays, and is fitted no more, so that
 /// the effect can be seen.
 void limit_delay(Machine& machine) {
@@ -106,15 +116,26 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
     : data_(train), cutoff_(cutoff), settings_(settings), progress_(progress), range_(motion_range(train)) {
   declared_.rig = declared;
   declared_.calibrations.resize(train.size());
+  if (declared.link_locked) start_in_travel();
   for (const std::string& name : parameter_names()) {
     FitParameter p = machine_parameter(name, declared);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
     const bool friction = name.find("viscous") != std::string::npos || name.find("coulomb") != std::string::npos;
-    if (p.positive && friction) {
+    if (p.positive && friction && !declared.link_locked) {  // there damping is hardly told and stays where it is
       p.positive = false;
       p.scale = p.get(declared);
     }
     declared_.parameters.push_back(p);
+  }
+}
+
+/// Play and the wind-up of both sides are about the middle of the travel, and both flanks must have touched.
+void Search::start_in_travel() {
+  double& gap = declared_.rig.mesh.backlash;
+  for (std::size_t i = 0; i < data_.size(); ++i) {
+    const auto [low, high] = std::minmax_element(data_[i].motor.begin(), data_[i].motor.end());
+    declared_.calibrations[i].encoder_offset = -0.5 * (*low + *high);
+    gap = std::min(gap, 0.5 * (*high - *low) * declared_.rig.mesh.lever());
   }
 }
 
@@ -283,7 +304,9 @@ bool Search::adopt(std::vector<Accepted> effects) {
   for (const Accepted& effect : effects)
     if (effect.candidate.id == "delay") without_calibration(machine);
   std::optional<Stage> fitted = attempted([&] {
-    return fit_stage(fit_stage(machine, cutoff_, kRoughTolerance).fit.machine, cutoff_, kFineTolerance);
+    Machine fitted = fit_stage(machine, cutoff_, kRoughTolerance).fit.machine;
+    if (fitted.largest_delay > 0) tell_held_again(fitted);
+    return fit_stage(fitted, cutoff_, kFineTolerance);
   });
   if (!fitted) return false;
   Stage& stage = *fitted;
@@ -350,7 +373,7 @@ void Search::add_learned() {
   if (stage_->leftover.torque < kSomethingLeft && stage_->leftover.deflection < kSomethingLeft) return;
   const std::vector<Accepted> named = effects_;
   const Stage stage = *stage_;
-  for (std::size_t i = effects_.size(); i-- > 0;)
+  for (std::size_t i = effects_.size(); load_moves_freely(declared_.rig) && i-- > 0;)
     if (effects_[i].gain.evidence.gain < kHalf) drop(i);
   bool helped = false;
   while (effects_.size() < settings_.most_effects && add_map()) helped = true;

@@ -61,6 +61,7 @@ class Search {
   /// Named effects that leave more than they explain may be stand-ins for what has no name.
   void drop_stand_ins();
 
+  void start_in_travel();
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
   Machine with_effects(const std::vector<Accepted>& effects) const;
