@@ -5,6 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/bandwidth.h"
+#include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "effects/independence.h"
 #include "effects/search.h"
@@ -16,10 +17,12 @@ namespace {
 constexpr double kTwoInertiaCutoff = 60;  // Hz
 constexpr double kHighestCutoff = 0.2;    // of the sampling rate
 constexpr double kPeriods = 100;          // in the record: friction has more to say than a slow motion
+constexpr double kLeastLoadTravel = 0.01; // of the motor's: less, and the link does not move freely
 constexpr double kSureSpeed = 5;          // standard deviations of the motor speed's noise
 constexpr double kLeastMoving = 0.05;     // of the samples
 constexpr int kLags = 25;                 // to either side, of the test for independence
 constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
+constexpr double kShapeOfFriction = 0.01; // of the signal: less is how friction begins, not an effect
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
 
 double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
@@ -31,10 +34,20 @@ double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
   return std::min(widest, highest);
 }
 
+double travel(const std::vector<double>& position) {
+  const auto [low, high] = std::minmax_element(position.begin(), position.end());
+  return *high - *low;
+}
+
 ServoData data_of(const Record& record, const Rig& rig) {
   ServoData data = servo_data(record, rig);
-  if (load_moves_freely(rig) && data.load.empty())
-    throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");
+  if (load_moves_freely(rig)) {
+    if (data.load.empty())
+      throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");
+    if (travel(data.load) < kLeastLoadTravel * travel(data.motor))
+      throw CannotIdentify(record.name + ": the load stands still while the motor moves; the rig file has a link that " +
+                           "moves freely (a gearbox with locked output: link: locked)");
+  }
   const double sure = kSureSpeed * data.rate_noise;
   const auto moving = std::count_if(data.motor_rate.begin(), data.motor_rate.end(),
                                     [&](double rate) { return std::fabs(rate) > sure; });
@@ -175,6 +188,27 @@ std::vector<FoundEffect> found_effects(const Search& search, std::vector<Measure
   return all;
 }
 
+/// Every friction builds up over some path; it is called missing only where that shows.
+void note_shape_of_friction(const Search& search, Trace& trace) {
+  const auto is_shape = [](const FoundEffect& e) { return e.id == "presliding"; };
+  const auto at = std::find_if(trace.steps.begin(), trace.steps.end(), is_shape);
+  if (at == trace.steps.end()) return;
+  const double share = search.share(at->id);
+  if (share >= kShapeOfFriction) return;
+  std::string note = "friction builds up after each reversal (presliding";
+  for (const EffectParameter& p : at->parameters) {
+    char text[96];
+    std::snprintf(text, sizeof text, ", %s %.3g +- %.2g %s", p.name.c_str(), p.measured.value, p.measured.standard_error,
+                  axis_unit(p.unit, trace.augmented.linear).c_str());
+    note += text;
+  }
+  char text[96];
+  std::snprintf(text, sizeof text, "): %.2g %% of the %s, so it is in the model but not called missing", 100 * share,
+                at->channel.c_str());
+  trace.notes.push_back(note + text);
+  trace.steps.erase(at);
+}
+
 TraceSeries series(const ServoData& data, const ServoPrediction& before, const ServoPrediction& after) {
   TraceSeries s;
   for (std::size_t k = 0; k < data.size(); ++k) s.time.push_back(double(k) * data.interval);
@@ -229,19 +263,22 @@ void require_same_rate(const std::vector<ServoData>& data, const ServoData& test
                            std::to_string(test.interval) + " s cannot be compared");
 }
 
-void warn_of_range(const std::vector<ServoData>& train, const ServoData& test, Trace& trace) {
+void warn_of_range(const std::vector<ServoData>& train, const ServoData& test, bool linear, Trace& trace) {
   const MotionRange known = motion_range(train), asked = motion_range({test});
   const double slack = 0.1 * (known.to - known.from);
+  const std::string angle = axis_unit("rad", linear), speed = axis_unit("rad/s", linear),
+                    torque = axis_unit("N m", linear);
   char text[256];
   if (asked.from < known.from - slack || asked.to > known.to + slack) {
-    std::snprintf(text, sizeof text, "the test record moves from %.3g to %.3g rad, the training records from %.3g to %.3g",
-                  asked.from, asked.to, known.from, known.to);
+    std::snprintf(text, sizeof text, "the test record moves from %.3g to %.3g %s, the training records from %.3g to %.3g",
+                  asked.from, asked.to, angle.c_str(), known.from, known.to);
     trace.warnings.push_back(text);
   }
   if (asked.speed > 1.5 * known.speed || asked.torque > 1.5 * known.torque) {
     std::snprintf(text, sizeof text, "the test record is faster or stronger than the training records: "
-                  "speed %.3g against %.3g rad/s, torque %.3g against %.3g N m (standard deviations)",
-                  asked.speed, known.speed, asked.torque, known.torque);
+                  "speed %.3g against %.3g %s, %s %.3g against %.3g %s (standard deviations)",
+                  asked.speed, known.speed, speed.c_str(), linear ? "force" : "torque", asked.torque, known.torque,
+                  torque.c_str());
     trace.warnings.push_back(text);
   }
 }
@@ -276,10 +313,12 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   if (!after.deflection.empty()) channel("deflection", &ServoPrediction::deflection_error);
   const std::size_t own = base.parameters.size();
   trace.base_parameters = numbers(search.base(), own).machine;
-  const Numbers found = numbers(search.stage(), own);
+  const Numbers found = numbers(search.stage(), own - search.held().size());
   trace.parameters = found.machine;
+  for (const std::string& name : search.held()) trace.parameters[name] = {0, 0};
   for (const FitParameter& p : base.parameters) trace.units[p.name] = p.unit;
   trace.steps = found_effects(search, found.effects, on_test, declared.terms.size());
+  note_shape_of_friction(search, trace);
   trace.unexplained = signature(last, search.stage().records, kUnexplained);
   if (!trace.steps.empty())
     trace.verdict = TraceVerdict::effect_found;
@@ -287,7 +326,7 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
     trace.verdict = TraceVerdict::unexplained;
   trace.series = series(unseen, before, after);
   trace.independence = independence(trace.series, unseen, trace.cutoff);
-  warn_of_range(data, unseen, trace);
+  warn_of_range(data, unseen, declared.linear, trace);
   return trace;
 }
 

@@ -22,7 +22,7 @@ FitParameter term_parameter(std::size_t term, const std::string& name, const Rig
       values[name] = value;
       changed.terms[term] = make_term(changed.terms[term]->id, values);
     };
-    const bool positive = spec.range.lower == 0 && spec.range.open_lower;
+    const bool positive = spec.range.lower == 0 && rig.terms[term]->values.at(name) > 0;
     return {name, spec.unit, positive, scale,
             [term, name](const Rig& r) { return r.terms[term]->values.at(name); }, set};
   }

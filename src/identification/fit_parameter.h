@@ -21,7 +21,8 @@ struct FitParameter {
 /// By its name among servo_parameters(). Throws InvalidParameter for one that must be > 0 and is not.
 FitParameter machine_parameter(const std::string& name, const Rig& rig);
 
-/// A number of the term at this place of rig.terms; `scale` as above.
+/// A number of the term at this place of rig.terms; `scale` as above. One that may not be negative, and is not 0,
+/// stays above 0.
 FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale);
 
 /// Entry `index` of a list of that term.

@@ -109,12 +109,18 @@ Leftover RecordSet::leftover(const Machine& machine) const {
     const NoiseFloors floor =
         noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
     const double torque = std::max(floor.torque, kNegligible * spreads_[i].torque);
-    sum.torque += std::pow(rms(r.torque, record.counts) / torque, 2);
+    const double torque_left = rms(r.torque, record.counts);
+    sum.torque += std::pow(torque_left / torque, 2);
+    if (spreads_[i].torque > 0) sum.torque_share += std::pow(torque_left / spreads_[i].torque, 2);
     if (r.deflection.empty()) continue;
     const double deflection = std::max(floor.deflection, kNegligible * spreads_[i].deflection);
-    sum.deflection += std::pow(rms(r.deflection, record.settled) / deflection, 2);
+    const double deflection_left = rms(r.deflection, record.settled);
+    sum.deflection += std::pow(deflection_left / deflection, 2);
+    if (spreads_[i].deflection > 0) sum.deflection_share += std::pow(deflection_left / spreads_[i].deflection, 2);
   }
-  return {std::sqrt(sum.torque / double(records_.size())), std::sqrt(sum.deflection / double(records_.size()))};
+  for (double* of : {&sum.torque, &sum.deflection, &sum.torque_share, &sum.deflection_share})
+    *of = std::sqrt(*of / double(records_.size()));
+  return sum;
 }
 
 Eigen::VectorXd RecordSet::rows(const Rig& rig, const std::vector<Calibration>& calibrations) const {

@@ -31,6 +31,7 @@ struct Weights {
 /// negligible part of the signal where that is more.
 struct Leftover {
   double torque = 0, deflection = 0;
+  double torque_share = 0, deflection_share = 0;  // of the signal's standard deviation instead
 };
 
 /// Records made ready at one bandwidth, with the weights of their channels. One row per channel and as many

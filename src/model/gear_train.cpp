@@ -217,6 +217,7 @@ EndFriction GearTrain::friction(const Motion& motion) const {
     sum.motor.forward += sum.load.forward;
     sum.motor.backward += sum.load.backward;
     sum.motor.presliding = std::max(sum.motor.presliding, sum.load.presliding);
+    sum.motor.presliding_damping += sum.load.presliding_damping;
     sum.load = {};
   }
   for (FrictionLimits* limits : {&sum.motor, &sum.load}) {
@@ -295,7 +296,7 @@ void GearTrain::derivative(double t, const double* state, AppliedTorque applied,
     if (end.mode.stuck())
       acceleration = rate[node] = 0;
     else
-      acceleration += end.mode.torque(limits(end, rubbing), state[node]) / inertia_[node];
+      acceleration += end.mode.torque(limits(end, rubbing), state[node], state[dof_ + node]) / inertia_[node];
   }
 }
 

@@ -9,11 +9,12 @@ namespace {
 
 FrictionLimits between(const FrictionLimits& a, const FrictionLimits& b, double part) {
   return {a.forward + part * (b.forward - a.forward), a.backward + part * (b.backward - a.backward),
-          a.presliding};
+          a.presliding, a.presliding_damping};
 }
 
-double friction_of(const Presliding& memory, int direction, const FrictionLimits& limits, double position) {
-  if (limits.presliding > 0) return memory.friction(direction, limits, position);
+double friction_of(const Presliding& memory, int direction, const FrictionLimits& limits, double position,
+                   double rate = 0) {
+  if (limits.presliding > 0) return memory.friction(direction, limits, position, rate);
   return direction > 0 ? limits.forward : direction < 0 ? -limits.backward : 0;
 }
 
@@ -25,6 +26,13 @@ double Presliding::friction(int direction, const FrictionLimits& limits, double 
   const double built_up = path < 0 ? path : -std::expm1(-path);
   const double end = direction > 0 ? limits.forward : -limits.backward;
   return friction_ + (end - friction_) * built_up;
+}
+
+double Presliding::friction(int direction, const FrictionLimits& limits, double position, double rate) const {
+  const double built_up = friction(direction, limits, position);
+  const double end = direction > 0 ? limits.forward : -limits.backward;
+  if (direction * rate <= 0 || end == 0) return built_up;
+  return built_up + limits.presliding_damping * rate * (1 - built_up / end);
 }
 
 std::vector<double> presliding_friction(const std::vector<double>& positions,
@@ -44,7 +52,7 @@ std::vector<double> presliding_friction(const std::vector<double>& positions,
           Presliding(turn, friction_of(memory, direction, between(limits[k - 1], limits[k], part), turn));
     }
     if (moves != 0) direction = moves;
-    friction[k] = friction_of(memory, direction, limits[k], positions[k]);
+    friction[k] = friction_of(memory, direction, limits[k], positions[k], rates[k]);
   }
   return friction;
 }

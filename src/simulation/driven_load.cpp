@@ -113,7 +113,7 @@ class Load {
   static constexpr int kHalvings = 10;  // of a sample, that place an event
   using Flanks = std::optional<GearTrain::Flanks>;
   struct Forces : GearTrain::LoadForces {  // net with what draws the load
-    double position;                       // rad, of the load
+    double position, rate;                 // rad, rad/s, of the load
     int side() const { return (mesh_torque > 0) - (mesh_torque < 0); }
   };
   struct Move {
@@ -132,13 +132,13 @@ class Load {
   /// `flanks`: where they are at nearly this position; else they are asked.
   Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
     const Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque};
-    Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position};
+    Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position, rate};
     f.net += inertia_ * feedback_ * (m.load_rate - rate);
     return f;
   }
 
   double acceleration(const Forces& f) const {
-    return (f.net + mode_.torque(f.friction, f.position)) / inertia_;
+    return (f.net + mode_.torque(f.friction, f.position, f.rate)) / inertia_;
   }
 
   /// Classical Runge-Kutta from u to v. Flanks are looked up twice only, halfway and at the end, where the
@@ -373,7 +373,8 @@ MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const D
     out.mean[k == 0 ? 0 : k - 1] += before.net / 12;
     out.mean[k + 1 == n ? k : k + 1] += after.net / 12;
     out.friction[k] = {0.5 * (before.friction.forward + after.friction.forward),
-                       0.5 * (before.friction.backward + after.friction.backward), after.friction.presliding};
+                       0.5 * (before.friction.backward + after.friction.backward), after.friction.presliding,
+                       after.friction.presliding_damping};
   }
   return out;
 }

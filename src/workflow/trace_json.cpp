@@ -133,6 +133,7 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
                                     {"after", number(i.after)}});
   json["base_parameters"] = machine_json(trace.base_parameters, trace);
   json["parameters"] = machine_json(trace.parameters, trace);
+  json["notes"] = trace.notes;
   json["warnings"] = trace.warnings;
   return dumped(json, 1);
 }

@@ -130,6 +130,7 @@ std::string remarks_section(const Trace& trace) {
             tag("p", tag("b", html_text(trace.unexplained->channel)) + ": " +
                          html_text(trace.unexplained->signature)) +
             "\n";
+  for (const std::string& note : trace.notes) text += tag("p", "Note: " + html_text(note)) + "\n";
   if (trace.warnings.empty()) return text;
   std::string items;
   for (const std::string& warning : trace.warnings) items += tag("li", html_text(warning)) + "\n";

@@ -129,6 +129,7 @@ std::string trace_summary(const Trace& trace) {
     text += row(machine, name, before == trace.base_parameters.end() ? "-" : with_error(before->second),
                 with_error(value), axis_unit(trace.units.at(name), linear));
   }
+  for (const std::string& note : trace.notes) text += "note: " + note + "\n";
   for (const std::string& warning : trace.warnings) text += "warning: " + warning + "\n";
   return text;
 }

@@ -212,7 +212,7 @@ TEST(Presliding, EventsDoNotUnderflow) {
 TEST(Presliding, TheTermSetsTheDistanceOfItsBody) {
   for (const char* body : {"motor", "load"}) {
     const auto term = read_term(YamlReader::from_text(
-        std::string("{id: presliding, body: ") + body + ", distance: 0.01}", "rig.yaml"));
+        std::string("{id: presliding, body: ") + body + ", distance: 0.01, damping: 3}", "rig.yaml"));
     EndFriction friction{{1, 2}, {3, 4}};
     EXPECT_TRUE(term->has_dry_friction());
     term->add_friction({}, friction);
@@ -222,9 +222,9 @@ TEST(Presliding, TheTermSetsTheDistanceOfItsBody) {
     EXPECT_EQ(friction.motor.forward, 1);
     EXPECT_EQ(term->moves_load(), !motor);
   }
-  EXPECT_THROW(read_term(YamlReader::from_text("{id: presliding, body: gear, distance: 0.01}", "rig.yaml")),
+  EXPECT_THROW(read_term(YamlReader::from_text("{id: presliding, body: gear, distance: 0.01, damping: 3}", "rig.yaml")),
                BadData);
-  EXPECT_THROW(read_term(YamlReader::from_text("{id: presliding, body: load, distance: -1}", "rig.yaml")),
+  EXPECT_THROW(read_term(YamlReader::from_text("{id: presliding, body: load, distance: -1, damping: 3}", "rig.yaml")),
                BadData);
   const TermSearch& search = *term_type("presliding").search;
   MotionRange range;

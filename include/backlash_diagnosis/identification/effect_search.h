@@ -98,6 +98,7 @@ struct Trace {
   std::vector<Independence> independence;
   std::vector<FoundEffect> steps;
   std::optional<Unexplained> unexplained;
+  std::vector<std::string> notes;  // what was added to the model and is too small to be called missing
   std::vector<std::string> warnings;
   TraceSeries series;
 };

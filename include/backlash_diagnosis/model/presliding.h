@@ -7,6 +7,10 @@
 // tends to, x_s the presliding distance. Continuous, independent of rate; a body at rest is held by it as by
 // a spring of at most 2 F_c / x_s, from rest without load F_c / x_s. Where F_c changes on the way (other
 // terms) the present one counts, as if it had been so since the reversal.
+//
+// With a damping s [N m s/rad] of the bristles the body feels F + s w (1 - F / F_c), w [rad/s] its speed: the
+// friction of LuGre (Canudas de Wit, Olsson, Astrom and Lischinsky 1995, IEEE Trans. Autom. Control 40:419,
+// Eqs. 3 to 5, with their sigma_0 = F_c / x_s, sigma_1 = s). It never drives, as F stays within its limits.
 #pragma once
 
 #include <vector>
@@ -24,6 +28,9 @@ class Presliding {
   /// 0: as it was at the turn). Needs limits.presliding > 0.
   double friction(int direction, const FrictionLimits& limits, double position) const;
 
+  /// With what the bristles damp at `rate` [rad/s], which is in this direction.
+  double friction(int direction, const FrictionLimits& limits, double position, double rate) const;
+
  private:
   double position_, friction_;
 };
@@ -31,8 +38,8 @@ class Presliding {
 /// The same along a recorded motion: friction [N m] of each sample, > 0 against forward motion, from a start
 /// without load. Limits without presliding give Coulomb friction.
 ///
-/// A rate [rad/s] counts by its sign (0: as before); with the interval [s] also as the speed that tells where
-/// between two samples the body turned, without (0) it turned at the sample before. Noise dithers friction
+/// A rate [rad/s] counts by its sign (0: as before) and for the damping; with the interval [s] also as the speed
+/// that tells where between two samples the body turned, without (0) it turned at the sample before. Noise dithers friction
 /// away: both columns are to be smooth to within a small part of x_s. Columns of equal length, or
 /// InvalidParameter.
 std::vector<double> presliding_friction(const std::vector<double>& positions,

@@ -22,9 +22,9 @@ class StickSlip {
   int direction() const { return direction_; }  // +1, 0, -1
 
   /// Friction on the body [N m] while it slides; a stuck one is held by whoever moves it. Here and below the
-  /// position [rad] counts only with presliding.
-  double torque(const FrictionLimits& limits, double position = 0) const {
-    if (limits.presliding > 0) return -memory_.friction(direction_, limits, position);
+  /// position [rad] and the speed [rad/s] count only with presliding.
+  double torque(const FrictionLimits& limits, double position = 0, double speed = 0) const {
+    if (limits.presliding > 0) return -memory_.friction(direction_, limits, position, speed);
     return direction_ == 0 ? 0 : direction_ > 0 ? -limits.forward : limits.backward;
   }
 

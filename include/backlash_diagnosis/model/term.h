@@ -40,6 +40,7 @@ struct FrictionLimits {
   double backward = 0;
   // rad, over which friction builds up after a reversal (Presliding), the same at all times; 0: at once
   double presliding = 0;
+  double presliding_damping = 0;  // N m s/rad, of what it builds up with (Presliding)
 };
 
 struct EndFriction {

@@ -18,6 +18,7 @@ constexpr double kProbe = 0.05;   // of a strength that would show clearly
 constexpr double kShowing = 0.05; // of the torque: such a strength
 constexpr double kGapShowing = 0.1;  // of the deflection
 constexpr double kStiffnessShowing = 0.1;
+constexpr double kSoftest = -0.9;  // share that a flank's stiffness may start with
 constexpr int kBlocks = 12;
 constexpr double kRidge = 1e-6;   // of the mean squared sensitivity: decides what nothing else does
 
@@ -69,10 +70,13 @@ std::vector<double> points_over(std::vector<double> values) {
   return points;
 }
 
+bool is_stiffness(const std::string& acts_on) {
+  return acts_on.find("stiffness") != std::string::npos;
+}
+
 double clear_strength(const std::string& acts_on, const MotionRange& range) {
   if (acts_on == "motor" || acts_on == "load") return kShowing * range.torque;
-  const bool stiffness = acts_on.find("stiffness") != std::string::npos;
-  return stiffness ? kStiffnessShowing : kGapShowing * range.deflection;
+  return is_stiffness(acts_on) ? kStiffnessShowing : kGapShowing * range.deflection;
 }
 
 ParameterValues map_values(const MapKind& kind, const std::vector<double>& points, std::vector<double> values) {
@@ -160,7 +164,8 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
     const double square = held_out_square(blocks, all, gradient, belief);
     if (!(square < least)) continue;
     least = square;
-    const Eigen::VectorXd v = (all + belief).ldlt().solve(gradient);
+    Eigen::VectorXd v = (all + belief).ldlt().solve(gradient);
+    if (is_stiffness(kind.acts_on)) v = v.cwiseMax(kSoftest);
     best.values = map_values(kind, points, {v.begin(), v.end()});
     best.smoothness = weight;
     best.gain = 1 - std::sqrt(std::max(0.0, square)) / left.norm();

@@ -37,6 +37,10 @@ constexpr int kOtherStarts = 4;
 constexpr double kBeside = 0.4;           // of the logarithm of a parameter
 constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum
 
+bool is_friction(const std::string& parameter) {
+  return parameter.find("viscous") != std::string::npos || parameter.find("coulomb") != std::string::npos;
+}
+
 /// Of both channels.
 double size(const Leftover& left) {
   return std::hypot(left.torque, left.deflection);
@@ -120,8 +124,7 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
   for (const std::string& name : parameter_names()) {
     FitParameter p = machine_parameter(name, declared);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
-    const bool friction = name.find("viscous") != std::string::npos || name.find("coulomb") != std::string::npos;
-    if (p.positive && friction && !declared.link_locked) {  // there damping is hardly told and stays where it is
+    if (p.positive && is_friction(name) && !declared.link_locked) {  // there damping is hardly told and stays where it is
       p.positive = false;
       p.scale = p.get(declared);
     }
@@ -145,6 +148,26 @@ void Search::run() {
   drop_superfluous();
   add_learned();
   drop_stand_ins();
+  hold_friction();
+}
+
+/// A machine that lacks an effect may want friction below 0, the final one may not.
+void Search::hold_friction() {
+  for (bool negative = true; negative;) {
+    const Machine& now = stage_->fit.machine;
+    const auto at = std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
+      return is_friction(p.name) && p.name.find("asymmetry") == std::string::npos && p.get(now.rig) < 0;
+    });
+    negative = at != declared_.parameters.end();
+    if (!negative) return;
+    held_.push_back(at->name);
+    at->set(stage_->fit.machine.rig, 0);
+    declared_.parameters.erase(at);
+    if (effects_.empty())
+      stage_ = fit_stage(with_effects({}), cutoff_, kFineTolerance);
+    else if (!adopt(effects_))
+      throw CannotIdentify(held_.back() + " comes out below 0, and with 0 the machine cannot be fitted");
+  }
 }
 
 void Search::report(const std::string& phase) const {
@@ -177,6 +200,17 @@ Machine Search::with_effects(const std::vector<Accepted>& effects) const {
   machine.largest_delay = base_->fit.machine.largest_delay;
   for (const Accepted& effect : effects) machine = extended(machine, effect.candidate);
   return machine;
+}
+
+double Search::share(const std::string& id) const {
+  Machine without = stage_->fit.machine;
+  auto& terms = without.rig.terms;
+  terms.erase(std::remove_if(terms.begin() + long(declared_.rig.terms.size()), terms.end(),
+                             [&](const auto& term) { return term->id == id; }),
+              terms.end());
+  const Leftover with = stage_->leftover, less = stage_->records.leftover(without);
+  const auto change = [](double before, double after) { return std::sqrt(std::max(0.0, before * before - after * after)); };
+  return std::max(change(less.torque_share, with.torque_share), change(less.deflection_share, with.deflection_share));
 }
 
 Machine Search::extended(Machine machine, const Candidate& candidate) const {
@@ -223,9 +257,10 @@ void Search::fit_base() {
 
 /// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
 std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
-  Trial trial{candidate, extended(stage_->fit.machine, candidate), {}, 0};
-  if (candidate.id == "delay") without_calibration(trial.start);
+  Trial trial{candidate, {}, {}, 0};
   const auto fit = attempted([&] {
+    trial.start = extended(stage_->fit.machine, candidate);
+    if (candidate.id == "delay") without_calibration(trial.start);
     const bool map = !trial.start.beliefs.empty();
     trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance, map)).machine;
     return fit_machine(trial.start, stage_->records, options(kFineTolerance, map));
@@ -300,10 +335,10 @@ bool Search::convinces(const Gain& gain, const Machine& after) const {
 }
 
 bool Search::adopt(std::vector<Accepted> effects) {
-  Machine machine = with_effects(effects);
-  for (const Accepted& effect : effects)
-    if (effect.candidate.id == "delay") without_calibration(machine);
   std::optional<Stage> fitted = attempted([&] {
+    Machine machine = with_effects(effects);
+    for (const Accepted& effect : effects)
+      if (effect.candidate.id == "delay") without_calibration(machine);
     Machine fitted = fit_stage(machine, cutoff_, kRoughTolerance).fit.machine;
     if (fitted.largest_delay > 0) tell_held_again(fitted);
     return fit_stage(fitted, cutoff_, kFineTolerance);

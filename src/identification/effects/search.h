@@ -40,6 +40,10 @@ class Search {
   const Stage& base() const { return *base_; }
   const Stage& stage() const { return *stage_; }
   const std::vector<Accepted>& effects() const { return effects_; }
+  /// What an effect changes of the signal, of the channel where that is more; all terms of this id together.
+  double share(const std::string& id) const;
+  /// Parameters of the machine that are held at 0 in stage().
+  const std::vector<std::string>& held() const { return held_; }
 
  private:
   struct Trial {
@@ -61,6 +65,7 @@ class Search {
   /// Named effects that leave more than they explain may be stand-ins for what has no name.
   void drop_stand_ins();
 
+  void hold_friction();
   void start_in_travel();
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
@@ -86,6 +91,7 @@ class Search {
   Machine declared_;
   std::optional<Stage> base_, stage_;
   std::vector<Accepted> effects_;
+  std::vector<std::string> held_;
 };
 
 }  // namespace backlash

@@ -5,12 +5,15 @@
 #include <cstdio>
 #include <numeric>
 
+#include "backlash_diagnosis/model/axis_unit.h"
+
 namespace backlash {
 namespace {
 
 constexpr int kBins = 24, kFolds = 12;
 constexpr int kLargestOrder = 80;
 constexpr double kWorthNaming = 0.05;  // of the variance
+constexpr double kWorthSaying = 0.01;  // of the signal: what is smaller lies within what any model neglects
 
 /// Residual of one channel and what it may follow, samples that count, of all records.
 struct Samples {
@@ -89,7 +92,9 @@ std::pair<int, double> strongest_order(const Samples& s, const std::vector<doubl
 }  // namespace
 
 std::optional<Unexplained> signature(const Machine& machine, const RecordSet& records, double clear) {
-  const Leftover left = records.leftover(machine);
+  Leftover left = records.leftover(machine);
+  if (left.torque_share < kWorthSaying) left.torque = 0;
+  if (left.deflection_share < kWorthSaying) left.deflection = 0;
   if (std::max(left.torque, left.deflection) < clear) return std::nullopt;
   const bool deflection = left.deflection > left.torque;
   const Samples s = samples(machine, records, deflection);
@@ -99,8 +104,8 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
   shares.emplace_back(share, "order " + std::to_string(order) + " of the motor position");
   std::stable_sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   char text[160];
-  const char* unit = deflection ? "rad" : "N m";
-  std::snprintf(text, sizeof text, "%.3g %s rms, %.1f times the noise floor", s.rms, unit,
+  const std::string unit = axis_unit(deflection ? "rad" : "N m", machine.rig.linear);
+  std::snprintf(text, sizeof text, "%.3g %s rms, %.1f times the noise floor", s.rms, unit.c_str(),
                 deflection ? left.deflection : left.torque);
   Unexplained u{deflection ? "deflection" : "torque", text};
   if (shares.front().first < kWorthNaming) {

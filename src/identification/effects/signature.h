@@ -8,7 +8,8 @@
 
 namespace backlash {
 
-/// Of the channel that stays farthest above its floor; none where both are below `clear` times theirs.
+/// Of the channel that stays farthest above its floor; none where both are below `clear` times theirs or a
+/// hundredth of the signal.
 std::optional<Unexplained> signature(const Machine& machine, const RecordSet& records, double clear);
 
 }  // namespace backlash

@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace backlash {
 namespace {
@@ -40,12 +39,26 @@ void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows
     (records.layout()[std::size_t(rows[i])].deflection ? deflection : torque) += r[Eigen::Index(i)] * r[Eigen::Index(i)];
 }
 
-double sum(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0);
-}
-
 double gain(double before, double after) {
   return before > 0 ? 1 - std::sqrt(after / before) : 0;
+}
+
+struct Squares {
+  double before = 0, after = 0;
+  double gain() const { return backlash::gain(before, after); }
+  double decrease() const { return before - after; }
+};
+
+/// Of all blocks but the one that gets worse by most: leaving a block out is linear, and where a parameter is
+/// told by one block alone that leads anywhere.
+Squares all_but_worst(const std::vector<double>& before, const std::vector<double>& after) {
+  std::size_t worst = 0;
+  Squares sum;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    sum.before += before[i], sum.after += after[i];
+    if (after[i] - before[i] > after[worst] - before[worst]) worst = i;
+  }
+  return {sum.before - before[worst], sum.after - after[worst]};
 }
 
 }  // namespace
@@ -82,12 +95,12 @@ HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& r
 
 Gain compare(const HeldOut& a, const HeldOut& b) {
   Gain g;
-  const double torque = gain(sum(a.torque), sum(b.torque)), deflection = gain(sum(a.deflection), sum(b.deflection));
-  g.deflection = deflection > torque;
+  const Squares torque = all_but_worst(a.torque, b.torque), deflection = all_but_worst(a.deflection, b.deflection);
+  g.deflection = deflection.decrease() > torque.decrease();
   const std::vector<double>&before = g.deflection ? a.deflection : a.torque,
       &after = g.deflection ? b.deflection : b.torque;
   Evidence& e = g.evidence;
-  e.gain_held_out = std::max(torque, deflection);
+  e.gain_held_out = (g.deflection ? deflection : torque).gain();
   e.gain = g.deflection ? gain(a.deflection_train, b.deflection_train) : gain(a.torque_train, b.torque_train);
   e.gain_forward =
       g.deflection ? gain(a.deflection_forward, b.deflection_forward) : gain(a.torque_forward, b.torque_forward);
@@ -96,7 +109,7 @@ Gain compare(const HeldOut& a, const HeldOut& b) {
     ++e.blocks;
     e.blocks_better += after[i] < before[i];
   }
-  g.total = gain(sum(a.torque) + sum(a.deflection), sum(b.torque) + sum(b.deflection));
+  g.total = gain(torque.before + deflection.before, torque.after + deflection.after);
   return g;
 }
 

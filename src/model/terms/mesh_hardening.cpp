@@ -31,7 +31,7 @@ std::vector<double> penetrations(const MotionRange& range) {
 }
 
 std::vector<double> exponents(const MotionRange&) {
-  return {2, 3};
+  return {1.5, 2, 3};  // Hertzian teeth, with the linear law grown soft; even; cubic
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Dry friction of a body builds up over a distance x_s [rad at the load] after each reversal, instead of at
-// once: Dahl's law, see presliding.h. The limits that it tends to are those of the body and of the other
-// terms.
+// once: Dahl's law, with damping that of LuGre, see presliding.h. The limits that it tends to are those of
+// the body and of the other terms.
 #include <algorithm>
 
 #include "terms.h"
@@ -10,16 +10,19 @@ namespace {
 
 class PreslidingTerm : public Term {
  public:
-  PreslidingTerm(bool of_motor, double distance) : of_motor_(of_motor), distance_(distance) {}
+  PreslidingTerm(bool of_motor, double distance, double damping)
+      : of_motor_(of_motor), distance_(distance), damping_(damping) {}
   bool has_dry_friction() const override { return true; }
   void add_friction(const Motion&, EndFriction& friction) const override {
-    (of_motor_ ? friction.motor : friction.load).presliding += distance_;
+    FrictionLimits& limits = of_motor_ ? friction.motor : friction.load;
+    limits.presliding += distance_;
+    limits.presliding_damping += damping_;
   }
   bool moves_load() const override { return !of_motor_; }
 
  private:
   bool of_motor_;
-  double distance_;
+  double distance_, damping_;
 };
 
 /// Friction is then building up for some percent of the way.
@@ -28,16 +31,23 @@ double typical(const MotionRange& range) {
   return std::max(0.01 * (range.to - range.from), kShortest);
 }
 
+/// From what hardly shows to what brakes like a wall.
+std::vector<double> dampings(const MotionRange& range) {
+  const double clear = range.speed > 0 ? range.torque / range.speed : 1;
+  return {0.1 * clear, 3 * clear};
+}
+
 }  // namespace
 
 TermType presliding_term() {
   return {"presliding",
           {{"body", "-", Range::any(), "whose friction it is", false, {"motor", "load"}},
-           {"distance", "rad", Range::not_negative(), "x_s, at the load"}},
+           {"distance", "rad", Range::not_negative(), "x_s, at the load"},
+           {"damping", "N m s/rad", Range::not_negative(), "of the bristles; 0: Dahl's law"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"));
+            return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"), p.at("damping"));
           },
-          TermSearch{"distance", "", typical, {}}};
+          TermSearch{"distance", "", typical, {{"damping", dampings, true}}}};
 }
 
 }  // namespace backlash
