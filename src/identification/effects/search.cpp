@@ -20,6 +20,9 @@ constexpr int kIterations = 12, kMapIterations = 3;
 constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more is an effect
 constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
 constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
+constexpr double kNoise = 0.01;           // of the signal: a floor above is not known so well that it could hide nothing
+constexpr double kLeastInNoise = 0.012;   // gain
+constexpr double kSure = 5.5;             // standard deviations, that noise alone does not reach in a thousand trials
 constexpr double kNearFloor = 2;          // times the floor: what is left is mostly noise
 constexpr double kClearlyRight = 1.3;     // times the floor: no other order needs to be tried
 constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate to be fitted
@@ -278,7 +281,7 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
 std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& candidates) const {
   std::vector<Trial> trials;
   for (std::size_t i = 0; i < std::min(kTrials, candidates.size()); ++i) {
-    if (candidates[i].gain < std::max(kWorthTrying * candidates.front().gain, kLeastPredicted * settings_.least_gain))
+    if (candidates[i].gain < std::max(kWorthTrying * candidates.front().gain, kLeastPredicted * least_gain_in_noise()))
       break;
     char text[96];
     std::snprintf(text, sizeof text, "trying %s (predicted gain %.3g)", candidates[i].id.c_str(), candidates[i].gain);
@@ -325,10 +328,20 @@ Search::Trial Search::best_neighbour(Trial trial) const {
   return trial;
 }
 
+/// Of a residual that is mostly noise a clear effect is a small part: as much as noise itself hardly ever gains
+/// is enough.
+double Search::least_gain_in_noise() const {
+  const double rows = 0.5 * double(stage_->records.layout().size());  // of a channel
+  return std::clamp(kSure * kSure / (2 * rows), std::min(kLeastInNoise, settings_.least_gain), settings_.least_gain);
+}
+
 bool Search::convinces(const Gain& gain, const Machine& after) const {
   const Leftover left = stage_->records.leftover(after);
   const bool clear = (gain.deflection ? left.deflection : left.torque) < kNearFloor;
-  const double least = clear ? settings_.least_gain : settings_.least_gain_unclear;
+  const bool noise = (gain.deflection ? left.deflection_share : left.torque_share) > kNoise;
+  const double least = !clear  ? settings_.least_gain_unclear
+                       : noise ? least_gain_in_noise()
+                               : settings_.least_gain;
   const Evidence& e = gain.evidence;
   return e.gain_held_out >= least && e.gain_forward >= 0.5 * least && gain.total > 0 &&
          e.blocks_better >= kMostBlocks * e.blocks;
@@ -357,7 +370,8 @@ bool Search::adopt(std::vector<Accepted> effects) {
 
 bool Search::add_one() {
   const Leftover& left = stage_->leftover;
-  if (left.torque < kAtFloor && left.deflection < kAtFloor) return false;
+  if (std::max(left.torque, left.deflection) < kAtFloor && std::max(left.torque_share, left.deflection_share) < kNoise)
+    return false;
   char text[96];
   std::snprintf(text, sizeof text, "screening (torque %.3g, deflection %.3g times the noise floor)", left.torque,
                 left.deflection);

@@ -78,6 +78,7 @@ class Search {
   bool add_one();
   bool add_map();
   Machine extended(Machine machine, const Candidate& candidate) const;
+  double least_gain_in_noise() const;
   bool convinces(const Gain& gain, const Machine& after) const;
   /// Fits with these effects at their own weights; false, and nothing changes, where that fails.
   bool adopt(std::vector<Accepted> effects);
