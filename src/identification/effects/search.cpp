@@ -116,6 +116,16 @@ void without_calibration(Machine& machine) {
   for (Calibration& c : machine.calibrations) c.torque_delay = 0;
 }
 
+/// A delay that is tried as an effect, the last term, begins with what calibration has found.
+void take_over_calibration(Machine& machine, double interval) {
+  double mean = 0;
+  for (const Calibration& c : machine.calibrations) mean += c.torque_delay / double(machine.calibrations.size());
+  ParameterValues values = machine.rig.terms.back()->values;
+  values["delay"] += mean * interval;
+  machine.rig.terms.back() = make_term("delay", values);
+  without_calibration(machine);
+}
+
 }  // namespace
 
 Search::Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff,
@@ -263,7 +273,7 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
   Trial trial{candidate, {}, {}, 0};
   const auto fit = attempted([&] {
     trial.start = extended(stage_->fit.machine, candidate);
-    if (candidate.id == "delay") without_calibration(trial.start);
+    if (candidate.id == "delay") take_over_calibration(trial.start, data_.front().interval);
     const bool map = !trial.start.beliefs.empty();
     trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance, map)).machine;
     return fit_machine(trial.start, stage_->records, options(kFineTolerance, map));
