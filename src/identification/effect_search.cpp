@@ -23,6 +23,7 @@ constexpr double kLeastMoving = 0.05;     // of the samples
 constexpr int kLags = 25;                 // to either side, of the test for independence
 constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
 constexpr double kShapeOfFriction = 0.01; // of the signal: less is how friction begins, not an effect
+constexpr double kWorse = 1.05;           // times the error on the test record: an effect that does harm
 constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
 
 double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
@@ -209,6 +210,38 @@ void note_shape_of_friction(const Search& search, Trace& trace) {
   trace.steps.erase(at);
 }
 
+/// The test record as the base and each stage have it.
+std::vector<ServoPrediction> stages_on(const ServoData& unseen, const Search& search, double cutoff) {
+  std::vector<ServoPrediction> all = {predicted(search.base().fit.machine, unseen, cutoff)};
+  for (const Accepted& effect : search.effects()) all.push_back(predicted(effect.after, unseen, cutoff));
+  return all;
+}
+
+/// Of the channel where the step is worse: the error after it over that before, 1 where neither got worse.
+double grown(const ServoPrediction& before, const ServoPrediction& after) {
+  const auto ratio = [](const ChannelError& a, const ChannelError& b) {
+    return (b.error + b.floor) / std::max(a.error + a.floor, 1e-12);
+  };
+  const double torque = ratio(before.torque_error, after.torque_error);
+  if (before.deflection.empty()) return torque;
+  const double deflection = ratio(before.deflection_error, after.deflection_error);
+  return std::min(torque, deflection) < 1 / kWorse ? 1 : std::max(torque, deflection);
+}
+
+/// What makes the prediction of the unseen record worse is not what the machine has, whatever the training
+/// records say.
+std::vector<ServoPrediction> without_harm(Search& search, const ServoData& unseen, double cutoff, Trace& trace) {
+  std::vector<ServoPrediction> all = stages_on(unseen, search, cutoff);
+  for (std::size_t i = 0; i + 1 < all.size(); ++i) {
+    if (grown(all[i], all[i + 1]) <= kWorse) continue;
+    trace.notes.push_back(search.effects()[i].candidate.id +
+                          " fits the training records and makes the test record worse: left out");
+    search.drop(i);
+    return without_harm(search, unseen, cutoff, trace);
+  }
+  return all;
+}
+
 TraceSeries series(const ServoData& data, const ServoPrediction& before, const ServoPrediction& after) {
   TraceSeries s;
   for (std::size_t k = 0; k < data.size(); ++k) s.time.push_back(double(k) * data.interval);
@@ -298,9 +331,8 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   Search search(declared, data, trace.cutoff, settings, progress);
   search.run();
 
+  const std::vector<ServoPrediction> on_test = without_harm(search, unseen, trace.cutoff, trace);
   const Machine &base = search.base().fit.machine, &last = search.stage().fit.machine;
-  std::vector<ServoPrediction> on_test = {predicted(base, unseen, trace.cutoff)};
-  for (const Accepted& effect : search.effects()) on_test.push_back(predicted(effect.after, unseen, trace.cutoff));
   const ServoPrediction &before = on_test.front(), &after = on_test.back();
   trace.base = base.rig;
   trace.augmented = last.rig;

@@ -25,6 +25,8 @@ constexpr double kLeastInNoise = 0.012;   // gain
 constexpr double kSure = 5.5;             // standard deviations, that noise alone does not reach in a thousand trials
 constexpr double kNearFloor = 2;          // times the floor: what is left is mostly noise
 constexpr double kClearlyRight = 1.3;     // times the floor: no other order needs to be tried
+constexpr double kClearlyLess = 0.9;      // of a residual: worth another set of effects
+constexpr double kAsGood = 1.02;          // of a residual: then fewer parameters are better
 constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate to be fitted
 constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
 constexpr double kWorthTrying = 0.2;      // of the best predicted gain
@@ -42,6 +44,14 @@ constexpr double kSame = 0.03;            // relative difference of what two sta
 
 bool is_friction(const std::string& parameter) {
   return parameter.find("viscous") != std::string::npos || parameter.find("coulomb") != std::string::npos;
+}
+
+const char* const kAsymmetry = "_asymmetry";
+
+double asymmetry_of(const std::string& friction, const Rig& rig) {
+  for (const RigParameter& p : servo_parameters())
+    if (p.name == friction + kAsymmetry) return p.get(rig);
+  return 0;
 }
 
 /// Of both channels.
@@ -159,20 +169,26 @@ void Search::run() {
   fit_base();
   add_effects();
   drop_superfluous();
+  reconsider();
+  try_equivalents();
   add_learned();
   drop_stand_ins();
   hold_friction();
 }
 
-/// A machine that lacks an effect may want friction below 0, the final one may not.
+/// A machine that lacks an effect may want friction below 0, of one direction or both, the final one may not.
 void Search::hold_friction() {
   for (bool negative = true; negative;) {
     const Machine& now = stage_->fit.machine;
-    const auto at = std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
-      return is_friction(p.name) && p.name.find("asymmetry") == std::string::npos && p.get(now.rig) < 0;
+    auto at = std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
+      return is_friction(p.name) && p.name.find(kAsymmetry) == std::string::npos &&
+             p.get(now.rig) < std::fabs(asymmetry_of(p.name, now.rig));
     });
     negative = at != declared_.parameters.end();
     if (!negative) return;
+    const auto asymmetry = std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
+                                        [&](const FitParameter& p) { return p.name == at->name + kAsymmetry; });
+    if (asymmetry != declared_.parameters.end()) at = asymmetry;
     held_.push_back(at->name);
     at->set(stage_->fit.machine.rig, 0);
     declared_.parameters.erase(at);
@@ -349,9 +365,10 @@ bool Search::convinces(const Gain& gain, const Machine& after) const {
   const Leftover left = stage_->records.leftover(after);
   const bool clear = (gain.deflection ? left.deflection : left.torque) < kNearFloor;
   const bool noise = (gain.deflection ? left.deflection_share : left.torque_share) > kNoise;
-  const double least = !clear  ? settings_.least_gain_unclear
-                       : noise ? least_gain_in_noise()
-                               : settings_.least_gain;
+  const bool one_channel = !load_moves_freely(declared_.rig);  // friction is never quite what a term says, and shows
+  const double least = !clear || one_channel ? settings_.least_gain_unclear
+                       : noise               ? least_gain_in_noise()
+                                             : settings_.least_gain;
   const Evidence& e = gain.evidence;
   return e.gain_held_out >= least && e.gain_forward >= 0.5 * least && gain.total > 0 &&
          e.blocks_better >= kMostBlocks * e.blocks;
@@ -360,10 +377,17 @@ bool Search::convinces(const Gain& gain, const Machine& after) const {
 bool Search::adopt(std::vector<Accepted> effects) {
   std::optional<Stage> fitted = attempted([&] {
     Machine machine = with_effects(effects);
-    for (const Accepted& effect : effects)
-      if (effect.candidate.id == "delay") without_calibration(machine);
+    const bool delay = std::any_of(effects.begin(), effects.end(),
+                                   [](const Accepted& effect) { return effect.candidate.id == "delay"; });
+    if (delay)
+      without_calibration(machine);
+    else
+      machine.largest_delay = Machine().largest_delay;  // it may have stood in for the effect
     Machine fitted = fit_stage(machine, cutoff_, kRoughTolerance).fit.machine;
-    if (fitted.largest_delay > 0) tell_held_again(fitted);
+    if (!delay) {
+      tell_held_again(fitted);
+      limit_delay(fitted);
+    }
     return fit_stage(fitted, cutoff_, kFineTolerance);
   });
   if (!fitted) return false;
@@ -392,11 +416,13 @@ bool Search::add_one() {
     const Trial best = best_neighbour(trials[i]);
     const Gain gain = compare(now, held_out(best.fit, best.start, stage_->records));
     if (!convinces(gain, best.fit.machine)) continue;
-    Accepted effect{best.candidate, gain, {}, {}, {}};
+    Accepted effect{best.candidate, gain, {}, {}, {}, {}};
     for (const Trial& other : trials) {
       if (other.candidate.id == best.candidate.id) continue;
       const Gain its = compare(now, held_out(other.fit, other.start, stage_->records));
-      if (its.total >= kAlike * gain.total) effect.equivalent_to.push_back(other.candidate.id);
+      if (its.total < kAlike * gain.total) continue;
+      effect.equivalent_to.push_back(other.candidate.id);
+      effect.alternatives.push_back(other.candidate);
     }
     std::vector<Accepted> effects = effects_;
     effects.push_back(effect);
@@ -415,7 +441,7 @@ bool Search::add_map() {
     if (!trial) continue;
     const Gain gain = compare(now, held_out(trial->fit, trial->start, stage_->records));
     if (gain.evidence.gain_held_out < settings_.least_gain_unclear || !convinces(gain, trial->fit.machine)) continue;
-    Accepted effect{trial->candidate, gain, {}, {}, {}};
+    Accepted effect{trial->candidate, gain, {}, {}, {}, {}};
     for (const Candidate& named : screen(stage_->fit, stage_->records, range_))
       if (effect.nearest.size() < kNearest) effect.nearest.push_back(named.id);
     std::vector<Accepted> effects = effects_;
@@ -482,7 +508,46 @@ void Search::drop_superfluous() {
   }
 }
 
-/// What came after it is fitted again, one by one.
+void Search::reconsider() {
+  for (std::size_t i = 0; effects_.size() > 1 && i < effects_.size();) {
+    const Leftover left = stage_->leftover;
+    if (left.torque < kClearlyRight && left.deflection < kClearlyRight) return;
+    const std::vector<Accepted> effects = effects_;
+    const Stage stage = *stage_;
+    report("reconsidering " + effects_[i].candidate.id);
+    drop(i);
+    add_effects();
+    drop_superfluous();
+    if (size(stage_->leftover) < kClearlyLess * size(left)) {
+      i = 0;
+      continue;
+    }
+    effects_ = effects;
+    stage_ = stage;
+    ++i;
+  }
+}
+
+void Search::try_equivalents() {
+  for (std::size_t i = 0; i < effects_.size(); ++i) {
+    for (const Candidate& other : std::vector<Candidate>(effects_[i].alternatives)) {
+      const std::vector<Accepted> effects = effects_;
+      const Stage stage = *stage_;
+      report("trying " + other.id + " instead of " + effects_[i].candidate.id);
+      std::vector<Accepted> swapped = effects_;
+      std::swap(swapped[i].candidate, *std::find_if(swapped[i].alternatives.begin(), swapped[i].alternatives.end(),
+                                                    [&](const Candidate& c) { return c.id == other.id; }));
+      std::replace(swapped[i].equivalent_to.begin(), swapped[i].equivalent_to.end(), other.id,
+                   effects_[i].candidate.id);
+      if (adopt(std::move(swapped))) drop_superfluous();
+      const bool fewer = stage_->start.parameters.size() < stage.start.parameters.size();
+      if (size(stage_->leftover) < (fewer ? kAsGood : kClearlyLess) * size(stage.leftover)) break;
+      effects_ = effects;
+      stage_ = stage;
+    }
+  }
+}
+
 void Search::drop(std::size_t effect) {
   std::vector<Accepted> rest(effects_.begin() + long(effect) + 1, effects_.end());
   effects_.resize(effect);

@@ -18,6 +18,7 @@ struct Accepted {
   Candidate candidate;  // with fitted values
   Gain gain;
   std::vector<std::string> equivalent_to;
+  std::vector<Candidate> alternatives;  // those, as fitted
   std::vector<std::string> nearest;  // of a learned map: named effects that explain part of the same
   Machine after;  // fitted with this effect and those before it
 };
@@ -36,6 +37,8 @@ class Search {
          const Progress& progress);
 
   void run();
+  /// Takes an effect out; what came after it is fitted again, one by one.
+  void drop(std::size_t effect);
 
   const Stage& base() const { return *base_; }
   const Stage& stage() const { return *stage_; }
@@ -59,6 +62,10 @@ class Search {
   void add_effects();
   /// Takes out what the others explain as well.
   void drop_superfluous();
+  /// An early effect may have stood in for a later one: where much is left, sets without it are tried.
+  void reconsider();
+  /// What explains the same alone may explain more, or the same with less, beside the others.
+  void try_equivalents();
 
   /// Where named effects leave much: what a learned map makes of it.
   void add_learned();
@@ -82,7 +89,6 @@ class Search {
   bool convinces(const Gain& gain, const Machine& after) const;
   /// Fits with these effects at their own weights; false, and nothing changes, where that fails.
   bool adopt(std::vector<Accepted> effects);
-  void drop(std::size_t effect);
 
   const std::vector<ServoData>& data_;
   double cutoff_;
