@@ -14,8 +14,8 @@
 namespace backlash {
 namespace {
 
-std::shared_ptr<const Term> presliding(const std::string& body, double distance) {
-  ParameterValues values{{"distance", distance}};
+std::shared_ptr<const Term> presliding(const std::string& body, double distance, double damping = 0) {
+  ParameterValues values{{"distance", distance}, {"damping", damping}};
   values.set_choice("body", body);
   return make_term("presliding", values);
 }
@@ -23,13 +23,13 @@ std::shared_ptr<const Term> presliding(const std::string& body, double distance)
 constexpr double kInertia = 2, kForward = 6, kBackward = 4;  // kg m^2, N m
 
 /// One body that never meets a wall.
-Rig block(double distance, double viscous = 0) {
+Rig block(double distance, double viscous = 0, double damping = 0) {
   Rig rig;
   rig.motor = {kInertia, viscous, 0, 0.5 * (kForward + kBackward), 0.5 * (kForward - kBackward)};
   rig.link_locked = true;
   rig.mesh.backlash = 1e6;
   rig.mesh.contact = make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}});
-  rig.terms = {presliding("motor", distance)};
+  rig.terms = {presliding("motor", distance, damping)};
   return rig;
 }
 
@@ -47,17 +47,18 @@ void put(Plant& plant, double position, double speed) {
   plant.set_state(state);
 }
 
-/// The same body with friction as a state of its own: dF/dt = w (F_c - F sign(w)) / x_s, classical
-/// Runge-Kutta.
-struct DahlBody {
-  double distance, q = 0, w = 0, f = 0;
+/// The same body with the bristles as a state of its own, dz/dt = w - |w| z / (F_c / sigma_0), friction
+/// sigma_0 z + sigma_1 dz/dt (LuGre; Dahl for sigma_1 = 0), sigma_0 = F_c / x_s, classical Runge-Kutta.
+struct BristleBody {
+  double distance, damping, q = 0, w = 0, f = 0;  // f = sigma_0 z
 
   void step(double t, double h, double amplitude, double frequency) {
     const auto rate = [&](double time, const double* y, double* dy) {
       const double limit = y[1] > 0 ? kForward : kBackward;
       dy[0] = y[1];
-      dy[1] = (amplitude * std::sin(2 * M_PI * frequency * time) - y[2]) / kInertia;
       dy[2] = (y[1] * limit - std::fabs(y[1]) * y[2]) / distance;
+      const double friction = y[2] + damping * dy[2] * distance / limit;
+      dy[1] = (amplitude * std::sin(2 * M_PI * frequency * time) - friction) / kInertia;
     };
     const double y[] = {q, w, f};
     double k[4][3], at[3];
@@ -72,13 +73,13 @@ struct DahlBody {
   }
 };
 
-// Far below, about and above break-away.
-TEST(PreslidingMotion, FollowsDahlsDifferentialEquation) {
+// Far below, about and above break-away, without damping and with four tenths of the critical one.
+void expect_bristles(double damping) {
   const double distance = 0.02, frequency = 1.5, h = 2e-5;
   for (const std::string& method : integrator_methods())
     for (double amplitude : {0.8, 5.5, 9.0}) {
-      Plant plant(block(distance), sine(amplitude, frequency), test::solver(1e-9, method));
-      DahlBody body{distance};
+      Plant plant(block(distance, 0, damping), sine(amplitude, frequency), test::solver(1e-9, method));
+      BristleBody body{distance, damping};
       double largest = 0, worst = 0;
       for (int k = 0; k < 100'000; ++k) {
         body.step(k * h, h, amplitude, frequency);
@@ -92,6 +93,14 @@ TEST(PreslidingMotion, FollowsDahlsDifferentialEquation) {
       EXPECT_LT(worst, 2e-6 * largest) << method << ", " << amplitude;
       EXPECT_LT(plant.statistics().steps, 20'000) << method << ", " << amplitude;
     }
+}
+
+TEST(PreslidingMotion, FollowsDahlsDifferentialEquation) {
+  expect_bristles(0);
+}
+
+TEST(PreslidingMotion, FollowsLuGresDifferentialEquations) {
+  expect_bristles(20);
 }
 
 // From rest without load the stiffness is F_c / x_s, and all that oscillates does so at its frequency; the
@@ -223,9 +232,10 @@ TEST(PreslidingMotion, ABrakedMotorDoesNotGiveWay) {
   EXPECT_NE(plant.state()[1], 0);
 }
 
+/// With a damping of the load's bristles that is small for the shortest distance here.
 Rig presliding_servo(double motor, double load) {
   Rig rig = test::other_servo();
-  rig.terms = {presliding("motor", motor), presliding("load", load)};
+  rig.terms = {presliding("motor", motor, 300), presliding("load", load, 2000)};
   return rig;
 }
 
@@ -246,7 +256,7 @@ TEST(PreslidingMotion, TheDrivenLoadRepeatsTheWholeTrain) {
     const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
     const MotorTorques motor = motor_torques(rig, motion_of(record), driven);
     Rig other = rig;
-    other.terms = {presliding("motor", 1e-4)};
+    other.terms = {presliding("motor", 1e-4, 300)};
     const DrivenLoad without = simulate_driven_load(other, motion_of(record));
     double worst = 0, wrong = 0;
     for (std::size_t k = 0; k < record.size(); ++k) {
@@ -277,7 +287,7 @@ TEST(PreslidingMotion, FrictionAlongARecordIsThatOfTheSimulation) {
       rate.push_back(o.motor_velocity);
       friction.push_back(net - train.motor_inertia() * rates[2]);
     }
-    const FrictionLimits limits{47, 47, distance};
+    const FrictionLimits limits{47, 47, distance, 300};
     const auto found = presliding_friction(position, std::vector<FrictionLimits>(position.size(), limits),
                                            rate, 1 / simulation.sampling_rate());
     double worst = 0, square = 0;
