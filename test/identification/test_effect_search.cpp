@@ -66,6 +66,32 @@ TEST(EffectSearch, NothingIsMissing) {
   }
 }
 
+std::shared_ptr<const Term> bristles(const std::string& body, double distance, double damping) {
+  ParameterValues values{{"distance", distance}, {"damping", damping}};
+  values.set_choice("body", body);
+  return make_term("presliding", values);
+}
+
+// Every friction begins along some path. Of a path that hardly shows the model must know, or the rest looks like
+// other effects; as long as the load turns within it, it is an effect.
+TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
+  Rig machine = test::other_servo();
+  machine.terms = {bristles("load", 2e-5, 8000)};
+  const Trace shape = traced(records_of(machine));
+  EXPECT_EQ(shape.verdict, TraceVerdict::nothing_missing);
+  EXPECT_TRUE(shape.steps.empty());
+  ASSERT_EQ(shape.notes.size(), 1u);
+  ASSERT_EQ(shape.augmented.terms.size(), 1u);
+  EXPECT_NEAR(shape.augmented.terms[0]->values.at("damping"), 8000, 0.1 * 8000);
+  expect_at_floor(shape);
+
+  machine.terms = {bristles("motor", 1e-3, 0)};
+  const Trace effect = traced(records_of(machine));
+  EXPECT_EQ(found(effect), std::set<std::string>{"presliding"});
+  EXPECT_NEAR(parameter(effect, "presliding", "distance").value, 1e-3, 0.05e-3);
+  expect_at_floor(effect);
+}
+
 TEST(EffectSearch, TwoEffectsAtOnce) {
   Rig machine = test::other_servo();
   machine.terms.push_back(make_term("cogging", {{"amplitude", 14}, {"order", 23}, {"phase", 0.7}}));
@@ -145,6 +171,9 @@ TEST(EffectSearch, RefusesRecordsThatCannotTell) {
   Record without_load = record;
   without_load.column(Channel::load_position).clear();
   EXPECT_THROW(trace_residual(rig, {without_load}, record), CannotIdentify);
+  Record standing = record;
+  for (double& position : standing.column(Channel::load_position)) position = 0.1;
+  EXPECT_THROW(trace_residual(rig, {standing}, record), CannotIdentify);
   SimulationSettings faster = test::servo_run(11);
   faster.sensors.sampling_rate = 2000;
   EXPECT_THROW(trace_residual(rig, {record}, simulate_record(rig, faster, 3)), CannotIdentify);
