@@ -27,6 +27,7 @@ constexpr double kNearFloor = 2;          // times the floor: what is left is mo
 constexpr double kClearlyRight = 1.3;     // times the floor: no other order needs to be tried
 constexpr double kClearlyLess = 0.9;      // of a residual: worth another set of effects
 constexpr double kAsGood = 1.02;          // of a residual: then fewer parameters are better
+constexpr double kLessThanNoise = 0.8;    // times the floor: a residual cannot be that small
 constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate to be fitted
 constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
 constexpr double kWorthTrying = 0.2;      // of the best predicted gain
@@ -124,6 +125,14 @@ void limit_delay(Machine& machine) {
 void without_calibration(Machine& machine) {
   machine.largest_delay = 0;
   for (Calibration& c : machine.calibrations) c.torque_delay = 0;
+}
+
+/// A map over the recorded torque may take it away, and all inertia with it: no residual, less than noise.
+bool takes_noise_away(const std::vector<Accepted>& effects, const Leftover& left) {
+  return left.torque < kLessThanNoise && std::any_of(effects.begin(), effects.end(), [](const Accepted& effect) {
+           return effect.candidate.id == kLearned &&
+                  effect.candidate.terms.front().choice("coordinate") == "motor_torque";
+         });
 }
 
 /// A delay that is tried as an effect, the last term, begins with what calibration has found.
@@ -390,7 +399,7 @@ bool Search::adopt(std::vector<Accepted> effects) {
     }
     return fit_stage(fitted, cutoff_, kFineTolerance);
   });
-  if (!fitted) return false;
+  if (!fitted || takes_noise_away(effects, fitted->leftover)) return false;
   Stage& stage = *fitted;
   std::size_t place = declared_.rig.terms.size();
   for (Accepted& effect : effects)
