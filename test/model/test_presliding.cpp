@@ -230,7 +230,7 @@ TEST(Presliding, TheTermSetsTheDistanceOfItsBody) {
   MotionRange range;
   range.from = -1, range.to = 2;
   EXPECT_EQ(search.strength, "distance");
-  EXPECT_DOUBLE_EQ(search.typical(range), 0.009);
+  EXPECT_DOUBLE_EQ(search.typical(range), 0.03);
 }
 
 }  // namespace

@@ -430,7 +430,8 @@ bool Search::add_one() {
       if (other.candidate.id == best.candidate.id) continue;
       const Gain its = compare(now, held_out(other.fit, other.start, stage_->records));
       if (its.total < kAlike * gain.total) continue;
-      effect.equivalent_to.push_back(other.candidate.id);
+      auto& names = effect.equivalent_to;
+      if (std::find(names.begin(), names.end(), other.candidate.id) == names.end()) names.push_back(other.candidate.id);
       effect.alternatives.push_back(other.candidate);
     }
     std::vector<Accepted> effects = effects_;

@@ -25,16 +25,16 @@ class PreslidingTerm : public Term {
   double distance_, damping_;
 };
 
-/// Friction is then building up for some thousandths of the way.
+/// Friction is then building up for some percent of the way.
 double typical(const MotionRange& range) {
   constexpr double kShortest = 1e-9;  // rad
-  return std::max(0.003 * (range.to - range.from), kShortest);
+  return std::max(0.01 * (range.to - range.from), kShortest);
 }
 
-/// From what hardly shows to what brakes like a wall.
+/// From what does not show, as in Dahl's law, to what brakes like a wall.
 std::vector<double> dampings(const MotionRange& range) {
   const double clear = range.speed > 0 ? range.torque / range.speed : 1;
-  return {0.1 * clear, 3 * clear, 20 * clear};
+  return {1e-3 * clear, 3 * clear, 20 * clear};
 }
 
 }  // namespace
