@@ -20,7 +20,7 @@ constexpr int kIterations = 12, kMapIterations = 3;
 constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more is an effect
 constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
 constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
-constexpr double kNoise = 0.01;           // of the signal: a floor above is not known so well that it could hide nothing
+constexpr double kNoise = 0.01;           // of the signal: a floor above may hide something, what is left below may stay
 constexpr double kLeastInNoise = 0.012;   // gain
 constexpr double kSure = 5.5;             // standard deviations, that noise alone does not reach in a thousand trials
 constexpr double kNearFloor = 2;          // times the floor: what is left is mostly noise
@@ -464,8 +464,10 @@ bool Search::add_map() {
 /// Tried without the effects that explain less than half of their residual, which may be stand-ins, then with
 /// named effects on top; the better of both remains.
 void Search::add_learned() {
-  const double before = size(stage_->leftover);
-  if (stage_->leftover.torque < kSomethingLeft && stage_->leftover.deflection < kSomethingLeft) return;
+  const Leftover& left = stage_->leftover;
+  const double before = size(left);
+  if (std::max(left.torque, left.deflection) < kSomethingLeft || std::max(left.torque_share, left.deflection_share) < kNoise)
+    return;
   const std::vector<Accepted> named = effects_;
   const Stage stage = *stage_;
   for (std::size_t i = effects_.size(); load_moves_freely(declared_.rig) && i-- > 0;)
