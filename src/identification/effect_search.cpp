@@ -217,29 +217,15 @@ std::vector<ServoPrediction> stages_on(const ServoData& unseen, const Search& se
   return all;
 }
 
-/// Of the channel where the step is worse: the error after it over that before, 1 where neither got worse.
-double grown(const ServoPrediction& before, const ServoPrediction& after) {
-  const auto ratio = [](const ChannelError& a, const ChannelError& b) {
-    return (b.error + b.floor) / std::max(a.error + a.floor, 1e-12);
-  };
-  const double torque = ratio(before.torque_error, after.torque_error);
-  if (before.deflection.empty()) return torque;
-  const double deflection = ratio(before.deflection_error, after.deflection_error);
-  return std::min(torque, deflection) < 1 / kWorse ? 1 : std::max(torque, deflection);
-}
-
-/// What makes the prediction of the unseen record worse is not what the machine has, whatever the training
-/// records say.
-std::vector<ServoPrediction> without_harm(Search& search, const ServoData& unseen, double cutoff, Trace& trace) {
-  std::vector<ServoPrediction> all = stages_on(unseen, search, cutoff);
-  for (std::size_t i = 0; i + 1 < all.size(); ++i) {
-    if (grown(all[i], all[i + 1]) <= kWorse) continue;
-    trace.notes.push_back(search.effects()[i].candidate.id +
-                          " fits the training records and makes the test record worse: left out");
-    search.drop(i);
-    return without_harm(search, unseen, cutoff, trace);
+/// Effects are chosen by the training records alone; the test record only judges them.
+void warn_of_harm(const std::vector<FoundEffect>& steps, std::vector<std::string>& warnings) {
+  for (const FoundEffect& e : steps) {
+    if (e.test_error_after <= kWorse * e.test_error_before) continue;
+    char text[160];
+    std::snprintf(text, sizeof text, "%s makes the test record worse (%s %.3g -> %.3g %%): not to be believed", e.id.c_str(),
+                  e.channel.c_str(), 100 * e.test_error_before, 100 * e.test_error_after);
+    warnings.push_back(text);
   }
-  return all;
 }
 
 TraceSeries series(const ServoData& data, const ServoPrediction& before, const ServoPrediction& after) {
@@ -331,7 +317,7 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   Search search(declared, data, trace.cutoff, settings, progress);
   search.run();
 
-  const std::vector<ServoPrediction> on_test = without_harm(search, unseen, trace.cutoff, trace);
+  const std::vector<ServoPrediction> on_test = stages_on(unseen, search, trace.cutoff);
   const Machine &base = search.base().fit.machine, &last = search.stage().fit.machine;
   const ServoPrediction &before = on_test.front(), &after = on_test.back();
   trace.base = base.rig;
@@ -359,6 +345,7 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   trace.series = series(unseen, before, after);
   trace.independence = independence(trace.series, unseen, trace.cutoff);
   warn_of_range(data, unseen, declared.linear, trace);
+  warn_of_harm(trace.steps, trace.warnings);
   return trace;
 }
 

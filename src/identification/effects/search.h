@@ -37,9 +37,6 @@ class Search {
          const Progress& progress);
 
   void run();
-  /// Takes an effect out; what came after it is fitted again, one by one.
-  void drop(std::size_t effect);
-
   const Stage& base() const { return *base_; }
   const Stage& stage() const { return *stage_; }
   const std::vector<Accepted>& effects() const { return effects_; }
@@ -89,6 +86,8 @@ class Search {
   bool convinces(const Gain& gain, const Machine& after) const;
   /// Fits with these effects at their own weights; false, and nothing changes, where that fails.
   bool adopt(std::vector<Accepted> effects);
+  /// Takes an effect out; what came after it is fitted again, one by one.
+  void drop(std::size_t effect);
 
   const std::vector<ServoData>& data_;
   double cutoff_;
