@@ -164,6 +164,16 @@ TEST(EffectSearch, IsTheSameEveryTime) {
   EXPECT_EQ(parameter(a, "gravity", "amplitude").value, parameter(b, "gravity", "amplitude").value);
 }
 
+// A drive that pushes a little: what comes out below 0 is held at 0, where a rig file can be written.
+TEST(EffectSearch, FrictionIsNeverNegative) {
+  Rig machine = test::other_servo();
+  machine.link.viscous_damping = -6;
+  const Trace trace = traced(records_of(machine));
+  EXPECT_LT(trace.base_parameters.at("load_viscous").value, 0);
+  EXPECT_EQ(trace.parameters.at("load_viscous").value, 0);
+  EXPECT_EQ(trace.augmented.link.viscous_damping, 0);
+}
+
 TEST(EffectSearch, RefusesRecordsThatCannotTell) {
   const Rig rig = test::servo_file().rig;
   const Record record = simulate_record(rig, test::servo_run(11), 3);
