@@ -14,19 +14,10 @@ namespace backlash {
 namespace {
 
 constexpr double kRoughCutoff = 15;       // Hz, of the first round: what moves slowly has fewer wrong minima
-constexpr double kRoughTolerance = 1e-3;
-constexpr double kFineTolerance = 1e-5;
-constexpr int kIterations = 12, kMapIterations = 3;
-constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more is an effect
-constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
 constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
 constexpr double kNoise = 0.01;           // of the signal: a floor above may hide something, what is left below may stay
 constexpr double kLeastInNoise = 0.012;   // gain
 constexpr double kSure = 5.5;             // standard deviations, that noise alone does not reach in a thousand trials
-constexpr double kNearFloor = 2;          // times the floor: what is left is mostly noise
-constexpr double kClearlyRight = 1.3;     // times the floor: no other order needs to be tried
-constexpr double kClearlyLess = 0.9;      // of a residual: worth another set of effects
-constexpr double kAsGood = 1.02;          // of a residual: then fewer parameters are better
 constexpr double kLessThanNoise = 0.8;    // times the floor: a residual cannot be that small
 constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate to be fitted
 constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
@@ -35,51 +26,12 @@ constexpr double kAlike = 0.8;            // of the best gain: another name for 
 constexpr double kTie = 0.005;            // of the misfit: then the term with the fewest shapes, gravity before cogging
 constexpr double kMostBlocks = 0.6;       // of the blocks must get better
 constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
-constexpr double kHalf = 0.5;             // of a residual: an effect that explains less may stand in for another
 constexpr std::size_t kMapTrials = 2;
 constexpr std::size_t kNearest = 3;
 const char* const kLearned = "learned_map";
 constexpr int kOtherStarts = 4;
 constexpr double kBeside = 0.4;           // of the logarithm of a parameter
 constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum
-
-bool is_friction(const std::string& parameter) {
-  return parameter.find("viscous") != std::string::npos || parameter.find("coulomb") != std::string::npos;
-}
-
-const char* const kAsymmetry = "_asymmetry";
-
-double asymmetry_of(const std::string& friction, const Rig& rig) {
-  for (const RigParameter& p : servo_parameters())
-    if (p.name == friction + kAsymmetry) return p.get(rig);
-  return 0;
-}
-
-/// Of both channels.
-double size(const Leftover& left) {
-  return std::hypot(left.torque, left.deflection);
-}
-
-/// A map has many values, in which the residuals are nearly linear.
-NonlinearOptions options(double tolerance, bool with_map = false) {
-  NonlinearOptions o;
-  o.iterations = with_map ? kMapIterations : kIterations;
-  o.tolerance = tolerance;
-  o.parallel = true;
-  return o;
-}
-
-/// A fit, or none where the model cannot be fitted or followed.
-template <typename Fit>
-auto attempted(const Fit& fit) -> std::optional<decltype(fit())> {
-  try {
-    return fit();
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error&) {
-    return std::nullopt;
-  }
-}
 
 /// Another start not far away, the same for the same number.
 Machine beside(Machine machine, int number) {
@@ -91,42 +43,6 @@ Machine beside(Machine machine, int number) {
   return machine;
 }
 
-/// What acts a good part of a sample earlier than a held torque is not held.
-void tell_held(Machine& machine) {
-  for (Calibration& c : machine.calibrations) {
-    if (c.held && c.torque_delay < -kUnheld) {
-      c.held = false;
-      c.torque_delay += 0.5;
-    }
-  }
-}
-
-/// What seemed not to be held, because the delay had to stand in for an effect, may be.
-void tell_held_again(Machine& machine) {
-  for (Calibration& c : machine.calibrations) {
-    if (!c.held && c.torque_delay > kUnheld) {
-      c.held = true;
-      c.torque_delay -= 0.5;
-    }
-  }
-}
-
-/// Beyond calibration a delay is an effect: then as much as is calibration stays, and is fitted no more, so that
-/// the effect can be seen.
-void limit_delay(Machine& machine) {
-  machine.largest_delay = kLargestDelay;
-  for (Calibration& c : machine.calibrations) {
-    if (std::fabs(c.torque_delay) > kLargestDelay) machine.largest_delay = 0;
-    c.torque_delay = std::clamp(c.torque_delay, -kLargestDelay, kLargestDelay);
-  }
-}
-
-/// Where delay is an effect calibration is part of it.
-void without_calibration(Machine& machine) {
-  machine.largest_delay = 0;
-  for (Calibration& c : machine.calibrations) c.torque_delay = 0;
-}
-
 /// A map over the recorded torque may take it away, and all inertia with it: no residual, less than noise.
 bool takes_noise_away(const std::vector<Accepted>& effects, const Leftover& left) {
   return left.torque < kLessThanNoise && std::any_of(effects.begin(), effects.end(), [](const Accepted& effect) {
@@ -135,17 +51,11 @@ bool takes_noise_away(const std::vector<Accepted>& effects, const Leftover& left
          });
 }
 
-/// A delay that is tried as an effect, the last term, begins with what calibration has found.
-void take_over_calibration(Machine& machine, double interval) {
-  double mean = 0;
-  for (const Calibration& c : machine.calibrations) mean += c.torque_delay / double(machine.calibrations.size());
-  ParameterValues values = machine.rig.terms.back()->values;
-  values["delay"] += mean * interval;
-  machine.rig.terms.back() = make_term("delay", values);
-  without_calibration(machine);
-}
-
 }  // namespace
+
+bool is_friction(const std::string& parameter) {
+  return parameter.find("viscous") != std::string::npos || parameter.find("coulomb") != std::string::npos;
+}
 
 Search::Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff,
                const TraceSettings& settings, const Progress& progress)
@@ -183,29 +93,6 @@ void Search::run() {
   add_learned();
   drop_stand_ins();
   hold_friction();
-}
-
-/// A machine that lacks an effect may want friction below 0, of one direction or both, the final one may not.
-void Search::hold_friction() {
-  for (bool negative = true; negative;) {
-    const Machine& now = stage_->fit.machine;
-    auto at = std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
-      return is_friction(p.name) && p.name.find(kAsymmetry) == std::string::npos &&
-             p.get(now.rig) < std::fabs(asymmetry_of(p.name, now.rig));
-    });
-    negative = at != declared_.parameters.end();
-    if (!negative) return;
-    const auto asymmetry = std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
-                                        [&](const FitParameter& p) { return p.name == at->name + kAsymmetry; });
-    if (asymmetry != declared_.parameters.end()) at = asymmetry;
-    held_.push_back(at->name);
-    at->set(stage_->fit.machine.rig, 0);
-    declared_.parameters.erase(at);
-    if (effects_.empty())
-      stage_ = fit_stage(with_effects({}), cutoff_, kFineTolerance);
-    else if (!adopt(effects_))
-      throw CannotIdentify(held_.back() + " comes out below 0, and with 0 the machine cannot be fitted");
-  }
 }
 
 void Search::report(const std::string& phase) const {
@@ -256,14 +143,6 @@ Machine Search::extended(Machine machine, const Candidate& candidate) const {
   return with_map(std::move(machine), {candidate.terms.front(), candidate.smoothness, 0}, range_);
 }
 
-Stage Search::fit_stage(Machine start, double cutoff, double tolerance) const {
-  RecordSet records(data_, std::min(cutoff, cutoff_), kLoadFeedback);
-  records.weigh(start);
-  MachineFit fit = fit_machine(start, records, options(tolerance, !start.beliefs.empty()));
-  const Leftover left = records.leftover(fit.machine);
-  return {std::move(fit), std::move(start), std::move(records), left};
-}
-
 /// Other starts are tried until two end alike: then that is the minimum, and what is left the machine has and
 /// the rig has not.
 Stage Search::rough_base() const {
@@ -271,7 +150,8 @@ Stage Search::rough_base() const {
   for (int i = 0; i <= kOtherStarts; ++i) {
     report("fit of the declared machine");
     try {
-      Stage other = fit_stage(i == 0 ? declared_ : beside(declared_, i), kRoughCutoff, kRoughTolerance);
+      Stage other = fit_stage(data_, i == 0 ? declared_ : beside(declared_, i), std::min(kRoughCutoff, cutoff_),
+                              kRoughTolerance);
       const double least = best ? size(best->leftover) : INFINITY, left = size(other.leftover);
       if (left < least) best = std::move(other);
       if (left < kNearFloor || std::fabs(left / least - 1) < kSame) break;
@@ -285,11 +165,11 @@ Stage Search::rough_base() const {
 void Search::fit_base() {
   Machine machine = rough_base().fit.machine;
   tell_held(machine);
-  machine = fit_stage(machine, cutoff_, kRoughTolerance).fit.machine;
+  machine = fit_stage(data_, machine, cutoff_, kRoughTolerance).fit.machine;
   tell_held(machine);
   limit_delay(machine);
-  base_ = fit_stage(machine, cutoff_, kRoughTolerance);
-  base_ = fit_stage(base_->fit.machine, cutoff_, kFineTolerance);
+  base_ = fit_stage(data_, machine, cutoff_, kRoughTolerance);
+  base_ = fit_stage(data_, base_->fit.machine, cutoff_, kFineTolerance);
   stage_ = base_;
 }
 
@@ -300,8 +180,8 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
     trial.start = extended(stage_->fit.machine, candidate);
     if (candidate.id == "delay") take_over_calibration(trial.start, data_.front().interval);
     const bool map = !trial.start.beliefs.empty();
-    trial.start = fit_machine(trial.start, stage_->records, options(kRoughTolerance, map)).machine;
-    return fit_machine(trial.start, stage_->records, options(kFineTolerance, map));
+    trial.start = fit_machine(trial.start, stage_->records, fit_options(kRoughTolerance, map)).machine;
+    return fit_machine(trial.start, stage_->records, fit_options(kFineTolerance, map));
   });
   if (!fit) return std::nullopt;
   trial.fit = *fit;
@@ -392,12 +272,12 @@ bool Search::adopt(std::vector<Accepted> effects) {
       without_calibration(machine);
     else
       machine.largest_delay = Machine().largest_delay;  // it may have stood in for the effect
-    Machine fitted = fit_stage(machine, cutoff_, kRoughTolerance).fit.machine;
+    Machine fitted = fit_stage(data_, machine, cutoff_, kRoughTolerance).fit.machine;
     if (!delay) {
       tell_held_again(fitted);
       limit_delay(fitted);
     }
-    return fit_stage(fitted, cutoff_, kFineTolerance);
+    return fit_stage(data_, fitted, cutoff_, kFineTolerance);
   });
   if (!fitted || takes_noise_away(effects, fitted->leftover)) return false;
   Stage& stage = *fitted;
@@ -483,95 +363,8 @@ void Search::add_learned() {
   stage_ = stage;
 }
 
-/// Friction of a machine with one channel is never quite what a term says, and its residual never at the floor;
-/// there what was found stands, and what remains is told beside it.
-void Search::drop_stand_ins() {
-  if (!load_moves_freely(declared_.rig)) return;
-  const Leftover &left = stage_->leftover, &first = base_->leftover;
-  if (effects_.empty() || std::max(left.torque, left.deflection) < kNearFloor) return;
-  if (size(left) < kHalf * size(first)) return;
-  effects_.clear();
-  stage_ = base_;
-}
-
 void Search::add_effects() {
   while (effects_.size() < settings_.most_effects && add_one()) {
-  }
-}
-
-void Search::drop_superfluous() {
-  for (std::size_t i = 0; effects_.size() > 1 && i < effects_.size();) {
-    report("doing without " + effects_[i].candidate.id);
-    std::vector<Accepted> fewer = effects_;
-    fewer.erase(fewer.begin() + long(i));
-    const Machine start = with_effects(fewer);
-    Machine again;
-    const auto fit = attempted([&] {
-      again = fit_machine(start, stage_->records, options(kRoughTolerance)).machine;
-      return fit_machine(again, stage_->records, options(kFineTolerance));
-    });
-    const bool needed = !fit || convinces(compare(held_out(*fit, again, stage_->records),
-                                                  held_out(stage_->fit, stage_->start, stage_->records)),
-                                          stage_->fit.machine);
-    if (needed)
-      ++i;
-    else
-      drop(i);
-  }
-}
-
-void Search::reconsider() {
-  for (std::size_t i = 0; effects_.size() > 1 && i < effects_.size();) {
-    const Leftover left = stage_->leftover;
-    if (left.torque < kClearlyRight && left.deflection < kClearlyRight) return;
-    const std::vector<Accepted> effects = effects_;
-    const Stage stage = *stage_;
-    report("reconsidering " + effects_[i].candidate.id);
-    drop(i);
-    add_effects();
-    drop_superfluous();
-    if (size(stage_->leftover) < kClearlyLess * size(left)) {
-      i = 0;
-      continue;
-    }
-    effects_ = effects;
-    stage_ = stage;
-    ++i;
-  }
-}
-
-void Search::try_equivalents() {
-  for (std::size_t i = 0; i < effects_.size(); ++i) {
-    for (const Candidate& other : std::vector<Candidate>(effects_[i].alternatives)) {
-      const std::vector<Accepted> effects = effects_;
-      const Stage stage = *stage_;
-      report("trying " + other.id + " instead of " + effects_[i].candidate.id);
-      std::vector<Accepted> swapped = effects_;
-      std::swap(swapped[i].candidate, *std::find_if(swapped[i].alternatives.begin(), swapped[i].alternatives.end(),
-                                                    [&](const Candidate& c) { return c.id == other.id; }));
-      std::replace(swapped[i].equivalent_to.begin(), swapped[i].equivalent_to.end(), other.id,
-                   effects_[i].candidate.id);
-      if (adopt(std::move(swapped))) drop_superfluous();
-      const bool fewer = stage_->start.parameters.size() < stage.start.parameters.size();
-      if (size(stage_->leftover) < (fewer ? kAsGood : kClearlyLess) * size(stage.leftover)) break;
-      effects_ = effects;
-      stage_ = stage;
-    }
-  }
-}
-
-void Search::drop(std::size_t effect) {
-  std::vector<Accepted> rest(effects_.begin() + long(effect) + 1, effects_.end());
-  effects_.resize(effect);
-  stage_ = base_;
-  if (effect > 0) {
-    std::vector<Accepted> before = effects_;
-    adopt(std::move(before));
-  }
-  for (const Accepted& one : rest) {
-    std::vector<Accepted> more = effects_;
-    more.push_back(one);
-    adopt(std::move(more));
   }
 }
 

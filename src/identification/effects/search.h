@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "../joint_fit.h"
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/identification/effect_search.h"
 #include "candidates.h"
+#include "stage.h"
 #include "validation.h"
 
 namespace backlash {
@@ -23,13 +23,11 @@ struct Accepted {
   Machine after;  // fitted with this effect and those before it
 };
 
-/// A fit at the full bandwidth with all that belongs to it.
-struct Stage {
-  MachineFit fit;
-  Machine start;  // what fit.fit.values belong to
-  RecordSet records;
-  Leftover leftover;
-};
+constexpr double kNearFloor = 2;        // times the floor: what is left is mostly noise
+constexpr double kClearlyRight = 1.3;   // times the floor: no other order, no other set needs to be tried
+constexpr double kHalf = 0.5;           // of a residual: an effect that explains less may stand in for another
+
+bool is_friction(const std::string& parameter);
 
 class Search {
  public:
@@ -74,7 +72,6 @@ class Search {
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
   Machine with_effects(const std::vector<Accepted>& effects) const;
-  Stage fit_stage(Machine start, double cutoff, double tolerance) const;
   Stage rough_base() const;
   std::optional<Trial> tried(const Candidate& candidate) const;
   std::vector<Trial> tried_best(const std::vector<Candidate>& candidates) const;
