@@ -85,6 +85,7 @@ class Search {
   bool adopt(std::vector<Accepted> effects);
   /// Takes an effect out; what came after it is fitted again, one by one.
   void drop(std::size_t effect);
+  bool dropped(std::size_t effect);
 
   const std::vector<ServoData>& data_;
   double cutoff_;

@@ -36,11 +36,19 @@ void Search::drop_superfluous() {
     const bool needed = !fit || convinces(compare(held_out(*fit, again, stage_->records),
                                                   held_out(stage_->fit, stage_->start, stage_->records)),
                                           stage_->fit.machine);
-    if (needed)
-      ++i;
-    else
-      drop(i);
+    if (needed || !dropped(i)) ++i;
   }
+}
+
+/// Takes an effect out for good, unless what comes after it then finds no fit that is nearly as good.
+bool Search::dropped(std::size_t effect) {
+  const std::vector<Accepted> effects = effects_;
+  const Stage stage = *stage_;
+  drop(effect);
+  if (size(stage_->leftover) * (1 - settings_.least_gain_unclear) < size(stage.leftover)) return true;
+  effects_ = effects;
+  stage_ = stage;
+  return false;
 }
 
 void Search::reconsider() {
