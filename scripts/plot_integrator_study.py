@@ -10,7 +10,7 @@ sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import plotting  # noqa: E402
 
 COLOURS = {"bogacki_shampine": "tab:gray", "cash_karp": "tab:olive", "dormand_prince": "tab:blue",
-           "fehlberg": "tab:cyan", "verner": "tab:green", "bdf": "tab:red", "adams": "tab:purple"}
+           "fehlberg": "tab:cyan", "tsitouras": "tab:brown", "verner": "tab:green", "bdf": "tab:red", "adams": "tab:purple"}
 
 
 def columns_of(tooth):

@@ -18,6 +18,8 @@
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
+#include "small_vector.h"
+#include "tsitouras.h"
 
 namespace backlash {
 namespace {
@@ -32,7 +34,6 @@ const std::map<std::string, ARKODE_ERKTableID>& explicit_tables() {
       {"bogacki_shampine", ARKODE_BOGACKI_SHAMPINE_4_2_3},
       {"cash_karp", ARKODE_CASH_KARP_6_4_5},
       {"dormand_prince", ARKODE_DORMAND_PRINCE_7_4_5},
-      {"verner", ARKODE_VERNER_8_5_6},
       {"fehlberg", ARKODE_FEHLBERG_6_4_5}};
   return tables;
 }
@@ -59,6 +60,24 @@ ARKodeButcherTable verner_first_same_as_last() {
   return table;
 }
 
+ARKodeButcherTable tsitouras_table() {
+  std::vector<double> a, b, c, embedded;
+  for (int i = 0; i < tsitouras::kStages; ++i) {
+    a.insert(a.end(), tsitouras::kA[i], tsitouras::kA[i] + tsitouras::kStages);
+    b.push_back(tsitouras::kA[tsitouras::kStages - 1][i]);
+    c.push_back(tsitouras::kC[i]);
+    embedded.push_back(b.back() - tsitouras::kError[i]);
+  }
+  return ARKodeButcherTable_Create(tsitouras::kStages, 5, 4, c.data(), a.data(), b.data(), embedded.data());
+}
+
+/// Those that are not in the library as they are needed here.
+const std::map<std::string, ARKodeButcherTable (*)()>& own_tables() {
+  static const std::map<std::string, ARKodeButcherTable (*)()> tables = {{"tsitouras", tsitouras_table},
+                                                                         {"verner", verner_first_same_as_last}};
+  return tables;
+}
+
 /// Times closer to t than this are the same: the solvers refuse so short a way, and no state changes within
 /// it.
 double rounding(double t) {
@@ -78,6 +97,7 @@ const std::vector<std::string>& integrator_methods() {
   static const std::vector<std::string> methods = [] {
     std::vector<std::string> names;
     for (const auto& [name, table] : explicit_tables()) names.push_back(name);
+    for (const auto& [name, table] : own_tables()) names.push_back(name);
     names.insert(names.end(), {"bdf", "adams"});
     return names;
   }();
@@ -153,23 +173,23 @@ int Integrator::Impl::guarded(Function function) {
 int Integrator::Impl::evaluate(realtype t, N_Vector y, N_Vector ydot, void* user) {
   Impl& self = *static_cast<Impl*>(user);
   return self.guarded([&] {
-    const double* rate = N_VGetArrayPointer(ydot);
-    self.derivative(t, N_VGetArrayPointer(y), N_VGetArrayPointer(ydot));
-    const bool finite =
-        std::all_of(rate, rate + N_VGetLength(ydot), [](double r) { return std::isfinite(r); });
-    if (!finite && ++self.not_finite > kMaxNotFinitePerCall) self.fail("the derivative is not finite");
+    double* const rate = NV_DATA_S(ydot);
+    self.derivative(t, NV_DATA_S(y), rate);
+    double sum = 0;  // not finite as soon as one of them is not
+    for (std::size_t i = 0; i < self.tolerances.size(); ++i) sum += rate[i];
+    if (!std::isfinite(sum) && ++self.not_finite > kMaxNotFinitePerCall) self.fail("the derivative is not finite");
   });
 }
 
 int Integrator::Impl::evaluate_events(realtype t, N_Vector y, realtype* values, void* user) {
   Impl& self = *static_cast<Impl*>(user);
-  return self.guarded([&] { self.events(t, N_VGetArrayPointer(y), values); });
+  return self.guarded([&] { self.events(t, NV_DATA_S(y), values); });
 }
 
 int Integrator::Impl::weigh(N_Vector y, N_Vector weights, void* user) {
   const Impl& self = *static_cast<Impl*>(user);
-  const double* values = N_VGetArrayPointer(y);
-  double* out = N_VGetArrayPointer(weights);
+  const double* const values = NV_DATA_S(y);
+  double* const out = NV_DATA_S(weights);
   for (std::size_t i = 0; i < self.tolerances.size(); ++i) {
     const StateTolerance& t = self.tolerances[i];
     out[i] = 1 / (t.absolute + self.settings.relative_tolerance * std::min(std::fabs(values[i]), t.largest));
@@ -184,7 +204,7 @@ Integrator::Impl::Impl(Derivative f, std::vector<StateTolerance> t, const Solver
       event_count(count),
       settings(s),
       multistep(s.method == "bdf" || s.method == "adams") {
-  if (!multistep && !explicit_tables().count(s.method))
+  if (!multistep && !explicit_tables().count(s.method) && !own_tables().count(s.method))
     throw InvalidParameter("solver.method", s.method, "is not a known method");
   const auto require_tolerance = [](const char* name, double value) {
     if (!Range::positive().contains(value)) throw InvalidParameter(name, value, "must be > 0 and finite");
@@ -193,9 +213,10 @@ Integrator::Impl::Impl(Derivative f, std::vector<StateTolerance> t, const Solver
   for (const StateTolerance& each : t) require_tolerance("solver absolute tolerance", each.absolute);
   tolerances = std::move(t);
   check(SUNContext_Create(nullptr, &context), "SUNContext_Create");
-  state = N_VNew_Serial(static_cast<sunindextype>(tolerances.size()), context);
+  const auto length = static_cast<sunindextype>(tolerances.size());
+  state = multistep ? N_VNew_Serial(length, context) : new_small_vector(length, context);
   if (!state) throw IntegrationError("N_VNew_Serial: out of memory");
-  check(N_VEnableFusedOps_Serial(state, SUNTRUE), "N_VEnableFusedOps_Serial");
+  if (multistep) check(N_VEnableFusedOps_Serial(state, SUNTRUE), "N_VEnableFusedOps_Serial");
 }
 
 Integrator::Impl::~Impl() {
@@ -228,9 +249,9 @@ void Integrator::Impl::create_explicit(double t) {
   memory = ERKStepCreate(evaluate, t, state, context);
   if (!memory) throw IntegrationError("ERKStepCreate failed");
   check(ERKStepSetErrHandlerFn(memory, silence, nullptr), "ERKStepSetErrHandlerFn");
-  if (settings.method == "verner") {
-    const std::unique_ptr<ARKodeButcherTableMem, void (*)(ARKodeButcherTable)> table(
-        verner_first_same_as_last(), ARKodeButcherTable_Free);
+  if (const auto own = own_tables().find(settings.method); own != own_tables().end()) {
+    const std::unique_ptr<ARKodeButcherTableMem, void (*)(ARKodeButcherTable)> table(own->second(),
+                                                                                     ARKodeButcherTable_Free);
     check(ERKStepSetTable(memory, table.get()), "ERKStepSetTable");
   } else {
     check(ERKStepSetTableNum(memory, explicit_tables().at(settings.method)), "ERKStepSetTableNum");
@@ -250,7 +271,7 @@ void Integrator::Impl::create_multistep(double t) {
   check(CVodeSetUserData(memory, this), "CVodeSetUserData");
   check(CVodeSetMaxNumSteps(memory, kMaxStepsPerCall), "CVodeSetMaxNumSteps");
   if (stiff) {  // Newton with a dense difference-quotient Jacobian
-    const sunindextype n = N_VGetLength(state);
+    const sunindextype n = NV_LENGTH_S(state);
     matrix = SUNDenseMatrix(n, n, context);
     linear_solver = SUNLinSol_Dense(state, matrix, context);
     check(CVodeSetLinearSolver(memory, linear_solver, matrix), "CVodeSetLinearSolver");
@@ -352,8 +373,8 @@ int Integrator::Impl::evolve(double t) {
 }
 
 void Integrator::Impl::require_finite() const {
-  const double* values = N_VGetArrayPointer(state);
-  for (sunindextype i = 0; i < N_VGetLength(state); ++i)
+  const double* values = NV_DATA_S(state);
+  for (sunindextype i = 0; i < NV_LENGTH_S(state); ++i)
     if (!std::isfinite(values[i])) fail("state " + std::to_string(i) + " is not finite");
 }
 
@@ -367,7 +388,7 @@ Integrator& Integrator::operator=(Integrator&&) noexcept = default;
 
 void Integrator::restart(double t, const double* state, double stop, double longest_step) {
   Impl& s = *impl_;
-  std::copy(state, state + N_VGetLength(s.state), N_VGetArrayPointer(s.state));
+  std::copy(state, state + NV_LENGTH_S(s.state), NV_DATA_S(s.state));
   s.time = t;
   s.stop = stop;
   s.longest_step = longest_step;
@@ -379,8 +400,8 @@ int Integrator::integrate_to(double t, double* state) {
   s.refuse_unreachable(t);
   const int event = s.evolve(t);
   s.require_finite();
-  const double* values = N_VGetArrayPointer(s.state);
-  std::copy(values, values + N_VGetLength(s.state), state);
+  const double* values = NV_DATA_S(s.state);
+  std::copy(values, values + NV_LENGTH_S(s.state), state);
   return event;
 }
 

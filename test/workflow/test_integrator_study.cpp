@@ -207,8 +207,8 @@ std::vector<double> decay(const std::string& method, double tolerance, Integrato
 TEST(WorkPrecisionTest, ErrorsAreThoseOfTheClosedForm) {
   int methods = 0;
   const WorkPrecision work("decay", decay, [&] { ++methods; });
-  EXPECT_EQ(methods, 7);
-  EXPECT_EQ(work.points().size(), 7 * 17);
+  EXPECT_EQ(methods, 8);
+  EXPECT_EQ(work.points().size(), 8 * 17);
   EXPECT_LT(work.agreement(), 1e-12);
   for (const WorkPoint& point : work.points()) {
     IntegratorStatistics statistics;

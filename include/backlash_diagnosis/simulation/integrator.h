@@ -23,8 +23,8 @@ struct SolverSettings {
   double velocity_tolerance = 1e-7;       // absolute, rad/s
 };
 
-/// ARKODE explicit pairs: bogacki_shampine, cash_karp, dormand_prince, verner (6(5), the pair of DVERK), fehlberg;
-/// CVODE: bdf, adams.
+/// ARKODE explicit pairs: bogacki_shampine, cash_karp, dormand_prince, fehlberg, tsitouras (2011), verner (6(5), the
+/// pair of DVERK); CVODE: bdf, adams.
 const std::vector<std::string>& integrator_methods();
 
 SolverSettings read_solver(const YamlReader& yaml);
