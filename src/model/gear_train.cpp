@@ -69,9 +69,25 @@ GearTrain::GearTrain(const Rig& rig)
   const bool load_rubs = (dry || rubs(coulomb_.load)) && node_[kLink] != kFixed;
   if (dry || rubs(coulomb_.motor) || (load_rubs && one_body())) dry_ends_.push_back({kMotor, {}});
   if (load_rubs && !one_body()) dry_ends_.push_back({kLink, {}});
+  simplify(rig);
+}
+
+/// Where no more than teeth and springs act; see SmoothTrain.
+void GearTrain::simplify(const Rig& rig) {
+  if (!contact_ || contact_->needs_impact_speed() || variation_ || !terms_.empty() || !dry_ends_.empty()) return;
+  SmoothTrain<double> t;
+  layout_ = {!input_.rigid, node_[kGear] != kFixed, !output_.rigid, !rig.link_locked};
+  std::copy(damping_.begin(), damping_.end(), t.damping);
+  std::copy(asymmetry_.begin(), asymmetry_.end(), t.asymmetry);
+  t.input_stiffness = input_.stiffness, t.input_damping = input_.damping;
+  t.output_stiffness = output_.stiffness, t.output_damping = output_.damping;
+  t.lever = lever_, t.start = start_;
+  for (int node = 0; node < dof_; ++node) t.inverse_inertia[node] = 1 / inertia_[node];
+  smooth_ = t;
 }
 
 void GearTrain::brake_motor() {
+  smooth_.reset();
   braked_ = true;
   if (dry_ends_.empty() || dry_ends_.front().slot != kMotor)
     dry_ends_.insert(dry_ends_.begin(), {kMotor, {}});
@@ -281,6 +297,13 @@ GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorq
 }
 
 void GearTrain::derivative(double t, const double* state, AppliedTorque applied, double* rate) const {
+  if (smooth_) {
+    const auto force = [this](double x, double v) {
+      const double penetration = std::fabs(x) - half_gap_, side = x > 0 ? 1 : -1;
+      return penetration > 0 ? side * contact_->force(penetration, side * v, 0) : 0;
+    };
+    return smooth_->derivative(layout_, state, applied.motor * ratio_, applied.load, half_gap_, force, rate);
+  }
   const Slots s = unpack(state);
   double net[kSlots];
   const double mesh_torque = net_torques(t, s, applied, net);

@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "support/rigs.h"
 
 namespace backlash {
 namespace {
@@ -365,6 +366,39 @@ TEST(GearTrain, RefusesMasslessPartsAndAMeshWithoutLaw) {
   Rig negative = full_rig();
   negative.mesh.backlash = -1e-6;
   EXPECT_EQ(message(negative), "backlash = -1e-06: must be >= 0 and finite");
+}
+
+// The equations are written twice, for trains that only their teeth make other than linear and for all others.
+TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> angle(-0.01, 0.01), speed(-0.5, 0.5);
+  for (int layout = 0; layout < 8; ++layout) {
+    Rig rig = test::sarkar_rig(20e-6);
+    rig.reduction_ratio = 3;
+    rig.gear.viscous_asymmetry = 0.002;
+    rig.link.inertia = 4e-5;
+    rig.link.viscous_damping = 0.003;
+    rig.input_coupling.rigid = layout & 1;
+    rig.output_coupling.rigid = layout & 2;
+    rig.link_locked = layout & 4;
+    const GearTrain smooth(rig);
+    ASSERT_TRUE(smooth.smooth());
+    rig.motor.coulomb_friction = 0.01;
+    GearTrain rubs(rig);
+    ASSERT_FALSE(rubs.smooth());
+    for (int i = 0; i < 100; ++i) {
+      State s{};
+      for (int k = 0; k < smooth.dof(); ++k) s[k] = angle(random), s[smooth.dof() + k] = speed(random);
+      rubs.begin_friction(0, s.data(), {0.03, 0.02});
+      double without[8], with[8];
+      smooth.derivative(0, s.data(), {0.03, 0.02}, without);
+      rubs.derivative(0, s.data(), {0.03, 0.02}, with);
+      const double motor_speed = s[smooth.dof()];
+      without[smooth.dof()] -= std::copysign(0.01 * smooth.ratio(), motor_speed) / rubs.motor_inertia();
+      for (int k = 0; k < 2 * smooth.dof(); ++k)
+        EXPECT_NEAR(with[k], without[k], 1e-12 * (std::fabs(with[k]) + 100 / 2e-5)) << "layout " << layout << ", " << k;
+    }
+  }
 }
 
 }  // namespace

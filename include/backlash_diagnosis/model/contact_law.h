@@ -12,6 +12,14 @@
 
 namespace backlash {
 
+/// A force that needs no more than four numbers, for whoever computes it of many teeth at once:
+///   F = max(0, K d^n (1 + loss d') + damping d')
+struct PowerContact {
+  double stiffness, exponent;  // K, n
+  double loss = 0;             // s/m
+  double damping = 0;          // N s/m
+};
+
 /// Contact force along the common normal as a function of penetration d [m] and its rate d' [m/s], d > 0
 /// where the flanks overlap, d' > 0 while they approach. Force > 0 pushes the flanks apart [N]. A rig without
 /// base radius uses the same laws with angles: d [rad], d' [rad/s], force [N m].
@@ -30,6 +38,9 @@ class ContactLaw {
   /// Coefficient of restitution by which the speeds jump at a touch; none where the force alone acts. A law
   /// that jumps needs the impact speed.
   virtual std::optional<double> jump_restitution(double /*impact_speed*/) const { return std::nullopt; }
+
+  /// The same law in numbers, where it is of this form.
+  virtual std::optional<PowerContact> power_contact() const { return std::nullopt; }
 
   /// Elastic energy at penetration d >= 0: the integral of the force at rest [J].
   virtual double elastic_energy(double penetration) const = 0;

@@ -14,8 +14,10 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/model/smooth_train.h"
 #include "backlash_diagnosis/model/stick_slip.h"
 
 namespace backlash {
@@ -91,6 +93,12 @@ class GearTrain {
   /// kg m^2 of all that moves with the motor and with the link (infinite where it is fixed); load-side.
   double motor_inertia() const { return inertia_[node_[kMotor]]; }
   double load_inertia() const;
+
+  /// The same equations, where nothing but springs, dampers and teeth without memory acts; null elsewhere.
+  const SmoothTrain<double>* smooth() const { return smooth_ ? &*smooth_ : nullptr; }
+  std::optional<PowerContact> power_contact() const { return contact_ ? contact_->power_contact() : std::nullopt; }
+  const TrainLayout& layout() const { return layout_; }
+  double ratio() const { return ratio_; }  // load-side torque per torque of the records
 
   /// Kinetic plus elastic energy (couplings, contact) [J], without terms and without what a flank stores that
   /// gives way under its torque or that a term adds to its contact law.
@@ -188,6 +196,7 @@ class GearTrain {
   void touch(Flank flank, double* state);
   double contact_force(const Slots& s) const;
   void join(const Rig& rig);
+  void simplify(const Rig& rig);
 
   double ratio_;  // load-side torque per torque of the records: Rig::motor_axis_ratio()
   int dof_ = 0;
@@ -211,6 +220,8 @@ class GearTrain {
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;
+  TrainLayout layout_;
+  std::optional<SmoothTrain<double>> smooth_;  // the same equations, where they are that simple
   std::vector<const Term*> flank_terms_, load_terms_;  // of terms_, that shape flanks and that move the load
   double load_gain_;  // -, of the load encoder
   static constexpr int kFixed = -1;

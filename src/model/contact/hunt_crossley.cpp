@@ -19,6 +19,11 @@ class HuntCrossley : public PowerElastic {
   double force(double d, double rate, double) const override {
     return spring(d) * std::max(0.0, 1 + loss_ * rate);
   }
+  std::optional<PowerContact> power_contact() const override {
+    PowerContact numbers = elastic();
+    numbers.loss = loss_;
+    return numbers;
+  }
 
  private:
   double loss_;

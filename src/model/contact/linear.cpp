@@ -16,6 +16,7 @@ class Linear : public ContactLaw {
   double force(double d, double rate, double) const override {
     return std::max(0.0, stiffness_ * d + damping_ * rate);
   }
+  std::optional<PowerContact> power_contact() const override { return PowerContact{stiffness_, 1, 0, damping_}; }
   double elastic_energy(double d) const override { return 0.5 * stiffness_ * d * d; }
   double static_penetration(double force) const override { return force / stiffness_; }
 

@@ -24,6 +24,7 @@ class PowerElastic : public ContactLaw {
   }
 
  protected:
+  PowerContact elastic() const { return {stiffness_, exponent_}; }
   double spring(double d) const { return stiffness_ * contact_power(d, exponent_); }
 
  private:

@@ -12,6 +12,7 @@ class PowerLaw : public PowerElastic {
  public:
   using PowerElastic::PowerElastic;
   double force(double d, double, double) const override { return spring(d); }
+  std::optional<PowerContact> power_contact() const override { return elastic(); }
 };
 
 }  // namespace
