@@ -5,18 +5,10 @@
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
+#include "tolerances.h"
 
 namespace backlash {
 namespace {
-
-/// Elastic deflections and play are differences of angles and far below this; beyond it no angle says more about them.
-constexpr double kLargestAngle = 0.1;  // rad
-
-std::vector<StateTolerance> state_tolerances(int dof, const SolverSettings& solver) {
-  std::vector<StateTolerance> tolerances(2 * dof, {solver.position_tolerance, kLargestAngle});
-  std::fill(tolerances.begin() + dof, tolerances.end(), StateTolerance{solver.velocity_tolerance});
-  return tolerances;
-}
 
 constexpr long kMaxChangesPerCall = 100'000;
 

@@ -31,6 +31,7 @@ SensorModel::SensorModel(const SensorsSettings& settings) : settings_(settings) 
 
 void SensorModel::reset() {
   for (std::size_t i = 0; i < kChannelCount; ++i) {
+    if (!(settings_.channels[i].noise > 0)) continue;  // its generator is never asked, and seeding costs
     std::seed_seq sequence{static_cast<std::uint32_t>(settings_.seed), static_cast<std::uint32_t>(settings_.seed >> 32),
                            static_cast<std::uint32_t>(i)};
     generators_[i].seed(sequence);
