@@ -27,18 +27,6 @@ double normal_distribution(double z) {
   return table[i] + (place - i) * (table[i + 1] - table[i]);
 }
 
-double product(const std::vector<double>& x, const std::vector<double>& y) {
-  double sum = 0;
-  for (std::size_t k = 0; k < x.size(); ++k) sum += x[k] * y[k];
-  return sum / static_cast<double>(x.size());
-}
-
-std::vector<double> difference(const Quantiles& x, const Quantiles& y) {
-  std::vector<double> d(x.size());
-  for (std::size_t k = 0; k < x.size(); ++k) d[k] = x[k] - y[k];
-  return d;
-}
-
 }  // namespace
 
 Quantiles quantiles_of(std::vector<double> samples) {
@@ -83,27 +71,35 @@ Quantiles with_noise(const Quantiles& exact, double sigma) {
   return noisy;
 }
 
-std::vector<std::vector<Quantiles>> ApdFamily::members_with_noise(double sigma) const {
-  auto noisy = members;
-  for (auto& phases : noisy)
-    for (Quantiles& member : phases) member = with_noise(member, sigma);
-  return noisy;
+NoisyFamily::NoisyFamily(const ApdFamily& family, double sigma)
+    : count_(family.members.size()), phases_(family.members.front().size()) {
+  members_.resize(kQuantiles, static_cast<Eigen::Index>(count_ * phases_));
+  for (std::size_t i = 0; i < count_; ++i)
+    for (std::size_t phase = 0; phase < phases_; ++phase) {
+      const Quantiles noisy = with_noise(family.members[i][phase], sigma);
+      members_.col(column(i, phase)) = Eigen::Map<const Eigen::VectorXd>(noisy.data(), kQuantiles);
+    }
+  middle_ = members_.rowwise().mean();
+  members_.colwise() -= middle_;
+  square_ = members_.colwise().squaredNorm();
+  neighbours_ = Eigen::VectorXd::Zero(members_.cols());
+  for (Eigen::Index k = 0; k + 1 < members_.cols(); ++k) neighbours_[k] = members_.col(k).dot(members_.col(k + 1));
 }
 
-FamilyDistance::FamilyDistance(const std::vector<std::vector<Quantiles>>& members, const Quantiles& observed) {
-  const std::size_t phases = members.front().size();
-  parabolas_.resize(members.size() - 1);
-  for (std::size_t phase = 0; phase < phases; ++phase) {
-    std::vector<double> start = difference(observed, members[0][phase]);
-    double at_start = product(start, start);
-    for (std::size_t i = 0; i + 1 < members.size(); ++i) {
-      std::vector<double> end = difference(observed, members[i + 1][phase]);
-      const double at_end = product(end, end), cross = product(start, end);
-      parabolas_[i].push_back({at_start - 2 * cross + at_end, 2 * (cross - at_start), at_start});
-      start = std::move(end);
-      at_start = at_end;
+// Squares of differences from products of the members with the record: those among the members are known already.
+FamilyDistance::FamilyDistance(const NoisyFamily& family, const Quantiles& observed) {
+  const Eigen::VectorXd own = Eigen::Map<const Eigen::VectorXd>(observed.data(), kQuantiles) - family.middle_;
+  const Eigen::VectorXd shared = family.members_.transpose() * own;
+  const double own_square = own.squaredNorm();
+  parabolas_.resize(family.count_ - 1);
+  for (std::size_t i = 0; i + 1 < family.count_; ++i)
+    for (std::size_t phase = 0; phase < family.phases_; ++phase) {
+      const Eigen::Index k = family.column(i, phase);
+      const double at_start = own_square - 2 * shared[k] + family.square_[k];
+      const double apart = family.square_[k] - 2 * family.neighbours_[k] + family.square_[k + 1];
+      const double cross = own_square - shared[k] - shared[k + 1] + family.neighbours_[k];
+      parabolas_[i].push_back({apart / kQuantiles, 2 * (cross - at_start) / kQuantiles, at_start / kQuantiles});
     }
-  }
   smallest_.distance = parabolas_[0][0].at(0);
   for (std::size_t i = 0; i < parabolas_.size(); ++i)
     for (const Parabola& p : parabolas_[i]) {

@@ -86,8 +86,7 @@ CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash
   return point;
 }
 
-Cell make_cell(const CurvePlan& plan, double backlash, Ticker& ticker) {
-  const FineRun run = run_fine(plan, backlash, ticker, plan.file.rig);
+Cell make_cell(const CurvePlan& plan, double backlash, const FineRun& run) {
   Cell cell;
   cell.point = make_point(plan, run, backlash);
   cell.members = family_members(plan, run);
@@ -117,6 +116,35 @@ int count_beyond(const CurvePlan& plan) {
   return static_cast<int>(std::ceil(kBeyond * (plan.request.points - 1)));
 }
 
+/// All machines that are run, by backlash: those of the points, those in the middle between two points, which are
+/// as far from the file as a real one may be, and those beyond the end of the curve.
+std::vector<Rig> machines_of(const CurvePlan& plan) {
+  const int count = plan.request.points;
+  const double step = plan.request.max_backlash / (count - 1);
+  std::vector<Rig> machines;
+  for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
+  for (int i = 0; i + 1 < count; ++i)
+    machines.push_back(with_backlash(machine_of(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
+  for (int i = 0; i < count_beyond(plan); ++i) machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
+  return machines;
+}
+
+/// What the run of machine `i` contributes.
+void take(const CurvePlan& plan, std::size_t i, double backlash, FineRun run, Cells& all) {
+  const std::size_t count = all.points.size();
+  if (i < count) {
+    all.points[i] = make_cell(plan, backlash, run);
+  } else if (i < 2 * count - 1) {
+    i -= count;
+    run.torque = run.position = {};
+    all.middle.backlash[i] = backlash;
+    all.middle.cells[i] = make_point(plan, run, backlash, &all.middle.means[i]).cells;
+    all.middle.runs[i] = std::move(run);
+  } else {
+    all.beyond[i - (2 * count - 1)] = family_members(plan, run);
+  }
+}
+
 Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   const int count = plan.request.points;
   Cells all;
@@ -126,22 +154,13 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   all.middle.means.resize(count - 1);
   all.middle.runs.resize(count - 1);
   all.beyond.resize(count_beyond(plan));
-  for_each_in_parallel(2 * count - 1 + count_beyond(plan), ticker, [&](int i) {
-    if (const int k = i - (2 * count - 1); k >= 0) {
-      const double backlash = plan.request.max_backlash * (count + k) / (count - 1);
-      all.beyond[k] = family_members(plan, run_fine(plan, backlash, ticker, plan.file.rig));
-      return;
-    }
-    const double backlash = 0.5 * plan.request.max_backlash * i / (count - 1);
-    if (i % 2 == 0) {
-      all.points[i / 2] = make_cell(plan, backlash, ticker);
-      return;
-    }
-    FineRun run = run_fine(plan, backlash, ticker, machine_of(plan.file, static_cast<std::uint64_t>(i)));
-    run.torque = run.position = {};
-    all.middle.backlash[i / 2] = backlash;
-    all.middle.cells[i / 2] = make_point(plan, run, backlash, &all.middle.means[i / 2]).cells;
-    all.middle.runs[i / 2] = std::move(run);
+  const std::vector<Rig> machines = machines_of(plan);
+  const std::size_t chunks = (machines.size() + kTogether - 1) / kTogether;
+  for_each_in_parallel(static_cast<int>(chunks), ticker, [&](int chunk) {
+    const std::size_t begin = chunk * kTogether, end = std::min(begin + kTogether, machines.size());
+    std::vector<FineRun> runs = run_fine(plan, {machines.begin() + begin, machines.begin() + end}, ticker);
+    for (std::size_t i = begin; i < end; ++i)
+      take(plan, i, machines[i].mesh.backlash, std::move(runs[i - begin]), all);
   });
   return all;
 }

@@ -39,8 +39,8 @@ struct Trial {
 
 using Trials = std::vector<Trial>;
 
-Trials run_trials(const CurvePlan& plan, const FineRun& run, const std::vector<std::vector<Quantiles>>& members,
-                  std::size_t segment, double noise) {
+Trials run_trials(const CurvePlan& plan, const FineRun& run, const NoisyFamily& members, std::size_t segment,
+                  double noise) {
   const long all = std::min(plan.request.periods, kMostPeriods);
   const long lengths[] = {std::max(1L, all / 5), std::max(1L, all / 2), all, all};
   Trials trials;
@@ -83,7 +83,7 @@ void calibrate_family(const CurvePlan& plan, const std::vector<FineRun>& between
   family.segments.assign(segments, {});
   std::vector<Trials> trials(segments);
   const auto run_all = [&](double noise) {
-    const auto members = family.members_with_noise(noise);
+    const NoisyFamily members(family, noise);
     for_each_in_parallel(static_cast<int>(segments), ticker, [&](int i) {
       trials[i] = run_trials(plan, between[i], members, i, noise);
       ticker.tick();

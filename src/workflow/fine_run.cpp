@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/simulation/ensemble.h"
 
 namespace backlash {
 namespace {
@@ -39,9 +41,27 @@ double signal_of(const Observation& o, Channel channel) {
   return kNaN;
 }
 
+void append(const CurvePlan& plan, const Observation& o, FineRun& run) {
+  run.signal.push_back(signal_of(o, plan.apd.signal));
+  run.torque.push_back(o.motor_torque);
+  run.position.push_back(o.motor_position);
+}
+
 double fine_samples(const CurvePlan& plan) {
   return static_cast<double>(plan.run_periods()) * plan.apd.period * plan.request.sampling_rate * plan.phases +
          plan.phases;
+}
+
+/// Moves `machines` from sample to sample and calls `take` at each, `period` after each period.
+template <typename Machines, typename Take, typename Period>
+void sample_finely(const CurvePlan& plan, Machines& machines, const Take& take, const Period& period) {
+  const double rate = plan.request.sampling_rate * plan.phases;
+  const long count = std::lround(fine_samples(plan)), periods = plan.run_periods();
+  for (long k = 0; k < count; ++k) {
+    machines.advance_to(k / rate);
+    take();
+    if ((k + 1) * periods / count > k * periods / count) period();
+  }
 }
 
 void check(const CurveRequest& request) {
@@ -78,7 +98,8 @@ double signal_scale(CurvePlan plan) {
   const Progress nobody;
   Ticker quiet(nobody, 1, "");
   double squares = 0;
-  const FineRun run = run_fine(plan, plan.request.max_backlash, quiet, plan.file.rig);
+  const FineRun run =
+      std::move(run_fine(plan, {with_backlash(plan.file.rig, plan.request.max_backlash)}, quiet).front());
   for (const double value : run.signal) squares += value * value;
   return std::sqrt(squares / static_cast<double>(run.signal.size()));
 }
@@ -113,21 +134,28 @@ CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
   return plan;
 }
 
-FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker, const Rig& machine) {
-  Plant plant(machine, plan.file.simulation.excitation, plan.file.simulation.solver);
-  plant.set_backlash(backlash);
-  const double rate = plan.request.sampling_rate * plan.phases;
-  const long count = std::lround(fine_samples(plan)), ticks = plan.run_periods();
-  FineRun run;
-  for (long k = 0; k < count; ++k) {
-    plant.advance_to(k / rate);
-    const Observation o = plant.observe();
-    run.signal.push_back(signal_of(o, plan.apd.signal));
-    run.torque.push_back(o.motor_torque);
-    run.position.push_back(o.motor_position);
-    if ((k + 1) * ticks / count > k * ticks / count) ticker.tick();
+Rig with_backlash(Rig rig, double backlash) {
+  rig.mesh.backlash = backlash;
+  return rig;
+}
+
+std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Rig>& machines, Ticker& ticker) {
+  const SimulationSettings& how = plan.file.simulation;
+  std::vector<FineRun> runs(machines.size());
+  if (Ensemble::takes(machines, how.excitation)) {
+    Ensemble ensemble(machines, how.excitation, how.solver);
+    sample_finely(plan, ensemble, [&] {
+      for (std::size_t i = 0; i < runs.size(); ++i) append(plan, ensemble.observe(i), runs[i]);
+    }, [&] {
+      for (std::size_t i = 0; i < runs.size(); ++i) ticker.tick();
+    });
+    return runs;
   }
-  return run;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    Plant plant(machines[i], how.excitation, how.solver);
+    sample_finely(plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
+  }
+  return runs;
 }
 
 std::vector<double> sample(const CurvePlan& plan, const FineRun& run, int phase, int seed, double noise) {

@@ -28,7 +28,12 @@ CurvePlan plan_curve(const RigFile& file, CurveRequest request);
 struct FineRun {
   std::vector<double> signal, torque, position;
 };
-FineRun run_fine(const CurvePlan& plan, double backlash, Ticker& ticker, const Rig& machine);
+/// One for each machine; at once where they differ in numbers only. A tick for every period of each.
+std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Rig>& machines, Ticker& ticker);
+/// Machines that are worth moving at once.
+constexpr std::size_t kTogether = 8;
+
+Rig with_backlash(Rig rig, double backlash);
 
 /// What the sensor reads of a fine run at one phase; `seed` is that of its noise (standard deviation, unit of
 /// the signal).

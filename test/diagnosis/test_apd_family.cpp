@@ -47,22 +47,23 @@ TEST(WithNoise, KeepsMeanAndAddsVariance) {
 }
 
 /// Members that are one distribution shifted: by `step` from one backlash to the next, by `shift` per phase.
-std::vector<std::vector<Quantiles>> shifted(int count, int phases, double step, double shift) {
-  std::vector<std::vector<Quantiles>> members(count);
+ApdFamily shifted(int count, int phases, double step, double shift) {
+  ApdFamily family;
+  family.members.resize(count);
   for (int i = 0; i < count; ++i)
     for (int phase = 0; phase < phases; ++phase) {
       Quantiles q(kQuantiles);
       for (int k = 0; k < kQuantiles; ++k) q[k] = 0.01 * k + step * i + shift * phase;
-      members[i].push_back(q);
+      family.members[i].push_back(q);
     }
-  return members;
+  return family;
 }
 
 TEST(FamilyDistance, OfShiftedDistributionsIsTheSquareOfTheShift) {
-  const auto members = shifted(5, 1, 1.0, 0);
-  Quantiles observed = members[2][0];
+  const ApdFamily family = shifted(5, 1, 1.0, 0);
+  Quantiles observed = family.members[2][0];
   for (double& v : observed) v += 0.25;  // a quarter of the way to the next member
-  const FamilyDistance distance(members, observed);
+  const FamilyDistance distance(NoisyFamily(family, 0), observed);
   EXPECT_EQ(distance.smallest().segment, 2u);
   EXPECT_NEAR(distance.smallest().share, 0.25, 1e-12);  // rounding, as all below
   EXPECT_NEAR(distance.smallest().distance, 0, 1e-12);
@@ -76,10 +77,30 @@ TEST(FamilyDistance, OfShiftedDistributionsIsTheSquareOfTheShift) {
   EXPECT_TRUE(distance.within(0, 0.01).empty());
 }
 
+// By the definition, at records that lie anywhere.
+TEST(FamilyDistance, IsTheMeanSquareDifference) {
+  const ApdFamily family = shifted(4, 3, 0.02, 0.005);
+  Quantiles observed(kQuantiles);
+  for (int k = 0; k < kQuantiles; ++k) observed[k] = 5 + std::sin(0.1 * k);
+  for (const double sigma : {0.0, 0.1}) {
+    const FamilyDistance distance(NoisyFamily(family, sigma), observed);
+    for (std::size_t i = 0; i + 1 < family.members.size(); ++i) {
+      double nearest = INFINITY;
+      for (std::size_t phase = 0; phase < 3; ++phase) {
+        const Quantiles from = with_noise(family.members[i][phase], sigma), to = with_noise(family.members[i + 1][phase], sigma);
+        double sum = 0;
+        for (int k = 0; k < kQuantiles; ++k) sum += std::pow(observed[k] - (0.6 * from[k] + 0.4 * to[k]), 2);
+        nearest = std::min(nearest, sum / kQuantiles);
+      }
+      EXPECT_NEAR(distance.at(i, 0.4), nearest, 1e-12 * nearest);
+    }
+  }
+}
+
 TEST(FamilyDistance, TakesTheNearestPhase) {
-  const auto members = shifted(3, 4, 1.0, 0.1);
-  Quantiles observed = members[1][3];  // as the first phase would show it 0.3 further
-  const FamilyDistance distance(members, observed);
+  const ApdFamily family = shifted(3, 4, 1.0, 0.1);
+  Quantiles observed = family.members[1][3];  // as the first phase would show it 0.3 further
+  const FamilyDistance distance(NoisyFamily(family, 0), observed);
   EXPECT_NEAR(distance.smallest().distance, 0, 1e-12);
   EXPECT_NEAR(distance.at(0, 1.0), 0, 1e-12);
   EXPECT_NEAR(distance.at(1, 0.3), 0, 1e-12);   // by the first phase

@@ -114,12 +114,15 @@ TEST(BuildCurve, IsDeterministicOnAnyNumberOfProcessors) {
 
 // The mean at a point does not depend on its neighbours or on the order in which the points are worked on (its
 // scatter does: neighbours share theirs).
-TEST(BuildCurve, PointsAreIndependent) {
+// Points that are moved at once share their steps, so that their runs differ by errors of the solver; where a gap is
+// chaotic these decide which of many like motions is run, and so the mean within its own scatter.
+TEST(BuildCurve, PointsDependOnTheOthersByTheSolversErrorOnly) {
   const MonitoringCurve three = build_curve(default_rig_file(), quick(3)),
                         two = build_curve(default_rig_file(), quick(2));
   for (const auto& [i, k] : {std::pair{0, 0}, std::pair{2, 1}})
     for (std::size_t level = 0; level < three.noise_levels.size(); ++level)
-      EXPECT_EQ(three.points[i].cells[level].mean, two.points[k].cells[level].mean);
+      EXPECT_NEAR(three.points[i].cells[level].mean, two.points[k].cells[level].mean,
+                  std::hypot(two.points[k].cells[level].within, two.points[k].cells[level].between));
 }
 
 TEST(BuildCurve, MoreSeedsKeepTheFirstAndChangeTheRest) {

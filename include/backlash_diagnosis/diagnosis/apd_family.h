@@ -10,6 +10,7 @@
 // quadratic there; the distance of a record is the smallest over the phases.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -40,15 +41,31 @@ struct FamilySegment {
 struct ApdFamily {
   std::vector<std::vector<Quantiles>> members;
   std::vector<FamilySegment> segments;
+};
 
-  std::vector<std::vector<Quantiles>> members_with_noise(double sigma) const;
+/// The members as noise of standard deviation sigma >= 0 shows them, ready for being compared with many records.
+class NoisyFamily {
+ public:
+  NoisyFamily(const ApdFamily& family, double sigma);
+
+ private:
+  friend class FamilyDistance;
+  Eigen::Index column(std::size_t member, std::size_t phase) const {
+    return static_cast<Eigen::Index>(phase * count_ + member);
+  }
+
+  std::size_t count_, phases_;  // members of a phase, phases
+  Eigen::VectorXd middle_;      // of all members; what follows is relative to it
+  Eigen::MatrixXd members_;     // a column each
+  Eigen::VectorXd square_;      // of each
+  Eigen::VectorXd neighbours_;  // product of each with the next of its phase
 };
 
 /// Distance of one observed distribution from all members, over backlash. Positions are segment + share: the
 /// backlash value that lies at `share` [0, 1] between those of the segment's two ends.
 class FamilyDistance {
  public:
-  FamilyDistance(const std::vector<std::vector<Quantiles>>& members, const Quantiles& observed);
+  FamilyDistance(const NoisyFamily& family, const Quantiles& observed);
 
   double at(std::size_t segment, double share) const;
 
