@@ -210,9 +210,9 @@ void note_shape_of_friction(const Search& search, Trace& trace) {
   trace.steps.erase(at);
 }
 
-/// The test record as the base and each stage have it.
+/// The test record as the machine before any effect and each stage have it.
 std::vector<ServoPrediction> stages_on(const ServoData& unseen, const Search& search, double cutoff) {
-  std::vector<ServoPrediction> all = {predicted(search.base().fit.machine, unseen, cutoff)};
+  std::vector<ServoPrediction> all = {predicted(search.start().fit.machine, unseen, cutoff)};
   for (const Accepted& effect : search.effects()) all.push_back(predicted(effect.after, unseen, cutoff));
   return all;
 }
@@ -319,7 +319,9 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
 
   const std::vector<ServoPrediction> on_test = stages_on(unseen, search, trace.cutoff);
   const Machine &base = search.base().fit.machine, &last = search.stage().fit.machine;
-  const ServoPrediction &before = on_test.front(), &after = on_test.back();
+  const ServoPrediction before =
+      search.other_teeth() ? predicted(base, unseen, trace.cutoff) : on_test.front();
+  const ServoPrediction& after = on_test.back();
   trace.base = base.rig;
   trace.augmented = last.rig;
   const auto channel = [&](const std::string& name, ChannelError ServoPrediction::*of) {
@@ -329,13 +331,17 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   };
   channel("torque", &ServoPrediction::torque_error);
   if (!after.deflection.empty()) channel("deflection", &ServoPrediction::deflection_error);
-  const std::size_t own = base.parameters.size();
-  trace.base_parameters = numbers(search.base(), own).machine;
+  const std::size_t own = search.start().start.parameters.size();
+  trace.base_parameters = numbers(search.base(), base.parameters.size()).machine;
   const Numbers found = numbers(search.stage(), own - search.held().size());
   trace.parameters = found.machine;
   for (const std::string& name : search.held()) trace.parameters[name] = {0, 0};
-  for (const FitParameter& p : base.parameters) trace.units[p.name] = p.unit;
+  for (const Machine* machine : {&base, &search.start().start})
+    for (const FitParameter& p : machine->parameters) trace.units[p.name] = p.unit;
   trace.steps = found_effects(search, found.effects, on_test, declared.terms.size());
+  if (search.other_teeth())
+    trace.notes.push_back("the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; " +
+                          std::string("so they are in the model, but nothing is called missing for it"));
   note_shape_of_friction(search, trace);
   trace.unexplained = signature(last, search.stage().records, kUnexplained);
   if (!trace.steps.empty())

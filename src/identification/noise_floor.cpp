@@ -48,9 +48,20 @@ std::vector<double> load_noise(const ServoData& data, const std::vector<double>&
   return power;
 }
 
-double contact_value(const Rig& rig, const char* name) {
-  const auto& values = rig.mesh.contact_spec.values;
-  return values.has(name) ? values.at(name) * rig.mesh.lever() * rig.mesh.lever() : 0;
+struct Spring {
+  double stiffness = 0, damping = 0;  // N m/rad, N m s/rad
+};
+
+/// Of the teeth under the usual torque of a record, about which noise moves them.
+Spring mesh_spring(const Rig& rig, const std::vector<double>& torque) {
+  if (rig.mesh.rigid || !rig.mesh.contact->power_contact()) return {};
+  double square = 0;
+  for (const double t : torque) square += t * t / double(torque.size());
+  const PowerContact law = *rig.mesh.contact->power_contact();
+  const double lever = rig.mesh.lever(), depth = rig.mesh.contact->static_penetration(std::sqrt(square) / lever);
+  const double force = law.stiffness * std::pow(depth, law.exponent);
+  const double stiffness = law.exponent == 1 ? law.stiffness : law.exponent * force / depth;
+  return {stiffness * lever * lever, (law.damping + law.loss * force) * lever * lever};
 }
 
 }  // namespace
@@ -60,7 +71,7 @@ NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vecto
   const GearTrain train(rig);
   const bool free = load_moves_freely(rig);
   const double motor_inertia = train.motor_inertia(), load_inertia = train.load_inertia();
-  const double k = contact_value(rig, "stiffness"), b = contact_value(rig, "damping");
+  const auto [k, b] = mesh_spring(rig, data.torque);
   const double rate_cutoff = load_rate_cutoff(data.interval);
   const std::vector<double> load_power =
       free ? load_noise(data, load) : std::vector<double>(data.size() / 2, 0.0);

@@ -12,7 +12,8 @@ void set_contact(Rig& rig, const char* name, double value) {
 }
 
 double contact_value(const Rig& rig, const char* name) {
-  return rig.mesh.contact_spec.values.at(name);
+  const ParameterValues& values = rig.mesh.contact_spec.values;
+  return values.has(name) ? values.at(name) : 0;  // no law has all of them
 }
 
 // One line per number of a Rig.
@@ -29,6 +30,9 @@ std::vector<RigParameter> make_parameters() {
       {"mesh_damping", "N m s/rad", "gear_train.mesh.contact.damping", true,
        [](const Rig& rig) { return contact_value(rig, "damping"); },
        [](Rig& rig, double value) { set_contact(rig, "damping", value); }},
+      {"mesh_alpha", "s/rad", "gear_train.mesh.contact.alpha", true,
+       [](const Rig& rig) { return contact_value(rig, "alpha"); },
+       [](Rig& rig, double value) { set_contact(rig, "alpha", value); }},
       {"backlash_angle", "rad", "gear_train.mesh.backlash_angle", true,
        [](const Rig& rig) { return rig.mesh.backlash / rig.mesh.lever(); },
        [](Rig& rig, double value) { rig.mesh.backlash = value * rig.mesh.lever(); }},

@@ -2,8 +2,11 @@
 
 #include <cmath>
 #include <cstdio>
+#include <set>
+#include <sstream>
 
 #include "backlash_diagnosis/base/yaml_edit.h"
+#include "backlash_diagnosis/base/yaml_tree.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 
 namespace backlash {
@@ -48,6 +51,24 @@ void RigText::set_backlash(const Rig& rig, const std::string& comment) {
     set("gear_train.mesh.backlash", backlash, comment);
 }
 
+void RigText::set_contact_law(const ContactSpec& contact) {
+  const YamlTree tree = parse_yaml(text_, name_);
+  const YamlNode& declared = *tree.root->entries.at("gear_train").value->entries.at("mesh").value->entries.at("contact").value;
+  std::set<int> dropped;  // lines
+  for (const auto& [key, entry] : declared.entries)
+    if (key != "law" && !contact.values.has(key)) dropped.insert(entry.line);
+  std::istringstream in(text_);
+  std::string kept, line;
+  for (int number = 1; std::getline(in, line); ++number)
+    if (dropped.count(number) == 0) kept += line + '\n';
+  text_ = with_yaml_value(kept, name_, "gear_train.mesh.contact.law", contact.law);
+  for (const ContactLawType& type : contact_laws()) {
+    if (type.name != contact.law) continue;
+    for (const ParameterSpec& spec : type.parameters)
+      set("gear_train.mesh.contact." + spec.name, contact.values.at(spec.name), spec.unit);
+  }
+}
+
 std::string FittedMachine::comment(const std::string& name, double divisor) const {
   const double error = parameters.at(name).standard_error;
   if (!std::isfinite(error)) return units.at(name) + ", fitted";
@@ -64,7 +85,7 @@ void write_servo(RigText& text, const FittedMachine& found, double ratio) {
     text.set("gear_train.motor.inertia", rig.motor.inertia / square, found.comment("motor_inertia", square));
   if (has("load_inertia"))
     text.set("gear_train.link.inertia", rig.link.inertia, found.comment("load_inertia"));
-  for (const char* name : {"mesh_stiffness", "mesh_damping"})
+  for (const char* name : {"mesh_stiffness", "mesh_damping", "mesh_alpha"})
     if (has(name)) text.set(servo_parameter(name).key, servo_parameter(name).get(rig), found.comment(name));
   if (has("backlash_angle")) {
     text.set_backlash(rig, found.comment("backlash_angle"));

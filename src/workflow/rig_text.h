@@ -22,6 +22,9 @@ class RigText {
   void set_directional(const std::string& part, const std::string& key, double mean, double asymmetry,
                        const std::string& comment);
 
+  /// Another law with all its values in place of the declared one.
+  void set_contact_law(const ContactSpec& contact);
+
   /// In the words of the file: backlash, half_gap or backlash_angle.
   void set_backlash(const Rig& rig, const std::string& comment);
 

@@ -92,6 +92,30 @@ TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
   expect_at_floor(effect);
 }
 
+/// Hertzian teeth, about as stiff as those of other_servo() under 300 N m.
+Rig hertzian_servo() {
+  Rig machine = test::other_servo();
+  machine.mesh.contact_spec = {"hunt_crossley", {{"stiffness", 1.5e7}, {"exponent", 1.5}, {"alpha", 1.0}}};
+  machine.mesh.contact = make_contact_law("hunt_crossley", machine.mesh.contact_spec.values);
+  return machine;
+}
+
+// What linear teeth leave looks like hardening, of which there is none.
+TEST(EffectSearch, TeethOfAnotherShapeAreNoEffect) {
+  Rig machine = hertzian_servo();
+  machine.terms.push_back(make_term("gravity", {{"amplitude", 40}, {"phase", 0.4}}));
+  const Trace trace = traced(records_of(machine));
+  EXPECT_EQ(found(trace), std::set<std::string>{"gravity"});
+  ASSERT_EQ(trace.notes.size(), 1u);
+  EXPECT_EQ(trace.augmented.mesh.contact_spec.law, "hunt_crossley");
+  EXPECT_NEAR(trace.parameters.at("mesh_stiffness").value, 1.5e7, 0.01e7);
+  EXPECT_NEAR(trace.parameters.at("mesh_alpha").value, 1, 0.05);
+  expect_at_floor(trace);
+  // Before: as declared, with linear teeth.
+  EXPECT_GT(trace.channels.at("deflection").before, 10 * trace.channels.at("deflection").after);
+  EXPECT_EQ(trace.base.mesh.contact_spec.law, "linear");
+}
+
 TEST(EffectSearch, TwoEffectsAtOnce) {
   Rig machine = test::other_servo();
   machine.terms.push_back(make_term("cogging", {{"amplitude", 14}, {"order", 23}, {"phase", 0.7}}));

@@ -43,7 +43,7 @@ IdentificationCase found(const std::string& rig_file) {
   int i = 0;
   for (const RigParameter& p : servo_parameters()) {
     const double factors[] = {1.3, 0.75, 0.8, 1.4};
-    if (p.name != "start_in_gap") p.set(wrong, p.get(wrong) * factors[i++ % 4]);
+    if (p.name != "start_in_gap" && p.name != "mesh_alpha") p.set(wrong, p.get(wrong) * factors[i++ % 4]);
   }
   IdentificationCase c = identification_case(wrong, records);
   for (const Procedure& procedure : servo_procedures()) {

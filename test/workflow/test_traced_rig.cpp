@@ -122,6 +122,22 @@ TEST(TracedRig, OfOneInertiaAndOfALockedLink) {
              {asymmetric("asymmetric_coulomb", "torque"), learned()});
 }
 
+TEST(TracedRig, OtherTeethReplaceTheDeclaredLaw) {
+  const RigFile declared = rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
+  Trace trace = found(declared.rig, kServo, {gravity()});
+  trace.augmented.mesh.contact_spec = {"hunt_crossley", {{"stiffness", 2.1e7}, {"exponent", 1.5}, {"alpha", 0.8}}};
+  trace.parameters.erase("mesh_damping");
+  trace.parameters["mesh_stiffness"] = {2.1e7, 1e5};
+  trace.parameters["mesh_alpha"] = {0.8, 0.01};
+  trace.units["mesh_alpha"] = "s/rad";
+  const RigFile file = rig_file_from_text(traced_rig_text(declared, trace), "rig.yaml");
+  EXPECT_EQ(file.rig.mesh.contact_spec.law, "hunt_crossley");
+  EXPECT_EQ(file.rig.mesh.contact_spec.values, trace.augmented.mesh.contact_spec.values);
+  EXPECT_EQ(file.text.find("damping: 483"), std::string::npos) << file.text;
+  EXPECT_NE(file.text.find("# s/rad, fitted +- 0.01"), std::string::npos) << file.text;
+  EXPECT_EQ(simulate_record(file.rig, file.simulation, 0.1).size(), 100u);
+}
+
 TEST(TracedRig, DeclaredTermsStayAsTheyAre) {
   const std::string servo = config("two_inertia_servo");
   const std::string declared = "  amplitude: 4.0   # N m, of the spring\n", tail = "\n# the end\n";

@@ -63,12 +63,18 @@ Search::Search(const Rig& declared, const std::vector<ServoData>& train, double 
   declared_.rig = declared;
   declared_.calibrations.resize(train.size());
   if (declared.link_locked) start_in_travel();
+  declare_parameters();
+}
+
+void Search::declare_parameters() {
+  const Rig& rig = declared_.rig;
+  declared_.parameters.clear();
   for (const std::string& name : parameter_names()) {
-    FitParameter p = machine_parameter(name, declared);
+    FitParameter p = machine_parameter(name, rig);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
-    if (p.positive && is_friction(name) && !declared.link_locked) {  // there damping is hardly told and stays where it is
+    if (p.positive && is_friction(name) && !rig.link_locked) {  // there damping is hardly told and stays where it is
       p.positive = false;
-      p.scale = p.get(declared);
+      p.scale = p.get(rig);
     }
     declared_.parameters.push_back(p);
   }
@@ -86,6 +92,7 @@ void Search::start_in_travel() {
 
 void Search::run() {
   fit_base();
+  declared_base_ = base_;
   add_effects();
   drop_superfluous();
   reconsider();
@@ -364,8 +371,8 @@ void Search::add_learned() {
 }
 
 void Search::add_effects() {
-  while (effects_.size() < settings_.most_effects && add_one()) {
-  }
+  while (effects_.size() < settings_.most_effects && add_one())
+    if (effects_.back().candidate.id == "mesh_hardening") try_other_teeth();
 }
 
 }  // namespace backlash

@@ -35,7 +35,11 @@ class Search {
          const Progress& progress);
 
   void run();
-  const Stage& base() const { return *base_; }
+  /// The declared machine, fitted.
+  const Stage& base() const { return *declared_base_; }
+  /// What effects are added to: base(), or the same with other teeth.
+  const Stage& start() const { return *base_; }
+  bool other_teeth() const { return other_teeth_; }
   const Stage& stage() const { return *stage_; }
   const std::vector<Accepted>& effects() const { return effects_; }
   /// What an effect changes of the signal, of the channel where that is more; all terms of this id together.
@@ -67,7 +71,11 @@ class Search {
   /// Named effects that leave more than they explain may be stand-ins for what has no name.
   void drop_stand_ins();
 
+  /// What hardens may be teeth of another shape than declared, and is then no effect.
+  void try_other_teeth();
+
   void hold_friction();
+  void declare_parameters();
   void start_in_travel();
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
@@ -93,7 +101,8 @@ class Search {
   const Progress& progress_;
   MotionRange range_;
   Machine declared_;
-  std::optional<Stage> base_, stage_;
+  std::optional<Stage> declared_base_, base_, stage_;
+  bool other_teeth_ = false, tried_teeth_ = false;
   std::vector<Accepted> effects_;
   std::vector<std::string> held_;
 };

@@ -5,6 +5,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "contact_shape.h"
 #include "search.h"
 
 namespace backlash {
@@ -38,6 +39,36 @@ void Search::drop_superfluous() {
                                           stage_->fit.machine);
     if (needed || !dropped(i)) ++i;
   }
+}
+
+void Search::try_other_teeth() {
+  const auto other = with_hertzian_teeth(base_->fit.machine.rig, range_.torque);
+  if (tried_teeth_ || !other) return;
+  tried_teeth_ = true;
+  report("trying other teeth");
+  const Machine declared = declared_;
+  const Stage base = *base_, stage = *stage_;
+  const std::vector<Accepted> effects = effects_;
+  declared_.rig = *other;
+  for (const RigParameter& p : servo_parameters())  // without the effects that it lacks it may have wanted less than none
+    if (is_friction(p.name) && p.get(*other) <= 0) p.set(declared_.rig, p.get(declared.rig));
+  const bool fits = attempted([&] {
+                      declare_parameters();
+                      fit_base();
+                      effects_.clear();
+                      for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
+                        std::vector<Accepted> more = effects_;
+                        more.push_back(effects[i]);
+                        adopt(std::move(more));
+                      }
+                      return size(stage_->leftover) < kClearlyLess * size(stage.leftover);
+                    }).value_or(false);
+  other_teeth_ = fits;
+  if (fits) return;
+  declared_ = declared;
+  base_ = base;
+  stage_ = stage;
+  effects_ = effects;
 }
 
 /// Takes an effect out for good, unless what comes after it then finds no fit that is nearly as good.
