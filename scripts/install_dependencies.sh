@@ -1,6 +1,6 @@
 #!/bin/bash
 # Installs what the package needs from Debian 12 and is not there yet; without anything missing it only looks.
-# Debian packages ROS 1 itself, so no foreign archive is needed. Run as root or with sudo.
+# Debian packages ROS 1 itself, so no foreign archive is needed. Run as root or with sudo. Arguments: further packages.
 set -euo pipefail
 
 # One line per purpose.
@@ -15,6 +15,7 @@ packages=(
   libgtest-dev
   python3-matplotlib python3-numpy python3-yaml                   # plots
 )
+packages+=("$@")
 
 missing=()
 installed=" $(dpkg-query --show --showformat '${Package}=${db:Status-Status} ' "${packages[@]}" 2>/dev/null || true)"
