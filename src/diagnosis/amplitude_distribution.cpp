@@ -18,29 +18,13 @@ ApdLayout read_apd_layout(const YamlReader& yaml) {
 }
 
 AmplitudeDistribution::AmplitudeDistribution(const ApdLayout& layout)
-    : layout_(layout), width_((layout.upper - layout.lower) / layout.classes) {
+    : layout_(layout), width_((layout.upper - layout.lower) / layout.classes), per_width_(1 / width_) {
   if (layout.classes < 2) throw InvalidParameter("apd.classes", layout.classes, "must be >= 2");
   if (!(layout.lower < layout.upper))
     throw InvalidParameter("apd.upper", layout.upper, "must be greater than lower");
   if (!std::isfinite(layout.lower)) throw InvalidParameter("apd.lower", layout.lower, "must be finite");
   if (!std::isfinite(width_)) throw InvalidParameter("apd.upper", layout.upper, "must be finite");
   counts_.assign(layout.classes, 0);
-}
-
-void AmplitudeDistribution::add(double value) {
-  ++samples_;
-  if (value < layout_.lower) {
-    ++below_;
-    return;
-  }
-  if (!(value < layout_.upper)) {
-    ++above_;
-    return;
-  }
-  auto k = std::min(static_cast<std::size_t>((value - layout_.lower) / width_), counts_.size() - 1);
-  if (k > 0 && value < border(k)) --k;  // the quotient may be rounded over a border
-  if (k + 1 < counts_.size() && value >= border(k + 1)) ++k;
-  ++counts_[k];
 }
 
 void AmplitudeDistribution::merge(const AmplitudeDistribution& other) {
@@ -91,7 +75,9 @@ double AmplitudeDistribution::kurtosis() const {
 }
 
 double RunningMoments::standard_deviation() const {
-  return count_ ? std::sqrt(squares_ / count_) : 0;
+  if (count_ == 0) return 0;
+  const double n = static_cast<double>(count_), mean = sum_ / n;
+  return std::sqrt(std::max(0.0, squares_ / n - mean * mean));
 }
 
 }  // namespace backlash

@@ -56,7 +56,7 @@ const PeriodResult* PeriodAnalyser::add(double time, double value) {
 
 const PeriodResult* PeriodAnalyser::take(double time, double value) {
   const PeriodResult* finished = nullptr;
-  const long index = grid_.index(time);
+  const long index = open_ && time < current_.end ? current_.index : grid_.index(time);  // stamps increase
   if (open_ && index > current_.index) finished = close();
   if (!open_ && index > last_index_) open(index, time);
   if (open_) {  // else: a late sample of a window that was closed already

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 
@@ -11,8 +10,17 @@ namespace {
 
 constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says
 
+constexpr std::size_t kRecent = 1000;  // samples from which the present rate is told
+
 double get(const ChannelValues& values, Channel channel) {
   return values[static_cast<std::size_t>(channel)];
+}
+
+/// A bit for each channel that has a finite value.
+unsigned present(const ChannelValues& values) {
+  unsigned bits = 0;
+  for (std::size_t i = 0; i < kChannelCount; ++i) bits |= static_cast<unsigned>(std::isfinite(values[i])) << i;
+  return bits;
 }
 
 }  // namespace
@@ -42,6 +50,7 @@ double SampleStream::jump_limit() const {
 /// A run has the channels of its first sample: every later one must have them, and one that has more begins a
 /// new run.
 SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
+  if (!channels_.empty() && present(values) == present_) return Fit::take;
   const Channel needed = settings_.apd ? settings_.apd->signal : Channel::motor_torque;
   if (channels_.empty() && !std::isfinite(get(values, needed))) {
     counters_.last_problem = channel_name(needed) + " is absent or not a number";
@@ -99,6 +108,7 @@ const PeriodResult* SampleStream::add(double time, const ChannelValues& values) 
     start_ = time;
     for (const Channel channel : kChannels)
       if (std::isfinite(get(values, channel))) channels_.push_back(channel);
+    present_ = present(values);
   }
   ++counters_.accepted;
   record_.time.push_back(time);
@@ -138,7 +148,12 @@ void SampleStream::trim() {
   if (last - record_.time.front() < 1.25 * keep) return;
   const auto first = std::lower_bound(record_.time.begin(), record_.time.end(), last - keep);
   dropped_ = *(first - 1);
-  record_ = record_.slice(*first, std::numeric_limits<double>::infinity());
+  record_.forget(static_cast<std::size_t>(first - record_.time.begin()));
+}
+
+double SampleStream::sampling_interval() const {
+  const std::size_t count = std::min(kRecent, record_.size());
+  return median_interval({record_.time.end() - static_cast<std::ptrdiff_t>(count), record_.time.end()});
 }
 
 SampleStream::Windows SampleStream::windows() const {

@@ -68,6 +68,14 @@ double Record::sampling_interval() const {
   return median_interval(time);
 }
 
+void Record::forget(std::size_t count) {
+  const auto drop = [count](std::vector<double>& values) {
+    values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(std::min(count, values.size())));
+  };
+  drop(time);
+  for (std::vector<double>& values : columns_) drop(values);
+}
+
 Record Record::slice(double from, double to) const {
   const auto first = std::lower_bound(time.begin(), time.end(), from) - time.begin();
   const auto last = std::max(first, std::lower_bound(time.begin(), time.end(), to) - time.begin());

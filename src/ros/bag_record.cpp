@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <limits>
 #include <map>
 #include <optional>
@@ -83,61 +84,127 @@ bool lengths_fit(const std::vector<std::uint8_t>& bytes) {
   return place == bytes.size();
 }
 
-/// One joint of one bag.
+/// A joint of a topic, message by message.
+class JointRun {
+ public:
+  JointRun(std::string path, std::string topic, std::string joint, std::optional<ros::Time> origin)
+      : path_(std::move(path)), topic_(std::move(topic)), joint_(std::move(joint)), origin_(origin) {
+    record_.name = path_;
+  }
+
+  const std::string& topic() const { return topic_; }
+
+  /// Throws BadData; the caller keeps it until it is known that this joint is wanted.
+  void take(const JointStateReader& reader, std::size_t place, const ros::Time& stamp, std::size_t index) {
+    if (!reader.problem(place).empty()) fail_at(index, reader.problem(place));
+    if (!accept_stamp(stamp, index)) return;
+    for (const Channel channel : kChannels)
+      add(channel, reader.values(place)[static_cast<std::size_t>(channel)], stamp, index);
+  }
+
+  Record finished() {
+    if (record_.time.empty())
+      throw BadData(path_, "no message of joint '" + printable(joint_) + "' on " + printable(topic_));
+    drop_absent_channels();
+    const std::string repeated = stamps_.describe("topic " + topic_);
+    if (!repeated.empty()) record_.warnings.push_back(repeated);
+    for (std::string& warning : describe_time_base(record_.time)) record_.warnings.push_back(std::move(warning));
+    return std::move(record_);
+  }
+
+  std::exception_ptr wrong;  // with a message of it
+
+ private:
+  [[noreturn]] void fail_at(std::size_t index, const std::string& reason) const {
+    throw BadData(path_ + ": " + printable(topic_) + " message " + std::to_string(index), reason);
+  }
+
+  bool accept_stamp(const ros::Time& stamp, std::size_t index) {
+    if (stamp.isZero()) fail_at(index, "header.stamp = 0: the publisher does not stamp its messages");
+    if (record_.time.empty() && stamps_.accepted() == 0) {
+      since_first_.seconds(stamp);
+      clock_.seconds(origin_.value_or(stamp));  // time 0
+    }
+    switch (stamps_.next(since_first_.seconds(stamp))) {
+      case StampVerdict::accept:
+        break;
+      case StampVerdict::repeated:
+        return false;
+      case StampVerdict::backwards:
+        fail_at(index, "header.stamp = " + stamp_text(stamp) + " s is before " + stamp_text(last_stamp_) +
+                           " s of the message before: a looped or merged recording, or a clock that jumped");
+    }
+    last_stamp_ = stamp;
+    record_.time.push_back(clock_.seconds(stamp));
+    return true;
+  }
+
+  /// A channel is there in all messages or in none.
+  void add(Channel channel, double value, const ros::Time& stamp, std::size_t index) {
+    std::vector<double>& column = record_.column(channel);
+    if (!column.empty() && std::isnan(column.front()) != std::isnan(value))
+      fail_at(index, channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " + stamp_text(stamp) +
+                         " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
+                         ", unlike in the messages before");
+    column.push_back(value);
+  }
+
+  void drop_absent_channels() {
+    std::vector<std::string> present;
+    for (const Channel channel : kChannels) {
+      std::vector<double>& column = record_.column(channel);
+      if (!column.empty() && std::isnan(column.front())) column.clear();
+      if (!column.empty()) present.push_back(channel_name(channel));
+    }
+    if (!record_.tells())
+      throw BadData(path_, "joint '" + printable(joint_) + "' on " + printable(topic_) +
+                               " has no torque, position, current or acceleration; it has: " +
+                               (present.empty() ? "nothing" : joined(present)));
+  }
+
+  std::string path_, topic_, joint_;
+  std::optional<ros::Time> origin_;
+  ros::Time last_stamp_;
+  StampClock clock_, since_first_;
+  StampChecker stamps_;
+  Record record_;
+};
+
+/// All joints of a topic, as their names turn up.
+struct TopicRuns {
+  std::set<std::string> names;
+  std::vector<std::string> joints;
+  std::vector<JointRun> runs;
+  JointStateReader reader{std::vector<std::string>()};
+  std::size_t messages = 0;
+};
+
+/// One joint of one bag, in one pass over its messages.
 class Reader {
  public:
   Reader(const std::string& path, const std::string& joint, const std::string& topic)
-      : path_(path), joint_(joint), wanted_topic_(topic) {
-    record_.name = path;
-  }
+      : path_(path), joint_(joint), wanted_topic_(topic) {}
 
   Record read() {
     check_bag_structure(path_);
     try {
       bag_.open(path_, rosbag::bagmode::Read);
-      choose_topic();
+      const std::vector<std::string> topics = candidate_topics();
       read_origin();
-      read_messages();
+      read_messages(topics);
+      JointRun& run = chosen(topics);
+      if (run.wrong) std::rethrow_exception(run.wrong);
+      return run.finished();
     } catch (const Error&) {
       throw;
     } catch (const std::exception& e) {
       throw BadData(path_,
                     std::string("damaged bag: ") + e.what() + "; 'rosbag reindex' may save a part of it");
     }
-    drop_absent_channels();
-    const std::string repeated = stamps_.describe("topic " + topic_);
-    if (!repeated.empty()) record_.warnings.push_back(repeated);
-    for (std::string& warning : describe_time_base(record_.time))
-      record_.warnings.push_back(std::move(warning));
-    return std::move(record_);
   }
 
  private:
   [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
-
-  [[noreturn]] void fail_at(std::size_t index, const std::string& reason) const {
-    throw BadData(path_ + ": " + printable(topic_) + " message " + std::to_string(index), reason);
-  }
-
-  /// Calls `use(message, index)` for the messages of some topics in the order of the bag.
-  template <typename Use>
-  void for_each(const std::vector<std::string>& topics, const Use& use) {
-    rosbag::View view(bag_, rosbag::TopicQuery(topics));
-    std::size_t index = 0;
-    std::vector<std::uint8_t> bytes;
-    for (const rosbag::MessageInstance& instance : view) {
-      bytes.resize(instance.size());
-      ros::serialization::OStream out(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-      instance.write(out);
-      if (!lengths_fit(bytes))
-        throw BadData(path_ + ": " + printable(instance.getTopic()) + " message " + std::to_string(index),
-                      "damaged: its arrays do not fit into it");
-      ros::serialization::IStream in(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-      sensor_msgs::JointState message;
-      ros::serialization::deserialize(in, message);
-      use(message, index++, instance.getTopic());
-    }
-  }
 
   std::vector<std::string> candidate_topics() {
     rosbag::View all(bag_);
@@ -154,34 +221,6 @@ class Reader {
       fail("no topic " + printable(wanted_topic_) +
            "; there are: " + (present.empty() ? "none" : joined(present)));
     return {topics.begin(), topics.end()};
-  }
-
-  /// Finds the joint (where not given) and its only topic.
-  void choose_topic() {
-    std::map<std::string, std::set<std::string>> topics_of_joint;
-    std::set<std::string> names;
-    const std::vector<std::string> candidates = candidate_topics();
-    for_each(candidates, [&](const sensor_msgs::JointState& m, std::size_t, const std::string& topic) {
-      for (const std::string& name : m.name) {
-        if (!names.insert(topic + " " + name).second) continue;
-        if (const auto joint = joint_of(name)) topics_of_joint[*joint].insert(topic);
-      }
-    });
-    std::vector<std::string> joints;
-    for (const auto& [joint, topics] : topics_of_joint) joints.push_back(printable(joint));
-    if (joints.empty())
-      fail("no joint on " + joined(candidates) +
-           ": expected names like 'joint_motor', 'joint_sensor' or 'joint_load'");
-    if (joint_.empty() && joints.size() > 1)
-      fail("several joints, choose one with --joint: " + joined(joints));
-    if (joint_.empty()) joint_ = topics_of_joint.begin()->first;
-    const auto found = topics_of_joint.find(joint_);
-    if (found == topics_of_joint.end())
-      fail("no joint '" + printable(joint_) + "'; there are (--joint): " + joined(joints));
-    if (found->second.size() > 1)
-      fail("joint '" + printable(joint_) +
-           "' is on several topics, choose one with --topic: " + joined(found->second));
-    topic_ = *found->second.begin();
   }
 
   void read_origin() {
@@ -201,78 +240,81 @@ class Reader {
     yaml.finish();
   }
 
-  void read_messages() {
-    const JointNames names(joint_);
-    for_each({topic_}, [&](const sensor_msgs::JointState& m, std::size_t index, const std::string&) {
-      if (!mentions(m, names)) return;
-      const std::string place = path_ + ": " + printable(topic_) + " message " + std::to_string(index);
-      const ChannelValues values = read_joint_state(m, names, place);
-      if (!accept_stamp(m.header.stamp, index)) return;
-      for (const Channel channel : kChannels)
-        add(channel, values[static_cast<std::size_t>(channel)], m, index);
-    });
-    if (record_.time.empty()) fail("no message of joint '" + printable(joint_) + "' on " + printable(topic_));
-  }
-
-  bool accept_stamp(const ros::Time& stamp, std::size_t index) {
-    if (stamp.isZero()) fail_at(index, "header.stamp = 0: the publisher does not stamp its messages");
-    if (record_.time.empty() && stamps_.accepted() == 0) {
-      first_ = stamp;
-      clock_.seconds(origin_.value_or(stamp));  // time 0
+  void read_messages(const std::vector<std::string>& topics) {
+    rosbag::View view(bag_, rosbag::TopicQuery(topics));
+    std::size_t index = 0;
+    std::vector<std::uint8_t> bytes;
+    sensor_msgs::JointState message;  // one for all: its arrays keep their room
+    for (const rosbag::MessageInstance& instance : view) {
+      bytes.resize(instance.size());
+      ros::serialization::OStream out(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+      instance.write(out);
+      if (!lengths_fit(bytes))
+        throw BadData(path_ + ": " + printable(instance.getTopic()) + " message " + std::to_string(index),
+                      "damaged: its arrays do not fit into it");
+      ros::serialization::IStream in(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+      ros::serialization::deserialize(in, message);
+      ++index;
+      take(message, instance.getTopic());
     }
-    switch (stamps_.next(since_first(stamp))) {
-      case StampVerdict::accept:
-        break;
-      case StampVerdict::repeated:
-        return false;
-      case StampVerdict::backwards:
-        fail_at(index, "header.stamp = " + stamp_text(stamp) + " s is before " + stamp_text(last_stamp_) +
-                           " s of the message before: a looped or merged recording, or a clock that jumped");
+  }
+
+  void take(const sensor_msgs::JointState& message, const std::string& topic) {
+    TopicRuns& on = topics_[topic];
+    for (const std::string& name : message.name)
+      if (on.names.insert(name).second) meet(name, topic, on);
+    const std::size_t index = on.messages++;
+    for (const std::size_t place : on.reader.read(message)) {
+      JointRun& run = on.runs[place];
+      const bool wanted = joint_.empty() ? joints_.size() == 1 : on.joints[place] == joint_;
+      if (run.wrong || !wanted) continue;
+      try {
+        run.take(on.reader, place, message.header.stamp, index);
+      } catch (const BadData&) {
+        run.wrong = std::current_exception();
+      }
     }
-    last_stamp_ = stamp;
-    record_.time.push_back(clock_.seconds(stamp));
-    return true;
   }
 
-  double since_first(const ros::Time& stamp) const {
-    StampClock clock;
-    clock.seconds(first_);
-    return clock.seconds(stamp);
+  /// A name that was not there before may be that of another joint.
+  void meet(const std::string& name, const std::string& topic, TopicRuns& on) {
+    const auto joint = joint_of(name);
+    if (!joint || std::find(on.joints.begin(), on.joints.end(), *joint) != on.joints.end()) return;
+    joints_.insert(*joint);
+    on.joints.push_back(*joint);
+    on.runs.emplace_back(path_, topic, *joint, origin_);
+    on.reader = JointStateReader(on.joints);
   }
 
-  /// A channel is there in all messages or in none.
-  void add(Channel channel, double value, const sensor_msgs::JointState& m, std::size_t index) {
-    std::vector<double>& column = record_.column(channel);
-    if (!column.empty() && std::isnan(column.front()) != std::isnan(value))
-      fail_at(index, channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
-                         stamp_text(m.header.stamp) + " s is " +
-                         (std::isnan(value) ? "missing or NaN" : "there") +
-                         ", unlike in the messages before");
-    column.push_back(value);
-  }
-
-  void drop_absent_channels() {
-    std::vector<std::string> present;
-    for (const Channel channel : kChannels) {
-      std::vector<double>& column = record_.column(channel);
-      if (!column.empty() && std::isnan(column.front())) column.clear();
-      if (!column.empty()) present.push_back(channel_name(channel));
-    }
-    if (!record_.tells())
-      fail("joint '" + printable(joint_) + "' on " + printable(topic_) +
-           " has no torque, position, current or acceleration; it has: " + (present.empty() ? "nothing" : joined(present)));
+  /// The joint that was asked for, or the only one; on its only topic.
+  JointRun& chosen(const std::vector<std::string>& topics) {
+    std::vector<std::string> joints;
+    for (const std::string& joint : joints_) joints.push_back(printable(joint));
+    if (joints.empty())
+      fail("no joint on " + joined(topics) + ": expected names like 'joint_motor', 'joint_sensor' or 'joint_load'");
+    if (joint_.empty() && joints.size() > 1) fail("several joints, choose one with --joint: " + joined(joints));
+    if (joint_.empty()) joint_ = *joints_.begin();
+    std::vector<JointRun*> found;
+    std::vector<std::string> where;
+    for (auto& [topic, on] : topics_)
+      for (std::size_t i = 0; i < on.joints.size(); ++i) {
+        if (on.joints[i] != joint_) continue;
+        found.push_back(&on.runs[i]);
+        where.push_back(topic);
+      }
+    if (found.empty()) fail("no joint '" + printable(joint_) + "'; there are (--joint): " + joined(joints));
+    if (found.size() > 1)
+      fail("joint '" + printable(joint_) + "' is on several topics, choose one with --topic: " + joined(where));
+    return *found.front();
   }
 
   const std::string path_;
   std::string joint_;
   const std::string wanted_topic_;
-  std::string topic_;
   rosbag::Bag bag_;
   std::optional<ros::Time> origin_;
-  ros::Time first_, last_stamp_;
-  StampClock clock_;
-  StampChecker stamps_;
-  Record record_;
+  std::set<std::string> joints_;
+  std::map<std::string, TopicRuns> topics_;
 };
 
 }  // namespace

@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <map>
 #include <set>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
@@ -32,26 +32,45 @@ std::uint32_t number_at(
   return value;
 }
 
-/// Header fields by name; false where they do not fill the header.
-bool parse_fields(std::string_view header, std::map<std::string, std::string>& fields) {
-  fields.clear();
-  while (!header.empty()) {
-    if (header.size() < 4) return false;
-    const std::uint32_t length = number_at(header.data());
-    header.remove_prefix(4);
-    if (length > header.size()) return false;
-    const std::string_view field = header.substr(0, length);
-    const auto equals = field.find('=');
-    if (equals == std::string_view::npos) return false;
-    fields.emplace(field.substr(0, equals), field.substr(equals + 1));
-    header.remove_prefix(length);
+/// The fields of a record header; they are views of its bytes, as there is a header for every message.
+class Fields {
+ public:
+  /// False where the fields do not fill the header.
+  bool parse(std::string_view header) {
+    all_.clear();
+    while (!header.empty()) {
+      if (header.size() < 4) return false;
+      const std::uint32_t length = number_at(header.data());
+      header.remove_prefix(4);
+      if (length > header.size()) return false;
+      const std::string_view field = header.substr(0, length);
+      const auto equals = field.find('=');
+      if (equals == std::string_view::npos) return false;
+      all_.emplace_back(field.substr(0, equals), field.substr(equals + 1));
+      header.remove_prefix(length);
+    }
+    return true;
   }
-  return true;
-}
+
+  /// Empty where there is none; of several the first.
+  std::string_view at(std::string_view name) const {
+    for (const auto& [known, value] : all_)
+      if (known == name) return value;
+    return {};
+  }
+
+  int operation() const {
+    const std::string_view op = at("op");
+    return op.size() == 1 ? op[0] : -1;
+  }
+
+ private:
+  std::vector<std::pair<std::string_view, std::string_view>> all_;
+};
 
 /// What a chunk holds: where its records begin.
 struct Chunk {
-  std::set<std::uint32_t> records;
+  std::vector<std::uint32_t> records;  // ascending
   std::uint32_t last_message = 0;
   bool has_message = false;
 };
@@ -110,32 +129,25 @@ class Checker {
   }
 
   std::uint32_t field(const char* name) const {
-    const auto found = fields_.find(name);
-    if (found == fields_.end() || found->second.size() < 4)
-      damaged(std::string("no ") + name + " in a record");
-    return number_at(found->second.data());
+    const std::string_view value = fields_.at(name);
+    if (value.size() < 4) damaged(std::string("no ") + name + " in a record");
+    return number_at(value.data());
   }
 
   std::uint64_t long_field(const char* name) const {
-    const auto found = fields_.find(name);
-    if (found == fields_.end() || found->second.size() != 8)
-      damaged(std::string("no ") + name + " in a record");
+    const std::string_view bytes = fields_.at(name);
     std::uint64_t value;
-    std::memcpy(&value, found->second.data(), sizeof value);
+    if (bytes.size() != sizeof value) damaged(std::string("no ") + name + " in a record");
+    std::memcpy(&value, bytes.data(), sizeof value);
     return value;
-  }
-
-  static int operation(const std::map<std::string, std::string>& fields) {
-    const auto found = fields.find("op");
-    return found == fields.end() || found->second.size() != 1 ? -1 : found->second[0];
   }
 
   void read_record() {
     record_start_ = place_;
-    const std::string header = take(take_length("a record header"), "a record header");
-    if (!parse_fields(header, fields_)) damaged("a record header does not hold together");
+    header_ = take(take_length("a record header"), "a record header");
+    if (!fields_.parse(header_)) damaged("a record header does not hold together");
     const std::string data = take(take_length("a record"), "a record");
-    const int op = operation(fields_);
+    const int op = fields_.operation();
     if (!seen_header_ && op != kBagHeader) damaged("it does not begin with a bag header");
     switch (op) {
       case kBagHeader:
@@ -163,15 +175,15 @@ class Checker {
   }
 
   void check_connection(const std::string& data) {
-    std::map<std::string, std::string> connection;
+    Fields connection;
     field("conn");
-    if (!parse_fields(data, connection)) damaged("a connection record does not hold together");
+    if (!connection.parse(data)) damaged("a connection record does not hold together");
   }
 
   Chunk read_chunk(const std::string& packed) {
     const std::uint32_t size = field("size");
     if (size > kLargestPart) damaged("a chunk has an impossible length");
-    const std::string compression = fields_.count("compression") ? fields_.at("compression") : "";
+    const std::string_view compression = fields_.at("compression");
     if (compression == "none") {
       if (packed.size() != size) damaged("a chunk has another length than it says");
       return walk_chunk(packed);
@@ -198,7 +210,7 @@ class Checker {
 
   Chunk walk_chunk(std::string_view bytes) const {
     Chunk chunk;
-    std::map<std::string, std::string> fields;
+    Fields fields;
     for (std::size_t place = 0; place < bytes.size();) {
       const auto start = static_cast<std::uint32_t>(place);
       const auto part = [&]() -> std::string_view {
@@ -209,11 +221,11 @@ class Checker {
         place += length;
         return bytes.substr(place - length, length);
       };
-      if (!parse_fields(part(), fields)) damaged("a record header in a chunk does not hold together");
+      if (!fields.parse(part())) damaged("a record header in a chunk does not hold together");
       part();
-      const int op = operation(fields);
+      const int op = fields.operation();
       if (op != kMessage && op != kConnection) damaged("a chunk holds a record of an unknown kind");
-      chunk.records.insert(start);
+      chunk.records.push_back(start);
       if (op == kMessage) {
         chunk.last_message = start;
         chunk.has_message = true;
@@ -228,7 +240,7 @@ class Checker {
     if (data.size() != std::uint64_t{kEntry} * field("count")) damaged("an index has the wrong length");
     for (std::size_t i = 0; i < data.size(); i += kEntry) {
       const std::uint32_t offset = number_at(data.data() + i + 8);
-      if (!chunk_.has_message || offset > chunk_.last_message || chunk_.records.count(offset) == 0)
+      if (!chunk_.has_message || offset > chunk_.last_message || !std::binary_search(chunk_.records.begin(), chunk_.records.end(), offset))
         damaged("an index points to no message");
     }
   }
@@ -237,7 +249,8 @@ class Checker {
   std::ifstream in_;
   std::uint64_t size_ = 0, place_ = 0, record_start_ = 0, index_place_ = 0;
   bool seen_header_ = false;
-  std::map<std::string, std::string> fields_;
+  std::string header_;
+  Fields fields_;  // of header_
   std::set<std::uint64_t> record_starts_, chunk_starts_;
   std::vector<std::uint64_t> stated_chunks_;
   Chunk chunk_;  // the last one

@@ -25,11 +25,21 @@ unsigned char level(Grade grade) {
   return DiagnosticStatus::WARN;
 }
 
+std::vector<std::string> names_of(const std::vector<MonitorSettings>& joints) {
+  std::vector<std::string> names;
+  for (const MonitorSettings& joint : joints) names.push_back(joint.joint);
+  return names;
+}
+
 }  // namespace
 
 DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle,
                              DiagnoserSettings settings)
-    : handle_(handle), private_handle_(private_handle), stale_(settings.stale), updater_(handle, private_handle) {
+    : handle_(handle),
+      private_handle_(private_handle),
+      stale_(settings.stale),
+      reader_(names_of(settings.joints)),
+      updater_(handle, private_handle) {
   for (MonitorSettings& joint : settings.joints) monitors_.push_back(std::make_unique<JointMonitor>(std::move(joint)));
   topic_ = handle_.resolveName("joint_states");
   advertise();
@@ -73,10 +83,10 @@ void DiagnoserNode::run() {
 }
 
 void DiagnoserNode::on_joint_state(const sensor_msgs::JointState::ConstPtr& message) {
-  for (const auto& monitor : monitors_) {
-    if (!mentions(*message, JointNames(monitor->joint()))) continue;
-    const auto report = monitor->take(*message, topic_);
-    if (report) publish(*monitor, *report);
+  for (const std::size_t joint : reader_.read(*message)) {
+    JointMonitor& monitor = *monitors_[joint];
+    const auto report = monitor.take(message->header.stamp, reader_.values(joint), reader_.problem(joint), topic_);
+    if (report) publish(monitor, *report);
   }
 }
 

@@ -22,7 +22,6 @@ StreamSettings stream_settings(const MonitorSettings& settings) {
 JointMonitor::JointMonitor(MonitorSettings settings)
     : settings_(std::move(settings)),
       diagnosis_settings_(without_settling(settings_.rig.diagnosis)),
-      names_(settings_.joint),
       stream_(stream_settings(settings_)) {
   if (settings_.baseline) set_baseline(settings_.baseline);
   if (settings_.curve) {
@@ -47,28 +46,25 @@ JointMonitor::~JointMonitor() {
   if (builder_.joinable()) builder_.join();
 }
 
-std::optional<PeriodReport> JointMonitor::take(const sensor_msgs::JointState& message, const std::string& topic) {
+std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const ChannelValues& values,
+                                               const std::string& problem, const std::string& topic) {
   const std::lock_guard<std::mutex> lock(mutex_);
   last_arrival_ = ros::WallTime::now();
-  ChannelValues values;
-  try {
-    if (message.header.stamp.isZero()) throw BadData(topic, "the header stamp is zero");
-    values = read_joint_state(message, names_, topic);
-  } catch (const BadData& error) {
+  if (!problem.empty() || stamp.isZero()) {
     ++bad_messages_;
-    last_problem_ = error.what();
+    last_problem_ = BadData(topic, stamp.isZero() ? "the header stamp is zero" : problem).what();
     return std::nullopt;
   }
   const long restarts = stream_.counters().restarts;
-  const PeriodResult* period = stream_.add(clock_.seconds(message.header.stamp), values);
+  const PeriodResult* period = stream_.add(clock_.seconds(stamp), values);
   if (stream_.counters().restarts != restarts) reported_periods_ = 0;
   if (!stream_.counters().last_problem.empty()) last_problem_ = topic + ": " + stream_.counters().last_problem;
   const long periods = stream_.periods();
   const bool complete = settings_.rig.diagnosis.apd ? period != nullptr : periods > reported_periods_;
   if (!complete) return std::nullopt;
   reported_periods_ = periods;
-  const double interval = stream_.kept().sampling_interval();
-  if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd && interval > 0) start_building(nominal_sampling_rate(interval));
+  if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd)
+    if (const double interval = stream_.sampling_interval(); interval > 0) start_building(nominal_sampling_rate(interval));
   auto result = report(period);
   changed_.notify_all();
   return result;
@@ -170,7 +166,7 @@ MonitorState JointMonitor::state() const {
   state.curve_state = curve_state_;
   for (const std::string& warning : {curve_warning_, baseline_warning_})
     if (!warning.empty()) state.warnings.push_back(warning);
-  const double interval = stream_.kept().sampling_interval();
+  const double interval = stream_.sampling_interval();
   state.rate = interval > 0 ? 1 / interval : 0;
   state.period = stream_.period();
   state.periods = stream_.periods();

@@ -14,18 +14,21 @@ constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
 double& at(ChannelValues& values, Channel channel) { return values[static_cast<std::size_t>(channel)]; }
 
-void check_size(const std::vector<double>& array, const char* name, std::size_t joints, const std::string& topic) {
-  if (array.empty() || array.size() == joints) return;
-  throw BadData(topic, std::string(name) + " has " + std::to_string(array.size()) + " values for " +
-                           std::to_string(joints) + " names");
+/// What is wrong with the length of an array; nothing where it is empty or has a value per name.
+std::string size_problem(const std::vector<double>& array, const char* name, std::size_t joints) {
+  if (array.empty() || array.size() == joints) return {};
+  return std::string(name) + " has " + std::to_string(array.size()) + " values for " + std::to_string(joints) +
+         " names";
 }
 
-double value(const std::vector<double>& array, std::size_t i, const char* what, const std::string& joint,
-             const std::string& topic) {
-  if (array.empty()) return kAbsent;
-  if (std::isinf(array[i])) throw BadData(topic, joint + " " + what + " is infinite");
-  return array[i];
+std::string size_problem(const sensor_msgs::JointState& m) {
+  std::string problem = size_problem(m.position, "position", m.name.size());
+  if (problem.empty()) problem = size_problem(m.velocity, "velocity", m.name.size());
+  if (problem.empty()) problem = size_problem(m.effort, "effort", m.name.size());
+  return problem;
 }
+
+enum Part { kMotor, kSensor, kLoad, kReference, kCurrent, kAccelerometer };
 
 /// Adds one joint; arrays stay parallel, they are emptied at the end where nobody has the quantity.
 void add(sensor_msgs::JointState& m, const std::string& name, double position, double velocity, double effort) {
@@ -59,49 +62,82 @@ double StampClock::seconds(const ros::Time& stamp) {
   return std::fabs(nanoseconds) < kExactIntegers ? nanoseconds / 1e9 : whole + rest * 1e-9;
 }
 
-bool mentions(const sensor_msgs::JointState& message, const JointNames& names) {
-  for (const std::string& name : message.name)
-    if (name == names.motor || name == names.sensor || name == names.load || name == names.current ||
-        name == names.accelerometer)
-      return true;
-  return false;
+JointStateReader::JointStateReader(const std::vector<std::string>& joints) : readings_(joints.size()) {
+  for (std::size_t joint = 0; joint < joints.size(); ++joint) {
+    const JointNames n(joints[joint]);
+    const std::string* const parts[] = {&n.motor, &n.sensor, &n.load, &n.reference, &n.current, &n.accelerometer};
+    for (int part = kMotor; part <= kAccelerometer; ++part) places_[*parts[part]] = {joint, part};
+    readings_[joint].values.fill(kAbsent);
+  }
+  seen_.reserve(joints.size());
+  mentioned_.reserve(joints.size());
 }
 
-ChannelValues read_joint_state(const sensor_msgs::JointState& m, const JointNames& names, const std::string& topic) {
-  check_size(m.position, "position", m.name.size(), topic);
-  check_size(m.velocity, "velocity", m.name.size(), topic);
-  check_size(m.effort, "effort", m.name.size(), topic);
-  ChannelValues values;
-  values.fill(kAbsent);
-  const std::string* seen[6] = {};
-  for (std::size_t i = 0; i < m.name.size(); ++i) {
-    const std::string& name = m.name[i];
-    const std::string* const known[] = {&names.motor,     &names.sensor,  &names.load,
-                                        &names.reference, &names.current, &names.accelerometer};
-    const auto which = std::find_if(std::begin(known), std::end(known), [&](auto* k) { return *k == name; });
-    if (which == std::end(known)) continue;
-    const std::size_t slot = which - std::begin(known);
-    if (seen[slot]) throw BadData(topic, "the name " + printable(name) + " appears twice");
-    seen[slot] = &name;
-    const double position = value(m.position, i, "position", name, topic);
-    const double velocity = value(m.velocity, i, "velocity", name, topic);
-    const double effort = value(m.effort, i, "effort", name, topic);
-    if (slot == 0) {
+const std::vector<std::size_t>& JointStateReader::read(const sensor_msgs::JointState& message) {
+  for (const std::size_t joint : seen_) {
+    readings_[joint].values.fill(kAbsent);
+    readings_[joint].problem.clear();
+    readings_[joint].seen = 0;
+  }
+  seen_.clear();
+  mentioned_.clear();
+  const std::string wrong_size = size_problem(message);
+  for (std::size_t i = 0; i < message.name.size(); ++i) {
+    const auto place = places_.find(message.name[i]);
+    if (place == places_.end()) continue;
+    const auto [joint, part] = place->second;
+    Reading& reading = readings_[joint];
+    if (reading.seen == 0) seen_.push_back(joint);
+    constexpr unsigned kReferenceOnly = 1U << kReference;  // a set-point alone says nothing of the joint
+    if ((reading.seen | kReferenceOnly) == kReferenceOnly && part != kReference) mentioned_.push_back(joint);
+    if (reading.problem.empty()) reading.problem = wrong_size;
+    if (reading.problem.empty() && (reading.seen & 1U << part))
+      reading.problem = "the name " + printable(message.name[i]) + " appears twice";
+    reading.seen |= 1U << part;
+    if (reading.problem.empty()) take(message, i, part, reading);
+  }
+  return mentioned_;
+}
+
+void JointStateReader::take(const sensor_msgs::JointState& m, std::size_t i, int part, Reading& reading) {
+  const auto value = [&](const std::vector<double>& array, const char* what) {
+    if (array.empty()) return kAbsent;
+    if (std::isinf(array[i])) reading.problem = m.name[i] + " " + what + " is infinite";
+    return array[i];
+  };
+  const double position = value(m.position, "position"), velocity = value(m.velocity, "velocity"),
+               effort = value(m.effort, "effort");
+  ChannelValues& values = reading.values;
+  switch (part) {
+    case kMotor:
       at(values, Channel::motor_position) = position;
       at(values, Channel::motor_velocity) = velocity;
       at(values, Channel::motor_torque) = effort;
-    } else if (slot == 1) {
+      break;
+    case kSensor:
       at(values, Channel::sensor_torque) = effort;
-    } else if (slot == 2) {
+      break;
+    case kLoad:
       at(values, Channel::load_position) = position;
       at(values, Channel::load_velocity) = velocity;
-    } else if (slot == 3) {
+      break;
+    case kReference:
       at(values, Channel::reference_position) = position;
-    } else {
-      at(values, slot == 4 ? Channel::motor_current : Channel::acceleration) = effort;
-    }
+      break;
+    case kCurrent:
+      at(values, Channel::motor_current) = effort;
+      break;
+    case kAccelerometer:
+      at(values, Channel::acceleration) = effort;
+      break;
   }
-  return values;
+}
+
+ChannelValues read_joint_state(const sensor_msgs::JointState& m, const std::string& joint, const std::string& topic) {
+  JointStateReader reader({joint});
+  reader.read(m);
+  if (!reader.problem(0).empty()) throw BadData(topic, reader.problem(0));
+  return reader.values(0);
 }
 
 sensor_msgs::JointState make_joint_state(const Observation& o, const JointNames& names) {

@@ -201,5 +201,12 @@ TEST(RunningMoments, AgreeWithTwoPasses) {
   EXPECT_NEAR(moments.standard_deviation(), std::sqrt(squares / values.size()), 1e-6);
 }
 
+TEST(RunningMoments, LoseNothingToAnOffset) {
+  RunningMoments moments;
+  for (int k = 0; k < 1000; ++k) moments.add(1e6 + 1e-3 * std::sin(2 * M_PI * k / 1000));
+  EXPECT_NEAR(moments.mean(), 1e6, 1e-9);  // roundings of 1e6
+  EXPECT_NEAR(moments.standard_deviation(), 1e-3 / std::sqrt(2), 1e-9);
+}
+
 }  // namespace
 }  // namespace backlash

@@ -19,9 +19,8 @@ TEST(JointState, CurrentAndAccelerationAreEffortsOfNamesOfTheirOwn) {
   sensor_msgs::JointState m;
   m.name = {"elbow_accelerometer", "wrist_current", "elbow_current", "elbow_motor"};
   m.effort = {-120, 9, 1.5, 0.05};
-  const JointNames names("elbow");
-  EXPECT_TRUE(mentions(m, names));
-  const ChannelValues values = read_joint_state(m, names, "joint_states");
+  EXPECT_EQ(JointStateReader({"elbow"}).read(m).size(), 1u);
+  const ChannelValues values = read_joint_state(m, "elbow", "joint_states");
   EXPECT_EQ(of(values, Channel::acceleration), -120);
   EXPECT_EQ(of(values, Channel::motor_current), 1.5);
   EXPECT_EQ(of(values, Channel::motor_torque), 0.05);
@@ -34,11 +33,11 @@ TEST(JointState, EitherNameAloneIsTheJoint) {
     sensor_msgs::JointState m;
     m.name = {"elbow" + suffix};
     m.effort = {2};
-    EXPECT_TRUE(mentions(m, JointNames("elbow")));
-    EXPECT_FALSE(mentions(m, JointNames("wrist")));
+    EXPECT_EQ(JointStateReader({"elbow"}).read(m).size(), 1u);
+    EXPECT_TRUE(JointStateReader({"wrist"}).read(m).empty());
     m.effort.clear();
     m.position = {3};  // says nothing of these two
-    const ChannelValues values = read_joint_state(m, JointNames("elbow"), "joint_states");
+    const ChannelValues values = read_joint_state(m, "elbow", "joint_states");
     EXPECT_TRUE(std::all_of(values.begin(), values.end(), [](double v) { return std::isnan(v); }));
   }
 }
@@ -49,7 +48,7 @@ TEST(JointState, WrongOnesAreRefusedByName) {
   m.effort = {1, 2};
   const auto refused = [&m](const std::string& reason) {
     try {
-      read_joint_state(m, JointNames("elbow"), "joint_states");
+      read_joint_state(m, "elbow", "joint_states");
       ADD_FAILURE() << "accepted; expected: " << reason;
     } catch (const BadData& error) {
       EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
@@ -67,7 +66,7 @@ TEST(JointState, ARecordsSampleComesBackAsItWas) {
   double value = 0.5;
   for (const Channel channel : kChannels) record.column(channel) = {value += 1, value += 1};
   const ChannelValues values =
-      read_joint_state(make_joint_state(record, 1, JointNames("elbow")), JointNames("elbow"), "t");
+      read_joint_state(make_joint_state(record, 1, JointNames("elbow")), "elbow", "t");
   for (const Channel channel : kChannels)
     EXPECT_EQ(of(values, channel), record.column(channel)[1]) << channel_name(channel);
 }
@@ -83,9 +82,45 @@ TEST(JointState, TheSimulatorNamesOnlyWhatIsMeasured) {
   o.acceleration = -120;
   const sensor_msgs::JointState m = make_joint_state(o, names);
   EXPECT_EQ(m.name.size(), 5u);
-  const ChannelValues values = read_joint_state(m, names, "t");
+  const ChannelValues values = read_joint_state(m, "elbow", "t");
   EXPECT_EQ(of(values, Channel::motor_current), 1.5);
   EXPECT_EQ(of(values, Channel::acceleration), -120);
+}
+
+TEST(JointStateReader, TellsTheJointsOfAMessageApart) {
+  JointStateReader reader({"elbow", "wrist", "knee"});
+  sensor_msgs::JointState m;
+  m.name = {"wrist_motor", "other_motor", "elbow_motor", "wrist_load", "knee_reference"};
+  m.position = {1, 2, 3, 4, 5};
+  m.effort = {10, 20, 30, NAN, NAN};
+  EXPECT_EQ(reader.read(m), (std::vector<std::size_t>{1, 0})) << "a reference alone is no mention";
+  EXPECT_EQ(of(reader.values(1), Channel::motor_torque), 10);
+  EXPECT_EQ(of(reader.values(1), Channel::load_position), 4);
+  EXPECT_EQ(of(reader.values(0), Channel::motor_position), 3);
+  EXPECT_TRUE(std::isnan(of(reader.values(0), Channel::load_position)));
+  m.name = {"knee_reference", "knee_motor"};  // nothing of the last message is left
+  m.position = {5, 6};
+  m.effort.clear();
+  EXPECT_EQ(reader.read(m), (std::vector<std::size_t>{2}));
+  EXPECT_EQ(of(reader.values(2), Channel::reference_position), 5);
+  EXPECT_TRUE(std::isnan(of(reader.values(1), Channel::motor_torque)));
+}
+
+TEST(JointStateReader, AProblemOfOneJointIsNotTheOthers) {
+  JointStateReader reader({"elbow", "wrist"});
+  sensor_msgs::JointState m;
+  m.name = {"elbow_motor", "wrist_motor", "elbow_motor"};
+  m.effort = {1, 2, 3};
+  EXPECT_EQ(reader.read(m).size(), 2u);
+  EXPECT_EQ(reader.problem(0), "the name elbow_motor appears twice");
+  EXPECT_EQ(reader.problem(1), "");
+  m.effort = {1, 2};
+  reader.read(m);
+  for (const std::size_t joint : {0, 1}) EXPECT_EQ(reader.problem(joint), "effort has 2 values for 3 names");
+  m.name = {"wrist_motor"};
+  m.effort = {2};
+  reader.read(m);
+  EXPECT_EQ(reader.problem(1), "");
 }
 
 }  // namespace

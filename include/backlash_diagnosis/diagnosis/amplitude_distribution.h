@@ -10,6 +10,7 @@
 // and Section 9.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -32,7 +33,22 @@ class AmplitudeDistribution {
   /// Throws InvalidParameter for a layout outside its range.
   explicit AmplitudeDistribution(const ApdLayout& layout);
 
-  void add(double value);                          ///< one sample; a NaN counts as outside (above)
+  /// One sample; a NaN counts as outside (above).
+  void add(double value) {
+    ++samples_;
+    if (value < layout_.lower) {
+      ++below_;
+      return;
+    }
+    if (!(value < layout_.upper)) {
+      ++above_;
+      return;
+    }
+    auto k = std::min(static_cast<std::size_t>((value - layout_.lower) * per_width_), counts_.size() - 1);
+    if (k > 0 && value < border(k)) --k;  // the product may be rounded over a border
+    if (k + 1 < counts_.size() && value >= border(k + 1)) ++k;
+    ++counts_[k];
+  }
   void merge(const AmplitudeDistribution& other);  ///< adds its samples; the layouts must be equal
   void clear();
 
@@ -52,27 +68,28 @@ class AmplitudeDistribution {
   double border(std::size_t k) const { return layout_.lower + static_cast<double>(k) * width_; }
 
   ApdLayout layout_;
-  double width_;
+  double width_, per_width_;
   std::vector<std::size_t> counts_;
   std::size_t samples_ = 0, below_ = 0, above_ = 0;
 };
 
-/// Mean and standard deviation of a signal, sample by sample (Welford 1962).
+/// Mean and standard deviation of a signal, sample by sample, by sums of the differences from the first sample: no
+/// division per sample, and nothing is lost to an offset.
 class RunningMoments {
  public:
   void add(double value) {
-    ++count_;
-    const double delta = value - mean_;
-    mean_ += delta / count_;
-    squares_ += delta * (value - mean_);
+    if (count_++ == 0) first_ = value;
+    const double d = value - first_;
+    sum_ += d;
+    squares_ += d * d;
   }
   std::size_t count() const { return count_; }
-  double mean() const { return mean_; }
+  double mean() const { return count_ ? first_ + sum_ / static_cast<double>(count_) : 0; }
   double standard_deviation() const;  ///< population, 0 without samples
 
  private:
   std::size_t count_ = 0;
-  double mean_ = 0, squares_ = 0;
+  double first_ = 0, sum_ = 0, squares_ = 0;
 };
 
 }  // namespace backlash

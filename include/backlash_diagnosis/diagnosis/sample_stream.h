@@ -46,6 +46,7 @@ class SampleStream {
 
   double period() const { return period_; }  ///< s; 0 until known
   double jump_limit() const;                 ///< s
+  double sampling_interval() const;          ///< s, median of the latest samples; 0 with fewer than two
   const StreamCounters& counters() const { return counters_; }
   const Record& kept() const { return record_; }
 
@@ -68,6 +69,7 @@ class SampleStream {
   StreamCounters counters_;
   Record record_;
   std::vector<Channel> channels_;   // those that the run's first sample has
+  unsigned present_ = 0;            // the same, a bit each
   double period_ = 0, start_ = 0;   // s; first stamp of the run
   double next_search_ = 0;          // s after start_
   std::optional<double> dropped_;   // s, last stamp that was trimmed since the windows began

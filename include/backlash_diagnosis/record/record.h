@@ -60,6 +60,9 @@ class Record {
   /// Median distance between samples [s]; 0 with fewer than two samples.
   double sampling_interval() const;
 
+  /// Drops the first `count` samples, in place.
+  void forget(std::size_t count);
+
   /// Samples with from <= time < to.
   Record slice(double from, double to) const;
 

@@ -64,6 +64,7 @@ class DiagnoserNode {
   ros::NodeHandle handle_, private_handle_;
   double stale_;
   std::vector<std::unique_ptr<JointMonitor>> monitors_;
+  JointStateReader reader_;  // its joints are the monitors
   std::string topic_;
   ros::CallbackQueue sample_queue_;  // samples have a thread of their own, services never hold them up
   ros::Subscriber subscriber_;

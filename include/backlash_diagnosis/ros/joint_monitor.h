@@ -2,7 +2,6 @@
 // subscriber feeds it from one thread while services ask from others.
 #pragma once
 
-#include <sensor_msgs/JointState.h>
 
 #include <condition_variable>
 #include <functional>
@@ -59,9 +58,10 @@ class JointMonitor {
   const RigFile& rig() const { return settings_.rig; }
   const std::string& baseline_path() const { return settings_.baseline_path; }
 
-  /// Takes a message that mentions the joint; a report when it completes a period. Never throws for bad content: that is
-  /// counted and told by state().
-  std::optional<PeriodReport> take(const sensor_msgs::JointState& message, const std::string& topic);
+  /// Takes what a message says of the joint, or what is wrong with it (see JointStateReader); a report when it completes
+  /// a period. Bad content is counted and told by state().
+  std::optional<PeriodReport> take(const ros::Time& stamp, const ChannelValues& values, const std::string& problem,
+                                   const std::string& topic);
 
   /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s] of wall time,
   /// then diagnoses the latest `periods` (0: all kept).
@@ -80,7 +80,6 @@ class JointMonitor {
 
   MonitorSettings settings_;
   DiagnosisSettings diagnosis_settings_;  // without settling: the stream cuts
-  JointNames names_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   StampClock clock_;

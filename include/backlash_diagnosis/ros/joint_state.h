@@ -18,6 +18,8 @@
 
 #include <array>
 #include <string>
+#include <unordered_map>
+#include <vector>
 
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/record.h"
@@ -42,12 +44,39 @@ class StampClock {
   ros::Time origin_;
 };
 
-/// True if the message speaks of this joint at all (a joint_states topic may carry others).
-bool mentions(const sensor_msgs::JointState& message, const JointNames& names);
+/// Reads the messages of some joints, each name looked up once; allocates only for what is wrong.
+class JointStateReader {
+ public:
+  explicit JointStateReader(const std::vector<std::string>& joints);
 
-/// Reads one message. Throws BadData naming `topic`, the array and its size where position, velocity or effort are
-/// neither empty nor as long as `name`, where a name appears twice, or where a value is infinite.
-ChannelValues read_joint_state(const sensor_msgs::JointState& message, const JointNames& names,
+  /// The joints that a message speaks of, by their place in `joints` (the topic may carry others). This and what
+  /// follows are valid until the next call.
+  const std::vector<std::size_t>& read(const sensor_msgs::JointState& message);
+  const ChannelValues& values(std::size_t joint) const { return readings_[joint].values; }
+  /// What is wrong with a joint: position, velocity or effort neither empty nor as long as `name` (array and sizes),
+  /// a name twice, an infinite value. Empty where nothing is.
+  const std::string& problem(std::size_t joint) const { return readings_[joint].problem; }
+
+ private:
+  struct Place {
+    std::size_t joint;
+    int part;
+  };
+  struct Reading {
+    ChannelValues values;
+    std::string problem;
+    unsigned seen = 0;  // a bit for each part
+  };
+
+  void take(const sensor_msgs::JointState& message, std::size_t i, int part, Reading& reading);
+
+  std::unordered_map<std::string, Place> places_;
+  std::vector<Reading> readings_;
+  std::vector<std::size_t> seen_, mentioned_;
+};
+
+/// Reads one message of one joint. Throws BadData naming `topic` where something is wrong with it.
+ChannelValues read_joint_state(const sensor_msgs::JointState& message, const std::string& joint,
                                const std::string& topic);
 
 /// Message for a simulated sample, without stamp.
