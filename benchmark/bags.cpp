@@ -1,5 +1,5 @@
-// Reading and diagnosing a recorded run of a minute at 5 kHz, against a bare loop over the bag that instantiates its
-// messages. The bag is made here, by the simulator, and removed.
+// Reading and diagnosing a recorded run of a minute at 5 kHz, against a bare loop over the bag that
+// instantiates its messages. The bag is made here, by the simulator, and removed.
 #include <benchmark/benchmark.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
@@ -51,7 +51,8 @@ void bare_view(benchmark::State& state) {
     rosbag::Bag opened(path);
     rosbag::View view(opened, rosbag::TopicQuery("joint_states"));
     for (const rosbag::MessageInstance& instance : view)
-      if (const auto message = instance.instantiate<sensor_msgs::JointState>()) sum += message->effort.front();
+      if (const auto message = instance.instantiate<sensor_msgs::JointState>())
+        sum += message->effort.front();
   }
   benchmark::DoNotOptimize(sum);
   rate(state);

@@ -1,5 +1,6 @@
-// A monitoring curve of 41 points, 10 periods and 8 noise seeds, against what Boost.odeint alone needs to simulate the
-// same machines for the same time at an error of about 1e-6, without noise, statistics or calibration.
+// A monitoring curve of 41 points, 10 periods and 8 noise seeds, against what Boost.odeint alone needs to
+// simulate the same machines for the same time at an error of about 1e-6, without noise, statistics or
+// calibration.
 #include <benchmark/benchmark.h>
 
 #include <atomic>
@@ -35,7 +36,8 @@ void machines_by_boost(benchmark::State& state) {
       for (int i = next++; i < kMachines; i = next++) {
         RigFile file = default_rig_file();
         file.rig.mesh.backlash = kLargestBacklash * 1.5 * i / (kMachines - 1);
-        benchmark::DoNotOptimize(peer::sensor_torque(file, 1e-6, 1e-8, (kSettling + kPeriods) * period, 16'000));
+        benchmark::DoNotOptimize(
+            peer::sensor_torque(file, 1e-6, 1e-8, (kSettling + kPeriods) * period, 16'000));
       }
     };
     std::thread other(work);
@@ -44,8 +46,16 @@ void machines_by_boost(benchmark::State& state) {
   }
 }
 
-BENCHMARK(curve)->Name("curve/build_curve")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
-BENCHMARK(machines_by_boost)->Name("curve/boost_dopri5")->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK(curve)
+    ->Name("curve/build_curve")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+BENCHMARK(machines_by_boost)
+    ->Name("curve/boost_dopri5")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
 
 }  // namespace
 

@@ -1,7 +1,8 @@
-// Cost of simulating a rig at a measured error: SUNDIALS through Plant, the ensemble, and Boost.odeint as their peer.
-// Every run is the same work: sensor torque at 1 kHz of config/sarkar_1997.yaml, half gap 50 um, 0.5 s; for the
-// ensemble 32 half gaps from 0 to 100 um, 0.1 s (some gaps are chaotic, longer runs would compare luck). The error is
-// that of the torque, rms over rms, against Verner's pair at 1e-13; of 32 rigs the median.
+// Cost of simulating a rig at a measured error: SUNDIALS through Plant, the ensemble, and Boost.odeint as
+// their peer. Every run is the same work: sensor torque at 1 kHz of config/sarkar_1997.yaml, half gap 50 um,
+// 0.5 s; for the ensemble 32 half gaps from 0 to 100 um, 0.1 s (some gaps are chaotic, longer runs would
+// compare luck). The error is that of the torque, rms over rms, against Verner's pair at 1e-13; of 32 rigs
+// the median.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -35,7 +36,8 @@ double half_gap_of(int rig) {
   return kLargestHalfGap * rig / (kRigs - 1);
 }
 
-/// Absolute tolerances that get most out of SUNDIALS here: a hundredth of a radian and a radian per second count as 1.
+/// Absolute tolerances that get most out of SUNDIALS here: a hundredth of a radian and a radian per second
+/// count as 1.
 SolverSettings solver(const std::string& method, double tolerance) {
   SolverSettings s;
   s.method = method;
@@ -86,7 +88,8 @@ const Signal& right_torque() {
 const Signals& right_torques() {
   static const Signals right = [] {
     Signals all;
-    for (int i = 0; i < kRigs; ++i) all.push_back(plant_torque(file_with(half_gap_of(i)), converged(), kShort));
+    for (int i = 0; i < kRigs; ++i)
+      all.push_back(plant_torque(file_with(half_gap_of(i)), converged(), kShort));
     return all;
   }();
   return right;
@@ -141,7 +144,8 @@ template <typename... Arguments>
 void add(const std::string& name, double tolerance, Arguments... arguments) {
   char text[16];
   std::snprintf(text, sizeof text, "%.0e", tolerance);
-  benchmark::RegisterBenchmark((name + "/" + text).c_str(), arguments..., tolerance)->Unit(benchmark::kMillisecond);
+  benchmark::RegisterBenchmark((name + "/" + text).c_str(), arguments..., tolerance)
+      ->Unit(benchmark::kMillisecond);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// The rig of config/sarkar_1997.yaml as one would write it by hand for Boost.odeint: the peer of the integrators here.
-// Equations of include/backlash_diagnosis/model/gear_train.h, with the numbers of the rig that is read.
+// The rig of config/sarkar_1997.yaml as one would write it by hand for Boost.odeint: the peer of the
+// integrators here. Equations of include/backlash_diagnosis/model/gear_train.h, with the numbers of the rig
+// that is read.
 #pragma once
 
 #include <array>
@@ -15,10 +16,17 @@ using State = std::array<double, 6>;  // motor, pinion, gear: angles, then speed
 
 struct Equations {
   explicit Equations(const backlash::Rig& rig)
-      : motor(1 / rig.motor.inertia), pinion(1 / rig.pinion.inertia), gear(1 / rig.gear.inertia),
-        viscous(rig.motor.viscous_damping), k_in(rig.input_coupling.stiffness), c_in(rig.input_coupling.damping),
-        k_out(rig.output_coupling.stiffness), c_out(rig.output_coupling.damping), radius(rig.mesh.lever()),
-        half_gap(0.5 * rig.mesh.backlash), stiffness(rig.mesh.contact_spec.values.at("stiffness")),
+      : motor(1 / rig.motor.inertia),
+        pinion(1 / rig.pinion.inertia),
+        gear(1 / rig.gear.inertia),
+        viscous(rig.motor.viscous_damping),
+        k_in(rig.input_coupling.stiffness),
+        c_in(rig.input_coupling.damping),
+        k_out(rig.output_coupling.stiffness),
+        c_out(rig.output_coupling.damping),
+        radius(rig.mesh.lever()),
+        half_gap(0.5 * rig.mesh.backlash),
+        stiffness(rig.mesh.contact_spec.values.at("stiffness")),
         loss(1.5 * rig.mesh.contact_spec.values.at("alpha")) {}
 
   void operator()(const State& s, State& d, double) const {
@@ -40,12 +48,13 @@ struct Equations {
 };
 
 /// Sensor torque at `rate` under a square torque, by dopri5 with dense output, started anew at each switch.
-inline std::vector<double> sensor_torque(const backlash::RigFile& file, double tolerance, double absolute, double duration,
-                                         double rate) {
+inline std::vector<double> sensor_torque(const backlash::RigFile& file, double tolerance, double absolute,
+                                         double duration, double rate) {
   using namespace boost::numeric::odeint;
   Equations equations(file.rig);
   auto stepper = make_dense_output(absolute, tolerance, runge_kutta_dopri5<State>());
-  const double half = 0.5 / file.simulation.excitation.frequency, amplitude = file.simulation.excitation.amplitude;
+  const double half = 0.5 / file.simulation.excitation.frequency,
+               amplitude = file.simulation.excitation.amplitude;
   const long count = std::lround(duration * rate);
   std::vector<double> values;
   State state{};

@@ -1,5 +1,5 @@
-// Cost per sample of the streaming statistics, against the same numbers from Boost.Accumulators and Boost.Histogram:
-// histogram of 60 classes and four moments of a signal, for whole periods of 1000 samples.
+// Cost per sample of the streaming statistics, against the same numbers from Boost.Accumulators and
+// Boost.Histogram: histogram of 60 classes and four moments of a signal, for whole periods of 1000 samples.
 #include <benchmark/benchmark.h>
 
 #include <boost/accumulators/accumulators.hpp>
@@ -33,8 +33,9 @@ const std::vector<double>& signal() {
 }
 
 void per_sample(benchmark::State& state) {
-  state.counters["ns_per_sample"] = benchmark::Counter(double(state.iterations()) * kSamples * 1e-9,
-                                                       benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["ns_per_sample"] =
+      benchmark::Counter(double(state.iterations()) * kSamples * 1e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void period_analyser(benchmark::State& state) {
@@ -43,7 +44,8 @@ void period_analyser(benchmark::State& state) {
   double sum = 0;
   for (auto _ : state)
     for (const double value : signal())
-      if (const PeriodResult* period = analyser.add(double(k++) / kRate, value)) sum += period->apd.skewness();
+      if (const PeriodResult* period = analyser.add(double(k++) / kRate, value))
+        sum += period->apd.skewness();
   benchmark::DoNotOptimize(sum);
   per_sample(state);
 }
@@ -51,8 +53,8 @@ void period_analyser(benchmark::State& state) {
 void boost_statistics(benchmark::State& state) {
   using namespace boost::accumulators;
   using Moments = accumulator_set<double, stats<tag::mean, tag::variance, tag::skewness, tag::kurtosis>>;
-  auto histogram = boost::histogram::make_histogram(boost::histogram::axis::regular<>(kLayout.classes, kLayout.lower,
-                                                                                      kLayout.upper));
+  auto histogram = boost::histogram::make_histogram(
+      boost::histogram::axis::regular<>(kLayout.classes, kLayout.lower, kLayout.upper));
   Moments moments;
   long k = 0;
   double sum = 0;

@@ -108,7 +108,8 @@ class JointRun {
     drop_absent_channels();
     const std::string repeated = stamps_.describe("topic " + topic_);
     if (!repeated.empty()) record_.warnings.push_back(repeated);
-    for (std::string& warning : describe_time_base(record_.time)) record_.warnings.push_back(std::move(warning));
+    for (std::string& warning : describe_time_base(record_.time))
+      record_.warnings.push_back(std::move(warning));
     return std::move(record_);
   }
 
@@ -143,8 +144,8 @@ class JointRun {
   void add(Channel channel, double value, const ros::Time& stamp, std::size_t index) {
     std::vector<double>& column = record_.column(channel);
     if (!column.empty() && std::isnan(column.front()) != std::isnan(value))
-      fail_at(index, channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " + stamp_text(stamp) +
-                         " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
+      fail_at(index, channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
+                         stamp_text(stamp) + " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
                          ", unlike in the messages before");
     column.push_back(value);
   }
@@ -291,8 +292,10 @@ class Reader {
     std::vector<std::string> joints;
     for (const std::string& joint : joints_) joints.push_back(printable(joint));
     if (joints.empty())
-      fail("no joint on " + joined(topics) + ": expected names like 'joint_motor', 'joint_sensor' or 'joint_load'");
-    if (joint_.empty() && joints.size() > 1) fail("several joints, choose one with --joint: " + joined(joints));
+      fail("no joint on " + joined(topics) +
+           ": expected names like 'joint_motor', 'joint_sensor' or 'joint_load'");
+    if (joint_.empty() && joints.size() > 1)
+      fail("several joints, choose one with --joint: " + joined(joints));
     if (joint_.empty()) joint_ = *joints_.begin();
     std::vector<JointRun*> found;
     std::vector<std::string> where;
@@ -304,7 +307,8 @@ class Reader {
       }
     if (found.empty()) fail("no joint '" + printable(joint_) + "'; there are (--joint): " + joined(joints));
     if (found.size() > 1)
-      fail("joint '" + printable(joint_) + "' is on several topics, choose one with --topic: " + joined(where));
+      fail("joint '" + printable(joint_) +
+           "' is on several topics, choose one with --topic: " + joined(where));
     return *found.front();
   }
 

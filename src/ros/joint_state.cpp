@@ -12,13 +12,15 @@ namespace {
 
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
-double& at(ChannelValues& values, Channel channel) { return values[static_cast<std::size_t>(channel)]; }
+double& at(ChannelValues& values, Channel channel) {
+  return values[static_cast<std::size_t>(channel)];
+}
 
 /// What is wrong with the length of an array; nothing where it is empty or has a value per name.
 std::string size_problem(const std::vector<double>& array, const char* name, std::size_t joints) {
   if (array.empty() || array.size() == joints) return {};
-  return std::string(name) + " has " + std::to_string(array.size()) + " values for " + std::to_string(joints) +
-         " names";
+  return std::string(name) + " has " + std::to_string(array.size()) + " values for " +
+         std::to_string(joints) + " names";
 }
 
 std::string size_problem(const sensor_msgs::JointState& m) {
@@ -31,7 +33,8 @@ std::string size_problem(const sensor_msgs::JointState& m) {
 enum Part { kMotor, kSensor, kLoad, kReference, kCurrent, kAccelerometer };
 
 /// Adds one joint; arrays stay parallel, they are emptied at the end where nobody has the quantity.
-void add(sensor_msgs::JointState& m, const std::string& name, double position, double velocity, double effort) {
+void add(sensor_msgs::JointState& m, const std::string& name, double position, double velocity,
+         double effort) {
   if (std::isnan(position) && std::isnan(velocity) && std::isnan(effort)) return;
   m.name.push_back(name);
   m.position.push_back(position);
@@ -46,15 +49,20 @@ void empty_if_absent(std::vector<double>& array) {
 }  // namespace
 
 JointNames::JointNames(const std::string& joint)
-    : motor(joint + "_motor"), sensor(joint + "_sensor"), load(joint + "_load"), reference(joint + "_reference"),
-      current(joint + "_current"), accelerometer(joint + "_accelerometer") {}
+    : motor(joint + "_motor"),
+      sensor(joint + "_sensor"),
+      load(joint + "_load"),
+      reference(joint + "_reference"),
+      current(joint + "_current"),
+      accelerometer(joint + "_accelerometer") {}
 
 double StampClock::seconds(const ros::Time& stamp) {
   if (!started_) {
     started_ = true;
     origin_ = stamp;
   }
-  // The double that a CSV with nine decimals would give, so that times survive the way through a bag bit by bit.
+  // The double that a CSV with nine decimals would give, so that times survive the way through a bag bit by
+  // bit.
   constexpr double kExactIntegers = 9007199254740992.0;  // 2^53
   const double whole = double(stamp.sec) - double(origin_.sec);
   const double rest = double(stamp.nsec) - double(origin_.nsec);
@@ -65,7 +73,8 @@ double StampClock::seconds(const ros::Time& stamp) {
 JointStateReader::JointStateReader(const std::vector<std::string>& joints) : readings_(joints.size()) {
   for (std::size_t joint = 0; joint < joints.size(); ++joint) {
     const JointNames n(joints[joint]);
-    const std::string* const parts[] = {&n.motor, &n.sensor, &n.load, &n.reference, &n.current, &n.accelerometer};
+    const std::string* const parts[] = {&n.motor,     &n.sensor,  &n.load,
+                                        &n.reference, &n.current, &n.accelerometer};
     for (int part = kMotor; part <= kAccelerometer; ++part) places_[*parts[part]] = {joint, part};
     readings_[joint].values.fill(kAbsent);
   }
@@ -133,7 +142,8 @@ void JointStateReader::take(const sensor_msgs::JointState& m, std::size_t i, int
   }
 }
 
-ChannelValues read_joint_state(const sensor_msgs::JointState& m, const std::string& joint, const std::string& topic) {
+ChannelValues read_joint_state(const sensor_msgs::JointState& m, const std::string& joint,
+                               const std::string& topic) {
   JointStateReader reader({joint});
   reader.read(m);
   if (!reader.problem(0).empty()) throw BadData(topic, reader.problem(0));
@@ -151,7 +161,9 @@ sensor_msgs::JointState make_joint_state(const Observation& o, const JointNames&
 }
 
 sensor_msgs::JointState make_joint_state(const Record& record, std::size_t i, const JointNames& names) {
-  const auto get = [&record, i](Channel channel) { return record.has(channel) ? record.column(channel)[i] : kAbsent; };
+  const auto get = [&record, i](Channel channel) {
+    return record.has(channel) ? record.column(channel)[i] : kAbsent;
+  };
   sensor_msgs::JointState m;
   add(m, names.motor, get(Channel::motor_position), get(Channel::motor_velocity), get(Channel::motor_torque));
   add(m, names.sensor, kAbsent, kAbsent, get(Channel::sensor_torque));

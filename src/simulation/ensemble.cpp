@@ -19,7 +19,7 @@ using namespace tsitouras;
 
 constexpr int kMaxStates = GearTrain::kMaxStates;
 constexpr double kSafety = 0.9, kShrink = 0.2, kGrow = 8;
-constexpr double kFirst = 0.01;  // of the time in which the state would change by itself
+constexpr double kFirst = 0.01;       // of the time in which the state would change by itself
 constexpr double kLeastFirst = 1e-7;  // s, of a first step from rest
 
 double rounding(double t) {
@@ -46,7 +46,8 @@ struct LaneContact {
   BACKLASH_LANES Lanes force(const Lanes& x, const Lanes& v) const {
     const Lanes depth = magnitude(x) - half_gap, none = {};
     const Lanes touching = larger(depth, none), rate = x > 0 ? v : -v;
-    const Lanes push = larger(stiffness * power(touching) * larger(1 + loss * rate, none) + damping * rate, none);
+    const Lanes push =
+        larger(stiffness * power(touching) * larger(1 + loss * rate, none) + damping * rate, none);
     return depth > 0 ? (x > 0 ? push : -push) : none;
   }
 };
@@ -61,7 +62,7 @@ struct Attempt {
   const LaneContact& contact;
   const LaneTolerance* tolerances;
   double relative;
-  const double* torques;  // of the stages [N m]
+  const double* torques;     // of the stages [N m]
   const Lanes* torque_gain;  // of motor, of load: 1 or the reduction, and 0
   double h;
   const Lanes* start;
@@ -75,7 +76,9 @@ BACKLASH_LANES void attempt(Attempt& a) {
   constexpr FixedLayout<Mask> layout;
   constexpr int States = 2 * layout.dof();
   Lanes(*const k)[kMaxStates] = a.rates;
-  const auto force = [&](const Lanes& x, const Lanes& v) __attribute__((always_inline)) { return a.contact.force(x, v); };
+  const auto force = [&](const Lanes& x, const Lanes& v) __attribute__((always_inline)) {
+    return a.contact.force(x, v);
+  };
 #pragma GCC unroll 8
   for (int stage = 1; stage < kStages; ++stage) {
     Lanes y[States];
@@ -86,8 +89,8 @@ BACKLASH_LANES void attempt(Attempt& a) {
       for (int j = 1; j < stage; ++j) sum += kA[stage][j] * k[j][i];
       y[i] = a.start[i] + a.h * sum;
     }
-    a.train.derivative(layout, y, a.torques[stage] * a.torque_gain[0], a.torques[stage] * a.torque_gain[1], a.contact.half_gap,
-                       force, k[stage]);
+    a.train.derivative(layout, y, a.torques[stage] * a.torque_gain[0], a.torques[stage] * a.torque_gain[1],
+                       a.contact.half_gap, force, k[stage]);
     if (stage == kStages - 1)
       for (int i = 0; i < States; ++i) a.end[i] = y[i];
   }
@@ -98,7 +101,8 @@ BACKLASH_LANES void attempt(Attempt& a) {
 #pragma GCC unroll 8
     for (int j = 1; j < kStages; ++j) sum += kError[j] * k[j][i];
     const Lanes size = larger(magnitude(a.start[i]), magnitude(a.end[i]));
-    const Lanes scaled = a.h * sum / (a.tolerances[i].absolute + a.relative * smaller(size, a.tolerances[i].largest));
+    const Lanes scaled =
+        a.h * sum / (a.tolerances[i].absolute + a.relative * smaller(size, a.tolerances[i].largest));
     square += scaled * scaled;
   }
   a.error = 0;
@@ -210,10 +214,12 @@ void Ensemble::Group::restart(double t, double torque) {
   step = 0;
   const auto force = [this](const Lanes& x, const Lanes& v) { return contact.force(x, v); };
   Lanes* const rate = rates[kStages - 1];
-  train.derivative(layout, end, torque * torque_gain[0], torque * torque_gain[1], contact.half_gap, force, rate);
+  train.derivative(layout, end, torque * torque_gain[0], torque * torque_gain[1], contact.half_gap, force,
+                   rate);
   double size = 0, change = 0;
   for (int i = 0; i < states; ++i) {
-    const Lanes weight = 1 / (tolerances[i].absolute + relative * smaller(magnitude(end[i]), tolerances[i].largest));
+    const Lanes weight =
+        1 / (tolerances[i].absolute + relative * smaller(magnitude(end[i]), tolerances[i].largest));
     for (int lane = 0; lane < kLanes; ++lane) {
       size = std::max(size, std::fabs(end[i][lane] * weight[lane]));
       change = std::max(change, std::fabs(rate[i][lane] * weight[lane]));
@@ -232,7 +238,8 @@ void Ensemble::Group::take_step(double stop, const Excitation& excitation, long 
     if (!(step > rounding(from)))
       throw IntegrationError("ensemble: the step is below rounding at t = " + std::to_string(from) + " s");
     double torques[kStages];
-    for (int stage = 0; stage < kStages; ++stage) torques[stage] = excitation.torque(from + kC[stage] * step, segment);
+    for (int stage = 0; stage < kStages; ++stage)
+      torques[stage] = excitation.torque(from + kC[stage] * step, segment);
     Attempt a{train, contact, tolerances, relative, torques, torque_gain, step, begin, rates, end, 0};
     attempt(a);
     const double factor = std::clamp(kSafety * std::pow(a.error, -0.2), kShrink, kGrow);  // of NaN: NaN
@@ -262,7 +269,8 @@ void Ensemble::Group::advance_to(double t, double stop, const Excitation& excita
 }
 
 bool Ensemble::takes(const std::vector<Rig>& rigs, const ExcitationSettings& excitation) {
-  if (rigs.empty() || excitation.is_speed_loop() || excitation.type == "topic" || excitation.motor_brake) return false;
+  if (rigs.empty() || excitation.is_speed_loop() || excitation.type == "topic" || excitation.motor_brake)
+    return false;
   std::optional<int> layout;
   std::optional<double> exponent;
   for (const Rig& rig : rigs) {
@@ -277,10 +285,13 @@ bool Ensemble::takes(const std::vector<Rig>& rigs, const ExcitationSettings& exc
   return true;
 }
 
-Ensemble::Ensemble(const std::vector<Rig>& rigs, const ExcitationSettings& excitation, const SolverSettings& solver)
+Ensemble::Ensemble(const std::vector<Rig>& rigs, const ExcitationSettings& excitation,
+                   const SolverSettings& solver)
     : at_load_(excitation.at_load), excitation_(excitation.create()) {
-  if (!takes(rigs, excitation)) throw InvalidParameter("rigs", double(rigs.size()), "cannot be moved at once");
-  if (at_load_ && rigs.front().link_locked) throw InvalidParameter("excitation.at", "load", "the link is locked");
+  if (!takes(rigs, excitation))
+    throw InvalidParameter("rigs", double(rigs.size()), "cannot be moved at once");
+  if (at_load_ && rigs.front().link_locked)
+    throw InvalidParameter("excitation.at", "load", "the link is locked");
   for (const Rig& rig : rigs) trains_.emplace_back(rig);
   for (std::size_t first = 0; first < trains_.size(); first += kLanes)
     groups_.emplace_back(&trains_[first], trains_.size() - first, solver, at_load_);
@@ -293,7 +304,8 @@ void Ensemble::advance_to(double t) {
   if (!std::isfinite(t) || t < time_ - rounding(time_))
     throw InvalidParameter("time", t, "must be finite and >= " + std::to_string(time_) + " s");
   const double reach = t + rounding(t);
-  for (double stop = excitation_->segment_end(segment_); stop <= reach; stop = excitation_->segment_end(segment_)) {
+  for (double stop = excitation_->segment_end(segment_); stop <= reach;
+       stop = excitation_->segment_end(segment_)) {
     for (Group& group : groups_) group.advance_to(stop, stop, *excitation_, segment_);
     const double torque = excitation_->torque(stop, ++segment_);
     for (Group& group : groups_) group.restart(stop, torque);
@@ -313,8 +325,8 @@ std::vector<double> Ensemble::state(std::size_t rig) const {
 
 Observation Ensemble::observe(std::size_t rig) const {
   const double torque = excitation_->torque(time_, segment_);
-  return trains_.at(rig).observe(state(rig).data(), at_load_ ? AppliedTorque(0, torque) : AppliedTorque(torque, 0),
-                                 time_);
+  return trains_.at(rig).observe(state(rig).data(),
+                                 at_load_ ? AppliedTorque(0, torque) : AppliedTorque(torque, 0), time_);
 }
 
 long Ensemble::steps() const {

@@ -5,8 +5,8 @@
 namespace backlash {
 namespace {
 
-// Two numbers at once: what every processor of this kind has, so that no other binary is needed. Compilers make two
-// of a plain loop only where its length is known.
+// Two numbers at once: what every processor of this kind has, so that no other binary is needed. Compilers
+// make two of a plain loop only where its length is known.
 using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
 
 constexpr int kMostVectors = 16;

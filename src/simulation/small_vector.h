@@ -1,5 +1,5 @@
-// SUNDIALS' serial vector with the operations of an explicit step written for a few numbers: there the library's own
-// take most of the time, by loops and calls that only long vectors repay.
+// SUNDIALS' serial vector with the operations of an explicit step written for a few numbers: there the
+// library's own take most of the time, by loops and calls that only long vectors repay.
 #pragma once
 
 #include <nvector/nvector_serial.h>

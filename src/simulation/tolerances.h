@@ -8,7 +8,8 @@
 
 namespace backlash {
 
-/// Elastic deflections and play are differences of angles and far below this; beyond it no angle says more about them.
+/// Elastic deflections and play are differences of angles and far below this; beyond it no angle says more
+/// about them.
 constexpr double kLargestAngle = 0.1;  // rad
 
 /// Angles first, then speeds.

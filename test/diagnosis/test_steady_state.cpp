@@ -55,7 +55,8 @@ TEST(SteadyState, SamplesAreKeptAndForgottenWithoutTheHeap) {
   const auto run = [&](double seconds) {
     for (const long end = k + std::lround(seconds * kRate); k < end; ++k) {
       values[std::size_t(Channel::sensor_torque)] = signal(k);
-      values[std::size_t(Channel::motor_torque)] = values[std::size_t(Channel::motor_position)] = 0.1 * signal(k);
+      values[std::size_t(Channel::motor_torque)] = values[std::size_t(Channel::motor_position)] =
+          0.1 * signal(k);
       periods += stream.add(double(k) / kRate, values) != nullptr;
     }
   };

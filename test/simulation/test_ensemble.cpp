@@ -1,4 +1,5 @@
-// Several rigs at once against the same rigs one by one, moved by other code: Plant, SUNDIALS and Verner's pair.
+// Several rigs at once against the same rigs one by one, moved by other code: Plant, SUNDIALS and Verner's
+// pair.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -37,8 +38,8 @@ std::vector<Rig> different(const Rig& rig, int count) {
   return rigs;
 }
 
-/// Largest difference of any state from that of a plant, relative to the largest state of its kind. Short enough that
-/// no gap has become chaotic.
+/// Largest difference of any state from that of a plant, relative to the largest state of its kind. Short
+/// enough that no gap has become chaotic.
 double largest_error(const std::vector<Rig>& rigs, const ExcitationSettings& excitation, double tolerance) {
   Ensemble ensemble(rigs, excitation, test::solver(tolerance));
   double worst = 0;
@@ -69,8 +70,8 @@ TEST(Ensemble, MovesEveryLayoutAsPlantsDo) {
     for (const bool link_apart : {false, true})
       for (const bool locked : {false, true}) {
         const auto rigs = different(rig_of(motor_apart, link_apart, locked), 3);
-        SCOPED_TRACE("motor apart " + std::to_string(motor_apart) + ", link apart " + std::to_string(link_apart) +
-                     ", locked " + std::to_string(locked));
+        SCOPED_TRACE("motor apart " + std::to_string(motor_apart) + ", link apart " +
+                     std::to_string(link_apart) + ", locked " + std::to_string(locked));
         // Local errors of 1e-10 in some 1e4 steps, with impacts that amplify: 1e-6, and less when tighter.
         EXPECT_LT(largest_error(rigs, test::square(0.05, 50), 1e-10), 1e-6);
       }
@@ -78,7 +79,8 @@ TEST(Ensemble, MovesEveryLayoutAsPlantsDo) {
 
 TEST(Ensemble, TakesAnyNumberOfRigs) {
   for (const int count : {1, 2, 4, 5, 9})
-    EXPECT_LT(largest_error(different(rig_of(true, true, true), count), test::square(0.05, 50), 1e-10), 1e-6) << count;
+    EXPECT_LT(largest_error(different(rig_of(true, true, true), count), test::square(0.05, 50), 1e-10), 1e-6)
+        << count;
 }
 
 TEST(Ensemble, ErrorFallsWithTheTolerance) {
@@ -86,7 +88,8 @@ TEST(Ensemble, ErrorFallsWithTheTolerance) {
   double before = std::numeric_limits<double>::infinity();
   for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
     const double error = largest_error(rigs, test::square(0.05, 50), tolerance);
-    EXPECT_LT(error, 0.3 * before) << tolerance;  // 0.01 if it were proportional; kinks of the contact take their part
+    EXPECT_LT(error, 0.3 * before)
+        << tolerance;  // 0.01 if it were proportional; kinks of the contact take their part
     before = error;
   }
 }
@@ -131,7 +134,8 @@ TEST(Ensemble, ObservesWhatAPlantObserves) {
 // What one rig does may depend on those beside it through the common step only, by its local errors.
 TEST(Ensemble, IsTheSameEveryTime) {
   const auto rigs = different(rig_of(true, true, true), 6);
-  Ensemble one(rigs, test::square(0.05, 50), test::solver(1e-6)), two(rigs, test::square(0.05, 50), test::solver(1e-6));
+  Ensemble one(rigs, test::square(0.05, 50), test::solver(1e-6)),
+      two(rigs, test::square(0.05, 50), test::solver(1e-6));
   one.advance_to(0.05);
   two.advance_to(0.05);
   for (std::size_t i = 0; i < rigs.size(); ++i) EXPECT_EQ(one.state(i), two.state(i));
@@ -150,8 +154,9 @@ TEST(Ensemble, LeavesToPlantsWhatIsNotSmooth) {
   other.mesh.contact = make_contact_law("linear", {{"stiffness", 1e6}, {"damping", 0}});
   EXPECT_FALSE(Ensemble::takes({smooth, other}, square)) << "other exponent";
   Rig remembers = smooth;
-  remembers.mesh.contact = make_contact_law(
-      "stereomechanical", {{"restitution", 0.5}, {"resting_speed", 1e-3}, {"stiffness", 1e6}, {"damping", 10}});
+  remembers.mesh.contact =
+      make_contact_law("stereomechanical",
+                       {{"restitution", 0.5}, {"resting_speed", 1e-3}, {"stiffness", 1e6}, {"damping", 10}});
   EXPECT_FALSE(Ensemble::takes({remembers}, square));
   EXPECT_FALSE(Ensemble::takes({smooth}, test::topic()));
   ExcitationSettings braked = square;

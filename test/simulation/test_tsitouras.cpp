@@ -1,10 +1,11 @@
-// The coefficients, against the conditions that make a Runge-Kutta pair one of order 5(4) (Butcher 2008, Table 302(I)).
-#include "../../src/simulation/tsitouras.h"
-
+// The coefficients, against the conditions that make a Runge-Kutta pair one of order 5(4) (Butcher 2008,
+// Table 302(I)).
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
 #include <cmath>
+
+#include "../../src/simulation/tsitouras.h"
 
 namespace backlash {
 namespace {

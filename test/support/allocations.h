@@ -1,5 +1,5 @@
-// Counts what is asked of the heap while an AllocationCount lives. Replaces operator new of a whole test binary: include
-// it in one file of each.
+// Counts what is asked of the heap while an AllocationCount lives. Replaces operator new of a whole test
+// binary: include it in one file of each.
 #pragma once
 
 #include <atomic>

@@ -1,6 +1,6 @@
-// The equations of motion of gear_train.h for a train that nothing but its teeth makes other than linear: no terms, no
-// dry friction, no law that needs touches. Written once for one rig (Real = double) and for several that differ in
-// their numbers (Real = Lanes, see lanes.h).
+// The equations of motion of gear_train.h for a train that nothing but its teeth makes other than linear: no
+// terms, no dry friction, no law that needs touches. Written once for one rig (Real = double) and for several
+// that differ in their numbers (Real = Lanes, see lanes.h).
 #pragma once
 
 namespace backlash {
@@ -19,25 +19,27 @@ struct TrainLayout {
 /// The same, known to the compiler.
 template <int Mask>
 struct FixedLayout {
-  static constexpr bool motor_apart = Mask & 1, gear_moves = Mask & 2, link_apart = Mask & 4, link_moves = Mask & 8;
+  static constexpr bool motor_apart = Mask & 1, gear_moves = Mask & 2, link_apart = Mask & 4,
+                        link_moves = Mask & 8;
   static constexpr int dof() { return 1 + motor_apart + gear_moves + (link_apart && link_moves); }
 };
 
 /// Coefficients, all referred to the load side; see gear_train.h for the signs.
 template <typename Real>
 struct SmoothTrain {
-  Real damping[4], asymmetry[4];                                          // N m s/rad: motor, pinion, gear, link
+  Real damping[4], asymmetry[4];  // N m s/rad: motor, pinion, gear, link
   Real input_stiffness, input_damping, output_stiffness, output_damping;  // 0 where rigid
   Real lever, start;                                                      // m (angular mesh: 1); see Mesh
   Real inverse_inertia[4];                                                // 1/(kg m^2), per degree of freedom
 
-  /// `state` and `rate` have 2 dof numbers: angles [rad], then speeds [rad/s]. Torques in N m, `half_gap` in m.
-  /// `force(x, v)` is that of the teeth [N] at x [m], in the middle of the gap 0 and > 0 towards the forward flank,
-  /// which moves there at v [m/s].
+  /// `state` and `rate` have 2 dof numbers: angles [rad], then speeds [rad/s]. Torques in N m, `half_gap` in
+  /// m. `force(x, v)` is that of the teeth [N] at x [m], in the middle of the gap 0 and > 0 towards the
+  /// forward flank, which moves there at v [m/s].
   template <typename Layout, typename Force>
   inline __attribute__((always_inline)) void derivative(const Layout& layout, const Real* state,
                                                         const Real& motor_torque, const Real& load_torque,
-                                                        const Real& half_gap, const Force& force, Real* rate) const {
+                                                        const Real& half_gap, const Force& force,
+                                                        Real* rate) const {
     const int dof = layout.dof();
     const Real* const speeds = state + dof;
     const bool link_free = layout.link_apart && layout.link_moves;
@@ -66,7 +68,8 @@ struct SmoothTrain {
     Real* const acceleration = rate + dof;
     acceleration[0] = (layout.motor_apart ? motor : motor + pinion) * inverse_inertia[0];
     if (layout.motor_apart) ++part, acceleration[part] = pinion * inverse_inertia[part];
-    if (layout.gear_moves) ++part, acceleration[part] = (layout.link_apart ? gear : gear + link) * inverse_inertia[part];
+    if (layout.gear_moves)
+      ++part, acceleration[part] = (layout.link_apart ? gear : gear + link) * inverse_inertia[part];
     if (link_free) ++part, acceleration[part] = link * inverse_inertia[part];
     rate[0] = w[0];
     part = 0;

@@ -11,17 +11,19 @@
 
 namespace backlash {
 
-/// By the explicit pair of Tsitouras (2011), which stands beside SUNDIALS here because a step of a few rigs in vector
-/// registers is shorter than the library's own work for one. The tolerances are those of `solver`, the method is not;
-/// each rig keeps to them, the strictest sets the step. What is returned is the same on every processor.
+/// By the explicit pair of Tsitouras (2011), which stands beside SUNDIALS here because a step of a few rigs
+/// in vector registers is shorter than the library's own work for one. The tolerances are those of `solver`,
+/// the method is not; each rig keeps to them, the strictest sets the step. What is returned is the same on
+/// every processor.
 class Ensemble {
  public:
-  /// Whether these can be moved at once: smooth trains (GearTrain::smooth()) of one layout with contact laws of one
-  /// exponent (ContactLaw::power_contact()), and an excitation that asks nothing of the machine. Others need a Plant
-  /// each.
+  /// Whether these can be moved at once: smooth trains (GearTrain::smooth()) of one layout with contact laws
+  /// of one exponent (ContactLaw::power_contact()), and an excitation that asks nothing of the machine.
+  /// Others need a Plant each.
   static bool takes(const std::vector<Rig>& rigs, const ExcitationSettings& excitation);
 
-  /// All at rest in the middle of their gaps at time 0, as Plant. Throws InvalidParameter where takes() says no.
+  /// All at rest in the middle of their gaps at time 0, as Plant. Throws InvalidParameter where takes() says
+  /// no.
   Ensemble(const std::vector<Rig>& rigs, const ExcitationSettings& excitation, const SolverSettings& solver);
   ~Ensemble();
 

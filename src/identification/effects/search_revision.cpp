@@ -1,4 +1,5 @@
-// What the search takes back: effects that others explain as well, that stood in for another or for what has no name.
+// What the search takes back: effects that others explain as well, that stood in for another or for what has
+// no name.
 #include <algorithm>
 #include <cmath>
 
@@ -11,8 +12,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kClearlyLess = 0.9;      // of a residual: worth another set of effects
-constexpr double kAsGood = 1.02;          // of a residual: then fewer parameters are better
+constexpr double kClearlyLess = 0.9;  // of a residual: worth another set of effects
+constexpr double kAsGood = 1.02;      // of a residual: then fewer parameters are better
 const char* const kAsymmetry = "_asymmetry";
 
 double asymmetry_of(const std::string& friction, const Rig& rig) {
@@ -50,7 +51,8 @@ void Search::try_other_teeth() {
   const Stage base = *base_, stage = *stage_;
   const std::vector<Accepted> effects = effects_;
   declared_.rig = *other;
-  for (const RigParameter& p : servo_parameters())  // without the effects that it lacks it may have wanted less than none
+  for (const RigParameter& p :
+       servo_parameters())  // without the effects that it lacks it may have wanted less than none
     if (is_friction(p.name) && p.get(*other) <= 0) p.set(declared_.rig, p.get(declared.rig));
   const bool fits = attempted([&] {
                       declare_parameters();
@@ -109,8 +111,9 @@ void Search::try_equivalents() {
       const Stage stage = *stage_;
       report("trying " + other.id + " instead of " + effects_[i].candidate.id);
       std::vector<Accepted> swapped = effects_;
-      std::swap(swapped[i].candidate, *std::find_if(swapped[i].alternatives.begin(), swapped[i].alternatives.end(),
-                                                    [&](const Candidate& c) { return c.id == other.id; }));
+      std::swap(swapped[i].candidate,
+                *std::find_if(swapped[i].alternatives.begin(), swapped[i].alternatives.end(),
+                              [&](const Candidate& c) { return c.id == other.id; }));
       std::replace(swapped[i].equivalent_to.begin(), swapped[i].equivalent_to.end(), other.id,
                    effects_[i].candidate.id);
       if (adopt(std::move(swapped))) drop_superfluous();
@@ -137,8 +140,8 @@ void Search::drop(std::size_t effect) {
   }
 }
 
-/// Friction of a machine with one channel is never quite what a term says, and its residual never at the floor;
-/// there what was found stands, and what remains is told beside it.
+/// Friction of a machine with one channel is never quite what a term says, and its residual never at the
+/// floor; there what was found stands, and what remains is told beside it.
 void Search::drop_stand_ins() {
   if (!load_moves_freely(declared_.rig)) return;
   const Leftover &left = stage_->leftover, &first = base_->leftover;
@@ -152,14 +155,16 @@ void Search::drop_stand_ins() {
 void Search::hold_friction() {
   for (bool negative = true; negative;) {
     const Machine& now = stage_->fit.machine;
-    auto at = std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
-      return is_friction(p.name) && p.name.find(kAsymmetry) == std::string::npos &&
-             p.get(now.rig) < std::fabs(asymmetry_of(p.name, now.rig));
-    });
+    auto at =
+        std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
+          return is_friction(p.name) && p.name.find(kAsymmetry) == std::string::npos &&
+                 p.get(now.rig) < std::fabs(asymmetry_of(p.name, now.rig));
+        });
     negative = at != declared_.parameters.end();
     if (!negative) return;
-    const auto asymmetry = std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
-                                        [&](const FitParameter& p) { return p.name == at->name + kAsymmetry; });
+    const auto asymmetry =
+        std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
+                     [&](const FitParameter& p) { return p.name == at->name + kAsymmetry; });
     if (asymmetry != declared_.parameters.end()) at = asymmetry;
     held_.push_back(at->name);
     at->set(stage_->fit.machine.rig, 0);

@@ -8,8 +8,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kLargestDelay = 0.5;     // samples, that are calibration; more is an effect
-constexpr double kUnheld = 0.25;          // samples earlier than a held torque: it is not held
+constexpr double kLargestDelay = 0.5;  // samples, that are calibration; more is an effect
+constexpr double kUnheld = 0.25;       // samples earlier than a held torque: it is not held
 constexpr int kIterations = 12, kMapIterations = 3;
 
 }  // namespace
@@ -67,7 +67,8 @@ void without_calibration(Machine& machine) {
 
 void take_over_calibration(Machine& machine, double interval) {
   double mean = 0;
-  for (const Calibration& c : machine.calibrations) mean += c.torque_delay / double(machine.calibrations.size());
+  for (const Calibration& c : machine.calibrations)
+    mean += c.torque_delay / double(machine.calibrations.size());
   ParameterValues values = machine.rig.terms.back()->values;
   values["delay"] += mean * interval;
   machine.rig.terms.back() = make_term("delay", values);

@@ -32,8 +32,8 @@ double size(const Leftover& left);
 void tell_held(Machine& machine);
 /// What seemed not to be held, because the delay had to stand in for an effect, may be.
 void tell_held_again(Machine& machine);
-/// Beyond calibration a delay is an effect: then as much as is calibration stays, and is fitted no more, so that
-/// the effect can be seen.
+/// Beyond calibration a delay is an effect: then as much as is calibration stays, and is fitted no more, so
+/// that the effect can be seen.
 void limit_delay(Machine& machine);
 /// Where delay is an effect calibration is part of it.
 void without_calibration(Machine& machine);
