@@ -28,7 +28,6 @@ constexpr double kMostBlocks = 0.6;       // of the blocks must get better
 constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
 constexpr std::size_t kMapTrials = 2;
 constexpr std::size_t kNearest = 3;
-const char* const kLearned = "learned_map";
 constexpr int kOtherStarts = 4;
 constexpr double kBeside = 0.4;           // of the logarithm of a parameter
 constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum

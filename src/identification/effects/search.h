@@ -27,6 +27,8 @@ constexpr double kNearFloor = 2;        // times the floor: what is left is most
 constexpr double kClearlyRight = 1.3;   // times the floor: no other order, no other set needs to be tried
 constexpr double kHalf = 0.5;           // of a residual: an effect that explains less may stand in for another
 
+const char* const kLearned = "learned_map";
+
 bool is_friction(const std::string& parameter);
 
 class Search {

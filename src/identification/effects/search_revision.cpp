@@ -73,12 +73,16 @@ void Search::try_other_teeth() {
   effects_ = effects;
 }
 
-/// Takes an effect out for good, unless what comes after it then finds no fit that is nearly as good.
+/// Takes an effect out for good. Learned maps do not always find their way back from the machine without it:
+/// where that shows it stays.
 bool Search::dropped(std::size_t effect) {
   const std::vector<Accepted> effects = effects_;
   const Stage stage = *stage_;
   drop(effect);
-  if (size(stage_->leftover) * (1 - settings_.least_gain_unclear) < size(stage.leftover)) return true;
+  const bool learned = std::any_of(effects.begin(), effects.end(),
+                                   [](const Accepted& e) { return e.candidate.id == kLearned; });
+  if (!learned || size(stage_->leftover) * (1 - settings_.least_gain_unclear) < size(stage.leftover))
+    return true;
   effects_ = effects;
   stage_ = stage;
   return false;
