@@ -106,7 +106,10 @@ std::string traced_rig_text(const RigFile& declared, const Trace& trace) {
   for (const auto& [name, unit] : trace.units) units[name] = axis_unit(unit, declared.rig.linear);
   RigText machine(declared);
   const ContactSpec& contact = trace.augmented.mesh.contact_spec;
-  if (!declared.rig.mesh.rigid && contact.law != declared.rig.mesh.contact_spec.law) machine.set_contact_law(contact);
+  if (!declared.rig.mesh.rigid && contact.law != declared.rig.mesh.contact_spec.law) {
+    machine.set_contact_law(contact);
+    units["mesh_stiffness"] += "^1.5";
+  }
   write_servo(machine, {trace.augmented, trace.parameters, units}, declared.rig.motor_axis_ratio());
   std::string text = with_whole_path(machine.text(), declared.source);
   const Lines entries = new_entries(declared.rig, trace.augmented);

@@ -134,6 +134,7 @@ TEST(TracedRig, OtherTeethReplaceTheDeclaredLaw) {
   EXPECT_EQ(file.rig.mesh.contact_spec.law, "hunt_crossley");
   EXPECT_EQ(file.rig.mesh.contact_spec.values, trace.augmented.mesh.contact_spec.values);
   EXPECT_EQ(file.text.find("damping: 483"), std::string::npos) << file.text;
+  EXPECT_NE(file.text.find("# N m/rad^1.5, fitted +- 1e+05"), std::string::npos) << file.text;
   EXPECT_NE(file.text.find("# s/rad, fitted +- 0.01"), std::string::npos) << file.text;
   EXPECT_EQ(simulate_record(file.rig, file.simulation, 0.1).size(), 100u);
 }

@@ -93,6 +93,7 @@ void Search::run() {
   fit_base();
   declared_base_ = base_;
   add_effects();
+  tried_teeth_ = true;  // what follows may be taken back, and other teeth are not
   drop_superfluous();
   reconsider();
   try_equivalents();
