@@ -93,7 +93,8 @@ void Search::run() {
   fit_base();
   declared_base_ = base_;
   add_effects();
-  tried_teeth_ = true;  // what follows may be taken back, and other teeth are not
+  if (try_other_teeth()) add_effects();
+  teeth_settled_ = true;  // what follows may be taken back, and other teeth are not
   drop_superfluous();
   reconsider();
   try_equivalents();
@@ -372,7 +373,7 @@ void Search::add_learned() {
 
 void Search::add_effects() {
   while (effects_.size() < settings_.most_effects && add_one())
-    if (effects_.back().candidate.id == "mesh_hardening") try_other_teeth();
+    if (effects_.back().candidate.id == kHardening) try_other_teeth();
 }
 
 }  // namespace backlash

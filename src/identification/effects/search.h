@@ -28,6 +28,7 @@ constexpr double kClearlyRight = 1.3;   // times the floor: no other order, no o
 constexpr double kHalf = 0.5;           // of a residual: an effect that explains less may stand in for another
 
 const char* const kLearned = "learned_map";
+const char* const kHardening = "mesh_hardening";
 
 bool is_friction(const std::string& parameter);
 
@@ -73,8 +74,9 @@ class Search {
   /// Named effects that leave more than they explain may be stand-ins for what has no name.
   void drop_stand_ins();
 
-  /// What hardens may be teeth of another shape than declared, and is then no effect.
-  void try_other_teeth();
+  /// What hardens may be teeth of another shape than declared, and is then no effect; whether it was.
+  bool try_other_teeth();
+  void put_on(const Rig& teeth);
 
   void hold_friction();
   void declare_parameters();
@@ -104,7 +106,8 @@ class Search {
   MotionRange range_;
   Machine declared_;
   std::optional<Stage> declared_base_, base_, stage_;
-  bool other_teeth_ = false, tried_teeth_ = false;
+  bool other_teeth_ = false, teeth_settled_ = false;
+  std::size_t teeth_tried_with_ = 0;  // effects
   std::vector<Accepted> effects_;
   std::vector<std::string> held_;
 };

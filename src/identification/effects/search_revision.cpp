@@ -42,35 +42,53 @@ void Search::drop_superfluous() {
   }
 }
 
-void Search::try_other_teeth() {
-  const auto other = with_hertzian_teeth(base_->fit.machine.rig, range_.torque);
-  if (tried_teeth_ || !other) return;
-  tried_teeth_ = true;
+/// Tried when hardening is found and once more beside all other effects, without which their shape may not show.
+bool Search::try_other_teeth() {
+  std::vector<Accepted> others = effects_;
+  others.erase(std::remove_if(others.begin(), others.end(),
+                              [](const Accepted& effect) { return effect.candidate.id == kHardening; }),
+               others.end());
+  const auto teeth = with_hertzian_teeth(base_->fit.machine.rig, range_.torque);  // hardening has its own stiffness
+  const bool news = others.size() < effects_.size() && teeth_tried_with_ != effects_.size();
+  const bool right = stage_->leftover.torque < kClearlyRight && stage_->leftover.deflection < kClearlyRight;
+  if (teeth_settled_ || !news || right || !teeth) return false;
+  teeth_tried_with_ = effects_.size();
   report("trying other teeth");
   const Machine declared = declared_;
   const Stage base = *base_, stage = *stage_;
   const std::vector<Accepted> effects = effects_;
-  declared_.rig = *other;
-  for (const RigParameter& p :
-       servo_parameters())  // without the effects that it lacks it may have wanted less than none
-    if (is_friction(p.name) && p.get(*other) <= 0) p.set(declared_.rig, p.get(declared.rig));
   const bool fits = attempted([&] {
-                      declare_parameters();
+                      put_on(*teeth);
+                      if (others.empty() || !adopt(std::move(others))) effects_.clear();
+                      const std::vector<Accepted> kept = effects_;
+                      const Stage with_them = *stage_;
                       fit_base();
-                      effects_.clear();
-                      for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
-                        std::vector<Accepted> more = effects_;
-                        more.push_back(effects[i]);
-                        adopt(std::move(more));
+                      if (!kept.empty()) {
+                        effects_ = kept;
+                        stage_ = with_them;
                       }
                       return size(stage_->leftover) < kClearlyLess * size(stage.leftover);
                     }).value_or(false);
-  other_teeth_ = fits;
-  if (fits) return;
+  if (fits) return other_teeth_ = true;
   declared_ = declared;
   base_ = base;
   stage_ = stage;
   effects_ = effects;
+  return false;
+}
+
+/// Declares a machine with other teeth; fits start with them.
+void Search::put_on(const Rig& teeth) {
+  Mesh& mesh = stage_->fit.machine.rig.mesh;
+  mesh.contact_spec = teeth.mesh.contact_spec;
+  mesh.contact = teeth.mesh.contact;
+  const Rig declared = declared_.rig;
+  declared_.rig = teeth;
+  for (const RigParameter& p : servo_parameters()) {
+    // Without the effects that it lacks the machine may have wanted less friction than none.
+    if (is_friction(p.name) && p.get(teeth) <= 0) p.set(declared_.rig, p.get(declared));
+  }
+  declare_parameters();
 }
 
 /// Takes an effect out for good. Learned maps do not always find their way back from the machine without it:
