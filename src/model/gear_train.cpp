@@ -9,6 +9,8 @@
 namespace backlash {
 namespace {
 
+constexpr double kWithinReach = 0.1;  // of half a gap, from which a flank that moves less than that cannot touch
+
 Coupling referred(Coupling coupling, double factor) {
   coupling.stiffness *= factor;
   coupling.damping *= factor;
@@ -59,8 +61,9 @@ GearTrain::GearTrain(const Rig& rig)
     shape_follows_torque_ |= term->shape_follows_torque();
     dry |= term->has_dry_friction();
     term->add_friction({}, at_rest);
+    const bool acts_on_flanks = term->shapes_flanks() || term->loads_flanks();
     if (term->shapes_flanks()) flank_terms_.push_back(term.get());
-    if (term->moves_load()) load_terms_.push_back(term.get());
+    if (term->moves_load() && !acts_on_flanks) load_terms_.push_back(term.get());
   }
   presliding_ = at_rest.motor.presliding > 0 || at_rest.load.presliding > 0;
   const auto rubs = [](const FrictionLimits& f) { return f.forward > 0 || f.backward > 0; };
@@ -365,7 +368,17 @@ GearTrain::Flanks GearTrain::flanks(double motor_position, double load_position)
   motion.motor_position = motor_position;
   motion.load_position = load_position;
   const Slots s = ends(motion);
-  return {shift(s, kForward, 0), shift(s, kReverse, 0)};
+  return {shift_within_reach(s, kForward), shift_within_reach(s, kReverse)};
+}
+
+/// Nobody asks where a flank is that cannot touch here.
+FlankShift GearTrain::shift_within_reach(const Slots& s, int side) const {
+  const double half = half_gap_ / lever_;
+  double nearest = half;
+  for (const Term* term : flank_terms_) nearest += term->least_opening(half);
+  const double away = nearest - side * relative(s) / lever_;
+  if (away > kWithinReach * half) return {std::numeric_limits<double>::infinity(), 0, 0};
+  return shift(s, side, 0);
 }
 
 GearTrain::LoadForces GearTrain::load_forces(const Motion& motion, const Flanks& flanks) const {

@@ -76,6 +76,13 @@ std::vector<const Term*> load_terms(const Rig& rig) {
   return terms;
 }
 
+/// Whether terms push the load, which may follow the torque of the motor; flanks do not.
+bool pushed(const Rig& rig) {
+  const std::vector<const Term*> terms = load_terms(rig);
+  return std::any_of(terms.begin(), terms.end(),
+                     [](const Term* term) { return !term->shapes_flanks() && !term->loads_flanks(); });
+}
+
 class Load {
  public:
   Load(const Rig& rig, double feedback)
@@ -83,7 +90,7 @@ class Load {
         inertia_(train_.load_inertia()),
         feedback_(feedback),
         rubs_(train_.friction_event_count() > 0),
-        terms_(!load_terms(rig).empty()),
+        may_follow_torque_(pushed(rig)),
         shaped_(train_.flanks_shift_with_position()) {}
 
   double q = 0, w = 0;
@@ -98,7 +105,7 @@ class Load {
   /// part. `sum` gathers the mesh torque on the motor; returns that through the teeth at the end.
   double step(const Segment& s, Halves& sum) {
     double u = 0;
-    if (terms_) last_ = forces(s.at(0), q, w, flanks_);  // the motor torque that they may follow has jumped
+    if (may_follow_torque_) last_ = forces(s.at(0), q, w, flanks_);  // the motor torque that they may follow has jumped
     Forces f = last_;
     for (int piece = 0; u < 1; ++piece) {
       const bool divide = piece < kMostPieces;
@@ -233,7 +240,7 @@ class Load {
 
   GearTrain train_;
   double inertia_, feedback_;
-  bool rubs_, terms_, shaped_;
+  bool rubs_, may_follow_torque_, shaped_;
   StickSlip mode_;
   Forces last_{};  // at the end of the sample before
   Flanks flanks_;  // there, if known

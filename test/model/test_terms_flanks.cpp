@@ -82,6 +82,43 @@ TEST(FlankTerms, OpeningsByHand) {
   }
 }
 
+const char* const kUneven = "id: varying_backlash, amplitude: -0.4, order: 3, phase: 0.7";
+const char* const kError = "id: transmission_error, amplitude: 5e-4, order: 7, phase: -1";
+
+TEST(FlankTerms, NoOpeningIsBelowTheLeast) {
+  for (const char* text : {kWider, kTooth, kBack, kBoth, kUneven, kError}) {
+    const auto t = term(text);
+    double least = INFINITY;
+    for (const int side : {1, -1})
+      for (double q = -3.2; q < 3.2; q += 1e-3) least = std::min(least, shift(t, side, q).opening);
+    EXPECT_GE(least, t->least_opening(kHalf)) << text;
+    // reached, or never below 0 far from a fault; steps of 1e-3 miss a crest of order 7 by (7e-3 / 2)^2 / 2
+    EXPECT_NEAR(least, t->least_opening(kHalf), 1e-5 * kHalf) << text;
+  }
+  EXPECT_EQ(term(kLoadMap)->least_opening(kHalf), -INFINITY);
+}
+
+// Flanks that cannot touch are not looked up; that changes no force.
+TEST(FlankTerms, ForcesAreTheSameWithFlanksThatAreKnown) {
+  Rig rig = free_rig(kUneven);
+  for (const char* text : {kError, kBack, kTooth}) rig.terms.push_back(term(text));
+  const GearTrain train(rig);
+  int far = 0, touching = 0;
+  for (double load = -3.2; load < 3.2; load += 0.0137) {
+    for (double x = -3 * kHalf; x < 3 * kHalf; x += 0.021 * kHalf) {
+      const Motion motion{0, load + x, 0.3, load, 0.2};
+      const GearTrain::Flanks flanks = train.flanks(motion.motor_position, load);
+      const GearTrain::LoadForces known = train.load_forces(motion, flanks), asked = train.load_forces(motion);
+      ASSERT_EQ(known.net, asked.net) << load << " " << x;
+      ASSERT_EQ(known.mesh_on_motor, asked.mesh_on_motor) << load << " " << x;
+      for (const FlankShift& at : flanks) far += std::isinf(at.opening);
+      touching += asked.mesh_torque != 0;
+    }
+  }
+  EXPECT_GT(far, 10000);
+  EXPECT_GT(touching, 10000);
+}
+
 TEST(FlankTerms, SlopesAreThoseOfTheOpening) {
   const double d = 1e-6;
   for (const char* text : {kWider, kTooth, kBack, kBoth, kLoadMap, kMotorMap, kTorqueMap}) {

@@ -76,8 +76,8 @@ class GearTrain {
   };
   LoadForces load_forces(const Motion& motion) const;
 
-  /// The shift of either flank at these positions, forward flank first; for whoever asks for forces several
-  /// times where it hardly changes. Only if terms act on the flanks and none shapes them by the torque.
+  /// The shift of either flank at these positions, forward flank first, infinite of one that is far away; for
+  /// whoever asks for forces several times where it hardly changes. Only if terms act on the flanks and none shapes them by the torque.
   using Flanks = std::array<FlankShift, 2>;
   bool flanks_shift_with_position() const { return shaped_ && !shape_follows_torque_; }
   Flanks flanks(double motor_position, double load_position) const;
@@ -181,6 +181,7 @@ class GearTrain {
   double relative(const Slots& s) const { return lever_ * (s.q[kPinion] - s.q[kGear]) + start_ * half_gap_; }
   FlankPoint flank_point(const Slots& s, int side, double mesh_torque) const;
   FlankShift shift(const Slots& s, int side, double mesh_torque) const;
+  FlankShift shift_within_reach(const Slots& s, int side) const;
   double flank_force(const Slots& s, int side, double penetration, double rate, double mesh_torque) const;
   double shaped_torques(const Slots& s, double* torque) const;
   double shaped_force(const Slots& s, int side, FlankShift& at) const;
@@ -222,7 +223,7 @@ class GearTrain {
   std::vector<std::shared_ptr<const Term>> terms_;
   TrainLayout layout_;
   std::optional<SmoothTrain<double>> smooth_;  // the same equations, where they are that simple
-  std::vector<const Term*> flank_terms_, load_terms_;  // of terms_, that shape flanks and that move the load
+  std::vector<const Term*> flank_terms_, load_terms_;  // of terms_, that shape flanks and that push the load
   double load_gain_;  // -, of the load encoder
   static constexpr int kFixed = -1;
 };

@@ -5,6 +5,7 @@
 // to try (TermSearch), the search for what a model lacks tries it with all the others.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -90,12 +91,16 @@ class Term {
   virtual bool has_dry_friction() const { return false; }
   virtual void add_friction(const Motion&, EndFriction&) const {}
 
-  /// Moves the flanks. The slopes make it conservative: the mesh torque acts through them on both ends.
+  /// Moves the flanks, and adds nothing then. The slopes make it conservative: the mesh torque acts through
+  /// them on both ends.
   virtual bool shapes_flanks() const { return false; }
   virtual bool shape_follows_torque() const { return false; }
   virtual void shape(const FlankPoint&, FlankShift&) const {}
+  /// The least opening [rad] that it gives a flank anywhere, with this half gap; -infinity if that is not known.
+  virtual double least_opening(double /*half_gap*/) const { return -std::numeric_limits<double>::infinity(); }
 
-  /// Adds to the torque >= 0 with which a flank resists [N m]; the sum of all never pulls.
+  /// Adds to the torque >= 0 with which a flank resists [N m], and nothing else then; the sum of all never
+  /// pulls.
   virtual bool loads_flanks() const { return false; }
   virtual void load_flank(const FlankLoad&, double& /*torque*/) const {}
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <random>
+#include <set>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
@@ -28,6 +29,7 @@ constexpr double kMostBlocks = 0.6;       // of the blocks must get better
 constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
 constexpr std::size_t kMapTrials = 2;
 constexpr std::size_t kNearest = 3;
+constexpr double kHopeless = 1.2;         // times a misfit, after the rough half of a fit
 constexpr int kOtherStarts = 4;
 constexpr double kBeside = 0.4;           // of the logarithm of a parameter
 constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum
@@ -40,6 +42,18 @@ Machine beside(Machine machine, int number) {
     if (p.positive) p.set(machine.rig, p.get(machine.rig) * std::exp(kBeside * (2 * share - 1)));
   }
   return machine;
+}
+
+/// What the terms of a candidate have from their grids, in rising order.
+std::vector<std::vector<double>> places(const Candidate& candidate) {
+  std::vector<std::vector<double>> all;
+  for (const ParameterValues& term : candidate.terms) {
+    all.emplace_back();
+    for (const TermShape& shape : term_type(candidate.id).search->shapes)
+      if (!shape.refined) all.back().push_back(term.at(shape.name));
+  }
+  std::sort(all.begin(), all.end());
+  return all;
 }
 
 /// A map over the recorded torque may take it away, and all inertia with it: no residual, less than noise.
@@ -182,13 +196,16 @@ void Search::fit_base() {
 }
 
 /// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
-std::optional<Search::Trial> Search::tried(const Candidate& candidate) const {
+/// Nothing where that fails or is far from the misfit that it should have.
+std::optional<Search::Trial> Search::tried(const Candidate& candidate, double wanted) const {
   Trial trial{candidate, {}, {}, 0};
   const auto fit = attempted([&] {
     trial.start = extended(stage_->fit.machine, candidate);
     if (candidate.id == "delay") take_over_calibration(trial.start, data_.front().interval);
     const bool map = !trial.start.beliefs.empty();
-    trial.start = fit_machine(trial.start, stage_->records, fit_options(kRoughTolerance, map)).machine;
+    const MachineFit rough = fit_machine(trial.start, stage_->records, fit_options(kRoughTolerance, map));
+    if (rough.fit.residuals.norm() > kHopeless * wanted) throw CannotIdentify("far from what was wanted");
+    trial.start = rough.machine;
     return fit_machine(trial.start, stage_->records, fit_options(kFineTolerance, map));
   });
   if (!fit) return std::nullopt;
@@ -221,26 +238,37 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
   return trials;
 }
 
+/// The same with its t-th term's shape some places farther in the grid; nothing where that ends or where two
+/// terms become one.
+std::optional<Candidate> Search::neighbour(const Candidate& candidate, std::size_t t, const TermShape& shape,
+                                           long step) const {
+  const std::vector<double> grid = shape.values(range_);
+  const long at = std::find(grid.begin(), grid.end(), candidate.terms[t].at(shape.name)) - grid.begin() + step;
+  if (at < 0 || at >= long(grid.size())) return std::nullopt;
+  for (const ParameterValues& term : candidate.terms)
+    if (term.at(shape.name) == grid[std::size_t(at)]) return std::nullopt;
+  Candidate other = candidate;
+  other.terms[t][shape.name] = grid[std::size_t(at)];
+  return other;
+}
+
 /// Sensitivities of a model that lacks an effect may mislead about orders: their neighbours are fitted too,
 /// unless what is left is noise.
 Search::Trial Search::best_neighbour(Trial trial) const {
   const Leftover left = stage_->records.leftover(trial.fit.machine);
   if (left.torque < kClearlyRight && left.deflection < kClearlyRight) return trial;
-  const TermSearch& search = *term_type(trial.candidate.id).search;
+  std::set<std::vector<std::vector<double>>> known;
   for (bool better = true; better;) {
     better = false;
-    for (const TermShape& shape : search.shapes) {
-      const std::vector<double> grid = shape.values(range_);
-      if (shape.refined || grid.size() < 2) continue;
-      for (std::size_t t = 0; t < trial.candidate.terms.size(); ++t) {
-        const Trial centre = trial;
-        const auto at = std::find(grid.begin(), grid.end(), centre.candidate.terms[t].at(shape.name)) - grid.begin();
+    for (const TermShape& shape : term_type(trial.candidate.id).search->shapes) {
+      if (shape.refined || shape.values(range_).size() < 2) continue;
+      const Trial centre = trial;
+      for (std::size_t t = 0; t < centre.candidate.terms.size(); ++t) {
         for (const long step : {-2L, -1L, 1L, 2L}) {
-          if (at + step < 0 || at + step >= long(grid.size())) continue;
+          const auto other = neighbour(centre.candidate, t, shape, step);
+          if (!other || !known.insert(places(*other)).second) continue;
           report("trying " + trial.candidate.id);
-          Candidate other = centre.candidate;
-          other.terms[t][shape.name] = grid[std::size_t(at + step)];
-          const auto fitted = tried(other);
+          const auto fitted = tried(*other, trial.misfit);
           if (!fitted || fitted->misfit >= 0.999 * trial.misfit) continue;
           trial = *fitted;
           better = true;

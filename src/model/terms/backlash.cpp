@@ -12,6 +12,7 @@ class Backlash : public Term {
   explicit Backlash(double angle) : opening_(0.5 * angle) {}
   bool shapes_flanks() const override { return true; }
   void shape(const FlankPoint&, FlankShift& shift) const override { shift.opening += opening_; }
+  double least_opening(double) const override { return opening_; }
 
  private:
   double opening_;

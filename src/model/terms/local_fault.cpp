@@ -29,6 +29,7 @@ class LocalFault : public Term {
     shift.opening += bump;
     shift.load_slope -= bump * chord * std::cos(half) / width_;
   }
+  double least_opening(double) const override { return std::min(0.0, amplitude_); }
 
  private:
   bool forward_, backward_;

@@ -19,6 +19,7 @@ class TransmissionError : public Term {
     shift.opening -= at.side * amplitude_ * std::sin(angle);
     shift.load_slope -= at.side * amplitude_ * order_ * std::cos(angle);
   }
+  double least_opening(double) const override { return -std::fabs(amplitude_); }
 
  private:
   double amplitude_, order_, phase_;

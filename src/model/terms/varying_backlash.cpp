@@ -19,6 +19,7 @@ class VaryingBacklash : public Term {
     shift.opening += at.half_gap * amplitude_ * std::sin(angle);
     shift.load_slope += at.half_gap * amplitude_ * order_ * std::cos(angle);
   }
+  double least_opening(double half_gap) const override { return -half_gap * std::fabs(amplitude_); }
 
  private:
   double amplitude_, order_, phase_;
