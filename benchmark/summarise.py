@@ -14,6 +14,10 @@ PAIRS = [  # figure, peer, which result, larger is better
     ("curve/build_curve", "curve/boost_dopri5", "real_time", False),
     ("bags/read", "bags/bare_view", "messages_per_s", True),
     ("bags/read_and_diagnose", "bags/bare_view", "messages_per_s", True),
+    ("nodes/diagnoser/flood", "nodes/bare/flood", "messages_per_s", True),
+    ("nodes/diagnoser/1000_Hz", "nodes/bare/1000_Hz", "us_per_message", False),
+    ("nodes/diagnoser/20000_Hz", "nodes/bare/20000_Hz", "us_per_message", False),
+    ("nodes/diagnoser/64_joints", "nodes/diagnoser/1_joints", "us_per_joint_sample", False),
 ]
 
 
@@ -72,10 +76,27 @@ def pairs(results, figures):
             result = results[each]
             value = milliseconds(result, key) if key.endswith("time") else result[key]
             values.append(value * 1e9 if key == "ns_per_sample" else value)
-        unit = {"real_time": "ms", "ns_per_sample": "ns/sample", "messages_per_s": "messages/s"}[key]
+        unit = {"real_time": "ms", "ns_per_sample": "ns/sample", "messages_per_s": "messages/s",
+                "us_per_message": "us/message", "us_per_joint_sample": "us/joint"}[key]
         figures[name] = values[0] / values[1]
         print(f"  {name:30} {values[0]:12.4g} {unit:12} {values[0] / values[1]:7.2f} x {peer} ({values[1]:.4g})"
               f"{', more is better' if larger else ''}")
+
+
+def show(results):
+    """What has no peer, or more to say than a ratio."""
+    print("\nnodes")
+    for name, result in results.items():
+        if not name.startswith("nodes/"):
+            continue
+        values = {key: value for key, value in result.items() if key not in ("name", "time_unit")}
+        print("  " + name.ljust(34) + "  ".join(
+            f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in values.items()))
+    print("\nrecords: s, s per minute of record, MB")
+    for name, result in results.items():
+        if name.startswith("records/"):
+            print(f"  {name:32} {result['real_time']:8.1f} {60 * result['real_time'] / result['length_s']:8.1f} "
+                  f"{result['memory_mb']:8.0f}  {', '.join(result.get('effects', []))}")
 
 
 def compare(figures, path):
@@ -104,6 +125,7 @@ def main():
     for group in TOLERANCES:
         work_precision(results, group, figures)
     pairs(results, figures)
+    show(results)
     if options.older:
         compare(figures, options.older)
     machine = {key: context[key] for key in ("date", "num_cpus", "mhz_per_cpu", "library_build_type") if key in context}

@@ -20,6 +20,7 @@ install_dependencies
 bash "${REPO}/scripts/install_dependencies.sh" libbenchmark-dev libboost-dev python3-scipy
 echo "Building in ${WS}"
 build
+build "${PACKAGE}_test_machine"
 use_workspace
 folder=${WS}/build/benchmark
 quietly configure_benchmark cmake -S "${REPO}/benchmark" -B "${folder}"
@@ -32,6 +33,14 @@ for name in integration statistics curve bags; do
   "${folder}/${name}" --benchmark_out="${folder}/${name}.json" --benchmark_out_format=json >"${folder}/${name}.log" 2>&1
   parts+=("${folder}/${name}.json")
 done
-echo "Running scipy"
-/usr/bin/python3 "${REPO}/benchmark/scipy_lsoda.py" >"${folder}/scipy.json"
-/usr/bin/python3 "${REPO}/benchmark/summarise.py" --out "${out}" ${older:+--older "${older}"} "${parts[@]}" "${folder}/scipy.json"
+executables=${WS}/devel/lib/${PACKAGE}
+measure() {
+  echo "Running $1"
+  /usr/bin/python3 "${REPO}/benchmark/$1.py" "${@:2}" >"${folder}/$1.json" 2>"${folder}/$1.log" ||
+    fail "$1.py failed: ${folder}/$1.log"
+  parts+=("${folder}/$1.json")
+}
+measure scipy_lsoda
+measure nodes "${executables}" "${folder}"
+measure records "${executables}"
+/usr/bin/python3 "${REPO}/benchmark/summarise.py" --out "${out}" ${older:+--older "${older}"} "${parts[@]}"

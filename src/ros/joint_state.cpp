@@ -150,13 +150,17 @@ ChannelValues read_joint_state(const sensor_msgs::JointState& m, const std::stri
   return reader.values(0);
 }
 
-sensor_msgs::JointState make_joint_state(const Observation& o, const JointNames& names) {
-  sensor_msgs::JointState m;
+void add_joint_state(const Observation& o, const JointNames& names, sensor_msgs::JointState& m) {
   add(m, names.motor, o.motor_position, o.motor_velocity, o.motor_torque);
   add(m, names.sensor, o.sensor_twist, o.sensor_twist_rate, o.sensor_torque);
   add(m, names.load, o.load_position, o.load_velocity, o.load_torque);
   add(m, names.current, kAbsent, kAbsent, o.motor_current);
   add(m, names.accelerometer, kAbsent, kAbsent, o.acceleration);
+}
+
+sensor_msgs::JointState make_joint_state(const Observation& o, const JointNames& names) {
+  sensor_msgs::JointState m;
+  add_joint_state(o, names, m);
   return m;
 }
 

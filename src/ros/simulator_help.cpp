@@ -12,6 +12,10 @@ Private parameters; unknown ones are refused. In brackets: units of values that 
   run                   [text] one of the rig file's test_runs: its excitation replaces that of the rig file
   joint                 [text] prefix of the names in joint_states: JOINT_motor, JOINT_sensor, JOINT_load, and
                         JOINT_current, JOINT_accelerometer where the rig file declares these sensors
+  joints                list of them instead: so many joints, all in the same messages. Other topics are then below
+                        JOINT/, set_backlash is ~JOINT/set_backlash, and a joint's own parameters override the
+                        common ones: JOINT/rig, JOINT/run, JOINT/backlash, JOINT/half_gap, JOINT/seed (else the
+                        common one plus its place in the list), JOINT/excitation_amplitude, ...frequency
   backlash              [m] total free play along the line of action, >= 0 (rig without base radius: rad)
   half_gap              [m] half of it; give one of the two
   sampling_rate         [Hz] 0.001 to 1e6

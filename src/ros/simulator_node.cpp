@@ -4,7 +4,6 @@
 #include <ros/console.h>
 #include <ros/init.h>
 #include <rosgraph_msgs/Clock.h>
-#include <std_msgs/String.h>
 
 #include <algorithm>
 #include <cmath>
@@ -58,9 +57,8 @@ std::uint32_t queue_length(double sampling_rate) {
 
 SimulatorNode::SimulatorNode(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle)
     : settings_(read_simulator_settings(private_handle)),
-      names_(settings_.file.rig.joint),
-      simulation_(settings_.file.rig, settings_.file.simulation),
-      pacer_(settings_.real_time_factor * simulation_.sampling_rate()),
+      sampling_rate_(settings_.joints.front().file.simulation.sensors.sampling_rate),
+      pacer_(settings_.real_time_factor * sampling_rate_),
       follows_ros_time_(ros::Time::isSimTime() && !settings_.publish_clock &&
                         settings_.real_time_factor == 1),
       clock_step_(clock_step(settings_.real_time_factor)),
@@ -68,28 +66,23 @@ SimulatorNode::SimulatorNode(const ros::NodeHandle& handle, const ros::NodeHandl
       private_handle_(private_handle),
       updater_(handle, private_handle) {
   advertise();
-  updater_.setHardwareID(settings_.file.rig.name);
+  updater_.setHardwareID(settings_.joints.front().file.rig.name);
   updater_.add("simulation", this, &SimulatorNode::diagnose);
-  last_report_ = next_report_ = next_warning_ = next_torque_warning_ = WallClock::now();
+  last_report_ = next_report_ = next_warning_ = WallClock::now();
 }
 
 void SimulatorNode::advertise() {
-  joint_states_ =
-      handle_.advertise<sensor_msgs::JointState>("joint_states", queue_length(simulation_.sampling_rate()));
-  rig_description_ = handle_.advertise<std_msgs::String>("rig_description", 1, true);
-  std_msgs::String description;
-  description.data = settings_.description;
-  rig_description_.publish(description);
-  true_backlash_ = handle_.advertise<std_msgs::Float64>("true_backlash", 1, true);
-  publish_true_backlash();
+  joint_states_ = handle_.advertise<sensor_msgs::JointState>("joint_states", queue_length(sampling_rate_));
+  for (const JointSettings& joint : settings_.joints) {
+    const std::string scope = settings_.named_joints ? joint.file.rig.joint : "";
+    joints_.push_back(std::make_unique<SimulatedJoint>(joint, ros::NodeHandle(handle_, scope),
+                                                       ros::NodeHandle(private_handle_, scope)));
+  }
   if (settings_.publish_clock) {  // latched: who comes before the first sample sees a valid time
     clock_ = handle_.advertise<rosgraph_msgs::Clock>("/clock", 1000, true);
     origin_ = wall_time();
     publish_clock(origin_);
   }
-  if (settings_.file.simulation.excitation.type == "topic")
-    torque_command_ = handle_.subscribe("torque_command", 100, &SimulatorNode::set_torque, this);
-  set_backlash_ = private_handle_.advertiseService("set_backlash", &SimulatorNode::set_backlash, this);
   reset_ = private_handle_.advertiseService("reset", &SimulatorNode::reset, this);
 }
 
@@ -137,9 +130,12 @@ void SimulatorNode::start() {
   const std::string pace = follows_ros_time_ ? "at the pace of /clock"
                            : factor == 0     ? "as fast as possible"
                                              : to_text(factor) + " times real time";
-  ROS_INFO_STREAM("simulating " << settings_.file.rig.name << " (" << settings_.file.source << ") at "
-                                << simulation_.sampling_rate() << " Hz with a backlash of " << true_backlash()
-                                << ", " << pace);
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const RigFile& file = settings_.joints[i].file;
+    ROS_INFO_STREAM(file.rig.joint << ": simulating " << file.rig.name << " (" << file.source << ") at "
+                                   << sampling_rate_ << " Hz with a backlash of " << joints_[i]->true_backlash()
+                                   << ", " << pace);
+  }
 }
 
 nanoseconds SimulatorNode::elapsed() const {
@@ -150,7 +146,7 @@ nanoseconds SimulatorNode::elapsed() const {
 ros::Time SimulatorNode::stamp(long sample) const {
   ros::Time time;
   time.fromNSec(origin_.toNSec() +
-                static_cast<std::uint64_t>(sample_time(sample, simulation_.sampling_rate()).count()));
+                static_cast<std::uint64_t>(sample_time(sample, sampling_rate_).count()));
   return time;
 }
 
@@ -165,7 +161,8 @@ void SimulatorNode::publish_burst() {
 }
 
 void SimulatorNode::publish_sample() {
-  sensor_msgs::JointState message = make_joint_state(simulation_.step(), names_);
+  sensor_msgs::JointState message;
+  for (const auto& joint : joints_) joint->step(message);
   message.header.stamp = stamp(published_);
   if (settings_.publish_clock && message.header.stamp >= next_clock_) {
     publish_clock(message.header.stamp);
@@ -181,19 +178,8 @@ void SimulatorNode::publish_clock(const ros::Time& now) {
   clock_.publish(message);
 }
 
-void SimulatorNode::publish_true_backlash() {
-  std_msgs::Float64 message;
-  message.data = simulation_.plant().gear_train().backlash();
-  true_backlash_.publish(message);
-}
-
-std::string SimulatorNode::true_backlash() const {
-  const double backlash = simulation_.plant().gear_train().backlash();
-  return to_text(backlash) + (settings_.file.rig.mesh.angular() ? " rad" : " m");
-}
-
 bool SimulatorNode::ros_time_went_back() const {
-  const nanoseconds interval = sample_time(1, simulation_.sampling_rate());
+  const nanoseconds interval = sample_time(1, sampling_rate_);
   return follows_ros_time_ && pacer_.wait(published_, elapsed()) > interval + kTolerableLag;
 }
 
@@ -227,8 +213,14 @@ void SimulatorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
     status.summary(DiagnosticStatus::OK, "running");
   const auto now = WallClock::now();
   const double wall = seconds(now - last_report_);
-  const double simulated = (published_ - reported_) / simulation_.sampling_rate();
-  const IntegratorStatistics statistics = simulation_.plant().statistics();
+  const double simulated = (published_ - reported_) / sampling_rate_;
+  IntegratorStatistics statistics;
+  for (const auto& joint : joints_) {
+    const IntegratorStatistics one = joint->simulation().plant().statistics();
+    statistics.steps += one.steps;
+    statistics.evaluations += one.evaluations;
+    statistics.error_test_failures += one.error_test_failures;
+  }
   status.add("lag [s]", seconds(lag_));
   status.add("samples published", published_);
   status.add("real time factor demanded", settings_.real_time_factor);
@@ -240,38 +232,15 @@ void SimulatorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   reported_ = published_;
 }
 
-bool SimulatorNode::set_backlash(backlash_diagnosis::SetBacklash::Request& request,
-                                 backlash_diagnosis::SetBacklash::Response& response) {
-  const double backlash = request.backlash;
-  if (!std::isfinite(backlash) || backlash < 0) {
-    response.success = false;
-    response.message = "backlash = " + to_text(backlash) + ": must be finite and >= 0";
-    ROS_WARN_STREAM("set_backlash refused: " << response.message);
-    return true;
-  }
-  simulation_.plant().set_backlash(backlash);
-  publish_true_backlash();
-  response.success = true;
-  response.message = "backlash is " + true_backlash();
-  ROS_INFO_STREAM(response.message);
-  return true;
-}
-
 bool SimulatorNode::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-  simulation_.reset();
-  publish_true_backlash();
   response.success = true;
-  response.message = "at rest; backlash is " + true_backlash();
+  response.message = "at rest; backlash is ";
+  for (const auto& joint : joints_) {
+    joint->reset();
+    response.message += (joint == joints_.front() ? "" : ", ") + joint->true_backlash();
+  }
   ROS_INFO_STREAM("reset: " << response.message);
   return true;
-}
-
-void SimulatorNode::set_torque(const std_msgs::Float64& message) {
-  if (std::isfinite(message.data))
-    simulation_.plant().set_torque(message.data);
-  else if (due(next_torque_warning_, 1s))
-    ROS_WARN_STREAM(torque_command_.getTopic()
-                    << ": torque = " << message.data << " refused: must be finite; the last one is held");
 }
 
 }  // namespace backlash

@@ -1,7 +1,10 @@
 #include "backlash_diagnosis/ros/simulator_settings.h"
 
+#include <ros/names.h>
+
 #include <cmath>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
@@ -15,31 +18,19 @@ constexpr double kSlowest = 1e-3;  // real time factor
 constexpr double kFastest = 1e3;
 constexpr double kLongest = 1e9;  // s, keeps sample numbers and nanoseconds far within 64 bits
 
-/// Reads the parameters that override the rig file and remembers which were given.
+/// Reads the parameters that override the rig file and remembers which were given: those below a scope ("" or
+/// "JOINT/") of one joint.
 class Overrides {
  public:
   Overrides(Parameters& parameters, RigFile& file) : parameters_(parameters), file_(file) {}
 
-  void apply() {
+  void apply(const std::string& scope) {
+    scope_ = scope;
     run();
-    joint();
     backlash();
     sensors();
     excitation("excitation_amplitude", Range::not_negative(), file_.simulation.excitation.amplitude);
     excitation("excitation_frequency", Range::positive(), file_.simulation.excitation.frequency);
-  }
-
-  std::string description() const {
-    std::string source = "# source: " + printable(file_.source, 1000);
-    if (!given_.empty()) source += "; changed by parameters: " + joined(given_);
-    return source + "\n" + file_.text;
-  }
-
- private:
-  void number(const std::string& name, const Range& range, double& value) {
-    if (!parameters_.has(name)) return parameters_.allow(name);
-    value = parameters_.number(name, value, range);
-    given_.push_back(name + " = " + to_text(value));
   }
 
   void joint() {
@@ -49,64 +40,130 @@ class Overrides {
     if (parameters_.has("joint")) given_.push_back("joint = " + printable(joint));
   }
 
+  /// The n-th joint of a list; noise of several joints must not be the same.
+  void joint(const std::string& name, int n) {
+    file_.rig.joint = name;
+    given_.push_back("joint = " + printable(name));
+    if (parameters_.has(name + "/seed") || n == 0) return;
+    file_.simulation.sensors.seed += n;
+    given_.push_back("seed = " + std::to_string(file_.simulation.sensors.seed));
+  }
+
+  std::string description() const {
+    std::string source = "# source: " + printable(file_.source, 1000);
+    if (!given_.empty()) source += "; changed by parameters: " + joined(given_);
+    return source + "\n" + file_.text;
+  }
+
+ private:
+  bool given(const std::string& name) {
+    if (!parameters_.has(scope_ + name)) parameters_.allow(scope_ + name);
+    return parameters_.has(scope_ + name);
+  }
+
+  void number(const std::string& name, const Range& range, double& value) {
+    if (!given(name)) return;
+    value = parameters_.number(scope_ + name, value, range);
+    given_.push_back(name + " = " + to_text(value));
+  }
+
   void run() {
-    if (!parameters_.has("run")) return parameters_.allow("run");
-    const std::string name = parameters_.text("run", "");
+    if (!given("run")) return;
+    const std::string name = parameters_.text(scope_ + "run", "");
     try {
       apply_test_run(find_test_run(file_.test_runs, name), file_);
     } catch (const InvalidParameter& e) {
-      throw InvalidParameter("~run", e.value(), e.limit());
+      throw InvalidParameter("~" + scope_ + "run", e.value(), e.limit());
     }
     given_.push_back("run = " + name);
   }
 
   void backlash() {
-    if (parameters_.has("backlash") && parameters_.has("half_gap"))
-      throw InvalidParameter("~half_gap", "given", "cannot be given together with ~backlash");
+    const bool half = given("half_gap");
+    if (given("backlash") && half)
+      throw InvalidParameter("~" + scope_ + "half_gap", "given", "cannot be given together with ~" + scope_ + "backlash");
     double& backlash = file_.rig.mesh.backlash;
     double half_gap = backlash / 2;
     number("backlash", Range::not_negative(), backlash);
     number("half_gap", Range::not_negative(), half_gap);
-    if (parameters_.has("half_gap")) backlash = 2 * half_gap;
+    if (half) backlash = 2 * half_gap;
   }
 
   void sensors() {
     SensorsSettings& sensors = file_.simulation.sensors;
     const Range rates = Range::between(1e-3, 1e6);
-    number("sampling_rate", rates, sensors.sampling_rate);
+    if (scope_.empty()) number("sampling_rate", rates, sensors.sampling_rate);  // one message holds all joints
     if (!rates.contains(sensors.sampling_rate))
       throw InvalidParameter("sensors.sampling_rate", sensors.sampling_rate, rates.text());
-    if (!parameters_.has("seed")) return parameters_.allow("seed");
-    sensors.seed = parameters_.integer("seed", 0, 0, std::numeric_limits<int>::max());
+    if (!given("seed")) return;
+    sensors.seed = parameters_.integer(scope_ + "seed", 0, 0, std::numeric_limits<int>::max());
     given_.push_back("seed = " + std::to_string(sensors.seed));
   }
 
   void excitation(const std::string& name, const Range& range, double& value) {
     const std::string& type = file_.simulation.excitation.type;
     const bool applies = type == "square" || type == "sine";
-    if (parameters_.has(name) && !applies)
-      throw InvalidParameter("~" + name, "given", "is for square and sine excitation, not for " + type);
+    if (given(name) && !applies)
+      throw InvalidParameter("~" + scope_ + name, "given", "is for square and sine excitation, not for " + type);
     number(name, range, value);
   }
 
   Parameters& parameters_;
   RigFile& file_;
+  std::string scope_;
   std::vector<std::string> given_;
 };
 
-RigFile read_rig_parameter(Parameters& parameters) {
-  if (!parameters.has("rig")) {
-    parameters.allow("rig");
-    return default_rig_file();
+RigFile read_rig_parameter(Parameters& parameters, const std::string& name, const RigFile& absent) {
+  if (!parameters.has(name)) {
+    parameters.allow(name);
+    return absent;
   }
-  const std::string path = parameters.text("rig", "");
+  const std::string path = parameters.text(name, "");
   try {
     return load_rig_file(path);
   } catch (const MissingInput& e) {
-    throw MissingInput(std::string("~rig: ") + e.what());
+    throw MissingInput("~" + name + ": " + e.what());
   } catch (const Error& e) {
-    throw BadData("~rig", e.what());
+    throw BadData("~" + name, e.what());
   }
+}
+
+JointSettings read_joint(Parameters& parameters, const RigFile& common) {
+  JointSettings joint{common, {}};
+  Overrides overrides(parameters, joint.file);
+  overrides.apply("");
+  overrides.joint();
+  joint.description = overrides.description();
+  return joint;
+}
+
+void require_topic_name(const std::string& joint) {
+  std::string why;
+  if (joint.empty() || joint.find('/') != std::string::npos || !ros::names::validate(joint, why))
+    throw InvalidParameter("~joints", printable(joint), "must be names of topics, without '/'");
+}
+
+std::vector<JointSettings> read_joints(Parameters& parameters, const RigFile& common) {
+  if (parameters.has("joint")) throw InvalidParameter("~joint", "given", "cannot be given together with ~joints");
+  std::vector<JointSettings> joints;
+  std::set<std::string> names;
+  for (const std::string& name : parameters.texts("joints", {})) {
+    require_topic_name(name);
+    if (!names.insert(name).second) throw InvalidParameter("~joints", name, "is named twice");
+    JointSettings joint{read_rig_parameter(parameters, name + "/rig", common), {}};
+    Overrides overrides(parameters, joint.file);
+    overrides.apply("");
+    overrides.joint(name, int(joints.size()));
+    overrides.apply(name + "/");
+    joint.description = overrides.description();
+    const double rate = joint.file.simulation.sensors.sampling_rate;
+    if (!joints.empty() && rate != joints.front().file.simulation.sensors.sampling_rate)
+      throw InvalidParameter("~" + name + "/rig", to_text(rate) + " Hz",
+                             "must have the sampling rate of the other joints; ~sampling_rate is for all");
+    joints.push_back(std::move(joint));
+  }
+  return joints;
 }
 
 double read_real_time_factor(Parameters& parameters) {
@@ -129,12 +186,15 @@ long read_samples(Parameters& parameters, double sampling_rate) {
 SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle) {
   Parameters parameters(private_handle);
   SimulatorSettings settings;
-  settings.file = read_rig_parameter(parameters);
-  Overrides overrides(parameters, settings.file);
-  overrides.apply();
-  settings.description = overrides.description();
+  const RigFile common = read_rig_parameter(parameters, "rig", default_rig_file());
+  parameters.allow("joints");
+  settings.named_joints = parameters.has("joints");
+  if (settings.named_joints)
+    settings.joints = read_joints(parameters, common);
+  else
+    settings.joints = {read_joint(parameters, common)};
   settings.real_time_factor = read_real_time_factor(parameters);
-  settings.samples = read_samples(parameters, settings.file.simulation.sensors.sampling_rate);
+  settings.samples = read_samples(parameters, settings.joints.front().file.simulation.sensors.sampling_rate);
   settings.publish_clock = parameters.boolean("publish_clock", settings.real_time_factor != 1);
   settings.wait_for_subscriber = parameters.boolean("wait_for_subscriber", false);
   settings.diagnostic_period = parameters.number("diagnostic_period", 1, Range::positive());

@@ -79,6 +79,9 @@ class JointStateReader {
 ChannelValues read_joint_state(const sensor_msgs::JointState& message, const std::string& joint,
                                const std::string& topic);
 
+/// Adds a simulated sample to a message, which may have those of other joints.
+void add_joint_state(const Observation& observation, const JointNames& names, sensor_msgs::JointState& message);
+
 /// Message for a simulated sample, without stamp.
 sensor_msgs::JointState make_joint_state(const Observation& observation, const JointNames& names);
 

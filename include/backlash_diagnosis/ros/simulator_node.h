@@ -1,4 +1,4 @@
-// The simulator as a ROS node: a Simulation, paced by a clock, with topics and services around it.
+// The simulator as a ROS node: simulated joints, paced by a clock.
 //
 // One thread: bursts of samples that are due, then the callbacks, then the next burst. So a service or a
 // torque acts at a sample boundary: from the time of the last published sample on.
@@ -8,18 +8,15 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <ros/service_server.h>
-#include <ros/subscriber.h>
-#include <std_msgs/Float64.h>
 #include <std_srvs/Trigger.h>
 
 #include <chrono>
-#include <string>
+#include <memory>
+#include <vector>
 
-#include "backlash_diagnosis/SetBacklash.h"
-#include "backlash_diagnosis/ros/joint_state.h"
 #include "backlash_diagnosis/ros/pacer.h"
+#include "backlash_diagnosis/ros/simulated_joint.h"
 #include "backlash_diagnosis/ros/simulator_settings.h"
-#include "backlash_diagnosis/simulation/simulation.h"
 
 namespace backlash {
 
@@ -44,23 +41,17 @@ class SimulatorNode {
   void publish_burst();
   void publish_sample();
   void publish_clock(const ros::Time& now);
-  void publish_true_backlash();
   ros::Time stamp(long sample) const;
   bool finished() const { return settings_.samples > 0 && published_ >= settings_.samples; }
-  std::string true_backlash() const;  // with its unit, for people
   bool ros_time_went_back() const;
   void warn_if_behind();
   void serve(Nanoseconds longest);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
-  bool set_backlash(backlash_diagnosis::SetBacklash::Request& request,
-                    backlash_diagnosis::SetBacklash::Response& response);
   bool reset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
-  void set_torque(const std_msgs::Float64& message);
 
   SimulatorSettings settings_;
-  JointNames names_;
-  Simulation simulation_;
+  double sampling_rate_;
   Pacer pacer_;
   bool follows_ros_time_;  // an external /clock sets the pace
   bool started_ = false;
@@ -70,14 +61,14 @@ class SimulatorNode {
   ros::Duration clock_step_;
   ros::Time next_clock_;
   Nanoseconds lag_{0};
-  WallClock::time_point next_warning_, next_torque_warning_, next_report_;
+  WallClock::time_point next_warning_, next_report_;
   WallClock::time_point last_report_;
   long reported_ = 0;  // samples at the last report
 
   ros::NodeHandle handle_, private_handle_;
-  ros::Publisher joint_states_, rig_description_, true_backlash_, clock_;
-  ros::Subscriber torque_command_;
-  ros::ServiceServer set_backlash_, reset_;
+  std::vector<std::unique_ptr<SimulatedJoint>> joints_;
+  ros::Publisher joint_states_, clock_;
+  ros::ServiceServer reset_;
   diagnostic_updater::Updater updater_;
 };
 

@@ -4,14 +4,21 @@
 #include <ros/node_handle.h>
 
 #include <string>
+#include <vector>
 
 #include "backlash_diagnosis/workflow/rig_file.h"
 
 namespace backlash {
 
-struct SimulatorSettings {
+/// One simulated joint.
+struct JointSettings {
   RigFile file;             // with the parameters that override it applied to `rig` and `simulation`
   std::string description;  // the rig file's text after a comment line: its source and what overrides it
+};
+
+struct SimulatorSettings {
+  std::vector<JointSettings> joints;  // at least one, all with the same sampling rate
+  bool named_joints;        // several, or a list of one: each has topics and services below its own name
   double real_time_factor;  // simulated per wall time; 0: as fast as possible
   long samples;             // to publish before the node ends; 0: endless
   bool publish_clock;

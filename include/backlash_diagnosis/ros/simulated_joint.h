@@ -1,0 +1,52 @@
+// One joint of the simulator node: a Simulation with its topics and services.
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <ros/service_server.h>
+#include <ros/subscriber.h>
+#include <std_msgs/Float64.h>
+
+#include <chrono>
+#include <string>
+
+#include "backlash_diagnosis/SetBacklash.h"
+#include "backlash_diagnosis/ros/joint_state.h"
+#include "backlash_diagnosis/ros/simulator_settings.h"
+#include "backlash_diagnosis/simulation/simulation.h"
+
+namespace backlash {
+
+class SimulatedJoint {
+ public:
+  /// Topics rig_description, true_backlash and torque_command are relative to `handle`, the service set_backlash to
+  /// `private_handle`.
+  SimulatedJoint(const JointSettings& settings, const ros::NodeHandle& handle, const ros::NodeHandle& private_handle);
+  SimulatedJoint(const SimulatedJoint&) = delete;  // callbacks refer to this object
+  SimulatedJoint& operator=(const SimulatedJoint&) = delete;
+
+  /// The next sample, added to a message.
+  void step(sensor_msgs::JointState& message) { add_joint_state(simulation_.step(), names_, message); }
+  /// At rest in the middle of the gap, backlash as at the start.
+  void reset();
+  std::string true_backlash() const;  // with its unit, for people
+  const Simulation& simulation() const { return simulation_; }
+
+ private:
+  void publish_true_backlash();
+  bool set_backlash(backlash_diagnosis::SetBacklash::Request& request,
+                    backlash_diagnosis::SetBacklash::Response& response);
+  void set_torque(const std_msgs::Float64& message);
+
+  std::string name_;
+  bool angular_;
+  JointNames names_;
+  Simulation simulation_;
+  std::chrono::steady_clock::time_point next_torque_warning_;
+  ros::NodeHandle handle_;
+  ros::Publisher rig_description_, true_backlash_;
+  ros::Subscriber torque_command_;
+  ros::ServiceServer set_backlash_;
+};
+
+}  // namespace backlash

@@ -1,0 +1,81 @@
+#include "backlash_diagnosis/ros/simulated_joint.h"
+
+#include <ros/console.h>
+#include <std_msgs/String.h>
+
+#include <cmath>
+
+#include "backlash_diagnosis/base/text.h"
+
+namespace backlash {
+namespace {
+
+constexpr std::chrono::seconds kWarningInterval{1};
+
+}  // namespace
+
+SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHandle& handle,
+                               const ros::NodeHandle& private_handle)
+    : name_(settings.file.rig.joint),
+      angular_(settings.file.rig.mesh.angular()),
+      names_(name_),
+      simulation_(settings.file.rig, settings.file.simulation),
+      next_torque_warning_(std::chrono::steady_clock::now()),
+      handle_(handle) {
+  rig_description_ = handle_.advertise<std_msgs::String>("rig_description", 1, true);
+  std_msgs::String description;
+  description.data = settings.description;
+  rig_description_.publish(description);
+  true_backlash_ = handle_.advertise<std_msgs::Float64>("true_backlash", 1, true);
+  publish_true_backlash();
+  if (settings.file.simulation.excitation.type == "topic")
+    torque_command_ = handle_.subscribe("torque_command", 100, &SimulatedJoint::set_torque, this);
+  ros::NodeHandle services(private_handle);
+  set_backlash_ = services.advertiseService("set_backlash", &SimulatedJoint::set_backlash, this);
+}
+
+void SimulatedJoint::reset() {
+  simulation_.reset();
+  publish_true_backlash();
+}
+
+void SimulatedJoint::publish_true_backlash() {
+  std_msgs::Float64 message;
+  message.data = simulation_.plant().gear_train().backlash();
+  true_backlash_.publish(message);
+}
+
+std::string SimulatedJoint::true_backlash() const {
+  return to_text(simulation_.plant().gear_train().backlash()) + (angular_ ? " rad" : " m");
+}
+
+bool SimulatedJoint::set_backlash(backlash_diagnosis::SetBacklash::Request& request,
+                                  backlash_diagnosis::SetBacklash::Response& response) {
+  const double backlash = request.backlash;
+  if (!std::isfinite(backlash) || backlash < 0) {
+    response.success = false;
+    response.message = "backlash = " + to_text(backlash) + ": must be finite and >= 0";
+    ROS_WARN_STREAM(name_ << ": set_backlash refused: " << response.message);
+    return true;
+  }
+  simulation_.plant().set_backlash(backlash);
+  publish_true_backlash();
+  response.success = true;
+  response.message = "backlash is " + true_backlash();
+  ROS_INFO_STREAM(name_ << ": " << response.message);
+  return true;
+}
+
+void SimulatedJoint::set_torque(const std_msgs::Float64& message) {
+  if (std::isfinite(message.data)) {
+    simulation_.plant().set_torque(message.data);
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_torque_warning_) return;
+  next_torque_warning_ = now + kWarningInterval;
+  ROS_WARN_STREAM(torque_command_.getTopic()
+                  << ": torque = " << message.data << " refused: must be finite; the last one is held");
+}
+
+}  // namespace backlash
