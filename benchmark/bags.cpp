@@ -4,8 +4,10 @@
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/JointState.h>
+#include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
@@ -21,7 +23,10 @@ constexpr double kRate = 5000, kDuration = 60;
 
 class BagFile {
  public:
-  BagFile() : path_(std::tmpnam(nullptr) + std::string(".bag")) {
+  BagFile() {
+    char name[] = "/tmp/benchmark_XXXXXX.bag";
+    close(mkstemps(name, 4));
+    path_ = name;
     RigFile file = default_rig_file();
     file.rig.mesh.backlash = 8e-5;
     file.simulation.sensors.sampling_rate = kRate;

@@ -8,9 +8,6 @@
 #include <emmintrin.h>
 #endif
 
-// Such numbers cross no boundary of a library, where it would matter how they are passed.
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace backlash {
 
 constexpr int kLanes = 4;
