@@ -54,7 +54,7 @@ void bare_view(benchmark::State& state) {
   double sum = 0;
   for (auto _ : state) {
     rosbag::Bag opened(path);
-    rosbag::View view(opened, rosbag::TopicQuery("joint_states"));
+    rosbag::View view(opened, rosbag::TopicQuery("/joint_states"));
     for (const rosbag::MessageInstance& instance : view)
       if (const auto message = instance.instantiate<sensor_msgs::JointState>())
         sum += message->effort.front();

@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 
+RIG = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "config", "sarkar_1997.yaml")
 FLOOD = 300_000  # messages
 FLOOD_RATE = 5_000  # Hz, of their stamps
 PATIENCE = 180  # s
@@ -177,7 +178,7 @@ def measure(machine, folder):
     curves = {}
     for hertz in (1000, FLOOD_RATE, 20_000):
         curves[hertz] = os.path.join(folder, f"curve_{hertz}.yaml")
-        machine.run("build_curve", "--points", "11", "--periods", "3", "--seeds", "4", "--sample-rate", str(hertz),
+        machine.run("build_curve", RIG, "--points", "11", "--periods", "3", "--seeds", "4", "--sample-rate", str(hertz),
                     "--out", curves[hertz])
     yield from flood(machine, curves)
     yield from at_rate(machine, curves, 1000, 20)

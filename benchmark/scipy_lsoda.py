@@ -18,11 +18,12 @@ RATE, DURATION, HALF_GAP = 1000, 0.5, 50e-6
 
 def equations(rig):
     train = rig["gear_train"]
-    j_motor, j_pinion, j_gear = (train[part]["inertia"] for part in ("motor", "pinion", "gear"))
+    j_motor, j_pinion, j_gear = (float(train[part]["inertia"]) for part in ("motor", "pinion", "gear"))
     viscous = train["motor"]["viscous_damping"]
     k_in, c_in = train["input_coupling"]["stiffness"], train["input_coupling"]["damping"]
     k_out, c_out = train["output_coupling"]["stiffness"], train["output_coupling"]["damping"]
-    radius, contact = train["mesh"]["base_radius"], train["mesh"]["contact"]
+    radius = train["mesh"]["base_radius"]
+    stiffness, alpha = (float(train["mesh"]["contact"][key]) for key in ("stiffness", "alpha"))  # 2.28e8: text to PyYAML
 
     def rates(_, s, torque):
         motor = k_in * (s[0] - s[1]) + c_in * (s[3] - s[4])
@@ -31,7 +32,7 @@ def equations(rig):
         if depth > 0:
             side = math.copysign(1, x)
             rate = side * radius * (s[4] - s[5])
-            force = side * contact["stiffness"] * depth**1.5 * max(0.0, 1 + 1.5 * contact["alpha"] * rate)
+            force = side * stiffness * depth**1.5 * max(0.0, 1 + 1.5 * alpha * rate)
         out = k_out * s[2] + c_out * s[5]
         return [s[3], s[4], s[5], (torque - viscous * s[3] - motor) / j_motor, (motor - radius * force) / j_pinion,
                 (radius * force - out) / j_gear]

@@ -168,7 +168,9 @@ void Search::drop_stand_ins() {
   if (!load_moves_freely(declared_.rig)) return;
   const Leftover &left = stage_->leftover, &first = base_->leftover;
   if (effects_.empty() || std::max(left.torque, left.deflection) < kNearFloor) return;
-  if (size(left) < kHalf * size(first)) return;
+  const bool telling = std::any_of(effects_.begin(), effects_.end(),
+                                   [](const Accepted& effect) { return effect.gain.evidence.gain >= kHalf; });
+  if (telling && size(left) < kHalf * size(first)) return;
   effects_.clear();
   stage_ = base_;
 }
