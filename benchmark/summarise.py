@@ -75,7 +75,7 @@ def pairs(results, figures):
         for each in (name, peer):
             result = results[each]
             value = milliseconds(result, key) if key.endswith("time") else result[key]
-            values.append(value * 1e9 if key == "ns_per_sample" else value)
+            values.append(value)
         unit = {"real_time": "ms", "ns_per_sample": "ns/sample", "messages_per_s": "messages/s",
                 "us_per_message": "us/message", "us_per_joint_sample": "us/joint"}[key]
         figures[name] = values[0] / values[1]
