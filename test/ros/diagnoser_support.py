@@ -5,7 +5,9 @@ import os
 import subprocess
 import tempfile
 import threading
+import time
 
+import actionlib
 import roslib.packages
 import rospy
 from backlash_diagnosis.msg import AmplitudeDistribution, BacklashEstimate
@@ -38,6 +40,17 @@ def build_curve(folder, rate=1000):
     run_tool("build_curve", rig_path(), "--out", path, "--points", 11, "--periods", 3, "--seeds", 4,
              "--sample-rate", rate)
     return path
+
+
+def result_of(client):
+    """SimpleActionClient overlooks an end that comes before its send_goal() has returned; the goal itself does not."""
+    end = time.monotonic() + TIMEOUT
+    while not client.wait_for_result(rospy.Duration(0.2)):
+        if client.gh.get_comm_state() == actionlib.CommState.DONE:
+            break
+        if time.monotonic() > end:
+            raise AssertionError("no result within %d s" % TIMEOUT)
+    return client.get_result()
 
 
 class Diagnoser:

@@ -11,7 +11,7 @@ import rospy
 import rostest
 from backlash_diagnosis.msg import BuildCurveAction, BuildCurveGoal
 from backlash_diagnosis.srv import SetBacklash
-from diagnoser_support import Diagnoser, Diagnostics, build_curve, level
+from diagnoser_support import Diagnoser, Diagnostics, build_curve, level, result_of
 from sensor_msgs.msg import JointState
 from simulator_support import TIMEOUT, Inbox, Simulator, nanoseconds
 
@@ -165,8 +165,7 @@ class DiagnoserTest(unittest.TestCase):
             fractions = []
             client.send_goal(BuildCurveGoal(points=5, periods=2, sampling_rate=1000),
                              feedback_cb=lambda feedback: fractions.append(feedback.fraction))
-            self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)))
-            result = client.get_result()
+            result = result_of(client)
             self.assertTrue(result.success, result.message)
             self.assertEqual(len(result.curve.points), 5)
             self.assertEqual(len(diagnoser.curve().curve.points), 5)
@@ -176,11 +175,11 @@ class DiagnoserTest(unittest.TestCase):
             client.send_goal(BuildCurveGoal(points=2000, sampling_rate=1000), feedback_cb=lambda _: first.set())
             self.assertTrue(first.wait(TIMEOUT))
             client.cancel_goal()
-            self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)))
+            result_of(client)
             self.assertEqual(client.get_state(), actionlib.GoalStatus.PREEMPTED)
             self.assertEqual(len(diagnoser.curve().curve.points), 5)
             client.send_goal(BuildCurveGoal(max_backlash=-1))
-            self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)))
+            result_of(client)
             self.assertEqual(client.get_state(), actionlib.GoalStatus.ABORTED)
             self.assertIn("max_backlash", client.get_result().message)
 

@@ -12,7 +12,7 @@ import actionlib
 import rospy
 import rostest
 from backlash_diagnosis.msg import TraceResidualAction, TraceResidualGoal
-from diagnoser_support import Diagnoser, rig_path, run_tool
+from diagnoser_support import Diagnoser, result_of, rig_path, run_tool
 from sensor_msgs.msg import JointState
 from simulator_support import TIMEOUT, Inbox, Simulator
 
@@ -53,8 +53,7 @@ class TraceResidualTest(unittest.TestCase):
         return TraceResidualGoal(**goal)
 
     def result(self):
-        self.assertTrue(self.client.wait_for_result(rospy.Duration(TIMEOUT)))
-        return self.client.get_result()
+        return result_of(self.client)
 
     def test_finds_what_the_nodes_own_rig_lacks(self):
         feedback = []
