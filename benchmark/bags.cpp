@@ -8,6 +8,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
@@ -24,9 +25,8 @@ constexpr double kRate = 5000, kDuration = 60;
 class BagFile {
  public:
   BagFile() {
-    char name[] = "/tmp/benchmark_XXXXXX.bag";
-    close(mkstemps(name, 4));
-    path_ = name;
+    path_ = (std::filesystem::temp_directory_path() / "benchmark_XXXXXX.bag").string();
+    close(mkstemps(path_.data(), 4));
     RigFile file = default_rig_file();
     file.rig.mesh.backlash = 8e-5;
     file.simulation.sensors.sampling_rate = kRate;

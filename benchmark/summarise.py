@@ -69,7 +69,7 @@ def work_precision(results, group, figures):
 def pairs(results, figures):
     print("\nfigure, and times the peer")
     for name, peer, key, larger in PAIRS:
-        if name not in results or peer not in results:
+        if any(each not in results or not results[each].get("handled", True) for each in (name, peer)):
             continue
         values = []
         for each in (name, peer):

@@ -105,7 +105,7 @@ class Load {
   /// part. `sum` gathers the mesh torque on the motor; returns that through the teeth at the end.
   double step(const Segment& s, Halves& sum) {
     double u = 0;
-    if (may_follow_torque_) last_ = forces(s.at(0), q, w, flanks_);  // the motor torque that they may follow has jumped
+    if (may_follow_torque_) last_ = forces(s.at(0), q, w, flanks_);  // the motor torque has jumped
     Forces f = last_;
     for (int piece = 0; u < 1; ++piece) {
       const bool divide = piece < kMostPieces;

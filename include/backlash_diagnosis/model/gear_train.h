@@ -77,7 +77,8 @@ class GearTrain {
   LoadForces load_forces(const Motion& motion) const;
 
   /// The shift of either flank at these positions, forward flank first, infinite of one that is far away; for
-  /// whoever asks for forces several times where it hardly changes. Only if terms act on the flanks and none shapes them by the torque.
+  /// whoever asks for forces several times where it hardly changes. Only if terms act on the flanks and none
+  /// shapes them by the torque.
   using Flanks = std::array<FlankShift, 2>;
   bool flanks_shift_with_position() const { return shaped_ && !shape_follows_torque_; }
   Flanks flanks(double motor_position, double load_position) const;

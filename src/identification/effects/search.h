@@ -86,8 +86,10 @@ class Search {
   std::vector<std::string> parameter_names() const;
   Machine with_effects(const std::vector<Accepted>& effects) const;
   Stage rough_base() const;
-  std::optional<Trial> tried(const Candidate& candidate, double wanted = std::numeric_limits<double>::infinity()) const;
-  std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t term, const TermShape& shape, long step) const;
+  std::optional<Trial> tried(const Candidate& candidate,
+                             double wanted = std::numeric_limits<double>::infinity()) const;
+  std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t term, const TermShape& shape,
+                                     long step) const;
   std::vector<Trial> tried_best(const std::vector<Candidate>& candidates) const;
   Trial best_neighbour(Trial trial) const;
   bool add_one();
