@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/quadratic.h"
@@ -11,6 +12,8 @@ namespace {
 
 constexpr double kReach = 4.5;         // standard deviations beyond which a normal distribution is 0 or 1
 constexpr double kCellsPerSigma = 4;   // of the grid on which distributions are summed
+constexpr double kLevelRatio = 1.03;      // between levels of noise at which a family is kept
+constexpr std::size_t kMostLevels = 32;   // half a megabyte each
 constexpr double kMostCells = 20'000;  // where noise is tiny against the range
 
 /// Normal distribution function within +-kReach, interpolated in a table to 2e-7.
@@ -84,6 +87,23 @@ NoisyFamily::NoisyFamily(const ApdFamily& family, double sigma)
   square_ = members_.colwise().squaredNorm();
   neighbours_ = Eigen::VectorXd::Zero(members_.cols());
   for (Eigen::Index k = 0; k + 1 < members_.cols(); ++k) neighbours_[k] = members_.col(k).dot(members_.col(k + 1));
+}
+
+ApdFamily::ApdFamily() : compared(std::make_shared<NoisyFamilies>()) {}
+
+std::shared_ptr<const NoisyFamily> NoisyFamilies::at(const ApdFamily& family, double sigma) {
+  const bool none = !(sigma > 0);
+  const double step = std::log(kLevelRatio);
+  const long level = none ? std::numeric_limits<long>::min() : std::lround(std::log(sigma) / step);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto known = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& k) { return k.level == level; });
+  if (known != kept_.end()) {
+    kept_.splice(kept_.begin(), kept_, known);
+  } else {
+    kept_.push_front({level, std::make_shared<NoisyFamily>(family, none ? 0 : std::exp(double(level) * step))});
+    if (kept_.size() > kMostLevels) kept_.pop_back();
+  }
+  return kept_.front().family;
 }
 
 // Squares of differences from products of the members with the record: those among the members are known already.

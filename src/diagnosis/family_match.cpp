@@ -63,7 +63,7 @@ FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> sampl
   const Quantiles observed = quantiles_of(std::move(samples));
   std::vector<std::pair<double, FamilyDistance>> fits;  // by noise
   for (const double sigma : noises_of(noise, curve.noise_levels))
-    fits.emplace_back(sigma, FamilyDistance(NoisyFamily(*curve.family, sigma), observed));
+    fits.emplace_back(sigma, FamilyDistance(*curve.family->compared->at(*curve.family, sigma), observed));
   FamilyMatch match;
   double smallest = std::numeric_limits<double>::infinity();
   for (const auto& [sigma, fit] : fits) {

@@ -107,5 +107,31 @@ TEST(FamilyDistance, TakesTheNearestPhase) {
   EXPECT_NEAR(distance.at(1, 0.15), 0.0025, 1e-12);  // between phases 1 (0.2 away) and 2 (0.1): 0.05 both
 }
 
+TEST(NoisyFamilies, KeepsWhatRecordsWereComparedWithLately) {
+  const ApdFamily family = shifted(4, 3, 0.02, 0.005), copy = family;
+  const auto first = family.compared->at(family, 0.1);
+  EXPECT_EQ(family.compared->at(family, 0.1001), first);
+  EXPECT_EQ(copy.compared->at(copy, 0.1), first);
+  EXPECT_NE(family.compared->at(family, 0.12), first);
+  EXPECT_NE(family.compared->at(family, 0), first);
+  for (int i = 0; i < 1000; ++i) family.compared->at(family, 0.2 * std::pow(1.05, i % 100));
+  EXPECT_EQ(first.use_count(), 1);  // not for ever
+  EXPECT_NE(family.compared->at(family, 0.1), first);
+  EXPECT_NE(shifted(4, 3, 0.02, 0.005).compared, family.compared);
+}
+
+// Levels are 3 % apart: noise is off by half of that at most, and so are the distances' roots, in its unit.
+TEST(NoisyFamilies, DistancesAreThoseOfTheExactNoise) {
+  const ApdFamily family = shifted(4, 3, 0.02, 0.005);
+  const Quantiles observed = with_noise(family.members[2][1], 0.3);
+  for (double sigma = 0.05; sigma < 0.5; sigma *= 1.07) {
+    const FamilyDistance near(*family.compared->at(family, sigma), observed), exact(NoisyFamily(family, sigma), observed);
+    for (std::size_t i = 0; i + 1 < family.members.size(); ++i)
+      EXPECT_NEAR(std::sqrt(near.at(i, 0.5)), std::sqrt(exact.at(i, 0.5)), 0.016 * sigma) << sigma;
+  }
+  const FamilyDistance none(*family.compared->at(family, 0), family.members[1][0]);
+  EXPECT_NEAR(none.smallest().distance, 0, 1e-12);  // rounding
+}
+
 }  // namespace
 }  // namespace backlash

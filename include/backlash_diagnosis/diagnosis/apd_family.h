@@ -12,6 +12,9 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <list>
+#include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -38,9 +41,13 @@ struct FamilySegment {
 /// Members by backlash value and phase, free of noise; one segment between each two backlash values of the
 /// curve. Members beyond those of the curve's points, as far apart as the last two, only serve to recognise
 /// backlash that is larger than the curve covers.
+class NoisyFamilies;
 struct ApdFamily {
+  ApdFamily();
   std::vector<std::vector<Quantiles>> members;
   std::vector<FamilySegment> segments;
+  /// What has been compared with records before; shared by copies, so members must not change from then on.
+  std::shared_ptr<NoisyFamilies> compared;
 };
 
 /// The members as noise of standard deviation sigma >= 0 shows them, ready for being compared with many records.
@@ -59,6 +66,22 @@ class NoisyFamily {
   Eigen::MatrixXd members_;     // a column each
   Eigen::VectorXd square_;      // of each
   Eigen::VectorXd neighbours_;  // product of each with the next of its phase
+};
+
+/// A family with the noise of the records that it was compared with lately, so that the next record of the same
+/// machine costs no more than its distances. Safe to use from several threads.
+class NoisyFamilies {
+ public:
+  /// With the noise nearest to sigma >= 0 of levels 3 % apart; noise is known less precisely than that.
+  std::shared_ptr<const NoisyFamily> at(const ApdFamily& family, double sigma);
+
+ private:
+  struct Kept {
+    long level;
+    std::shared_ptr<const NoisyFamily> family;
+  };
+  std::mutex mutex_;
+  std::list<Kept> kept_;  // the last that was asked for first
 };
 
 /// Distance of one observed distribution from all members, over backlash. Positions are segment + share: the
