@@ -42,10 +42,12 @@ class Machine:
         return program
 
     def start(self, program, *words, core=None):
+        """A node; only what `messages` prints is read, and by stop()."""
+        output = subprocess.PIPE if program == "messages" else subprocess.DEVNULL
         command = [self.path(program), *words]
         if core is not None:
             command = ["taskset", "-c", str(core)] + command
-        process = subprocess.Popen(command, env=self.env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        process = subprocess.Popen(command, env=self.env, stdout=output, stderr=subprocess.DEVNULL, text=True)
         self.processes.append(process)
         return process
 
@@ -56,6 +58,9 @@ class Machine:
     def wait_for(self, condition, what):
         end = time.monotonic() + PATIENCE
         while not condition():
+            for process in self.processes:
+                if process.poll() is not None and process.returncode != 0:
+                    raise RuntimeError(f"{process.args[0]} ended with {process.returncode}")
             if time.monotonic() > end:
                 raise TimeoutError(f"{what} did not come within {PATIENCE} s")
             time.sleep(0.05)
@@ -79,25 +84,29 @@ class Machine:
         return json.loads(done.stdout)
 
     def diagnostics(self, name):
-        """The latest values of a status, as the node publishes it by itself within two seconds."""
+        """The values of the second status from now: the first may be from before."""
         import rospy  # after ROS_MASTER_URI is known
         from diagnostic_msgs.msg import DiagnosticArray
+        found = []
         if not rospy.core.is_initialized():
             rospy.init_node("benchmark", anonymous=True, disable_signals=True)
-        end = time.monotonic() + PATIENCE
-        fresh = time.monotonic() + 1.5  # two in turn: the first may be from before
-        while time.monotonic() < end:
-            message = rospy.wait_for_message("/diagnostics", DiagnosticArray, timeout=PATIENCE)
-            for status in message.status:
-                if status.name.endswith(name) and time.monotonic() > fresh:
-                    return {value.key: value.value for value in status.values}
-        raise TimeoutError(f"no status {name}")
+        subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, lambda message: found.extend(
+            status for status in message.status if status.name.endswith(name)))
+        try:
+            self.wait_for(lambda: len(found) > 1, f"status {name}")
+        finally:
+            subscriber.unregister()
+        return {value.key: value.value for value in found[1].values}
+
+
+def name_joints(machine, node, number):
+    """As a parameter: roscpp takes no lists from the command line."""
+    machine.run("rosparam", "set", f"/{node}/joints", "[" + ", ".join(f"joint_{j}" for j in range(number)) + "]")
 
 
 def diagnoser(machine, curve, joints=1):
     if joints > 1:
-        names = "[" + ", ".join(f"joint_{j}" for j in range(joints)) + "]"
-        machine.run("rosparam", "set", "/diagnoser/joints", names)
+        name_joints(machine, "diagnoser", joints)
     process = machine.start("diagnoser", f"_curve:={curve}", "_queue:=10000000")
     machine.wait_for(lambda: "/joint_states" in machine.run("rosnode", "info", "/diagnoser", check=False).stdout,
                      "the diagnoser's subscription")
@@ -184,8 +193,8 @@ def measure(machine, folder):
     yield from at_rate(machine, curves, 1000, 20)
     yield from at_rate(machine, curves, 20_000, 10)
     yield from joints(machine, curves, 1000, 10)
-    names = ", ".join(f"j{i}" for i in range(32))
-    yield simulator(machine, "32_joints_1000_Hz", f"_joints:=[{names}]", "_sampling_rate:=1000")
+    name_joints(machine, "simulator", 32)
+    yield simulator(machine, "32_joints_1000_Hz", "_sampling_rate:=1000")
     yield simulator(machine, "1_joint_10000_Hz", "_sampling_rate:=10000")
 
 

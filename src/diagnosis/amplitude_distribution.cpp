@@ -25,6 +25,9 @@ AmplitudeDistribution::AmplitudeDistribution(const ApdLayout& layout)
   if (!std::isfinite(layout.lower)) throw InvalidParameter("apd.lower", layout.lower, "must be finite");
   if (!std::isfinite(width_)) throw InvalidParameter("apd.upper", layout.upper, "must be finite");
   counts_.assign(layout.classes, 0);
+  for (int k = 0; k <= layout.classes; ++k) borders_.push_back(layout.lower + k * width_);
+  borders_.front() = -std::numeric_limits<double>::infinity();
+  borders_.back() = std::numeric_limits<double>::infinity();
 }
 
 void AmplitudeDistribution::merge(const AmplitudeDistribution& other) {

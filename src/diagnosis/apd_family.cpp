@@ -10,24 +10,25 @@
 namespace backlash {
 namespace {
 
-constexpr double kReach = 4.5;         // standard deviations beyond which a normal distribution is 0 or 1
-constexpr double kCellsPerSigma = 4;   // of the grid on which distributions are summed
-constexpr double kLevelRatio = 1.03;      // between levels of noise at which a family is kept
-constexpr std::size_t kMostLevels = 32;   // half a megabyte each
-constexpr double kMostCells = 20'000;  // where noise is tiny against the range
+constexpr int kCellsPerSigma = 4;  // of the grid on which distributions are summed
+constexpr int kReach = 18;         // cells beyond which a normal distribution is 0 or 1: 4.5 standard deviations
+constexpr int kShares = 64;        // places of a centre within its cell that are told apart
+constexpr double kLeastNoise = 2e-4;     // of the range of a distribution, less cannot be seen in it
+constexpr double kLevelRatio = 1.03;     // between levels of noise at which a family is kept
+constexpr std::size_t kMostLevels = 32;  // half a megabyte each
 
-/// Normal distribution function within +-kReach, interpolated in a table to 2e-7.
-double normal_distribution(double z) {
-  constexpr int kSteps = 2000;
-  static const std::vector<double> table = [] {
-    std::vector<double> values(kSteps + 2);
-    for (int i = 0; i < kSteps + 2; ++i)
-      values[i] = 0.5 * std::erfc(-(2.0 * i / kSteps - 1) * kReach * M_SQRT1_2);
-    return values;
+/// The normal distribution function at the grid's points about its centre, which lies `share` / kShares of a cell
+/// beyond the point before it: from kReach cells before that point to kReach + 1 after it.
+using Rise = Eigen::Array<double, 2 * kReach + 2, 1>;
+const Rise& normal_rise(int share) {
+  static const std::vector<Rise> rises = [] {
+    std::vector<Rise> all(kShares + 1);
+    for (int s = 0; s <= kShares; ++s)
+      for (int i = 0; i < Rise::SizeAtCompileTime; ++i)
+        all[s][i] = 0.5 * std::erfc(-(i - kReach - double(s) / kShares) / kCellsPerSigma * M_SQRT1_2);
+    return all;
   }();
-  const double place = std::clamp((z / kReach + 1) * (0.5 * kSteps), 0.0, static_cast<double>(kSteps));
-  const int i = static_cast<int>(place);
-  return table[i] + (place - i) * (table[i + 1] - table[i]);
+  return rises[share];
 }
 
 }  // namespace
@@ -48,25 +49,25 @@ Quantiles quantiles_of(std::vector<double> samples) {
 
 // The mixture of equal normal distributions about the exact quantiles, summed on a grid and inverted.
 Quantiles with_noise(const Quantiles& exact, double sigma) {
-  if (!(sigma > 0)) return exact;
-  const double lower = exact.front() - kReach * sigma, range = exact.back() - exact.front() + 2 * kReach * sigma;
-  const double cell = std::max(sigma / kCellsPerSigma, range / kMostCells);
-  const auto cells = static_cast<std::size_t>(std::ceil(range / cell)) + 1;
-  std::vector<double> cumulative(cells + 1, 0), whole(cells + 2, 0);
+  const double range = exact.back() - exact.front();
+  if (!(sigma > kLeastNoise * range)) return exact;
+  const double cell = sigma / kCellsPerSigma, lower = exact.front() - (kReach + 1) * cell;
+  const auto cells = static_cast<Eigen::Index>(range / cell) + 2 * kReach + 4;
+  Eigen::ArrayXd cumulative = Eigen::ArrayXd::Zero(cells), whole = Eigen::ArrayXd::Zero(cells);
   for (const double centre : exact) {
-    const auto begin = static_cast<std::size_t>(std::max(0.0, (centre - kReach * sigma - lower) / cell));
-    const auto end = std::min(cells + 1, static_cast<std::size_t>((centre + kReach * sigma - lower) / cell) + 1);
-    for (std::size_t i = begin; i < end; ++i)
-      cumulative[i] += normal_distribution((lower + static_cast<double>(i) * cell - centre) / sigma);
-    whole[end] += 1;
+    const double place = (centre - lower) / cell;
+    const auto before = static_cast<Eigen::Index>(place);
+    const Rise& rise = normal_rise(static_cast<int>(std::lround((place - double(before)) * kShares)));
+    cumulative.segment<Rise::SizeAtCompileTime>(before - kReach) += rise;
+    whole[before + kReach + 2] += 1;
   }
   double passed = 0;
-  for (std::size_t i = 0; i <= cells; ++i) cumulative[i] += passed += whole[i];
+  for (Eigen::Index i = 0; i < cells; ++i) cumulative[i] += passed += whole[i];
   Quantiles noisy(exact.size());
-  std::size_t i = 1;
+  Eigen::Index i = 1;
   for (std::size_t k = 0; k < exact.size(); ++k) {
     const double wanted = static_cast<double>(k) + 0.5;
-    while (i < cells && cumulative[i] < wanted) ++i;
+    while (i + 1 < cells && cumulative[i] < wanted) ++i;
     const double step = cumulative[i] - cumulative[i - 1];
     const double share = step > 0 ? std::clamp((wanted - cumulative[i - 1]) / step, 0.0, 1.0) : 0.5;
     noisy[k] = lower + (static_cast<double>(i - 1) + share) * cell;
@@ -111,34 +112,43 @@ FamilyDistance::FamilyDistance(const NoisyFamily& family, const Quantiles& obser
   const Eigen::VectorXd own = Eigen::Map<const Eigen::VectorXd>(observed.data(), kQuantiles) - family.middle_;
   const Eigen::VectorXd shared = family.members_.transpose() * own;
   const double own_square = own.squaredNorm();
-  parabolas_.resize(family.count_ - 1);
+  phases_ = family.phases_;
+  parabolas_.reserve((family.count_ - 1) * phases_);
   for (std::size_t i = 0; i + 1 < family.count_; ++i)
     for (std::size_t phase = 0; phase < family.phases_; ++phase) {
       const Eigen::Index k = family.column(i, phase);
       const double at_start = own_square - 2 * shared[k] + family.square_[k];
       const double apart = family.square_[k] - 2 * family.neighbours_[k] + family.square_[k + 1];
       const double cross = own_square - shared[k] - shared[k + 1] + family.neighbours_[k];
-      parabolas_[i].push_back({apart / kQuantiles, 2 * (cross - at_start) / kQuantiles, at_start / kQuantiles});
+      parabolas_.push_back({apart / kQuantiles, 2 * (cross - at_start) / kQuantiles, at_start / kQuantiles});
     }
-  smallest_.distance = parabolas_[0][0].at(0);
-  for (std::size_t i = 0; i < parabolas_.size(); ++i)
-    for (const Parabola& p : parabolas_[i]) {
-      const double lowest = p.a > 0 ? std::clamp(-p.b / (2 * p.a), 0.0, 1.0) : 0;
-      for (const double share : {0.0, lowest, 1.0})
-        if (p.at(share) < smallest_.distance) smallest_ = {std::max(0.0, p.at(share)), i, share};
-    }
+  smallest_.distance = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < parabolas_.size(); ++k) {
+    const double share = parabolas_[k].lowest(), distance = parabolas_[k].at(share);
+    if (distance < smallest_.distance) smallest_ = {distance, k / phases_, share};
+  }
+  smallest_.distance = std::max(0.0, smallest_.distance);
+}
+
+double FamilyDistance::Parabola::lowest() const {
+  if (a > 0) return std::clamp(-b / (2 * a), 0.0, 1.0);
+  return a + b < 0 ? 1 : 0;
 }
 
 double FamilyDistance::at(std::size_t segment, double share) const {
-  double smallest = parabolas_[segment][0].at(share);
-  for (const Parabola& p : parabolas_[segment]) smallest = std::min(smallest, p.at(share));
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t phase = 0; phase < phases_; ++phase)
+    smallest = std::min(smallest, parabolas_[segment * phases_ + phase].at(share));
   return std::max(0.0, smallest);
 }
 
 std::vector<std::pair<double, double>> FamilyDistance::within(std::size_t segment, double limit) const {
   std::vector<std::pair<double, double>> all;
-  for (const Parabola& p : parabolas_[segment])
+  for (std::size_t phase = 0; phase < phases_; ++phase) {
+    const Parabola& p = parabolas_[segment * phases_ + phase];
+    if (p.at(p.lowest()) > limit) continue;  // most
     for (const auto& interval : not_positive(p.a, p.b, p.c - limit)) all.push_back(interval);
+  }
   return all;
 }
 

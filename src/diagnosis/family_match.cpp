@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <utility>
 
 namespace backlash {
@@ -62,8 +63,12 @@ void accept(const MonitoringCurve& curve, const FamilyDistance& fit, double nois
 FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> samples, const NoiseRange& noise) {
   const Quantiles observed = quantiles_of(std::move(samples));
   std::vector<std::pair<double, FamilyDistance>> fits;  // by noise
-  for (const double sigma : noises_of(noise, curve.noise_levels))
-    fits.emplace_back(sigma, FamilyDistance(*curve.family->compared->at(*curve.family, sigma), observed));
+  std::shared_ptr<const NoisyFamily> family;
+  for (const double sigma : noises_of(noise, curve.noise_levels)) {
+    auto next = curve.family->compared->at(*curve.family, sigma);
+    fits.emplace_back(sigma, next == family ? fits.back().second : FamilyDistance(*next, observed));
+    family = std::move(next);
+  }
   FamilyMatch match;
   double smallest = std::numeric_limits<double>::infinity();
   for (const auto& [sigma, fit] : fits) {

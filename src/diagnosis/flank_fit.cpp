@@ -2,8 +2,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
+#include <optional>
 
 #include "backlash_diagnosis/diagnosis/robust.h"
 
@@ -23,6 +26,7 @@ constexpr double kHeld =
     0.1;  // relative error of g up to which the record holds it better than a declaration
 constexpr double kVaries = 1.25;           // ratio of residuals, constant over varying gap
 constexpr double kInertiaDeviation = 0.5;  // relative, of the declared inertia
+constexpr double kTorqueStep = 0.05;       // of the rms torque, for slopes
 constexpr int kIterations = 40;
 constexpr std::size_t kFewest = 12;  // windows per flank
 
@@ -51,6 +55,27 @@ double rms(const std::vector<double>& x) {
   return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
 }
 
+/// Slope of the elastic deflection over torque, from differences of `step` and tabulated: it only steers the iteration.
+class Slope {
+ public:
+  Slope(const std::function<double(double)>& elastic, double reach, double step) : reach_(reach) {
+    for (int k = 0; k <= kCells; ++k) {
+      const double torque = reach * (2.0 * k / kCells - 1);
+      values_[k] = (elastic(torque + step) - elastic(torque - step)) / (2 * step);
+    }
+  }
+  double operator()(double torque) const {
+    const double place = std::clamp((torque / reach_ + 1) * (0.5 * kCells), 0.0, kCells - 1e-9);
+    const int k = static_cast<int>(place);
+    return values_[k] + (place - k) * (values_[k + 1] - values_[k]);
+  }
+
+ private:
+  static constexpr int kCells = 64;
+  double reach_;
+  std::array<double, kCells + 1> values_;
+};
+
 /// One fit in the making.
 class Fitter {
  public:
@@ -63,8 +88,9 @@ class Fitter {
     phi_ = Eigen::Map<const VectorXd>(w_.deflection.data(), n_);
     inertia_ = model.inertia;
     slow_ = model.moving ? kSlow * rms(w_.speed) : -1;
-    slip_scale_ = std::max(rms(w_.slip), 1e-300);
-    torque_step_ = 0.05 * std::max(rms(w_.torque), 1e-300);
+    const auto [least, most] = std::minmax_element(w_.torque.begin(), w_.torque.end());
+    const double torque = std::max(rms(w_.torque), 1e-300);
+    slope_.emplace(model.elastic, 2 * std::max({torque, -*least, *most}), kTorqueStep * torque);
   }
 
   FlankFit fit();
@@ -85,7 +111,8 @@ class Fitter {
   MatrixXd common_, gap_, f_basis_;
   VectorXd phi_, side_, offset_;  // offset: of the linearisation
   std::vector<char> use_;
-  double slow_, slip_scale_, torque_step_;
+  double slow_;
+  std::optional<Slope> slope_;
   double factor_ = 1, inertia_, viscous_ = 0, coulomb_ = 0;  // g, J, d, C
   // of the last solution
   MatrixXd a_, inverse_;
@@ -127,9 +154,7 @@ MatrixXd Fitter::design(const MatrixXd& gap) const {
     const double sign = w_.speed[i] > 0 ? 1 : -1;
     const double torque = w_.torque[i] - inertia_ * w_.acceleration[i] - viscous_ * w_.speed[i] -
                           coulomb_ * sign * (friction > 0);
-    const double slope = factor_ *
-                         (model_.elastic(torque + torque_step_) - model_.elastic(torque - torque_step_)) /
-                         (2 * torque_step_);
+    const double slope = factor_ * (*slope_)(torque);
     a(i, at) = model_.elastic(torque);
     a(i, at + 1) = -slope * w_.acceleration[i];
     if (friction > 0) {
@@ -147,16 +172,16 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   gap_at_ = f_basis_.cols();
   elastic_at_ = gap_at_ + gap.cols();
   a_ = design(gap);
-  MatrixXd normal = MatrixXd::Zero(a_.cols(), a_.cols());
-  VectorXd right = VectorXd::Zero(a_.cols());
-  double count = 0;
-  for (Eigen::Index i = 0; i < n_; ++i) {
+  const auto count = static_cast<double>(std::count(use_.begin(), use_.end(), 1));
+  MatrixXd used(static_cast<Eigen::Index>(count), a_.cols());
+  VectorXd observed(used.rows());
+  for (Eigen::Index i = 0, row = 0; i < n_; ++i) {
     if (!use_[i]) continue;
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(a_.row(i).transpose());
-    right += a_.row(i).transpose() * phi_[i];
-    ++count;
+    observed[row] = phi_[i];
+    used.row(row++) = a_.row(i);
   }
-  normal = normal.selfadjointView<Eigen::Lower>();
+  MatrixXd normal = used.transpose() * used;
+  VectorXd right = used.transpose() * observed;
   const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
   // A declaration is worth one window per its own variance times what a correlated record repeats itself.
   const double weight = noise * noise * std::max(1.0, count / 50);
@@ -284,7 +309,6 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
 }
 
 FlankFit Fitter::fit() {
-  if (n_ < 4 * static_cast<Eigen::Index>(kFewest)) return {};
   choose_outermost();
   iterate(false, 4);
   iterate(true, kIterations);
@@ -352,6 +376,7 @@ FlankWindows average_windows(const TwoEncoders& motion, std::size_t half) {
 }
 
 FlankFit fit_flanks(const FlankWindows& windows, const FlankModel& model) {
+  if (windows.size() < 4 * kFewest) return {};
   return Fitter(windows, model).fit();
 }
 

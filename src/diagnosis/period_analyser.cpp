@@ -34,10 +34,10 @@ void PeriodAnalyser::reset() {
   leading_.clear();
   last_index_ = -1;
   known_ = open_ = false;
+  calm_until_ = -std::numeric_limits<double>::infinity();
 }
 
-const PeriodResult* PeriodAnalyser::add(double time, double value) {
-  if (known_) return take(time, value);
+const PeriodResult* PeriodAnalyser::lead(double time, double value) {
   leading_.emplace_back(time, value);
   if (leading_.size() < kLeadingSamples) return nullptr;
   std::vector<double> stamps;
@@ -59,11 +59,7 @@ const PeriodResult* PeriodAnalyser::take(double time, double value) {
   const long index = open_ && time < current_.end ? current_.index : grid_.index(time);  // stamps increase
   if (open_ && index > current_.index) finished = close();
   if (!open_ && index > last_index_) open(index, time);
-  if (open_) {  // else: a late sample of a window that was closed already
-    current_.apd.add(value);
-    current_.signal.add(value);
-    if (current_.signal.count() > 1) current_.largest_gap = std::max(current_.largest_gap, time - last_time_);
-  }
+  if (open_) count(time, value);  // else: a late sample of a window that was closed already
   last_time_ = time;
   // Closed as soon as the next sample, even a quarter early, would lie beyond: no waiting for a stream that
   // ends here.
@@ -85,12 +81,15 @@ void PeriodAnalyser::open(long index, double time) {
   current_.apd.clear();
   current_.signal = RunningMoments();
   current_.largest_gap = std::max(0.0, time - grid_.start(index) - 0.5 * grid_.interval);
+  last_time_ = time;
   last_index_ = index;
+  calm_until_ = current_.end - grid_.interval;
   open_ = true;
 }
 
 const PeriodResult* PeriodAnalyser::close() {
   open_ = false;
+  calm_until_ = -std::numeric_limits<double>::infinity();
   current_.largest_gap = std::max(current_.largest_gap, current_.end - last_time_ - 0.5 * grid_.interval);
   current_.complete = current_.largest_gap <= std::max(0.05 * period_, 1.5 * grid_.interval);
   std::swap(current_, finished_);

@@ -177,6 +177,9 @@ TEST(PositionDifference, WhatTheRecordLacksBecomesAStatus) {
   EXPECT_EQ(status_without(Channel::load_position), Status::insufficient_data);
   EXPECT_EQ(status_without(Channel::motor_torque), Status::insufficient_data);
   EXPECT_EQ(estimate_position_difference(full.slice(0, 0.05), settings()).status, Status::insufficient_data);
+  // Enough samples to begin with, of which the longest averages leave no window at all.
+  const double few = 100 * full.sampling_interval();
+  EXPECT_EQ(estimate_position_difference(full.slice(0, few), settings()).status, Status::out_of_domain);
   Record one_sided = locked(1e-3);
   for (std::size_t i = 0; i < one_sided.size(); ++i) {
     one_sided.column(Channel::motor_torque)[i] = 1 + 0.1 * std::sin(20 * one_sided.time[i]);

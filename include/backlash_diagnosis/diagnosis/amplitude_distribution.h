@@ -44,9 +44,9 @@ class AmplitudeDistribution {
       ++above_;
       return;
     }
-    auto k = std::min(static_cast<std::size_t>((value - layout_.lower) * per_width_), counts_.size() - 1);
-    if (k > 0 && value < border(k)) --k;  // the product may be rounded over a border
-    if (k + 1 < counts_.size() && value >= border(k + 1)) ++k;
+    auto k = static_cast<std::size_t>((value - layout_.lower) * per_width_);
+    k -= value < borders_[k];  // the product may be rounded over a border
+    k += value >= borders_[k + 1];
     ++counts_[k];
   }
   void merge(const AmplitudeDistribution& other);  ///< adds its samples; the layouts must be equal
@@ -65,10 +65,10 @@ class AmplitudeDistribution {
 
  private:
   double standardised_moment(int order) const;
-  double border(std::size_t k) const { return layout_.lower + static_cast<double>(k) * width_; }
 
   ApdLayout layout_;
   double width_, per_width_;
+  std::vector<double> borders_;  // between class k - 1 and k; the outermost are infinite
   std::vector<std::size_t> counts_;
   std::size_t samples_ = 0, below_ = 0, above_ = 0;
 };

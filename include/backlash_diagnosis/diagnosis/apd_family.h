@@ -107,8 +107,10 @@ class FamilyDistance {
   struct Parabola {
     double a, b, c;
     double at(double share) const { return (a * share + b) * share + c; }
+    double lowest() const;  // share in [0, 1]
   };
-  std::vector<std::vector<Parabola>> parabolas_;  // by segment and phase
+  std::vector<Parabola> parabolas_;  // by segment, then phase
+  std::size_t phases_;
   Place smallest_;
 };
 

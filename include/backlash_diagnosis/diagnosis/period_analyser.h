@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -52,7 +53,11 @@ class PeriodAnalyser {
   /// Adds a sample; stamps must increase (the caller sees to that). Returns a window when this sample
   /// completes it, else null; valid until the next call. Windows that end within the first kLeadingSamples
   /// samples are not returned.
-  const PeriodResult* add(double time, double value);
+  const PeriodResult* add(double time, double value) {
+    if (!(time < calm_until_)) return known_ ? take(time, value) : lead(time, value);
+    count(time, value);
+    return nullptr;
+  }
 
   /// No more samples will come: returns the open window if its end is less than two samples away, else null.
   const PeriodResult* finish();
@@ -63,7 +68,14 @@ class PeriodAnalyser {
   double period() const { return period_; }
 
  private:
+  const PeriodResult* lead(double time, double value);
   const PeriodResult* take(double time, double value);
+  void count(double time, double value) {
+    current_.apd.add(value);
+    current_.signal.add(value);
+    if (time - last_time_ > current_.largest_gap) current_.largest_gap = time - last_time_;
+    last_time_ = time;
+  }
   void open(long index, double time);
   const PeriodResult* close();
 
@@ -74,6 +86,7 @@ class PeriodAnalyser {
   long last_index_ = -1;
   bool known_ = false, open_ = false;
   double last_time_ = 0;
+  double calm_until_ = -std::numeric_limits<double>::infinity();  // stamps before it only belong to the open window
 };
 
 }  // namespace backlash
