@@ -9,15 +9,17 @@
 namespace backlash {
 namespace {
 
-constexpr int kNoiseSteps = 5;  // where only bounds of the noise are known
+constexpr int kMostNoises = 5;       // where only bounds of the noise are known
+constexpr double kNoiseRatio = 1.2;  // of neighbours among them, if that needs no more
 
 std::vector<double> noises_of(const NoiseRange& range, const std::vector<double>& levels) {
   const double upper = std::min(std::isnan(range.upper) ? levels.back() : range.upper, levels.back());
   const double lower = std::min(range.lower, upper);
   if (lower == upper) return {upper};
+  const double ratios = std::log(upper / lower) / std::log(kNoiseRatio);  // infinite where the lower bound is zero
+  const int steps = static_cast<int>(std::ceil(std::min(ratios, kMostNoises - 1.0)));
   std::vector<double> noises;
-  for (int step = 0; step < kNoiseSteps; ++step)
-    noises.push_back(lower + (upper - lower) * step / (kNoiseSteps - 1));
+  for (int step = 0; step <= steps; ++step) noises.push_back(lower + (upper - lower) * step / steps);
   return noises;
 }
 

@@ -97,7 +97,8 @@ void DiagnoserNode::publish(const JointMonitor& monitor, const PeriodReport& rep
     m.joint = monitor.joint();
     distributions_.publish(m);
   }
-  for (const Estimate& estimate : report.diagnosis.estimates) {
+  if (!report.diagnosis) return;
+  for (const Estimate& estimate : report.diagnosis->estimates) {
     auto m = to_message(estimate);
     m.header.stamp = report.stamp;
     m.joint = monitor.joint();

@@ -46,6 +46,8 @@ parameters (private)
             ~set_baseline, removed where that clears it; default: a baseline lasts as long as the node
   JOINT/rig, JOINT/curve, JOINT/limits, JOINT/baseline   the same for one of several joints
   window    whole periods that the published estimates look back; default 5
+  estimate_interval   s at least from one published estimate to the next, by their stamps; default 0.25;
+            0: each period
   keep      s of samples kept for the service; default 60
   queue     messages waiting at most; default 20000
   stale     s of wall time without a message before /diagnostics says so; default 2
@@ -55,7 +57,7 @@ subscribes
                            JOINT_current and JOINT_accelerometer (A and rad/s^2 as effort)
 publishes
   amplitude_distribution   backlash_diagnosis/AmplitudeDistribution, each whole period
-  backlash_estimate        backlash_diagnosis/BacklashEstimate, one per method each period
+  backlash_estimate        backlash_diagnosis/BacklashEstimate, one per method, each ~estimate_interval
   /diagnostics             diagnostic_msgs/DiagnosticArray
 services
   ~diagnose  ~set_baseline  ~get_curve
@@ -73,6 +75,7 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   const RigFile common = rig_from(rig);
   MonitorSettings defaults;
   defaults.window = static_cast<int>(parameters.integer("window", 5, 1, 1'000'000));
+  defaults.estimate_interval = parameters.number("estimate_interval", 0.25, Range::not_negative());
   defaults.keep = parameters.number("keep", 60, Range::positive());
   settings.queue = static_cast<int>(parameters.integer("queue", 20000, 1, 10'000'000));
   settings.stale = parameters.number("stale", 2, Range::positive());

@@ -56,8 +56,12 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const Cha
     return std::nullopt;
   }
   const long restarts = stream_.counters().restarts;
-  const PeriodResult* period = stream_.add(clock_.seconds(stamp), values);
-  if (stream_.counters().restarts != restarts) reported_periods_ = 0;
+  const double time = clock_.seconds(stamp);
+  const PeriodResult* period = stream_.add(time, values);
+  if (stream_.counters().restarts != restarts) {
+    reported_periods_ = 0;
+    estimated_.reset();
+  }
   if (!stream_.counters().last_problem.empty()) last_problem_ = topic + ": " + stream_.counters().last_problem;
   const long periods = stream_.periods();
   const bool complete = settings_.rig.diagnosis.apd ? period != nullptr : periods > reported_periods_;
@@ -65,21 +69,26 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const Cha
   reported_periods_ = periods;
   if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd)
     if (const double interval = stream_.sampling_interval(); interval > 0) start_building(nominal_sampling_rate(interval));
-  auto result = report(period);
+  auto result = report(time, period);
   changed_.notify_all();
   return result;
 }
 
 /// Called with the lock held.
-std::optional<PeriodReport> JointMonitor::report(const PeriodResult* period) {
+std::optional<PeriodReport> JointMonitor::report(double time, const PeriodResult* period) {
   PeriodReport report;
   if (period) report.period = *period;
   report.period_length = stream_.period();
+  report.stamp = clock_.stamp(time);
+  // Half a sample is what rounding and jitter may take from an interval of whole periods.
+  const double slack = 0.5 * stream_.sampling_interval();
+  if (estimated_ && time < *estimated_ + settings_.estimate_interval - slack) return report;
   const Record window = stream_.latest(settings_.window);
   if (window.time.empty()) return std::nullopt;
+  estimated_ = time;
   report.stamp = clock_.stamp(window.time.back());
-  report.diagnosis = diagnose_settled(window, diagnosis_settings_, curve_.get(), baseline_);
-  latest_ = report.diagnosis;
+  latest_ = diagnose_settled(window, diagnosis_settings_, curve_.get(), baseline_);
+  report.diagnosis = latest_;
   return report;
 }
 

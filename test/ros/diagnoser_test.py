@@ -85,6 +85,21 @@ class DiagnoserTest(unittest.TestCase):
         # By stamps, so a slow machine does not matter: five periods of window and some settling.
         self.assertLessEqual(nanoseconds(estimate) - start, 1_000_000_000)
 
+    def estimate_interval(self, estimates):
+        """From stamp to stamp [ns] of one method, all equal."""
+        def some(messages):
+            stamps = [nanoseconds(m) for m in messages if m.method == "lost_motion"]
+            return stamps if len(stamps) > 4 else None
+        stamps = estimates.wait_for(some, "five estimates")
+        distances = {b - a for a, b in zip(stamps, stamps[1:])}
+        self.assertEqual(len(distances), 1, distances)
+        return distances.pop()
+
+    def test_estimates_come_at_their_interval(self):
+        self.assertEqual(self.estimate_interval(self.estimates), 3 * PERIOD)  # whole periods not below 0.25 s
+        with Diagnoser({"curve": self.curve, "estimate_interval": 0.0}, self.states) as eager:
+            self.assertEqual(self.estimate_interval(eager.estimates()), PERIOD)
+
     def test_distribution_is_that_of_its_samples(self):
         first = self.distributions.wait_for_count(3)[-1]
         end = nanoseconds(first)

@@ -24,13 +24,14 @@ struct MonitorSettings {
   std::string baseline_path;             // where a new baseline is kept; empty: nowhere
   std::optional<MonitoringCurve> curve;  // absent: built from the rig at the sampling rate of the messages
   int window = 5;                        // periods that the running estimates look back
+  double estimate_interval = 0.25;       // s of stamps at least from one running estimate to the next
   double keep = 60;                      // s of samples kept
 };
 
 /// What the outside hears of a completed period.
 struct PeriodReport {
   std::optional<PeriodResult> period;  // absent for a rig without APD
-  Diagnosis diagnosis;                 // over the last `window` periods
+  std::optional<Diagnosis> diagnosis;  // over the last `window` periods, where a running estimate is due
   double period_length = 0;            // s
   ros::Time stamp;                     // of the last sample
 };
@@ -75,7 +76,7 @@ class JointMonitor {
  private:
   void start_building(double rate);
   void build(double rate);
-  std::optional<PeriodReport> report(const PeriodResult* period);
+  std::optional<PeriodReport> report(double time, const PeriodResult* period);
   long wanted_periods(long periods) const { return periods > 0 ? periods : 1; }
 
   MonitorSettings settings_;
@@ -85,6 +86,7 @@ class JointMonitor {
   StampClock clock_;
   SampleStream stream_;
   long reported_periods_ = 0;
+  std::optional<double> estimated_;  // s, when the last running estimate was due
   std::shared_ptr<const MonitoringCurve> curve_;
   std::optional<Baseline> baseline_;
   std::optional<Diagnosis> latest_;
