@@ -84,6 +84,16 @@ bool lengths_fit(const std::vector<std::uint8_t>& bytes) {
   return place == bytes.size();
 }
 
+/// Takes a message's bytes as they lie in the bag. MessageInstance::write asks a stream for no more than this; to ask the
+/// instance for its size before would read its header twice.
+struct RawMessage {
+  std::vector<std::uint8_t> bytes;
+  std::uint8_t* advance(std::uint32_t size) {
+    bytes.resize(size);
+    return bytes.data();
+  }
+};
+
 /// A joint of a topic, message by message.
 class JointRun {
  public:
@@ -244,16 +254,15 @@ class Reader {
   void read_messages(const std::vector<std::string>& topics) {
     rosbag::View view(bag_, rosbag::TopicQuery(topics));
     std::size_t index = 0;
-    std::vector<std::uint8_t> bytes;
+    RawMessage raw;
     sensor_msgs::JointState message;  // one for all: its arrays keep their room
     for (const rosbag::MessageInstance& instance : view) {
-      bytes.resize(instance.size());
-      ros::serialization::OStream out(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-      instance.write(out);
-      if (!lengths_fit(bytes))
+      raw.bytes.clear();  // an empty message asks for nothing
+      instance.write(raw);
+      if (!lengths_fit(raw.bytes))
         throw BadData(path_ + ": " + printable(instance.getTopic()) + " message " + std::to_string(index),
                       "damaged: its arrays do not fit into it");
-      ros::serialization::IStream in(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+      ros::serialization::IStream in(raw.bytes.data(), static_cast<std::uint32_t>(raw.bytes.size()));
       ros::serialization::deserialize(in, message);
       ++index;
       take(message, instance.getTopic());
