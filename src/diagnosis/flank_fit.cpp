@@ -98,10 +98,11 @@ class Fitter {
  private:
   void choose_outermost();
   void iterate(bool by_position, int iterations);
-  MatrixXd design(const MatrixXd& gap) const;
+  void design(const MatrixXd& gap);
   void solve(const MatrixXd& gap, double elastic_deviation);
   void take_over();
   bool choose_loaded();
+  bool holds_compliance();
   FlankFit result(const MatrixXd& gap) const;
   double sum_of_stays(const VectorXd& score, std::size_t& stays) const;
 
@@ -115,7 +116,7 @@ class Fitter {
   std::optional<Slope> slope_;
   double factor_ = 1, inertia_, viscous_ = 0, coulomb_ = 0;  // g, J, d, C
   // of the last solution
-  MatrixXd a_, inverse_;
+  MatrixXd a_, used_, inverse_;  // used_: a_ with zeros for windows not in use
   VectorXd p_, residual_;
   double sigma_ = 0, prior_g_ = 0;
   Eigen::Index gap_at_ = 0, elastic_at_ = 0;
@@ -144,9 +145,10 @@ void Fitter::choose_outermost() {
 }
 
 /// Columns: f, side b / 2, g, J, (d, C,) c. Nonlinear e is linearised at the present J, d, C.
-MatrixXd Fitter::design(const MatrixXd& gap) const {
+void Fitter::design(const MatrixXd& gap) {
   const Eigen::Index friction = model_.moving ? 2 : 0;
-  MatrixXd a(n_, f_basis_.cols() + gap.cols() + 3 + friction);
+  MatrixXd& a = a_;
+  a.resize(n_, f_basis_.cols() + gap.cols() + 3 + friction);
   a.leftCols(f_basis_.cols()) = f_basis_;
   a.middleCols(f_basis_.cols(), gap.cols()) = (0.5 * side_).asDiagonal() * gap;
   const Eigen::Index at = f_basis_.cols() + gap.cols();
@@ -163,7 +165,6 @@ MatrixXd Fitter::design(const MatrixXd& gap) const {
     }
     a(i, at + 2 + friction) = w_.slip[i];
   }
-  return a;
 }
 
 /// Least squares on the windows in use. elastic_deviation > 0: with g = 1 +- elastic_deviation as one more
@@ -171,17 +172,12 @@ MatrixXd Fitter::design(const MatrixXd& gap) const {
 void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   gap_at_ = f_basis_.cols();
   elastic_at_ = gap_at_ + gap.cols();
-  a_ = design(gap);
-  const auto count = static_cast<double>(std::count(use_.begin(), use_.end(), 1));
-  MatrixXd used(static_cast<Eigen::Index>(count), a_.cols());
-  VectorXd observed(used.rows());
-  for (Eigen::Index i = 0, row = 0; i < n_; ++i) {
-    if (!use_[i]) continue;
-    observed[row] = phi_[i];
-    used.row(row++) = a_.row(i);
-  }
-  MatrixXd normal = used.transpose() * used;
-  VectorXd right = used.transpose() * observed;
+  design(gap);
+  const VectorXd used = Eigen::Map<const Eigen::Array<char, Eigen::Dynamic, 1>>(use_.data(), n_).cast<double>();
+  const double count = used.sum();
+  used_.noalias() = used.asDiagonal() * a_;
+  MatrixXd normal = used_.transpose() * a_;
+  VectorXd right = used_.transpose() * phi_;
   const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
   // A declaration is worth one window per its own variance times what a correlated record repeats itself.
   const double weight = noise * noise * std::max(1.0, count / 50);
@@ -308,28 +304,35 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   return fit;
 }
 
-FlankFit Fitter::fit() {
-  choose_outermost();
-  iterate(false, 4);
-  iterate(true, kIterations);
-  if (std::count(use_.begin(), use_.end(), 1) < 2 * static_cast<long>(kFewest)) return {};
-  // Does the record hold the compliance? Then the declaration is not needed, and may be wrong.
+/// Does the record hold the compliance? Then the declaration is not needed, and may be wrong.
+bool Fitter::holds_compliance() {
   solve(gap_, 0);
   const double free = p_[elastic_at_];
   std::size_t stays = 0;
   const double error = std::sqrt(sum_of_stays(a_ * inverse_.col(elastic_at_), stays));
-  const bool held = model_.moving && free > 0 && error < kHeld * free;
+  return free > 0 && error < kHeld * free;
+}
+
+FlankFit Fitter::fit() {
+  choose_outermost();
+  if (model_.moving) iterate(false, 4);  // a locked output has but one position
+  iterate(true, kIterations);
+  if (std::count(use_.begin(), use_.end(), 1) < 2 * static_cast<long>(kFewest)) return {};
+  const bool held = model_.moving && holds_compliance();
   const double deviation = held ? 0 : model_.elastic_deviation;
   solve(gap_, deviation);
-  FlankFit varying = result(gap_);
-  const VectorXd knots = p_.segment(gap_at_, gap_.cols());
-  solve(MatrixXd::Ones(n_, 1), deviation);
-  FlankFit fit = result(MatrixXd::Ones(n_, 1));
-  if (gap_.cols() > 1 && fit.residual > kVaries * varying.residual) {
-    fit = varying;
-    fit.varies = true;
-    fit.least_gap = knots.minCoeff();
-    fit.largest_gap = knots.maxCoeff();
+  FlankFit fit = result(gap_);
+  if (gap_.cols() > 1) {
+    FlankFit varying = fit;
+    const VectorXd knots = p_.segment(gap_at_, gap_.cols());
+    solve(MatrixXd::Ones(n_, 1), deviation);
+    fit = result(MatrixXd::Ones(n_, 1));
+    if (fit.residual > kVaries * varying.residual) {
+      fit = varying;
+      fit.varies = true;
+      fit.least_gap = knots.minCoeff();
+      fit.largest_gap = knots.maxCoeff();
+    }
   }
   fit.compliance_from_record = held;
   if (model_.moving && common_.cols() > 1) {
