@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Reading and diagnosing a recorded run of a minute at 5 kHz, against a bare loop over the bag that
 // instantiates its messages. The bag is made here, by the simulator, and removed.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A monitoring curve of 41 points, 10 periods and 8 noise seeds, against what Boost.odeint alone needs to
 // simulate the same machines for the same time at an error of about 1e-6, without noise, statistics or
 // calibration.

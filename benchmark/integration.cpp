@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Cost of simulating a rig at a measured error: SUNDIALS through Plant, the ensemble, and Boost.odeint as
 // their peer. Every run is the same work: sensor torque at 1 kHz of config/sarkar_1997.yaml, half gap 50 um,
 // 0.5 s; for the ensemble 32 half gaps from 0 to 100 um, 0.1 s (some gaps are chaotic, longer runs would

@@ -1,9 +1,13 @@
-// What the benchmarks of the nodes need beside them: a publisher of joint states and subscribers that do nothing.
+// SPDX-License-Identifier: BSD-3-Clause
+// What the benchmarks of the nodes need beside them: a publisher of joint states and subscribers that do
+// nothing.
 //
-//   messages publish RATE COUNT JOINTS PID   publishes COUNT samples of JOINTS joints on joint_states, RATE [Hz] of
-//       them per second of stamps and of wall time (RATE < 0: as fast as they are taken, stamps at -RATE), and prints
-//       as JSON the seconds until the subscriber of process PID has handled the last and its CPU seconds until then.
-//       That it has is told by amplitude_distribution (a period is complete) or by bare_done.
+//   messages publish RATE COUNT JOINTS PID   publishes COUNT samples of JOINTS joints on joint_states, RATE
+//   [Hz] of
+//       them per second of stamps and of wall time (RATE < 0: as fast as they are taken, stamps at -RATE),
+//       and prints as JSON the seconds until the subscriber of process PID has handled the last and its CPU
+//       seconds until then. That it has is told by amplitude_distribution (a period is complete) or by
+//       bare_done.
 //   messages bare COUNT      subscribes with an empty callback; one bare_done when COUNT have come
 //   messages latency         subscribes; when stopped prints as JSON how late samples came after their stamps
 #include <backlash_diagnosis/AmplitudeDistribution.h>
@@ -62,7 +66,8 @@ Messages one_round(double rate, int joints) {
     if (k < kSettling * period) continue;
     round.emplace_back();
     for (int j = 0; j < joints; ++j)
-      add_joint_state(seen, JointNames(joints == 1 ? file.rig.joint : "joint_" + std::to_string(j)), round.back());
+      add_joint_state(seen, JointNames(joints == 1 ? file.rig.joint : "joint_" + std::to_string(j)),
+                      round.back());
   }
   return round;
 }
@@ -76,10 +81,11 @@ int publish(double rate, long count, int joints, const std::string& pid) {
   const ros::Time origin = ros::Time::now();
   const ros::Time last = origin + ros::Duration(double(count - 2) / rate);
   const auto of_diagnoser = handle.subscribe<backlash_diagnosis::AmplitudeDistribution>(
-      "amplitude_distribution", 1000,
-      [&](const backlash_diagnosis::AmplitudeDistribution::ConstPtr& m) { if (m->header.stamp >= last) done = true; });
-  const auto of_bare =
-      handle.subscribe<std_msgs::Empty>("bare_done", 10, [&](const std_msgs::Empty::ConstPtr&) { done = true; });
+      "amplitude_distribution", 1000, [&](const backlash_diagnosis::AmplitudeDistribution::ConstPtr& m) {
+        if (m->header.stamp >= last) done = true;
+      });
+  const auto of_bare = handle.subscribe<std_msgs::Empty>(
+      "bare_done", 10, [&](const std_msgs::Empty::ConstPtr&) { done = true; });
   ros::Publisher states = handle.advertise<sensor_msgs::JointState>("joint_states", 0);
   const ros::WallTime patience = ros::WallTime::now() + ros::WallDuration(kPatience);
   while (states.getNumSubscribers() == 0 && ros::WallTime::now() < patience) ros::WallDuration(0.05).sleep();
@@ -106,7 +112,9 @@ int bare(long count) {
   long taken = 0;
   const auto subscriber = handle.subscribe<sensor_msgs::JointState>(
       "joint_states", 0,
-      [&](const sensor_msgs::JointState::ConstPtr&) { if (++taken == count) done.publish(std_msgs::Empty()); },
+      [&](const sensor_msgs::JointState::ConstPtr&) {
+        if (++taken == count) done.publish(std_msgs::Empty());
+      },
       ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
   ros::spin();
   return 0;
@@ -118,13 +126,17 @@ int latency() {
   late.reserve(1'000'000);
   const auto subscriber = handle.subscribe<sensor_msgs::JointState>(
       "joint_states", 0,
-      [&](const sensor_msgs::JointState::ConstPtr& m) { late.push_back((ros::Time::now() - m->header.stamp).toSec()); },
+      [&](const sensor_msgs::JointState::ConstPtr& m) {
+        late.push_back((ros::Time::now() - m->header.stamp).toSec());
+      },
       ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
   ros::spin();
   std::sort(late.begin(), late.end());
-  const auto at = [&](double share) { return late.empty() ? NAN : 1e3 * late[std::size_t(share * double(late.size() - 1))]; };
-  std::printf("{\"samples\": %zu, \"median_ms\": %.3f, \"p999_ms\": %.3f, \"worst_ms\": %.3f}\n", late.size(), at(0.5),
-              at(0.999), at(1));
+  const auto at = [&](double share) {
+    return late.empty() ? NAN : 1e3 * late[std::size_t(share * double(late.size() - 1))];
+  };
+  std::printf("{\"samples\": %zu, \"median_ms\": %.3f, \"p999_ms\": %.3f, \"worst_ms\": %.3f}\n", late.size(),
+              at(0.5), at(0.999), at(1));
   return 0;
 }
 

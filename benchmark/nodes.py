@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The nodes as processes, beside a bare roscpp subscriber in the same run: message rate, CPU, losses, lateness.
 
 Starts a roscore of its own. Prints JSON in the form of Google Benchmark. The nodes and tools of the package and `messages`
@@ -190,7 +191,7 @@ def measure(machine, folder):
         machine.run("build_curve", RIG, "--points", "11", "--periods", "3", "--seeds", "4", "--sample-rate", str(hertz),
                     "--out", curves[hertz])
     yield from flood(machine, curves)
-    yield from at_rate(machine, curves, 1000, 20)
+    yield from at_rate(machine, curves, 1000, 60)
     yield from at_rate(machine, curves, 20_000, 10)
     yield from joints(machine, curves, 1000, 10)
     name_joints(machine, "simulator", 32)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The rig of config/sarkar_1997.yaml as one would write it by hand for Boost.odeint: the peer of the
 // integrators here. Equations of include/backlash_diagnosis/model/gear_train.h, with the numbers of the rig
 // that is read.

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """identify and trace_residual on longer and longer records: time, memory, and how both grow with the length.
 
 A machine of the test generator (its own integrator, seeded) with two undeclared effects, gravity and cogging, 1 kHz, two
@@ -47,7 +48,7 @@ def main():
             results.append(run("trace_residual", length, options.folder / "trace_residual", "--rig", RIG, "--train",
                                folder / "train.csv", "--test", folder / "test.csv", "--out", folder / "report"))
             with open(folder / "report/report.json", encoding="utf-8") as report:
-                results[-1]["effects"] = [step["id"] for step in json.load(report)["steps"]]
+                results[-1]["effects"] = [step["effect"] for step in json.load(report)["steps"]]
     print(json.dumps({"benchmarks": results}))
 
 

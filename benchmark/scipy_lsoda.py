@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The rig of config/sarkar_1997.yaml by scipy's LSODA, as one would write it in Python: cost at a measured error.
 
 Prints JSON in the form of Google Benchmark: CPU milliseconds and error (rms over rms, against LSODA at 1e-12) for each

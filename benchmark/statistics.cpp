@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Cost per sample of the streaming statistics, against the same numbers from Boost.Accumulators and
 // Boost.Histogram: histogram of 60 classes and four moments of a signal, for whole periods of 1000 samples.
 #include <benchmark/benchmark.h>

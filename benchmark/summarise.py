@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Puts results of Google Benchmark together, prints each figure as a ratio to its peer, and compares with an older run."""
 import argparse
 import json

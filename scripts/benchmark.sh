@@ -2,6 +2,7 @@
 # Builds the package and its benchmarks, runs them and prints every figure as a ratio to a peer of the same run. The
 # machine should have nothing else to do. Usage: bash scripts/benchmark.sh [OUT.json [OLDER.json]]
 # OUT.json (default: build/benchmark.json of this repository) can be compared with a later run.
+# SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -1,5 +1,6 @@
 # Shell functions that the scripts share; to be sourced: source "$(dirname "$0")/common.sh"
 # Afterwards: REPO (this repository) and WS (the catkin workspace that the scripts build in).
+# SPDX-License-Identifier: BSD-3-Clause
 
 REPO=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 # Hidden and below build: rosrun and roslaunch search the package's folder for executables, but not there.

@@ -1,6 +1,7 @@
 #!/bin/bash
 # Installs, builds, simulates a geared joint with backlash, asks the diagnoser for it, and draws the answer.
 # Usage: bash scripts/demo.sh [HALF_GAP_METRES]     default 4e-5; results in the workspace's folder demo
+# SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

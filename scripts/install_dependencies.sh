@@ -1,6 +1,7 @@
 #!/bin/bash
 # Installs what the package needs from Debian 12 and is not there yet; without anything missing it only looks.
 # Debian packages ROS 1 itself, so no foreign archive is needed. Run as root or with sudo. Arguments: further packages.
+# SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 
 # One line per purpose.

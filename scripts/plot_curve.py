@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws a monitoring curve with its scatter; the stretch where it is not monotonic is marked.
 
 Exit codes: 0 done, 64 usage, 65 not a curve, 66 curve missing, 70 matplotlib missing, 73 cannot write.

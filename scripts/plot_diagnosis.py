@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws one diagnosis: torque over two periods, its APD, and the monitoring curve with the estimate marked.
 
 usage: plot_diagnosis.py --record RECORD.csv --diagnosis OUT.json --curve CURVE.yaml --out PICTURE [--true METRES]

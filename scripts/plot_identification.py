@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws what the procedures of an identification saw: one panel each, as far as the records allowed them.
 
 usage: plot_identification.py IDENTIFICATION.json --out PICTURE

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws the JSON of gear_geometry: pairs in contact and the stiffness laws over two mesh cycles.
 
 usage: plot_mesh_stiffness.py GEARS.json --out PICTURE

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws what compare_models found: position difference, speed difference after an impact, errors of the models.
 
 usage: plot_model_comparison.py MODELS.json --out PICTURE

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws a record: its channels over time, a part of it enlarged, and torque over position difference.
 
 usage: plot_record.py RECORD.csv --out PICTURE [--from S] [--to S]

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Simulates and draws Figs. 5, 6 and 10 of Sarkar, Ellis and Moore (1997) and compares with their published skewness.
 
 Runs the package's commands simulate, build_curve and diagnose_record, which lie beside this script, and reads only what

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws an uncertainty study: estimates against the truth, and coverage and error by sensor noise.
 
 Exit codes: 0 done, 64 usage, 65 not a study, 66 study missing, 70 matplotlib missing, 73 cannot write.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the plot scripts share: command line, errors with exit codes, reading and writing files whole.
 
 Exit codes of all of them: 0 done, 64 usage, 65 not the data, 66 data missing, 70 matplotlib missing, 73 cannot write.

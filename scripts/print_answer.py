@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Prints true and estimated backlash from a saved answer of the service `diagnose` (demo.sh).
 
 usage: print_answer.py ANSWER.yaml TRUE_BACKLASH_METRES; exit code 1 where the answer is no success.

@@ -1,6 +1,7 @@
 #!/bin/bash
 # Makes every figure and table of doc/sarkar_1997.md, in minutes: builds the package if need be and writes all to OUT
 # (default: build/sarkar_1997 of this repository). Usage: bash scripts/reproduce_sarkar_1997.sh [OUT]
+# SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Counts the results of gtests and rostests from their XML files, because run_tests exits with 0 on failures.
 
 Prints every failed test with its message and every skipped one with its reason; the last line is

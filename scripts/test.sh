@@ -1,6 +1,7 @@
 #!/bin/bash
 # Installs, builds and runs every test; the last line is "N passed, N failed, N skipped" and the exit code is 0
 # only if nothing failed and something passed. Usage: bash scripts/test.sh
+# SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

@@ -2,6 +2,7 @@
 # Builds the package if need be, makes the test machines, runs trace_residual on each and prints the confusion table
 # against the goals. Everything is kept in OUT (default: build/machines of this repository), and what is there already
 # is not run again. Usage: bash scripts/trace_machines.sh [OUT [OPTION...]]; options as test/tools/confusion_table.py.
+# SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

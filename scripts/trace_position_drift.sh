@@ -2,6 +2,7 @@
 # The open question of Yumrukcal (2013, Section 6.2.1): why does the position difference drift under load? Simulates the
 # servo with each candidate cause, and asks trace_residual, which knows none of them, what its model lacks. Minutes; all
 # is kept in OUT (default: build/position_drift of this repository). Usage: bash scripts/trace_position_drift.sh [OUT]
+# SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

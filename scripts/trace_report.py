@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws the figures of a trace_residual report as a piece of HTML with the pictures inside.
 
 usage: trace_report.py REPORT.json --series SERIES.json --out FIGURES.html

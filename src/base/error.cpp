@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/base/error.h"
 
 #include <sstream>
@@ -14,7 +15,8 @@ std::string to_text(double value) {
 
 }  // namespace
 
-InvalidParameter::InvalidParameter(const std::string& name, const std::string& value, const std::string& limit)
+InvalidParameter::InvalidParameter(const std::string& name, const std::string& value,
+                                   const std::string& limit)
     : Error(name + " = " + value + ": " + limit), name_(name), value_(value), limit_(limit) {}
 
 InvalidParameter::InvalidParameter(const std::string& name, double value, const std::string& limit)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/apd_family.h"
 
 #include <algorithm>
@@ -11,14 +12,14 @@ namespace backlash {
 namespace {
 
 constexpr int kCellsPerSigma = 4;  // of the grid on which distributions are summed
-constexpr int kReach = 18;         // cells beyond which a normal distribution is 0 or 1: 4.5 standard deviations
-constexpr int kShares = 64;        // places of a centre within its cell that are told apart
+constexpr int kReach = 18;   // cells beyond which a normal distribution is 0 or 1: 4.5 standard deviations
+constexpr int kShares = 64;  // places of a centre within its cell that are told apart
 constexpr double kLeastNoise = 2e-4;     // of the range of a distribution, less cannot be seen in it
 constexpr double kLevelRatio = 1.03;     // between levels of noise at which a family is kept
 constexpr std::size_t kMostLevels = 32;  // half a megabyte each
 
-/// The normal distribution function at the grid's points about its centre, which lies `share` / kShares of a cell
-/// beyond the point before it: from kReach cells before that point to kReach + 1 after it.
+/// The normal distribution function at the grid's points about its centre, which lies `share` / kShares of a
+/// cell beyond the point before it: from kReach cells before that point to kReach + 1 after it.
 using Rise = Eigen::Array<double, 2 * kReach + 2, 1>;
 const Rise& normal_rise(int share) {
   static const std::vector<Rise> rises = [] {
@@ -61,16 +62,17 @@ Quantiles with_noise(const Quantiles& exact, double sigma) {
     cumulative.segment<Rise::SizeAtCompileTime>(before - kReach) += rise;
     whole[before + kReach + 2] += 1;
   }
-  double passed = 0;
-  for (Eigen::Index i = 0; i < cells; ++i) cumulative[i] += passed += whole[i];
   Quantiles noisy(exact.size());
-  Eigen::Index i = 1;
-  for (std::size_t k = 0; k < exact.size(); ++k) {
-    const double wanted = static_cast<double>(k) + 0.5;
-    while (i + 1 < cells && cumulative[i] < wanted) ++i;
-    const double step = cumulative[i] - cumulative[i - 1];
-    const double share = step > 0 ? std::clamp((wanted - cumulative[i - 1]) / step, 0.0, 1.0) : 0.5;
-    noisy[k] = lower + (static_cast<double>(i - 1) + share) * cell;
+  double before = 0, passed = 0;  // samples up to the last point of the grid, beyond their own rise
+  std::size_t k = 0;
+  for (Eigen::Index i = 0; i < cells && k < noisy.size(); ++i) {
+    passed += whole[i];
+    const double now = cumulative[i] + passed;
+    for (; k < noisy.size() && now >= static_cast<double>(k) + 0.5; ++k) {
+      const double share = (static_cast<double>(k) + 0.5 - before) / (now - before);
+      noisy[k] = lower + (static_cast<double>(i - 1) + share) * cell;
+    }
+    before = now;
   }
   return noisy;
 }
@@ -87,7 +89,8 @@ NoisyFamily::NoisyFamily(const ApdFamily& family, double sigma)
   members_.colwise() -= middle_;
   square_ = members_.colwise().squaredNorm();
   neighbours_ = Eigen::VectorXd::Zero(members_.cols());
-  for (Eigen::Index k = 0; k + 1 < members_.cols(); ++k) neighbours_[k] = members_.col(k).dot(members_.col(k + 1));
+  for (Eigen::Index k = 0; k + 1 < members_.cols(); ++k)
+    neighbours_[k] = members_.col(k).dot(members_.col(k + 1));
 }
 
 ApdFamily::ApdFamily() : compared(std::make_shared<NoisyFamilies>()) {}
@@ -97,17 +100,20 @@ std::shared_ptr<const NoisyFamily> NoisyFamilies::at(const ApdFamily& family, do
   const double step = std::log(kLevelRatio);
   const long level = none ? std::numeric_limits<long>::min() : std::lround(std::log(sigma) / step);
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto known = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& k) { return k.level == level; });
+  const auto known =
+      std::find_if(kept_.begin(), kept_.end(), [&](const Kept& k) { return k.level == level; });
   if (known != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, known);
   } else {
-    kept_.push_front({level, std::make_shared<NoisyFamily>(family, none ? 0 : std::exp(double(level) * step))});
+    kept_.push_front(
+        {level, std::make_shared<NoisyFamily>(family, none ? 0 : std::exp(double(level) * step))});
     if (kept_.size() > kMostLevels) kept_.pop_back();
   }
   return kept_.front().family;
 }
 
-// Squares of differences from products of the members with the record: those among the members are known already.
+// Squares of differences from products of the members with the record: those among the members are known
+// already.
 FamilyDistance::FamilyDistance(const NoisyFamily& family, const Quantiles& observed) {
   const Eigen::VectorXd own = Eigen::Map<const Eigen::VectorXd>(observed.data(), kQuantiles) - family.middle_;
   const Eigen::VectorXd shared = family.members_.transpose() * own;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
 
 #include <algorithm>
@@ -49,7 +50,8 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
   if (largest < 0.95 * made.amplitude)
     return mismatch("excitation amplitude", largest, made.amplitude, "N m");
   const double often = quantile(std::move(magnitude), 0.9);
-  if (often > 1.1 * made.amplitude + kOftenNoise * noise) return mismatch("excitation amplitude", often, made.amplitude, "N m");
+  if (often > 1.1 * made.amplitude + kOftenNoise * noise)
+    return mismatch("excitation amplitude", often, made.amplitude, "N m");
   return {};
 }
 
@@ -248,8 +250,8 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
   if (match.family->alien()) {
     std::ostringstream text;
     text.precision(3);
-    text << "the distribution is " << match.family->misfit << " (rms) from the nearest of " << curve->conditions.rig
-         << ", simulated records were within " << match.family->usual_misfit
+    text << "the distribution is " << match.family->misfit << " (rms) from the nearest of "
+         << curve->conditions.rig << ", simulated records were within " << match.family->usual_misfit
          << ": the machine does something that the rig does not contain";
     match.refused = refuse(Status::out_of_domain, text.str());
   }
@@ -257,9 +259,9 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
 }
 
 Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, const MonitoringCurve* curve) {
-  Estimate estimate =
-      match.refused ? *match.refused
-                    : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), match.noise);
+  Estimate estimate = match.refused
+                          ? *match.refused
+                          : curve->invert(apd.skewness, static_cast<int>(apd.periods.size()), match.noise);
   // Beyond the curve skewness comes back to values that it has on the curve; the whole distribution notices.
   if (estimate.status == Status::ok && match.family && match.family->touches_end) {
     estimate.status = Status::ambiguous;

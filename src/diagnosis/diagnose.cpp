@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
 #include <algorithm>
@@ -58,8 +59,8 @@ Estimate by_momentum_transfer(const DiagnosisInput& in) {
 CoherenceSettings read_coherence(const YamlReader& yaml) {
   CoherenceSettings coherence;
   coherence.segment = yaml.number("segment", Range::positive());
-  coherence.response = channel_from_name(
-      yaml.choice("response", {"motor_velocity", "motor_position", "load_velocity", "load_position", "acceleration"}));
+  coherence.response = channel_from_name(yaml.choice(
+      "response", {"motor_velocity", "motor_position", "load_velocity", "load_position", "acceleration"}));
   coherence.lower = yaml.number_or("lower", kNaN, Range::positive());
   coherence.upper = yaml.number_or("upper", kNaN, Range::positive());
   if (const auto healthy = yaml.optional_map("baseline"))
@@ -90,12 +91,15 @@ DiagnosisSettings without_settling(DiagnosisSettings settings) {
 
 const std::vector<DiagnosisMethod>& diagnosis_method_table() {
   static const std::vector<DiagnosisMethod> methods = {
-      {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", true, by_apd<estimate_apd_skewness>},
+      {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", true,
+       by_apd<estimate_apd_skewness>},
       {"apd_shape", "the signal of diagnosis.apd and a monitoring curve", true, by_apd<estimate_apd_shape>},
-      {"lost_motion", "motor_position, and motor_torque or sensor_torque; output locked", false, by_lost_motion},
+      {"lost_motion", "motor_position, and motor_torque or sensor_torque; output locked", false,
+       by_lost_motion},
       {"position_difference", "motor_position, load_position, and motor_torque or sensor_torque", false,
        by_position_difference},
-      {"momentum_transfer", "motor_torque, and motor_velocity or motor_position", false, by_momentum_transfer},
+      {"momentum_transfer", "motor_torque, and motor_velocity or motor_position", false,
+       by_momentum_transfer},
   };
   return methods;
 }
@@ -137,9 +141,8 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
   const DiagnosisInput input{record, settings, curve, diagnosis.apd, match};
   for (const DiagnosisMethod& each : diagnosis_method_table()) {
     if (!method.empty() && method != each.name) continue;
-    diagnosis.estimates.push_back(record.time.empty()
-                                      ? not_served("no whole excitation period after settling")
-                                      : each.estimate(input));
+    diagnosis.estimates.push_back(
+        record.time.empty() ? not_served("no whole excitation period after settling") : each.estimate(input));
     diagnosis.estimates.back().method = each.name;
   }
   if (settings.coherence) diagnosis.coherence = detect_nonlinearity(record, *settings.coherence);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/family_match.h"
 
 #include <algorithm>
@@ -16,7 +17,8 @@ std::vector<double> noises_of(const NoiseRange& range, const std::vector<double>
   const double upper = std::min(std::isnan(range.upper) ? levels.back() : range.upper, levels.back());
   const double lower = std::min(range.lower, upper);
   if (lower == upper) return {upper};
-  const double ratios = std::log(upper / lower) / std::log(kNoiseRatio);  // infinite where the lower bound is zero
+  const double ratios =
+      std::log(upper / lower) / std::log(kNoiseRatio);  // infinite where the lower bound is zero
   const int steps = static_cast<int>(std::ceil(std::min(ratios, kMostNoises - 1.0)));
   std::vector<double> noises;
   for (int step = 0; step <= steps; ++step) noises.push_back(lower + (upper - lower) * step / steps);

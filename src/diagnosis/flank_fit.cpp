@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
 
 #include <Eigen/Dense>
@@ -55,7 +56,8 @@ double rms(const std::vector<double>& x) {
   return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
 }
 
-/// Slope of the elastic deflection over torque, from differences of `step` and tabulated: it only steers the iteration.
+/// Slope of the elastic deflection over torque, from differences of `step` and tabulated: it only steers the
+/// iteration.
 class Slope {
  public:
   Slope(const std::function<double(double)>& elastic, double reach, double step) : reach_(reach) {
@@ -173,7 +175,8 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   gap_at_ = f_basis_.cols();
   elastic_at_ = gap_at_ + gap.cols();
   design(gap);
-  const VectorXd used = Eigen::Map<const Eigen::Array<char, Eigen::Dynamic, 1>>(use_.data(), n_).cast<double>();
+  const VectorXd used =
+      Eigen::Map<const Eigen::Array<char, Eigen::Dynamic, 1>>(use_.data(), n_).cast<double>();
   const double count = used.sum();
   used_.noalias() = used.asDiagonal() * a_;
   MatrixXd normal = used_.transpose() * a_;

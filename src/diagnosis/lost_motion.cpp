@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/lost_motion.h"
 
 #include <algorithm>
@@ -29,8 +30,9 @@ constexpr double kUnsettled = 0.1;
 // ... or if rms ringing is this share of the elastic deflection, so that the flank is left again.
 constexpr double kContactLoss = 0.5;
 constexpr std::size_t kFewest = 2;  // excursions per side
-// Torque in the sensor rings with the motor, so that its excursions need not be those of the excitation. It is not
-// trusted with this share of deviating passages, or with so many times more excursions than half cycles.
+// Torque in the sensor rings with the motor, so that its excursions need not be those of the excitation. It
+// is not trusted with this share of deviating passages, or with so many times more excursions than half
+// cycles.
 constexpr double kManyOutliers = 0.15;
 constexpr double kManyExcursions = 1.25;
 

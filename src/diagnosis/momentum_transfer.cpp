@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 
 #include <algorithm>
@@ -389,7 +390,8 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
 
 Estimate estimate_momentum_transfer(const Record& record, const MomentumTransferSettings& settings) {
   check(settings);
-  return estimate_or_refusal("momentum_transfer", [&](Estimate& estimate) { fill(record, settings, estimate); });
+  return estimate_or_refusal("momentum_transfer",
+                             [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
 }  // namespace backlash

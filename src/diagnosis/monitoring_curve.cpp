@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 namespace backlash {
 namespace {
 
-constexpr double kFloor = 1e-6;         // smallest difference of skewness that may count as one
+constexpr double kFloor = 1e-6;  // smallest difference of skewness that may count as one
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 SkewnessCell mix(const SkewnessCell& a, const SkewnessCell& b, double share) {
@@ -29,8 +30,9 @@ std::pair<std::size_t, double> locate(std::size_t count, Get value, double x) {
   return {i, std::clamp((x - value(i)) / (value(i + 1) - value(i)), 0.0, 1.0)};
 }
 
-/// Structure finer than the grid about point i: rms distance of the runs in the middle of the segments around it
-/// from the straight line. Divided by 1.5, the variance of a value minus the mean of two others of variance 1.
+/// Structure finer than the grid about point i: rms distance of the runs in the middle of the segments around
+/// it from the straight line. Divided by 1.5, the variance of a value minus the mean of two others of
+/// variance 1.
 double roughness(const std::vector<CurvePoint>& points, const std::vector<std::vector<SkewnessCell>>& middle,
                  std::size_t i, std::size_t level) {
   double sum = 0;
@@ -68,7 +70,8 @@ struct Accepted {
 };
 
 /// All backlash values whose model agrees with the observation within the 95 % limits (Neyman's
-/// construction): (skewness - mean(b))^2 <= (coverage_factor sigma(b))^2, between two points a quadratic inequality.
+/// construction): (skewness - mean(b))^2 <= (coverage_factor sigma(b))^2, between two points a quadratic
+/// inequality.
 Accepted accept(const MonitoringCurve& curve, double skewness, int periods, double noise) {
   Accepted result;
   for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
@@ -77,7 +80,8 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
     const double offset = skewness - cell.mean, slope = next.mean - cell.mean;
     double a = slope * slope, b = -2 * offset * slope, c = offset * offset - kFloor * kFloor;
     const auto widen = [&](double at_start, double at_end, double divisor) {
-      const double factor = curve.coverage_factor * curve.coverage_factor / divisor, change = at_end - at_start;
+      const double factor = curve.coverage_factor * curve.coverage_factor / divisor,
+                   change = at_end - at_start;
       a -= factor * change * change;
       b -= factor * 2 * at_start * change;
       c -= factor * at_start * at_start;
@@ -94,7 +98,8 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
     const double crossing = std::clamp(slope == 0 ? 0 : offset / slope, 0.0, 1.0);
     for (const double share : {0.0, crossing, 1.0}) {
       const SkewnessCell here = mix(cell, next, share);
-      const double distance = std::fabs(skewness - here.mean) / std::max(MonitoringCurve::deviation(here, periods), kFloor);
+      const double distance =
+          std::fabs(skewness - here.mean) / std::max(MonitoringCurve::deviation(here, periods), kFloor);
       if (!(distance < result.best_distance)) continue;
       result.best_distance = distance;
       result.best = from + share * span;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Monitoring curves as files.
 #include <yaml-cpp/yaml.h>
 
@@ -140,7 +141,8 @@ std::vector<Quantiles> read_member(const YamlReader& yaml) {
   std::vector<Quantiles> phases;
   for (auto begin = values.begin(); begin != values.end(); begin += kQuantiles) {
     phases.emplace_back(begin, begin + kQuantiles);
-    if (!std::is_sorted(begin, begin + kQuantiles)) yaml.fail("quantiles", "must not decrease within a phase");
+    if (!std::is_sorted(begin, begin + kQuantiles))
+      yaml.fail("quantiles", "must not decrease within a phase");
   }
   return phases;
 }
@@ -161,7 +163,8 @@ ApdFamily read_family(const YamlReader& yaml, std::size_t points, std::size_t le
     if (family.members.back().size() != family.members.front().size())
       member.fail("quantiles", "every member needs the same number of phases");
   }
-  if (family.members.size() < points) yaml.fail("members", "needs one member per point of the curve, or more");
+  if (family.members.size() < points)
+    yaml.fail("members", "needs one member per point of the curve, or more");
   if (family.segments.size() + 1 != points) yaml.fail("segments", "needs one segment between two points");
   return family;
 }

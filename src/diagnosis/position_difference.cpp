@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 
 #include <algorithm>
@@ -17,7 +18,8 @@ constexpr std::size_t kShortestWindow = 4, kLongestWindow = 64;  // samples, hal
 // Residuals fall by 2^2.5 per doubling of the window where second differences of noise dominate, by 2^0.5
 // where white torque noise does; only the former is worth a longer window.
 constexpr double kNoiseFalls = 2.0;
-// Of the play, with a locked output: bouncing takes longer the larger the gap, until it fills the half period.
+// Of the play, with a locked output: bouncing takes longer the larger the gap, until it fills the half
+// period.
 constexpr double kBounce = 0.03;
 constexpr double kLockedTravel = 0.05;  // of the motor's travel
 // Share of the rms residual in the interval, of a locked rig and of a moving load.
@@ -174,7 +176,8 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
 
 Estimate estimate_position_difference(const Record& record, const PositionDifferenceSettings& settings) {
   check(settings);
-  return estimate_or_refusal("position_difference", [&](Estimate& estimate) { fill(record, settings, estimate); });
+  return estimate_or_refusal("position_difference",
+                             [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
 }  // namespace backlash

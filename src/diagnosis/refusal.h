@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How estimators give up: a status with its reason, thrown where the record turns out unfit.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 
 #include <algorithm>
@@ -19,7 +20,8 @@ double get(const ChannelValues& values, Channel channel) {
 /// A bit for each channel that has a finite value.
 unsigned present(const ChannelValues& values) {
   unsigned bits = 0;
-  for (std::size_t i = 0; i < kChannelCount; ++i) bits |= static_cast<unsigned>(std::isfinite(values[i])) << i;
+  for (std::size_t i = 0; i < kChannelCount; ++i)
+    bits |= static_cast<unsigned>(std::isfinite(values[i])) << i;
   return bits;
 }
 

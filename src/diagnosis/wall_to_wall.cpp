@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/wall_to_wall.h"
 
 #include <algorithm>
@@ -13,9 +14,9 @@ constexpr double kSwitchTime = 0.1;    // passage between the sides over length 
 constexpr double kSwitchChange = 0.2;  // change of torque in the last third of an excursion over torque
 // Largest ratio of spreads half a window apart that is still taken for dying ringing.
 constexpr double kLargestDecay = 0.7;
-// What ringing and settling leave unknown, as shares of the rms at one wall and of the settling extrapolation;
-// they hold 95 % of the errors in simulations of a ringing rig. Without extrapolation the rms counts twice at
-// each of the two walls.
+// What ringing and settling leave unknown, as shares of the rms at one wall and of the settling
+// extrapolation; they hold 95 % of the errors in simulations of a ringing rig. Without extrapolation the rms
+// counts twice at each of the two walls.
 constexpr double kSwitchedRinging = 0.25;
 constexpr double kSettling = 0.3;
 constexpr double kRampedRinging = 4.0;
@@ -88,7 +89,8 @@ WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<Wa
   result.value = scale.centre + extrapolation;
   result.travel = median(travels);
   result.ringing = median_of(readings, &WallReading::ringing);
-  result.motion = std::hypot(kSettling * extrapolation, (switched ? kSwitchedRinging : kRampedRinging) * result.ringing);
+  result.motion =
+      std::hypot(kSettling * extrapolation, (switched ? kSwitchedRinging : kRampedRinging) * result.ringing);
   result.passages = plays.size();
   result.outliers = scale.outliers;
   // Neighbouring passages share a wall, so n walls make n/2 independent passages; a median scatters 1.25

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/effect_search.h"
 
 #include <algorithm>
@@ -14,24 +15,25 @@
 namespace backlash {
 namespace {
 
-constexpr double kTwoInertiaCutoff = 60;  // Hz
-constexpr double kHighestCutoff = 0.2;    // of the sampling rate
-constexpr double kPeriods = 100;          // in the record: friction has more to say than a slow motion
-constexpr double kLeastLoadTravel = 0.01; // of the motor's: less, and the link does not move freely
-constexpr double kSureSpeed = 5;          // standard deviations of the motor speed's noise
-constexpr double kLeastMoving = 0.05;     // of the samples
-constexpr int kLags = 25;                 // to either side, of the test for independence
-constexpr double kUnexplained = 2;        // times the floor, beyond which something is left
-constexpr double kShapeOfFriction = 0.01; // of the signal: less is how friction begins, not an effect
-constexpr double kWorse = 1.05;           // times the error on the test record: an effect that does harm
-constexpr double kCalibrationCutoff = 15; // Hz, of the first round of a calibration
+constexpr double kTwoInertiaCutoff = 60;   // Hz
+constexpr double kHighestCutoff = 0.2;     // of the sampling rate
+constexpr double kPeriods = 100;           // in the record: friction has more to say than a slow motion
+constexpr double kLeastLoadTravel = 0.01;  // of the motor's: less, and the link does not move freely
+constexpr double kSureSpeed = 5;           // standard deviations of the motor speed's noise
+constexpr double kLeastMoving = 0.05;      // of the samples
+constexpr int kLags = 25;                  // to either side, of the test for independence
+constexpr double kUnexplained = 2;         // times the floor, beyond which something is left
+constexpr double kShapeOfFriction = 0.01;  // of the signal: less is how friction begins, not an effect
+constexpr double kWorse = 1.05;            // times the error on the test record: an effect that does harm
+constexpr double kCalibrationCutoff = 15;  // Hz, of the first round of a calibration
 
 double default_cutoff(const Rig& rig, const std::vector<ServoData>& data) {
   const double highest = kHighestCutoff / data.front().interval;
   if (load_moves_freely(rig)) return std::min(kTwoInertiaCutoff, highest);
   double widest = 0;
   for (const ServoData& d : data)
-    widest = std::max({widest, motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
+    widest =
+        std::max({widest, motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
   return std::min(widest, highest);
 }
 
@@ -46,14 +48,16 @@ ServoData data_of(const Record& record, const Rig& rig) {
     if (data.load.empty())
       throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");
     if (travel(data.load) < kLeastLoadTravel * travel(data.motor))
-      throw CannotIdentify(record.name + ": the load stands still while the motor moves; the rig file has a link that " +
+      throw CannotIdentify(record.name +
+                           ": the load stands still while the motor moves; the rig file has a link that " +
                            "moves freely (a gearbox with locked output: link: locked)");
   }
   const double sure = kSureSpeed * data.rate_noise;
   const auto moving = std::count_if(data.motor_rate.begin(), data.motor_rate.end(),
                                     [&](double rate) { return std::fabs(rate) > sure; });
   if (double(moving) < kLeastMoving * double(data.size()))
-    throw CannotIdentify(record.name + " moves too slowly: its speed stands out of the noise of the encoder in " +
+    throw CannotIdentify(record.name +
+                         " moves too slowly: its speed stands out of the noise of the encoder in " +
                          std::to_string(100 * moving / long(data.size())) + " % of the samples");
   return data;
 }
@@ -84,7 +88,8 @@ ChannelError train_error(const Machine& machine, const std::vector<ServoData>& d
   OutputErrorSettings settings;
   settings.cutoff = cutoff;
   for (std::size_t i = 0; i < data.size(); ++i)
-    error += std::pow((predict_servo(machine.rig, data[i], settings, machine.calibrations[i]).*channel).error, 2);
+    error +=
+        std::pow((predict_servo(machine.rig, data[i], settings, machine.calibrations[i]).*channel).error, 2);
   return {std::sqrt(error / double(data.size())), 0};
 }
 
@@ -132,7 +137,8 @@ void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& 
 }
 
 /// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0.
-void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted, FoundEffect& effect) {
+void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted,
+              FoundEffect& effect) {
   const TermType& type = term_type(term.id);
   if (!type.search) return describe_map(term, fitted, effect);
   const TermSearch& search = *type.search;
@@ -158,7 +164,8 @@ void describe(const Term& term, const std::string& suffix, std::vector<Measured>
 
 /// One step per effect; a second term of the same kind belongs to the step of the first.
 std::vector<FoundEffect> found_effects(const Search& search, std::vector<Measured> fitted,
-                                       const std::vector<ServoPrediction>& on_test, std::size_t declared_terms) {
+                                       const std::vector<ServoPrediction>& on_test,
+                                       std::size_t declared_terms) {
   std::vector<FoundEffect> all;
   const auto error = [](const ServoPrediction& p, const std::string& channel) {
     return channel == "torque" ? p.torque_error.error : p.deflection_error.error;
@@ -199,13 +206,13 @@ void note_shape_of_friction(const Search& search, Trace& trace) {
   std::string note = "friction builds up after each reversal (presliding";
   for (const EffectParameter& p : at->parameters) {
     char text[96];
-    std::snprintf(text, sizeof text, ", %s %.3g +- %.2g %s", p.name.c_str(), p.measured.value, p.measured.standard_error,
-                  axis_unit(p.unit, trace.augmented.linear).c_str());
+    std::snprintf(text, sizeof text, ", %s %.3g +- %.2g %s", p.name.c_str(), p.measured.value,
+                  p.measured.standard_error, axis_unit(p.unit, trace.augmented.linear).c_str());
     note += text;
   }
   char text[96];
-  std::snprintf(text, sizeof text, "): %.2g %% of the %s, so it is in the model but not called missing", 100 * share,
-                at->channel.c_str());
+  std::snprintf(text, sizeof text, "): %.2g %% of the %s, so it is in the model but not called missing",
+                100 * share, at->channel.c_str());
   trace.notes.push_back(note + text);
   trace.steps.erase(at);
 }
@@ -222,7 +229,8 @@ void warn_of_harm(const std::vector<FoundEffect>& steps, std::vector<std::string
   for (const FoundEffect& e : steps) {
     if (e.test_error_after <= kWorse * e.test_error_before) continue;
     char text[160];
-    std::snprintf(text, sizeof text, "%s makes the test record worse (%s %.3g -> %.3g %%): not to be believed", e.id.c_str(),
+    std::snprintf(text, sizeof text,
+                  "%s makes the test record worse (%s %.3g -> %.3g %%): not to be believed", e.id.c_str(),
                   e.channel.c_str(), 100 * e.test_error_before, 100 * e.test_error_after);
     warnings.push_back(text);
   }
@@ -256,20 +264,22 @@ std::vector<Independence> independence(const TraceSeries& s, const ServoData& da
     for (std::size_t k = 0; k < x.size(); k += stride) out.push_back(x[k]);
     return out;
   };
-  const auto residual = [&](const std::vector<double>& y, const std::vector<double>& p, const std::vector<char>& counts) {
+  const auto residual = [&](const std::vector<double>& y, const std::vector<double>& p,
+                            const std::vector<char>& counts) {
     std::vector<double> r(y.size());
     for (std::size_t k = 0; k < y.size(); ++k) r[k] = counts[k] ? y[k] - p[k] : 0;
     return thinned(r);
   };
   std::vector<Independence> all;
   const std::pair<const char*, std::vector<double>> inputs[] = {{"motor_torque", thinned(s.torque)},
-                                                               {"motor_velocity", thinned(data.motor_rate)}};
+                                                                {"motor_velocity", thinned(data.motor_rate)}};
   for (const auto& [name, input] : inputs) {
     const auto share = [&](const std::vector<double>& r) { return share_outside_band(r, input, kLags); };
     all.push_back({"torque", name, share(residual(s.torque, s.torque_before, s.torque_counts)),
                    share(residual(s.torque, s.torque_after, s.torque_counts))});
     if (!s.deflection.empty())
-      all.push_back({"deflection", name, share(residual(s.deflection, s.deflection_before, s.deflection_counts)),
+      all.push_back({"deflection", name,
+                     share(residual(s.deflection, s.deflection_before, s.deflection_counts)),
                      share(residual(s.deflection, s.deflection_after, s.deflection_counts))});
   }
   return all;
@@ -289,15 +299,17 @@ void warn_of_range(const std::vector<ServoData>& train, const ServoData& test, b
                     torque = axis_unit("N m", linear);
   char text[256];
   if (asked.from < known.from - slack || asked.to > known.to + slack) {
-    std::snprintf(text, sizeof text, "the test record moves from %.3g to %.3g %s, the training records from %.3g to %.3g",
+    std::snprintf(text, sizeof text,
+                  "the test record moves from %.3g to %.3g %s, the training records from %.3g to %.3g",
                   asked.from, asked.to, angle.c_str(), known.from, known.to);
     trace.warnings.push_back(text);
   }
   if (asked.speed > 1.5 * known.speed || asked.torque > 1.5 * known.torque) {
-    std::snprintf(text, sizeof text, "the test record is faster or stronger than the training records: "
+    std::snprintf(text, sizeof text,
+                  "the test record is faster or stronger than the training records: "
                   "speed %.3g against %.3g %s, %s %.3g against %.3g %s (standard deviations)",
-                  asked.speed, known.speed, speed.c_str(), linear ? "force" : "torque", asked.torque, known.torque,
-                  torque.c_str());
+                  asked.speed, known.speed, speed.c_str(), linear ? "force" : "torque", asked.torque,
+                  known.torque, torque.c_str());
     trace.warnings.push_back(text);
   }
 }
@@ -340,8 +352,9 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
     for (const FitParameter& p : machine->parameters) trace.units[p.name] = p.unit;
   trace.steps = found_effects(search, found.effects, on_test, declared.terms.size());
   if (search.other_teeth())
-    trace.notes.push_back("the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; " +
-                          std::string("so they are in the model, but nothing is called missing for it"));
+    trace.notes.push_back(
+        "the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; " +
+        std::string("so they are in the model, but nothing is called missing for it"));
   note_shape_of_friction(search, trace);
   trace.unexplained = signature(last, search.stage().records, kUnexplained);
   if (!trace.steps.empty())

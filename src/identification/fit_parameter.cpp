@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "fit_parameter.h"
 
 #include "backlash_diagnosis/base/error.h"
@@ -23,8 +24,12 @@ FitParameter term_parameter(std::size_t term, const std::string& name, const Rig
       changed.terms[term] = make_term(changed.terms[term]->id, values);
     };
     const bool positive = spec.range.lower == 0 && rig.terms[term]->values.at(name) > 0;
-    return {name, spec.unit, positive, scale,
-            [term, name](const Rig& r) { return r.terms[term]->values.at(name); }, set};
+    return {name,
+            spec.unit,
+            positive,
+            scale,
+            [term, name](const Rig& r) { return r.terms[term]->values.at(name); },
+            set};
   }
   throw InvalidParameter(name, id, "is not a parameter of this term");
 }
@@ -37,8 +42,12 @@ FitParameter list_parameter(std::size_t term, const std::string& name, std::size
     values.set_list(name, list);
     changed.terms[term] = make_term(changed.terms[term]->id, values);
   };
-  return {name, "", false, scale,
-          [term, name, index](const Rig& rig) { return rig.terms[term]->values.list(name)[index]; }, set};
+  return {name,
+          "",
+          false,
+          scale,
+          [term, name, index](const Rig& rig) { return rig.terms[term]->values.list(name)[index]; },
+          set};
 }
 
 }  // namespace backlash

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One number of a rig that a fit may change: of the machine itself or of one of its terms.
 #pragma once
 
@@ -12,8 +13,8 @@ namespace backlash {
 struct FitParameter {
   std::string name;  // in reports
   std::string unit;
-  bool positive;     // > 0: its logarithm is fitted
-  double scale;      // a typical size, of one that is not positive
+  bool positive;  // > 0: its logarithm is fitted
+  double scale;   // a typical size, of one that is not positive
   std::function<double(const Rig&)> get;
   std::function<void(Rig&, double)> set;
 };
@@ -21,8 +22,8 @@ struct FitParameter {
 /// By its name among servo_parameters(). Throws InvalidParameter for one that must be > 0 and is not.
 FitParameter machine_parameter(const std::string& name, const Rig& rig);
 
-/// A number of the term at this place of rig.terms; `scale` as above. One that may not be negative, and is not 0,
-/// stays above 0.
+/// A number of the term at this place of rig.terms; `scale` as above. One that may not be negative, and is
+/// not 0, stays above 0.
 FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale);
 
 /// Entry `index` of a list of that term.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "joint_fit.h"
 
 #include <algorithm>
@@ -10,13 +11,13 @@
 namespace backlash {
 namespace {
 
-constexpr double kFarthest = 30;     // times the start or a part of it: approached, never reached
-constexpr double kWideStep = 1e-2;   // of the differences that the errors are taken from
-constexpr double kBlock = 1;         // s: the slowest oscillation that a servo record shows
-constexpr double kNegligible = 2e-3; // of a signal: no floor is lower, no model need be better
-constexpr double kSaturated = 3;     // where tanh no longer moves: 0.995 of the largest delay
-constexpr double kVague = 30;        // times the scale: what is believed of a parameter before any record
-constexpr double kDefaultGap = 1e-4; // rad, scale of an encoder offset where the rig has no gap
+constexpr double kFarthest = 30;      // times the start or a part of it: approached, never reached
+constexpr double kWideStep = 1e-2;    // of the differences that the errors are taken from
+constexpr double kBlock = 1;          // s: the slowest oscillation that a servo record shows
+constexpr double kNegligible = 2e-3;  // of a signal: no floor is lower, no model need be better
+constexpr double kSaturated = 3;      // where tanh no longer moves: 0.995 of the largest delay
+constexpr double kVague = 30;         // times the scale: what is believed of a parameter before any record
+constexpr double kDefaultGap = 1e-4;  // rad, scale of an encoder offset where the rig has no gap
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(0.4 / (record.cutoff * record.data().interval)));
@@ -61,7 +62,8 @@ double limited(double logarithm) {
 
 /// The covariance of neighbouring rows is itself an estimate from few blocks and now and then far too small.
 void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
-  const Eigen::VectorXd growth = (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
+  const Eigen::VectorXd growth =
+      (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
   covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
 }
 
@@ -116,7 +118,8 @@ Leftover RecordSet::leftover(const Machine& machine) const {
     const double deflection = std::max(floor.deflection, kNegligible * spreads_[i].deflection);
     const double deflection_left = rms(r.deflection, record.settled);
     sum.deflection += std::pow(deflection_left / deflection, 2);
-    if (spreads_[i].deflection > 0) sum.deflection_share += std::pow(deflection_left / spreads_[i].deflection, 2);
+    if (spreads_[i].deflection > 0)
+      sum.deflection_share += std::pow(deflection_left / spreads_[i].deflection, 2);
   }
   for (double* of : {&sum.torque, &sum.deflection, &sum.torque_share, &sum.deflection_share})
     *of = std::sqrt(*of / double(records_.size()));
@@ -131,7 +134,8 @@ Eigen::VectorXd RecordSet::rows(const Rig& rig, const std::vector<Calibration>& 
     const ServoResiduals r = record.residuals(rig, calibrations[i]);
     for (std::size_t k = 0; k < record.data().size(); k += stride(record)) {
       rows[next++] = record.counts[k] ? r.torque[k] / weights_[i].torque : 0;
-      rows[next++] = record.settled[k] && !r.deflection.empty() ? r.deflection[k] / weights_[i].deflection : 0;
+      rows[next++] =
+          record.settled[k] && !r.deflection.empty() ? r.deflection[k] / weights_[i].deflection : 0;
     }
   }
   return rows;
@@ -231,11 +235,13 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records, const Non
 
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records) {
   const Unknowns unknowns(start);
-  const Eigen::Index known = unknowns.size() + Eigen::Index(start.beliefs.size()), rows = fit.fit.residuals.size() - known;
+  const Eigen::Index known = unknowns.size() + Eigen::Index(start.beliefs.size()),
+                     rows = fit.fit.residuals.size() - known;
   const Eigen::Index wanted = 2 * std::lround(kBlock / records.row_interval());
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
-  widen_jacobian(fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
-                 kWideStep * unknowns.scale(), true);
+  widen_jacobian(
+      fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
+      kWideStep * unknowns.scale(), true);
   take_larger(fit.fit.covariance, block_covariance(fit.fit, block, known));
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The unknowns of a machine fitted to several records together (output_error.h says what counts).
 #pragma once
 
@@ -35,7 +36,8 @@ struct Leftover {
 };
 
 /// Records made ready at one bandwidth, with the weights of their channels. One row per channel and as many
-/// samples as a signal of this bandwidth has independent values: of each record torque and deflection in turn.
+/// samples as a signal of this bandwidth has independent values: of each record torque and deflection in
+/// turn.
 class RecordSet {
  public:
   RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback);

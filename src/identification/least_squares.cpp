@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/least_squares.h"
 
 #include <Eigen/Cholesky>

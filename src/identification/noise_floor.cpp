@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/noise_floor.h"
 
 #include <algorithm>
@@ -58,7 +59,8 @@ Spring mesh_spring(const Rig& rig, const std::vector<double>& torque) {
   double square = 0;
   for (const double t : torque) square += t * t / double(torque.size());
   const PowerContact law = *rig.mesh.contact->power_contact();
-  const double lever = rig.mesh.lever(), depth = rig.mesh.contact->static_penetration(std::sqrt(square) / lever);
+  const double lever = rig.mesh.lever(),
+               depth = rig.mesh.contact->static_penetration(std::sqrt(square) / lever);
   const double force = law.stiffness * std::pow(depth, law.exponent);
   const double stiffness = law.exponent == 1 ? law.stiffness : law.exponent * force / depth;
   return {stiffness * lever * lever, (law.damping + law.loss * force) * lever * lever};

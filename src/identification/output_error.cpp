@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/output_error.h"
 
 #include <cmath>
@@ -9,10 +10,10 @@
 namespace backlash {
 namespace {
 
-constexpr double kHold = 0.5;         // samples, mean delay of a held torque
-constexpr double kRoughCutoff = 15;   // Hz, of the first round: what moves slowly has fewer wrong minima
-constexpr double kClean = 2;     // times the noise floor, up to which nothing is missing
-constexpr double kAlike = 0.03;  // relative difference of what two starts leave in the same minimum
+constexpr double kHold = 0.5;        // samples, mean delay of a held torque
+constexpr double kRoughCutoff = 15;  // Hz, of the first round: what moves slowly has fewer wrong minima
+constexpr double kClean = 2;         // times the noise floor, up to which nothing is missing
+constexpr double kAlike = 0.03;      // relative difference of what two starts leave in the same minimum
 constexpr int kOtherStarts = 8;
 constexpr double kBeside = 0.4;  // of the logarithm of a parameter
 constexpr double kRoughTolerance = 1e-3;
@@ -110,7 +111,8 @@ Rig beside(const Rig& start, const std::vector<std::string>& names, int number) 
 
 /// The first round. Where it leaves more than noise, other starts are tried until two end alike: then that is
 /// the minimum, and the machine has something that the rig does not.
-Rounds rough_fit(const Rig& start, const std::vector<ServoData>& records, const OutputErrorSettings& settings) {
+Rounds rough_fit(const Rig& start, const std::vector<ServoData>& records,
+                 const OutputErrorSettings& settings) {
   Rounds best(start, records, settings);
   double least = best.try_run(kRoughCutoff, kRoughTolerance);
   if (settings.parameters.empty()) return best;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/rig_parameters.h"
 
 #include "backlash_diagnosis/base/error.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/servo_data.h"
 
 #include <algorithm>
@@ -16,11 +17,11 @@ namespace {
 
 constexpr std::size_t kStart = 10;        // samples
 constexpr std::size_t kLeastToTell = 64;  // samples, for the noise of a position
-constexpr double kRateNoise = 0.95;       // of a five-point difference of white noise of deviation 1, per sample
-constexpr double kClear = 0.02;           // of the speed: noise that does not hide its direction
-constexpr double kWidestBand = 0.2;       // of the sampling rate
+constexpr double kRateNoise = 0.95;  // of a five-point difference of white noise of deviation 1, per sample
+constexpr double kClear = 0.02;      // of the speed: noise that does not hide its direction
+constexpr double kWidestBand = 0.2;  // of the sampling rate
 constexpr double kNarrower = 0.9;
-constexpr double kLeastPeriods = 10;      // of the band, in the record: below, nothing is smoothed
+constexpr double kLeastPeriods = 10;  // of the band, in the record: below, nothing is smoothed
 
 std::vector<double> scaled(const Record& record, Channel channel, double factor) {
   std::vector<double> values = record.column(channel);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a rig says of a record: torque and deflection, and what is left of them.
 #include "servo_prediction.h"
 
@@ -15,10 +16,10 @@
 namespace backlash {
 namespace {
 
-constexpr double kEnds = 3;          // periods of the cutoff at either end, where the filter has not settled
-constexpr double kStarts = 12;       // time constants of the feedback, until the start of the load is forgotten
-constexpr double kSureSpeed = 5;     // standard deviations of the motor speed, from which it has a sign
-constexpr long kReach = 2;           // samples to either side that it uses
+constexpr double kEnds = 3;       // periods of the cutoff at either end, where the filter has not settled
+constexpr double kStarts = 12;    // time constants of the feedback, until the start of the load is forgotten
+constexpr double kSureSpeed = 5;  // standard deviations of the motor speed, from which it has a sign
+constexpr long kReach = 2;        // samples to either side that it uses
 
 // A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
 // torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
@@ -41,7 +42,8 @@ std::vector<int> sliding(const ServoData& data) {
   const double slowest = kSureSpeed * data.rate_noise;
   const long n = static_cast<long>(data.size());
   std::vector<int> direction(n), sure(n);
-  for (long k = 0; k < n; ++k) direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);
+  for (long k = 0; k < n; ++k)
+    direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);
   for (long k = 0; k < n; ++k) {
     sure[k] = direction[k];
     for (long j = std::max(0L, k - kReach); j <= std::min(n - 1, k + kReach); ++j)

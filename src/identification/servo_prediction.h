@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A record made ready for many predictions by rigs that differ in their parameters.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What can be read off the response without a model of all of it: resonances and plateaus.
 #include <Eigen/Core>
 #include <algorithm>

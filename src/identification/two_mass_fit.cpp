@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The whole response at once.
 #include <Eigen/Core>
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/model/gear_geometry.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/model/gear_train.h"
 
 #include <algorithm>
@@ -9,7 +10,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kWithinReach = 0.1;  // of half a gap, from which a flank that moves less than that cannot touch
+constexpr double kWithinReach =
+    0.1;  // of half a gap, from which a flank that moves less than that cannot touch
 
 Coupling referred(Coupling coupling, double factor) {
   coupling.stiffness *= factor;
@@ -75,7 +77,8 @@ GearTrain::GearTrain(const Rig& rig)
 
 /// Where no more than teeth and springs act; see SmoothTrain.
 void GearTrain::simplify(const Rig& rig) {
-  if (!contact_ || contact_->needs_impact_speed() || variation_ || !terms_.empty() || !dry_ends_.empty()) return;
+  if (!contact_ || contact_->needs_impact_speed() || variation_ || !terms_.empty() || !dry_ends_.empty())
+    return;
   SmoothTrain<double> t;
   layout_ = {!input_.rigid, node_[kGear] != kFixed, !output_.rigid, !rig.link_locked};
   std::copy(damping_.begin(), damping_.end(), t.damping);
@@ -156,7 +159,8 @@ FlankShift GearTrain::shift(const Slots& s, int side, double mesh_torque) const 
 }
 
 /// Of a flank that is closed by `penetration` [m], moving at `rate` [m/s].
-double GearTrain::flank_force(const Slots& s, int side, double penetration, double rate, double mesh_torque) const {
+double GearTrain::flank_force(const Slots& s, int side, double penetration, double rate,
+                              double mesh_torque) const {
   double force = contact_->force(penetration, rate, impact_speed_);
   if (variation_) force *= variation_->factor(lever_ * s.q[kPinion], side);
   if (!loaded_) return force;

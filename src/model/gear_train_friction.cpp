@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sticking and sliding of the ends of a gear train; see StickSlip.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Touches of teeth whose law depends on how a contact began.
 #include <algorithm>
 #include <cmath>

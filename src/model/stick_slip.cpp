@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/model/stick_slip.h"
 
 #include <algorithm>
@@ -6,8 +7,8 @@
 namespace backlash {
 namespace {
 
-// With presliding a body would swing for ever, in the end by roundings. At rest are speeds far below any that is
-// computed; the torque moves a body that is held by it by less than this part of the presliding distance.
+// With presliding a body would swing for ever, in the end by roundings. At rest are speeds far below any that
+// is computed; the torque moves a body that is held by it by less than this part of the presliding distance.
 constexpr double kRestingSpeed = 1e-12;  // rad/s
 
 double resting_torque(const FrictionLimits& limits) {
@@ -39,8 +40,8 @@ void StickSlip::begin(double net, double& speed, const FrictionLimits& limits, d
   update(net, speed, limits, position);
 }
 
-/// Where it turns the speed stays as it is, just beyond zero: friction, and with it the acceleration, does not
-/// jump there.
+/// Where it turns the speed stays as it is, just beyond zero: friction, and with it the acceleration, does
+/// not jump there.
 bool StickSlip::turn(double net, double& speed, const FrictionLimits& limits, double position) {
   if (direction_ * speed > 0) return false;
   const double friction = memory_.friction(direction_, limits, position), pull = net - friction;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The simulator node; `--help` lists its parameters, topics and services.
 #include "backlash_diagnosis/ros/node_main.h"
 #include "backlash_diagnosis/ros/simulator_node.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/record/csv.h"
 
 #include <algorithm>
@@ -128,8 +129,8 @@ class Reader {
     for (const std::string_view field : fields_) add_column(std::string(field));
     if (time_column_ == kNone) lines_.fail("no column 'time'; there are: " + joined(names_));
     if (!has_required_channel(channels_)) {
-      lines_.fail("no torque, position, current or acceleration: needs at least one of " + joined(required_names()) +
-                  "; there are: " + joined(names_));
+      lines_.fail("no torque, position, current or acceleration: needs at least one of " +
+                  joined(required_names()) + "; there are: " + joined(names_));
     }
   }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/record/record.h"
 
 #include <algorithm>
@@ -70,7 +71,8 @@ double Record::sampling_interval() const {
 
 void Record::forget(std::size_t count) {
   const auto drop = [count](std::vector<double>& values) {
-    values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(std::min(count, values.size())));
+    values.erase(values.begin(),
+                 values.begin() + static_cast<std::ptrdiff_t>(std::min(count, values.size())));
   };
   drop(time);
   for (std::vector<double>& values : columns_) drop(values);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/bag_record.h"
 
 #include <rosbag/bag.h>
@@ -84,8 +85,8 @@ bool lengths_fit(const std::vector<std::uint8_t>& bytes) {
   return place == bytes.size();
 }
 
-/// Takes a message's bytes as they lie in the bag. MessageInstance::write asks a stream for no more than this; to ask the
-/// instance for its size before would read its header twice.
+/// Takes a message's bytes as they lie in the bag. MessageInstance::write asks a stream for no more than
+/// this; to ask the instance for its size before would read its header twice.
 struct RawMessage {
   std::vector<std::uint8_t> bytes;
   std::uint8_t* advance(std::uint32_t size) {

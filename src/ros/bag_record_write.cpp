@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The writing half of bag_record.h.
 #include <fcntl.h>
 #include <rosbag/bag.h>

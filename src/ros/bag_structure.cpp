@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "bag_structure.h"
 
 #include <rosbag/chunked_file.h>
@@ -240,7 +241,8 @@ class Checker {
     if (data.size() != std::uint64_t{kEntry} * field("count")) damaged("an index has the wrong length");
     for (std::size_t i = 0; i < data.size(); i += kEntry) {
       const std::uint32_t offset = number_at(data.data() + i + 8);
-      if (!chunk_.has_message || offset > chunk_.last_message || !std::binary_search(chunk_.records.begin(), chunk_.records.end(), offset))
+      if (!chunk_.has_message || offset > chunk_.last_message ||
+          !std::binary_search(chunk_.records.begin(), chunk_.records.end(), offset))
         damaged("an index points to no message");
     }
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Checks of what a bag file promises, before the bag library believes it: that library takes lengths and
 // offsets from the file as they are, and a damaged bag would make it read beyond its buffers or never end.
 #pragma once

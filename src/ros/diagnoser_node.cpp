@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/diagnoser_node.h"
 
 #include <cmath>
@@ -16,11 +17,15 @@ using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus;
 
 unsigned char level(Grade grade) {
   switch (grade) {
-    case Grade::good: return DiagnosticStatus::OK;
-    case Grade::watch: return DiagnosticStatus::WARN;
+    case Grade::good:
+      return DiagnosticStatus::OK;
+    case Grade::watch:
+      return DiagnosticStatus::WARN;
     case Grade::service:
-    case Grade::stop: return DiagnosticStatus::ERROR;
-    case Grade::cannot_tell: break;
+    case Grade::stop:
+      return DiagnosticStatus::ERROR;
+    case Grade::cannot_tell:
+      break;
   }
   return DiagnosticStatus::WARN;
 }
@@ -40,7 +45,8 @@ DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandl
       stale_(settings.stale),
       reader_(names_of(settings.joints)),
       updater_(handle, private_handle) {
-  for (MonitorSettings& joint : settings.joints) monitors_.push_back(std::make_unique<JointMonitor>(std::move(joint)));
+  for (MonitorSettings& joint : settings.joints)
+    monitors_.push_back(std::make_unique<JointMonitor>(std::move(joint)));
   topic_ = handle_.resolveName("joint_states");
   advertise();
   add_diagnostics();
@@ -55,7 +61,8 @@ DiagnoserNode::~DiagnoserNode() {
 }
 
 void DiagnoserNode::advertise() {
-  distributions_ = handle_.advertise<backlash_diagnosis::AmplitudeDistribution>("amplitude_distribution", 100);
+  distributions_ =
+      handle_.advertise<backlash_diagnosis::AmplitudeDistribution>("amplitude_distribution", 100);
   estimates_ = handle_.advertise<backlash_diagnosis::BacklashEstimate>("backlash_estimate", 100);
   services_ = {private_handle_.advertiseService("diagnose", &DiagnoserNode::on_diagnose, this),
                private_handle_.advertiseService("set_baseline", &DiagnoserNode::on_set_baseline, this),
@@ -63,11 +70,12 @@ void DiagnoserNode::advertise() {
   curve_server_ = std::make_unique<CurveServer>(
       private_handle_, "build_curve", [this](const auto& goal) { on_build_curve(goal); }, false);
   curve_server_->start();
-  trace_server_ = std::make_unique<TraceServer>(
-      private_handle_, "trace_residual", [this](const std::string& joint, std::string& why) -> const RigFile* {
-        const JointMonitor* monitor = find(joint, why);
-        return monitor ? &monitor->rig() : nullptr;
-      });
+  trace_server_ =
+      std::make_unique<TraceServer>(private_handle_, "trace_residual",
+                                    [this](const std::string& joint, std::string& why) -> const RigFile* {
+                                      const JointMonitor* monitor = find(joint, why);
+                                      return monitor ? &monitor->rig() : nullptr;
+                                    });
 }
 
 void DiagnoserNode::run() {
@@ -85,7 +93,8 @@ void DiagnoserNode::run() {
 void DiagnoserNode::on_joint_state(const sensor_msgs::JointState::ConstPtr& message) {
   for (const std::size_t joint : reader_.read(*message)) {
     JointMonitor& monitor = *monitors_[joint];
-    const auto report = monitor.take(message->header.stamp, reader_.values(joint), reader_.problem(joint), topic_);
+    const auto report =
+        monitor.take(message->header.stamp, reader_.values(joint), reader_.problem(joint), topic_);
     if (report) publish(monitor, *report);
   }
 }
@@ -161,7 +170,8 @@ bool DiagnoserNode::on_set_baseline(backlash_diagnosis::SetBaseline::Request& re
   return true;
 }
 
-void DiagnoserNode::clear_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response) {
+void DiagnoserNode::clear_baseline(JointMonitor& monitor,
+                                   backlash_diagnosis::SetBaseline::Response& response) {
   const std::string& path = monitor.baseline_path();
   std::error_code error;
   if (!path.empty()) std::filesystem::remove(path, error);
@@ -251,7 +261,8 @@ void DiagnoserNode::add_diagnostics() {
   }
 }
 
-void DiagnoserNode::report_backlash(JointMonitor& monitor, diagnostic_updater::DiagnosticStatusWrapper& status) const {
+void DiagnoserNode::report_backlash(JointMonitor& monitor,
+                                    diagnostic_updater::DiagnosticStatusWrapper& status) const {
   const MonitorState state = monitor.state();
   status.add("Monitoring curve", state.curve_state);
   for (const std::string& warning : state.warnings) status.add("Warning", warning);
@@ -272,12 +283,14 @@ void DiagnoserNode::report_backlash(JointMonitor& monitor, diagnostic_updater::D
   }
 }
 
-void DiagnoserNode::report_input(JointMonitor& monitor, diagnostic_updater::DiagnosticStatusWrapper& status) const {
+void DiagnoserNode::report_input(JointMonitor& monitor,
+                                 diagnostic_updater::DiagnosticStatusWrapper& status) const {
   const MonitorState state = monitor.state();
   const StreamCounters& c = state.counters;
   const double age = state.any_sample ? (ros::WallTime::now() - state.last_arrival).toSec() : 0;
   if (!state.any_sample && state.bad_messages + c.not_a_number == 0)
-    status.summary(DiagnosticStatus::WARN, "no message on " + topic_ + " has named " + monitor.joint() + " yet");
+    status.summary(DiagnosticStatus::WARN,
+                   "no message on " + topic_ + " has named " + monitor.joint() + " yet");
   else if (!state.any_sample)
     status.summary(DiagnosticStatus::ERROR, "no usable sample; " + state.last_problem);
   else if (age > stale_)

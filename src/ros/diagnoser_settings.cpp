@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Parameters of the node `diagnoser`.
 #include <filesystem>
 
@@ -8,7 +9,9 @@
 namespace backlash {
 namespace {
 
-RigFile rig_from(const std::string& path) { return path.empty() ? default_rig_file() : load_rig_file(path); }
+RigFile rig_from(const std::string& path) {
+  return path.empty() ? default_rig_file() : load_rig_file(path);
+}
 
 void use_limits(MonitorSettings& monitor, const std::string& path) {
   if (path.empty()) return;
@@ -84,7 +87,8 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   const std::string baseline = parameters.text("baseline", "");
   const auto joints = parameters.texts("joints", {common.rig.joint});
   if (joints.size() > 1 && !baseline.empty())
-    throw InvalidParameter("~baseline", baseline, "is one file for several joints; give each its JOINT/baseline");
+    throw InvalidParameter("~baseline", baseline,
+                           "is one file for several joints; give each its JOINT/baseline");
   for (const std::string& joint : joints) {
     for (const MonitorSettings& other : settings.joints)
       if (other.joint == joint) throw InvalidParameter("~joints", joint, "is named twice");

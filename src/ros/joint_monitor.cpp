@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/joint_monitor.h"
 
 #include <ros/console.h>
@@ -62,13 +63,15 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const Cha
     reported_periods_ = 0;
     estimated_.reset();
   }
-  if (!stream_.counters().last_problem.empty()) last_problem_ = topic + ": " + stream_.counters().last_problem;
+  if (!stream_.counters().last_problem.empty())
+    last_problem_ = topic + ": " + stream_.counters().last_problem;
   const long periods = stream_.periods();
   const bool complete = settings_.rig.diagnosis.apd ? period != nullptr : periods > reported_periods_;
   if (!complete) return std::nullopt;
   reported_periods_ = periods;
   if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd)
-    if (const double interval = stream_.sampling_interval(); interval > 0) start_building(nominal_sampling_rate(interval));
+    if (const double interval = stream_.sampling_interval(); interval > 0)
+      start_building(nominal_sampling_rate(interval));
   auto result = report(time, period);
   changed_.notify_all();
   return result;
@@ -149,7 +152,8 @@ void JointMonitor::set_baseline(const std::optional<Baseline>& baseline) {
   baseline_ = baseline;
   baseline_warning_.clear();
   if (!baseline) return;
-  baseline_warning_ = check_baseline(*baseline, settings_.rig.rig.name, settings_.rig.digest, settings_.baseline_path);
+  baseline_warning_ =
+      check_baseline(*baseline, settings_.rig.rig.name, settings_.rig.digest, settings_.baseline_path);
   if (!baseline_warning_.empty()) ROS_WARN("%s: %s", settings_.joint.c_str(), baseline_warning_.c_str());
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/messages.h"
 
 #include <cmath>
@@ -7,7 +8,8 @@ namespace {
 
 using EstimateMessage = backlash_diagnosis::BacklashEstimate;
 
-backlash_diagnosis::AmplitudeDistribution distribution(const AmplitudeDistribution& apd, const ApdSettings& settings) {
+backlash_diagnosis::AmplitudeDistribution distribution(const AmplitudeDistribution& apd,
+                                                       const ApdSettings& settings) {
   backlash_diagnosis::AmplitudeDistribution m;
   m.signal = channel_name(settings.signal);
   m.lower = apd.layout().lower;
@@ -23,12 +25,18 @@ backlash_diagnosis::AmplitudeDistribution distribution(const AmplitudeDistributi
 
 std::uint8_t code(Status status) {
   switch (status) {
-    case Status::ok: return EstimateMessage::OK;
-    case Status::below_range: return EstimateMessage::BELOW_RANGE;
-    case Status::above_range: return EstimateMessage::ABOVE_RANGE;
-    case Status::out_of_domain: return EstimateMessage::OUT_OF_DOMAIN;
-    case Status::insufficient_data: return EstimateMessage::INSUFFICIENT_DATA;
-    case Status::ambiguous: break;
+    case Status::ok:
+      return EstimateMessage::OK;
+    case Status::below_range:
+      return EstimateMessage::BELOW_RANGE;
+    case Status::above_range:
+      return EstimateMessage::ABOVE_RANGE;
+    case Status::out_of_domain:
+      return EstimateMessage::OUT_OF_DOMAIN;
+    case Status::insufficient_data:
+      return EstimateMessage::INSUFFICIENT_DATA;
+    case Status::ambiguous:
+      break;
   }
   return EstimateMessage::AMBIGUOUS;
 }

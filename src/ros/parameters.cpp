@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/parameters.h"
 
 #include <xmlrpcpp/XmlRpcValue.h>
@@ -19,7 +20,8 @@ std::string shown(XmlRpc::XmlRpcValue value) {
 }
 
 bool is_number(const XmlRpc::XmlRpcValue& value) {
-  return value.getType() == XmlRpc::XmlRpcValue::TypeDouble || value.getType() == XmlRpc::XmlRpcValue::TypeInt;
+  return value.getType() == XmlRpc::XmlRpcValue::TypeDouble ||
+         value.getType() == XmlRpc::XmlRpcValue::TypeInt;
 }
 
 }  // namespace
@@ -33,17 +35,21 @@ XmlRpc::XmlRpcValue Parameters::value(const std::string& name, bool& present) {
   return value;
 }
 
-bool Parameters::has(const std::string& name) { return handle_.hasParam(name); }
+bool Parameters::has(const std::string& name) {
+  return handle_.hasParam(name);
+}
 
-void Parameters::allow(const std::string& name) { known_.insert(name); }
+void Parameters::allow(const std::string& name) {
+  known_.insert(name);
+}
 
 double Parameters::number(const std::string& name, double absent, const Range& range) {
   bool present;
   XmlRpc::XmlRpcValue found = value(name, present);
   if (!present) return absent;
   if (!is_number(found)) throw InvalidParameter("~" + name, shown(found), "must be a number");
-  const double number = found.getType() == XmlRpc::XmlRpcValue::TypeInt ? static_cast<int>(found)
-                                                                        : static_cast<double>(found);
+  const double number =
+      found.getType() == XmlRpc::XmlRpcValue::TypeInt ? static_cast<int>(found) : static_cast<double>(found);
   if (!std::isfinite(number)) throw InvalidParameter("~" + name, number, "must be finite");
   if (!range.contains(number)) throw InvalidParameter("~" + name, number, range.text());
   return number;
@@ -103,8 +109,11 @@ void Parameters::finish() const {
     if (full.compare(0, prefix.size(), prefix) != 0) continue;
     const std::string name = full.substr(prefix.size());
     bool known = false;
-    for (const std::string& k : known_) known = known || name == k || name.compare(0, k.size() + 1, k + "/") == 0;
-    if (!known) throw InvalidParameter("~" + name, "given", "is not a parameter of this node; known: " + joined(known_));
+    for (const std::string& k : known_)
+      known = known || name == k || name.compare(0, k.size() + 1, k + "/") == 0;
+    if (!known)
+      throw InvalidParameter("~" + name, "given",
+                             "is not a parameter of this node; known: " + joined(known_));
   }
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/simulator_node.h"
 
 #include <ros/callback_queue.h>
@@ -17,11 +18,12 @@ using namespace std::chrono_literals;
 using std::chrono::nanoseconds;
 
 constexpr nanoseconds kBurst = 10ms;  // services are answered at least this often
-// A subscriber like rosbag record holds 100 messages: samples that are due together go out in smaller portions.
+// A subscriber like rosbag record holds 100 messages: samples that are due together go out in smaller
+// portions.
 constexpr long kPortion = 50;
 constexpr nanoseconds kBreath = 1ms;
-constexpr nanoseconds kIdle = 20ms;   // longest sleep, so that Ctrl-C ends fast
-constexpr nanoseconds kPoll = 1ms;    // of an external /clock
+constexpr nanoseconds kIdle = 20ms;  // longest sleep, so that Ctrl-C ends fast
+constexpr nanoseconds kPoll = 1ms;   // of an external /clock
 constexpr nanoseconds kTolerableLag = 100ms;
 constexpr nanoseconds kWarningInterval = 5s;
 constexpr nanoseconds kLinger = 500ms;  // for the last messages; roscpp cannot tell when they are out
@@ -92,7 +94,8 @@ int SimulatorNode::run() {
   while (ros::ok() && !finished()) {
     publish_burst();
     warn_if_behind();
-    const nanoseconds wait = finished() ? nanoseconds(0) : std::max(kBreath, pacer_.wait(published_, elapsed()));
+    const nanoseconds wait =
+        finished() ? nanoseconds(0) : std::max(kBreath, pacer_.wait(published_, elapsed()));
     serve(std::min(wait, follows_ros_time_ ? kPoll : kIdle));
   }
   const auto end = WallClock::now() + kLinger;
@@ -133,8 +136,8 @@ void SimulatorNode::start() {
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     const RigFile& file = settings_.joints[i].file;
     ROS_INFO_STREAM(file.rig.joint << ": simulating " << file.rig.name << " (" << file.source << ") at "
-                                   << sampling_rate_ << " Hz with a backlash of " << joints_[i]->true_backlash()
-                                   << ", " << pace);
+                                   << sampling_rate_ << " Hz with a backlash of "
+                                   << joints_[i]->true_backlash() << ", " << pace);
   }
 }
 
@@ -145,8 +148,7 @@ nanoseconds SimulatorNode::elapsed() const {
 
 ros::Time SimulatorNode::stamp(long sample) const {
   ros::Time time;
-  time.fromNSec(origin_.toNSec() +
-                static_cast<std::uint64_t>(sample_time(sample, sampling_rate_).count()));
+  time.fromNSec(origin_.toNSec() + static_cast<std::uint64_t>(sample_time(sample, sampling_rate_).count()));
   return time;
 }
 

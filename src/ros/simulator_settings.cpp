@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/simulator_settings.h"
 
 #include <ros/names.h>
@@ -81,7 +82,8 @@ class Overrides {
   void backlash() {
     const bool half = given("half_gap");
     if (given("backlash") && half)
-      throw InvalidParameter("~" + scope_ + "half_gap", "given", "cannot be given together with ~" + scope_ + "backlash");
+      throw InvalidParameter("~" + scope_ + "half_gap", "given",
+                             "cannot be given together with ~" + scope_ + "backlash");
     double& backlash = file_.rig.mesh.backlash;
     double half_gap = backlash / 2;
     number("backlash", Range::not_negative(), backlash);
@@ -92,7 +94,8 @@ class Overrides {
   void sensors() {
     SensorsSettings& sensors = file_.simulation.sensors;
     const Range rates = Range::between(1e-3, 1e6);
-    if (scope_.empty()) number("sampling_rate", rates, sensors.sampling_rate);  // one message holds all joints
+    if (scope_.empty())
+      number("sampling_rate", rates, sensors.sampling_rate);  // one message holds all joints
     if (!rates.contains(sensors.sampling_rate))
       throw InvalidParameter("sensors.sampling_rate", sensors.sampling_rate, rates.text());
     if (!given("seed")) return;
@@ -104,7 +107,8 @@ class Overrides {
     const std::string& type = file_.simulation.excitation.type;
     const bool applies = type == "square" || type == "sine";
     if (given(name) && !applies)
-      throw InvalidParameter("~" + scope_ + name, "given", "is for square and sine excitation, not for " + type);
+      throw InvalidParameter("~" + scope_ + name, "given",
+                             "is for square and sine excitation, not for " + type);
     number(name, range, value);
   }
 
@@ -145,7 +149,8 @@ void require_topic_name(const std::string& joint) {
 }
 
 std::vector<JointSettings> read_joints(Parameters& parameters, const RigFile& common) {
-  if (parameters.has("joint")) throw InvalidParameter("~joint", "given", "cannot be given together with ~joints");
+  if (parameters.has("joint"))
+    throw InvalidParameter("~joint", "given", "cannot be given together with ~joints");
   std::vector<JointSettings> joints;
   std::set<std::string> names;
   for (const std::string& name : parameters.texts("joints", {})) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/simulation/driven_load.h"
 
 #include <algorithm>
@@ -26,8 +27,8 @@ struct Cubic {
   }
 };
 
-/// After sample k, with slopes from the samples beside it (Catmull and Rom): a straight line would lose 0.03 %
-/// of a speed at a hundredth of the sampling rate, which next to the feedback is no longer small.
+/// After sample k, with slopes from the samples beside it (Catmull and Rom): a straight line would lose 0.03
+/// % of a speed at a hundredth of the sampling rate, which next to the feedback is no longer small.
 Cubic between(const std::vector<double>& y, std::size_t k) {
   const std::size_t last = y.size() - 1, j = std::min(k + 1, last);
   const auto slope = [&](std::size_t i) {
@@ -179,7 +180,8 @@ class Load {
   template <typename Changed>
   static std::pair<double, double> bracket(double u, double v, const Changed& changed) {
     double before = u, after = v;
-    for (int i = 0; i < kHalvings; ++i) (changed(0.5 * (before + after)) ? after : before) = 0.5 * (before + after);
+    for (int i = 0; i < kHalvings; ++i)
+      (changed(0.5 * (before + after)) ? after : before) = 0.5 * (before + after);
     return {before, after};
   }
 
@@ -215,7 +217,8 @@ class Load {
     const auto at = [&](double v) { return forces(s.at(v), q, 0); };
     const auto changes = [&](const Forces& end) { return end.side() != f.side() || !holds(end); };
     double before = 1, after = 1;
-    if (divide && changes(at(1))) std::tie(before, after) = bracket(u, 1, [&](double v) { return changes(at(v)); });
+    if (divide && changes(at(1)))
+      std::tie(before, after) = bracket(u, 1, [&](double v) { return changes(at(v)); });
     const Forces end = at(before);
     sum.add(u, before, f.mesh_on_motor, at(0.5 * (u + before)).mesh_on_motor, end.mesh_on_motor);
     if (before == after) {
@@ -271,7 +274,8 @@ class LockedLoad {
 
 void check(const Rig& rig) {
   if (!rig.input_coupling.rigid || !rig.output_coupling.rigid)
-    throw InvalidParameter("coupling", "flexible", "a load that follows the recorded motor needs rigid couplings");
+    throw InvalidParameter("coupling", "flexible",
+                           "a load that follows the recorded motor needs rigid couplings");
   if (!rig.mesh.rigid && rig.mesh.contact->needs_impact_speed())
     throw InvalidParameter("contact.law", "with touches",
                            "a load that follows the recorded motor needs a law without impact speed");

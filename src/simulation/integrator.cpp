@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/simulation/integrator.h"
 
 #include <arkode/arkode_erkstep.h>
@@ -73,8 +74,8 @@ ARKodeButcherTable tsitouras_table() {
 
 /// Those that are not in the library as they are needed here.
 const std::map<std::string, ARKodeButcherTable (*)()>& own_tables() {
-  static const std::map<std::string, ARKodeButcherTable (*)()> tables = {{"tsitouras", tsitouras_table},
-                                                                         {"verner", verner_first_same_as_last}};
+  static const std::map<std::string, ARKodeButcherTable (*)()> tables = {
+      {"tsitouras", tsitouras_table}, {"verner", verner_first_same_as_last}};
   return tables;
 }
 
@@ -177,7 +178,8 @@ int Integrator::Impl::evaluate(realtype t, N_Vector y, N_Vector ydot, void* user
     self.derivative(t, NV_DATA_S(y), rate);
     double sum = 0;  // not finite as soon as one of them is not
     for (std::size_t i = 0; i < self.tolerances.size(); ++i) sum += rate[i];
-    if (!std::isfinite(sum) && ++self.not_finite > kMaxNotFinitePerCall) self.fail("the derivative is not finite");
+    if (!std::isfinite(sum) && ++self.not_finite > kMaxNotFinitePerCall)
+      self.fail("the derivative is not finite");
   });
 }
 
@@ -380,8 +382,8 @@ void Integrator::Impl::require_finite() const {
 
 Integrator::Integrator(Derivative derivative, std::vector<StateTolerance> tolerances,
                        const SolverSettings& settings, Events events, int event_count)
-    : impl_(std::make_unique<Impl>(std::move(derivative), std::move(tolerances), settings,
-                                   std::move(events), event_count)) {}
+    : impl_(std::make_unique<Impl>(std::move(derivative), std::move(tolerances), settings, std::move(events),
+                                   event_count)) {}
 Integrator::~Integrator() = default;
 Integrator::Integrator(Integrator&&) noexcept = default;
 Integrator& Integrator::operator=(Integrator&&) noexcept = default;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Numbers of several rigs side by side, worked on at once by the vector units. With AVX2 four at a time,
 // without it two and two; either way the same operations in the same order, so that results do not depend on
 // the processor: no fused multiply-add, which rounds once where others round twice.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/simulation/sensor_model.h"
 
 #include <algorithm>
@@ -23,17 +24,20 @@ SensorsSettings read_sensors(const YamlReader& yaml) {
   settings.sampling_rate = yaml.number("sampling_rate", Range::positive());
   settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
   for (Channel channel : kChannels)
-    if (const auto sensor = yaml.optional_map(channel_name(channel))) settings.of(channel) = read_sensor(*sensor);
+    if (const auto sensor = yaml.optional_map(channel_name(channel)))
+      settings.of(channel) = read_sensor(*sensor);
   return settings;
 }
 
-SensorModel::SensorModel(const SensorsSettings& settings) : settings_(settings) { reset(); }
+SensorModel::SensorModel(const SensorsSettings& settings) : settings_(settings) {
+  reset();
+}
 
 void SensorModel::reset() {
   for (std::size_t i = 0; i < kChannelCount; ++i) {
     if (!(settings_.channels[i].noise > 0)) continue;  // its generator is never asked, and seeding costs
-    std::seed_seq sequence{static_cast<std::uint32_t>(settings_.seed), static_cast<std::uint32_t>(settings_.seed >> 32),
-                           static_cast<std::uint32_t>(i)};
+    std::seed_seq sequence{static_cast<std::uint32_t>(settings_.seed),
+                           static_cast<std::uint32_t>(settings_.seed >> 32), static_cast<std::uint32_t>(i)};
     generators_[i].seed(sequence);
     normal_[i].reset();
   }

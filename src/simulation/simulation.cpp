@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/simulation/simulation.h"
 
 #include <algorithm>
@@ -66,8 +67,10 @@ void Simulation::reset() {
   forget();
 }
 
-Record simulate_record(const Rig& rig, const SimulationSettings& settings, double duration, const Progress& progress) {
-  if (!(duration > 0) || !std::isfinite(duration)) throw InvalidParameter("duration", duration, "must be > 0 s");
+Record simulate_record(const Rig& rig, const SimulationSettings& settings, double duration,
+                       const Progress& progress) {
+  if (!(duration > 0) || !std::isfinite(duration))
+    throw InvalidParameter("duration", duration, "must be > 0 s");
   Simulation simulation(rig, settings);
   const long samples = std::lround(duration * simulation.sampling_rate());
   if (samples < 1 || samples > 1'000'000'000L)

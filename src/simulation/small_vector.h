@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // SUNDIALS' serial vector with the operations of an explicit step written for a few numbers: there the
 // library's own take most of the time, by loops and calls that only long vectors repay.
 #pragma once

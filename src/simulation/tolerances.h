@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the error of each state of a gear train is measured by.
 #pragma once
 

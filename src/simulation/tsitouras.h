@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The explicit Runge-Kutta pair 5(4) of Tsitouras (2011), "Runge-Kutta pairs of order 5(4) satisfying only
 // the first column simplifying assumption", Computers & Mathematics with Applications 62:770-775, Table 1 and
 // its interpolant. First same as last: the seventh stage is the derivative at the end of the step, and has a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Builds a monitoring curve and, where asked, its plot.
 #include <iostream>
 #include <sstream>

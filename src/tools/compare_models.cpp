@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How well several models of a machine say what a record of it shows: table, JSON and picture.
 #include <cmath>
 #include <iomanip>

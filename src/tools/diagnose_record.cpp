@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All estimators on one record, without ROS.
 #include <algorithm>
 #include <cmath>
@@ -49,11 +50,11 @@ Command command() {
       {"periods", "N",
        "use only the last N excitation periods (and those before them that settling discards)"},
   };
-  c.notes =
-      std::string(
-          "backlash is the total free play along the line of action [m], backlash_angle the same as an angle on "
-          "the axis of motor_position [rad]; intervals hold with 95 %. ") +
-      needs_of_methods();
+  c.notes = std::string(
+                "backlash is the total free play along the line of action [m], backlash_angle the same as an "
+                "angle on "
+                "the axis of motor_position [rad]; intervals hold with 95 %. ") +
+            needs_of_methods();
   c.examples = {"diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json",
                 "diagnose_record run.bag --joint elbow --curve curve.yaml --json -",
                 "diagnose_record new.csv --rig rig.yaml --save-baseline healthy.yaml --json new.json",
@@ -250,8 +251,7 @@ int diagnose_record(const Arguments& arguments) {
     write_text(out, json);
     print_summary(report, std::cout);
   }
-  if (arguments.has("save-baseline") &&
-      !save_baseline(report.diagnosis, in, arguments.text("save-baseline")))
+  if (arguments.has("save-baseline") && !save_baseline(report.diagnosis, in, arguments.text("save-baseline")))
     return kInconclusive;
   return exit_code(report.diagnosis.verdict.grade);
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Geometry and mesh stiffness of a pair of spur gears, from shim to backlash and back.
 #include "backlash_diagnosis/model/gear_geometry.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Identifies the machine of a rig file from records of it and writes the fitted rig file.
 #include "backlash_diagnosis/identification/identify.h"
 

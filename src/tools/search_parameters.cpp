@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Searches the unprinted parameters of a published monitoring curve.
 #include <cmath>
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where skewness can separate backlash from noise, friction and load: table, JSON and picture.
 #include "backlash_diagnosis/workflow/separability_map.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Runs a rig without ROS and writes what its sensors measure.
 #include <cmath>
 #include <iostream>

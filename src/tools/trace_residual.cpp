@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Says what the model of a machine lacks, from records of it.
 #include <filesystem>
 #include <iostream>

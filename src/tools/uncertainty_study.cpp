@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the estimates are worth: a seeded study over random backlash, noise and length of record.
 #include "backlash_diagnosis/workflow/uncertainty_study.h"
 
@@ -27,7 +28,8 @@ Command command() {
   c.name = "uncertainty_study";
   c.summary =
       "Simulates records with random backlash, sensor noise and length on machines whose stiffness is not "
-      "exactly the rig file's, diagnoses each with all channels and from the signal alone, and counts: error, "
+      "exactly the rig file's, diagnoses each with all channels and from the signal alone, and counts: "
+      "error, "
       "coverage of the 95 % interval, share of 'cannot tell'. Then the same under wrong conditions.";
   c.positional = {"RIG.yaml"};
   c.options = {
@@ -40,7 +42,8 @@ Command command() {
       {"plot", "OUT.png", "also draw errors and coverage"},
   };
   c.notes =
-      "'combined' is the verdict. A confident miss is an answer that is more than two of its interval's widths "
+      "'combined' is the verdict. A confident miss is an answer that is more than two of its interval's "
+      "widths "
       "from the truth. Under wrong conditions an answer within one width counts as right.";
   c.examples = {"uncertainty_study config/sarkar_1997.yaml --json study.json --plot study.png"};
   c.exit_codes = "  0   done\n  1   there were confident misses, or wrong answers under wrong conditions\n";
@@ -88,7 +91,8 @@ void print(const Table& table) {
     std::cout << "all noise levels\n";
   else
     std::cout << "noise " << 100 * table.noise << " % of rms\n";
-  std::cout << "  method               records  error [um] median   95 %   width   coverage  cannot tell  misses\n";
+  std::cout
+      << "  method               records  error [um] median   95 %   width   coverage  cannot tell  misses\n";
   for (const StudyRow& row : table.rows) {
     std::cout << "  " << std::left << std::setw(22) << row.method << std::right << std::setw(6) << row.trials;
     if (row.told == 0) {
@@ -118,8 +122,11 @@ void print(const std::vector<VariantRow>& rows) {
 Json trials_json(const std::vector<StudyTrial>& trials) {
   Json all = Json::array();
   for (const StudyTrial& trial : trials) {
-    Json json = {{"variant", trial.variant}, {"backlash", trial.backlash}, {"noise", trial.noise},
-                 {"periods", trial.periods}, {"position", trial.position}};
+    Json json = {{"variant", trial.variant},
+                 {"backlash", trial.backlash},
+                 {"noise", trial.noise},
+                 {"periods", trial.periods},
+                 {"position", trial.position}};
     for (const Estimate& e : trial.estimates)
       json["estimates"][e.method] = {{"status", to_string(e.status)},
                                      {"backlash", number(e.backlash)},
@@ -148,7 +155,8 @@ MonitoringCurve curve_for(const Arguments& arguments, const RigFile& file, const
 }
 
 int study(const Arguments& arguments) {
-  const std::string rig = arguments.positional(0), out = arguments.text("json"), plot = arguments.text("plot");
+  const std::string rig = arguments.positional(0), out = arguments.text("json"),
+                    plot = arguments.text("plot");
   StudyRequest request;
   request.records = static_cast<int>(arguments.integer("records", request.records, 1, 1'000'000));
   request.seed = arguments.integer("seed", request.seed, 0, std::uint64_t{1} << 53);
@@ -170,8 +178,8 @@ int study(const Arguments& arguments) {
   }
   const std::vector<Table> tables = tables_of(trials, request);
   const std::vector<VariantRow> rows = summarise_variants(wrong);
-  Json json = {{"schema_version", 1}, {"version", version()}, {"rig", rig}, {"seed", request.seed},
-               {"records", request.records}, {"max_backlash", request.max_backlash}};
+  Json json = {{"schema_version", 1},  {"version", version()},       {"rig", rig},
+               {"seed", request.seed}, {"records", request.records}, {"max_backlash", request.max_backlash}};
   for (const Table& table : tables) {
     Json entry = {{"position", table.position}, {"half_gap", table.half_gap}, {"noise", number(table.noise)}};
     for (const StudyRow& row : table.rows) entry["rows"].push_back(row_json(row));
@@ -179,8 +187,12 @@ int study(const Arguments& arguments) {
     print(table);
   }
   for (const VariantRow& row : rows)
-    json["variants"].push_back({{"variant", row.variant}, {"method", row.method}, {"position", row.position},
-                                {"recognised", row.recognised}, {"right", row.right}, {"wrong", row.wrong}});
+    json["variants"].push_back({{"variant", row.variant},
+                                {"method", row.method},
+                                {"position", row.position},
+                                {"recognised", row.recognised},
+                                {"right", row.right},
+                                {"wrong", row.wrong}});
   print(rows);
   json["trials"] = trials_json(trials);
   json["variant_trials"] = trials_json(wrong);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/workflow/curve_builder.h"
 
 #include <algorithm>
@@ -116,16 +117,18 @@ int count_beyond(const CurvePlan& plan) {
   return static_cast<int>(std::ceil(kBeyond * (plan.request.points - 1)));
 }
 
-/// All machines that are run, by backlash: those of the points, those in the middle between two points, which are
-/// as far from the file as a real one may be, and those beyond the end of the curve.
+/// All machines that are run, by backlash: those of the points, those in the middle between two points, which
+/// are as far from the file as a real one may be, and those beyond the end of the curve.
 std::vector<Rig> machines_of(const CurvePlan& plan) {
   const int count = plan.request.points;
   const double step = plan.request.max_backlash / (count - 1);
   std::vector<Rig> machines;
   for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
   for (int i = 0; i + 1 < count; ++i)
-    machines.push_back(with_backlash(machine_of(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
-  for (int i = 0; i < count_beyond(plan); ++i) machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
+    machines.push_back(
+        with_backlash(machine_of(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
+  for (int i = 0; i < count_beyond(plan); ++i)
+    machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
   return machines;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The text of config/sarkar_1997.yaml, put into the library by CMake.
 #pragma once
 

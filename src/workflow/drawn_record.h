@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Simulated records of known backlash, as a recorder gives them that was switched on at some moment, with
 // noise.
 #pragma once

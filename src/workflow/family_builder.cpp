@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "family_builder.h"
 
 #include <algorithm>
@@ -70,8 +71,7 @@ std::vector<double> pooled(const std::vector<Trials>& trials, std::size_t segmen
 std::vector<Quantiles> family_members(const CurvePlan& plan, const FineRun& run) {
   std::vector<Quantiles> members;
   for (int phase = 0; phase < plan.phases; ++phase) {
-    members.push_back(
-        quantiles_of(settled(plan, sample(plan, run, phase, 0, 0), plan.request.periods)));
+    members.push_back(quantiles_of(settled(plan, sample(plan, run, phase, 0, 0), plan.request.periods)));
     for (double& value : members.back()) value = rounded(value);
   }
   return members;

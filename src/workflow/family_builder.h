@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Builds the family of distributions of a curve and calibrates how a record is compared with it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "fine_run.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@ namespace backlash {
 namespace {
 
 constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3};  // of the signal's scale
-constexpr double kFinestSampling = 1e5;                                      // Hz
+constexpr double kFinestSampling = 1e5;                                           // Hz
 constexpr int kMostPhases = 16;
 constexpr double kFewestPerPeriod = 16;  // samples
 constexpr double kMostSamples = 5e7;     // of one run, about 1 GB
@@ -48,7 +49,8 @@ void append(const CurvePlan& plan, const Observation& o, FineRun& run) {
 }
 
 double fine_samples(const CurvePlan& plan) {
-  return static_cast<double>(plan.run_periods()) * plan.apd.period * plan.request.sampling_rate * plan.phases +
+  return static_cast<double>(plan.run_periods()) * plan.apd.period * plan.request.sampling_rate *
+             plan.phases +
          plan.phases;
 }
 
@@ -144,16 +146,20 @@ std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Rig>& mac
   std::vector<FineRun> runs(machines.size());
   if (Ensemble::takes(machines, how.excitation)) {
     Ensemble ensemble(machines, how.excitation, how.solver);
-    sample_finely(plan, ensemble, [&] {
-      for (std::size_t i = 0; i < runs.size(); ++i) append(plan, ensemble.observe(i), runs[i]);
-    }, [&] {
-      for (std::size_t i = 0; i < runs.size(); ++i) ticker.tick();
-    });
+    sample_finely(
+        plan, ensemble,
+        [&] {
+          for (std::size_t i = 0; i < runs.size(); ++i) append(plan, ensemble.observe(i), runs[i]);
+        },
+        [&] {
+          for (std::size_t i = 0; i < runs.size(); ++i) ticker.tick();
+        });
     return runs;
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
     Plant plant(machines[i], how.excitation, how.solver);
-    sample_finely(plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
+    sample_finely(
+        plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
   }
   return runs;
 }

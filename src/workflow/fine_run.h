@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One simulated run of a rig, finer than it will be sampled, and what all runs of a curve share.
 #pragma once
 
 #include <vector>
 
-#include "backlash_diagnosis/workflow/curve_builder.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/workflow/curve_builder.h"
 
 namespace backlash {
 

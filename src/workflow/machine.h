@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A machine as its rig file describes it, but for what the file does not know exactly.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/workflow/minimise.h"
 
 #include <algorithm>
@@ -85,7 +86,8 @@ class Evaluator {
     if (!progress_ || stop_) return;
     std::ostringstream phase;
     phase << done_ << " of " << budget_ << ", best " << best_;
-    if (progress_(std::min(1.0, static_cast<double>(done_) / static_cast<double>(budget_)), phase.str())) return;
+    if (progress_(std::min(1.0, static_cast<double>(done_) / static_cast<double>(budget_)), phase.str()))
+      return;
     stop_ = true;  // before the lock is given up, or another thread asks once more
     throw Cancelled();
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "rig_text.h"
 
 #include <cmath>
@@ -53,7 +54,8 @@ void RigText::set_backlash(const Rig& rig, const std::string& comment) {
 
 void RigText::set_contact_law(const ContactSpec& contact) {
   const YamlTree tree = parse_yaml(text_, name_);
-  const YamlNode& declared = *tree.root->entries.at("gear_train").value->entries.at("mesh").value->entries.at("contact").value;
+  const YamlNode& declared =
+      *tree.root->entries.at("gear_train").value->entries.at("mesh").value->entries.at("contact").value;
   std::set<int> dropped;  // lines
   for (const auto& [key, entry] : declared.entries)
     if (key != "law" && !contact.values.has(key)) dropped.insert(entry.line);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The text of a rig file whose values are replaced one by one: its layout, other values and comments stay.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/workflow/separability_map.h"
 
 #include <algorithm>
@@ -5,9 +6,9 @@
 #include <map>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
 #include "drawn_record.h"
-#include "backlash_diagnosis/base/parallel.h"
 
 namespace backlash {
 namespace {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What effects add to the motion of a record.
 #pragma once
 

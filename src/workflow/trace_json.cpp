@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The JSON part of trace_report.h.
 #include <algorithm>
 #include <cmath>

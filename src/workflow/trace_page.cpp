@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The page that shows a trace: text and tables from here, figures as they come.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/workflow/uncertainty_study.h"
 
 #include <algorithm>
@@ -6,22 +7,23 @@
 #include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/diagnosis/robust.h"
 #include "drawn_record.h"
-#include "backlash_diagnosis/base/parallel.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kMisses = 2;    // widths of an interval beyond which a miss was confident
+constexpr double kMisses = 2;  // widths of an interval beyond which a miss was confident
 
 Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
-  std::seed_seq sequence{static_cast<std::uint32_t>(request.seed), static_cast<std::uint32_t>(request.seed >> 32),
-                         static_cast<std::uint32_t>(index)};
+  std::seed_seq sequence{static_cast<std::uint32_t>(request.seed),
+                         static_cast<std::uint32_t>(request.seed >> 32), static_cast<std::uint32_t>(index)};
   std::mt19937_64 random(sequence);
   Draw d{};
   d.backlash = request.max_backlash * uniform(random);
-  d.noise = request.noise[static_cast<std::size_t>(uniform(random) * static_cast<double>(request.noise.size()))];
+  d.noise =
+      request.noise[static_cast<std::size_t>(uniform(random) * static_cast<double>(request.noise.size()))];
   d.start = period * uniform(random);
   d.periods = request.fewest_periods +
               static_cast<int>(uniform(random) * (request.most_periods - request.fewest_periods + 1));
@@ -156,15 +158,15 @@ std::vector<StudyTrial> run_study(const RigFile& rig_file, const MonitoringCurve
     const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(i));
     const Record record = simulate_draw(file, d);
     trials[2 * i] = {"", d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
-    trials[2 * i + 1] = {"", d.backlash, d.noise, d.periods, false,
-                         estimates_of(signal_alone(record, apd.signal), file, curve)};
+    trials[2 * i + 1] = {"",        d.backlash, d.noise,
+                         d.periods, false,      estimates_of(signal_alone(record, apd.signal), file, curve)};
     ticker.tick();
   });
   return trials;
 }
 
-std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, bool position, double max_half_gap,
-                                      double noise) {
+std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, bool position,
+                                      double max_half_gap, double noise) {
   std::vector<StudyRow> rows;
   const std::size_t methods = trials.empty() ? 0 : trials.front().estimates.size();
   for (std::size_t m = 0; m < methods; ++m) {
@@ -211,8 +213,9 @@ std::vector<StudyTrial> run_variants(const RigFile& rig_file, const MonitoringCu
     d.backlash += variant.shortest * request.max_backlash;
     const Record record = simulate_variant(file, variant, d, apd.settling_periods);
     trials[2 * i] = {variant.name, d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
-    trials[2 * i + 1] = {variant.name, d.backlash, d.noise, d.periods, false,
-                         estimates_of(signal_alone(record, apd.signal), file, curve)};
+    trials[2 * i + 1] = {variant.name, d.backlash,
+                         d.noise,      d.periods,
+                         false,        estimates_of(signal_alone(record, apd.signal), file, curve)};
     ticker.tick();
   });
   return trials;

@@ -1,11 +1,11 @@
-#include "backlash_diagnosis/diagnosis/apd_family.h"
-
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/apd_family.h"
 
 namespace backlash {
 namespace {
@@ -87,7 +87,8 @@ TEST(FamilyDistance, IsTheMeanSquareDifference) {
     for (std::size_t i = 0; i + 1 < family.members.size(); ++i) {
       double nearest = INFINITY;
       for (std::size_t phase = 0; phase < 3; ++phase) {
-        const Quantiles from = with_noise(family.members[i][phase], sigma), to = with_noise(family.members[i + 1][phase], sigma);
+        const Quantiles from = with_noise(family.members[i][phase], sigma),
+                        to = with_noise(family.members[i + 1][phase], sigma);
         double sum = 0;
         for (int k = 0; k < kQuantiles; ++k) sum += std::pow(observed[k] - (0.6 * from[k] + 0.4 * to[k]), 2);
         nearest = std::min(nearest, sum / kQuantiles);
@@ -103,7 +104,7 @@ TEST(FamilyDistance, TakesTheNearestPhase) {
   const FamilyDistance distance(NoisyFamily(family, 0), observed);
   EXPECT_NEAR(distance.smallest().distance, 0, 1e-12);
   EXPECT_NEAR(distance.at(0, 1.0), 0, 1e-12);
-  EXPECT_NEAR(distance.at(1, 0.3), 0, 1e-12);   // by the first phase
+  EXPECT_NEAR(distance.at(1, 0.3), 0, 1e-12);        // by the first phase
   EXPECT_NEAR(distance.at(1, 0.15), 0.0025, 1e-12);  // between phases 1 (0.2 away) and 2 (0.1): 0.05 both
 }
 
@@ -125,7 +126,8 @@ TEST(NoisyFamilies, DistancesAreThoseOfTheExactNoise) {
   const ApdFamily family = shifted(4, 3, 0.02, 0.005);
   const Quantiles observed = with_noise(family.members[2][1], 0.3);
   for (double sigma = 0.05; sigma < 0.5; sigma *= 1.07) {
-    const FamilyDistance near(*family.compared->at(family, sigma), observed), exact(NoisyFamily(family, sigma), observed);
+    const FamilyDistance near(*family.compared->at(family, sigma), observed),
+        exact(NoisyFamily(family, sigma), observed);
     for (std::size_t i = 0; i + 1 < family.members.size(); ++i)
       EXPECT_NEAR(std::sqrt(near.at(i, 0.5)), std::sqrt(exact.at(i, 0.5)), 0.016 * sigma) << sigma;
   }

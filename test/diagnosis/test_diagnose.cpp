@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -40,7 +41,8 @@ TEST(Diagnose, AllMethodsInTheirOrder) {
   ASSERT_TRUE(d.apd);
   EXPECT_EQ(d.apd->periods.size(), 13u);
   ASSERT_GE(d.verdict.estimate, 0);
-  EXPECT_EQ(d.estimates[d.verdict.estimate].method, "lost_motion");  // 0.01 rad times 0.015 m, the narrower interval
+  EXPECT_EQ(d.estimates[d.verdict.estimate].method,
+            "lost_motion");  // 0.01 rad times 0.015 m, the narrower interval
   // 2 %: the ringing of 20 % has died out by exp(-5) where the wall is read.
   EXPECT_NEAR(by("lost_motion", d.estimates).backlash, 1.5e-4, 3e-6);
 }
@@ -89,7 +91,8 @@ TEST(Diagnose, WhatCannotBeServedIsListedWithItsReason) {
   for (const Estimate& e : d.estimates) {
     EXPECT_EQ(e.status, Status::insufficient_data);
     const bool of_the_file = e.method != "position_difference" && e.method != "momentum_transfer";
-    EXPECT_NE(e.message.find(of_the_file ? "declares no diagnosis." : "the rig"), std::string::npos) << e.message;
+    EXPECT_NE(e.message.find(of_the_file ? "declares no diagnosis." : "the rig"), std::string::npos)
+        << e.message;
   }
   EXPECT_EQ(d.verdict.grade, Grade::cannot_tell);
   EXPECT_FALSE(d.apd);

@@ -1,9 +1,9 @@
-#include "backlash_diagnosis/diagnosis/family_match.h"
-
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "backlash_diagnosis/diagnosis/family_match.h"
 #include "support/curve.h"
 
 namespace backlash {

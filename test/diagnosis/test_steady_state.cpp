@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What runs for months beside a robot asks nothing of the heap, sample by sample and period by period.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -81,7 +82,8 @@ TEST(Verdict, CombinesWhatAgreesSharpestFirst) {
   EXPECT_NEAR(v.angle_upper, kToAngle * v.upper, 1e-16);
 }
 
-// Errors of two estimators with standard deviations 1 and 2 um, uncorrelated, and fully correlated: the worst case.
+// Errors of two estimators with standard deviations 1 and 2 um, uncorrelated, and fully correlated: the worst
+// case.
 TEST(Verdict, TheIntervalHoldsItsPromiseForAnyCorrelation) {
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
@@ -262,7 +264,7 @@ TEST(Verdict, GrowthHasTheUncertaintyOfNowAndThen) {
   baseline.upper = 5e-5 + 12e-6;
   Verdict v = combined({ok("m", 1.4e-4, 5e-6)}, kLimits, baseline);
   EXPECT_NEAR(v.growth, 9e-5, 1e-18);
-  EXPECT_NEAR(v.growth_lower, 9e-5 - 13e-6, 1e-18);              // hypot(5, 12)
+  EXPECT_NEAR(v.growth_lower, 9e-5 - 13e-6, 1e-18);                 // hypot(5, 12)
   EXPECT_NEAR(v.growth_upper, 9e-5 + std::sqrt(34) * 1e-6, 1e-18);  // hypot(5, 3)
   EXPECT_TRUE(mentions(v, "grown by 9e-05 m (95 %: 7.7e-05 to 9.583e-05) since the baseline")) << v.message;
   EXPECT_EQ(v.message.find("good: "), 0u) << v.message;

@@ -1,6 +1,8 @@
-// What the model lacks, found in records of simulated machines whose truth is known. The simulation is another
-// integrator than that of the search (SUNDIALS on the whole train), the effect is added in the rig that makes
-// the records and left out of the rig that is declared, which is up to 30 % off in all parameters as well.
+// SPDX-License-Identifier: BSD-3-Clause
+// What the model lacks, found in records of simulated machines whose truth is known. The simulation is
+// another integrator than that of the search (SUNDIALS on the whole train), the effect is added in the rig
+// that makes the records and left out of the rig that is declared, which is up to 30 % off in all parameters
+// as well.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,8 +45,8 @@ const Measured& parameter(const Trace& trace, const std::string& effect, const s
   throw InvalidParameter(name, effect, "not found");
 }
 
-/// Every channel ends where noise alone would leave it. 1.3: the floor is itself an estimate, and other starts
-/// of the record's noise scatter it by a tenth.
+/// Every channel ends where noise alone would leave it. 1.3: the floor is itself an estimate, and other
+/// starts of the record's noise scatter it by a tenth.
 void expect_at_floor(const Trace& trace) {
   for (const auto& [name, channel] : trace.channels) EXPECT_LT(channel.after, 1.3 * channel.floor) << name;
 }
@@ -56,10 +58,9 @@ TEST(EffectSearch, NothingIsMissing) {
   EXPECT_FALSE(trace.unexplained);
   expect_at_floor(trace);
   // Identified with errors that hold the truth; four of them: nine parameters are tested together.
-  const std::map<std::string, double> truth = {{"motor_inertia", 7.8},  {"load_inertia", 84},
-                                               {"motor_coulomb", 47},   {"motor_viscous", 10},
-                                               {"load_coulomb", 18},    {"load_viscous", 7},
-                                               {"backlash_angle", 6.3e-4}, {"mesh_stiffness", 400e3}};
+  const std::map<std::string, double> truth = {
+      {"motor_inertia", 7.8}, {"load_inertia", 84}, {"motor_coulomb", 47},      {"motor_viscous", 10},
+      {"load_coulomb", 18},   {"load_viscous", 7},  {"backlash_angle", 6.3e-4}, {"mesh_stiffness", 400e3}};
   for (const auto& [name, value] : truth) {
     const Measured& m = trace.parameters.at(name);
     EXPECT_NEAR(m.value, value, 4 * m.standard_error + 0.003 * value) << name;
@@ -72,8 +73,8 @@ std::shared_ptr<const Term> bristles(const std::string& body, double distance, d
   return make_term("presliding", values);
 }
 
-// Every friction begins along some path. Of a path that hardly shows the model must know, or the rest looks like
-// other effects; as long as the load turns within it, it is an effect.
+// Every friction begins along some path. Of a path that hardly shows the model must know, or the rest looks
+// like other effects; as long as the load turns within it, it is an effect.
 TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
   Rig machine = test::other_servo();
   machine.terms = {bristles("load", 2e-5, 8000)};
@@ -136,7 +137,8 @@ TEST(EffectSearch, TwoEffectsAtOnce) {
   }
   // 99 % band: a hundredth of the lags outside where nothing is missing; these 51 lags are no 51 independent
   // trials, so up to a seventh.
-  for (const Independence& i : trace.independence) EXPECT_LT(i.after, 0.15) << i.channel << " " << i.input << " before " << i.before;
+  for (const Independence& i : trace.independence)
+    EXPECT_LT(i.after, 0.15) << i.channel << " " << i.input << " before " << i.before;
 }
 
 /// A drive that gives less than it is asked for: of a recorded torque u the machine feels T0 tanh(u / T0).
@@ -150,7 +152,8 @@ TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
   Records r = records_of(test::other_servo(), 10);
   double largest = 0;
   for (const Record* record : {&r.train, &r.test})
-    for (const double torque : record->column(Channel::motor_torque)) largest = std::max(largest, std::fabs(torque));
+    for (const double torque : record->column(Channel::motor_torque))
+      largest = std::max(largest, std::fabs(torque));
   r.train = with_saturation(r.train, 1.15 * largest);
   r.test = with_saturation(r.test, 1.15 * largest);
   const Trace trace = traced(r);
@@ -216,7 +219,8 @@ TEST(EffectSearch, RefusesRecordsThatCannotTell) {
 TEST(EffectSearch, CanBeStopped) {
   const Rig rig = test::servo_file().rig;
   const Record record = simulate_record(rig, test::servo_run(11), 3);
-  EXPECT_THROW(trace_residual(rig, {record}, record, {}, [](double, const std::string&) { return false; }), Cancelled);
+  EXPECT_THROW(trace_residual(rig, {record}, record, {}, [](double, const std::string&) { return false; }),
+               Cancelled);
 }
 
 }  // namespace

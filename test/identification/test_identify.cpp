@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which procedures a set of records allows, and what is said about the others.
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "backlash_diagnosis/identification/servo_data.h"
-
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "backlash_diagnosis/identification/bandwidth.h"
+#include "backlash_diagnosis/identification/servo_data.h"
 
 namespace backlash {
 namespace {
@@ -19,7 +19,8 @@ Record rounded_sine(double amplitude) {
     const double t = k * kInterval;
     record.time.push_back(t);
     record.column(Channel::motor_torque).push_back(std::cos(0.5 * M_PI * t));
-    record.column(Channel::motor_position).push_back(kStep * std::round(amplitude * std::sin(0.5 * M_PI * t) / kStep));
+    record.column(Channel::motor_position)
+        .push_back(kStep * std::round(amplitude * std::sin(0.5 * M_PI * t) / kStep));
   }
   return record;
 }
@@ -35,7 +36,8 @@ Rig locked() {
 double rate_error(const ServoData& data, double amplitude) {
   double square = 0, n = 0;
   for (std::size_t k = 400; k + 400 < data.size(); ++k, ++n)
-    square += std::pow(data.motor_rate[k] - 0.5 * M_PI * amplitude * std::cos(0.5 * M_PI * double(k) * kInterval), 2);
+    square += std::pow(
+        data.motor_rate[k] - 0.5 * M_PI * amplitude * std::cos(0.5 * M_PI * double(k) * kInterval), 2);
   return std::sqrt(square / n);
 }
 
@@ -45,7 +47,8 @@ double speed(double amplitude) {
 
 TEST(ServoData, TellsTheSpeedOfALockedMotorThatCrawls) {
   const ServoData data = servo_data(rounded_sine(kSlow), locked());
-  // Raw, the rounding (uniform over a step) times the rate of a five-point difference is as large as the speed.
+  // Raw, the rounding (uniform over a step) times the rate of a five-point difference is as large as the
+  // speed.
   const double raw = 0.95 * kStep / std::sqrt(12.0) / kInterval;
   EXPECT_GT(raw, 0.9 * speed(kSlow));
   // The promise is a fiftieth for white noise; rounding is not white near the turns, so half as much again.

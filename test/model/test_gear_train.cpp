@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -80,8 +81,8 @@ TEST(GearTrain, FollowsTheEquationsOnBothFlanksAndInTheGap) {
 TEST(GearTrain, SensorShowsTheSpringOrSpringAndDamper) {
   Rig rig = full_rig();
   State s{};
-  s[0] = 0.002, s[1] = 0.0005;      // twist 0.0015 rad
-  s[4] = 0.3, s[5] = -0.1;          // 0.4 rad/s
+  s[0] = 0.002, s[1] = 0.0005;  // twist 0.0015 rad
+  s[4] = 0.3, s[5] = -0.1;      // 0.4 rad/s
   const double spring = rig.input_coupling.stiffness * 0.0015, damper = rig.input_coupling.damping * 0.4;
   ASSERT_GT(damper, 0);
   EXPECT_NEAR(GearTrain(rig).observe(s.data(), 0).sensor_torque, spring, 1e-14);
@@ -368,7 +369,8 @@ TEST(GearTrain, RefusesMasslessPartsAndAMeshWithoutLaw) {
   EXPECT_EQ(message(negative), "backlash = -1e-06: must be >= 0 and finite");
 }
 
-// The equations are written twice, for trains that only their teeth make other than linear and for all others.
+// The equations are written twice, for trains that only their teeth make other than linear and for all
+// others.
 TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> angle(-0.01, 0.01), speed(-0.5, 0.5);
@@ -396,7 +398,8 @@ TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
       const double motor_speed = s[smooth.dof()];
       without[smooth.dof()] -= std::copysign(0.01 * smooth.ratio(), motor_speed) / rubs.motor_inertia();
       for (int k = 0; k < 2 * smooth.dof(); ++k)
-        EXPECT_NEAR(with[k], without[k], 1e-12 * (std::fabs(with[k]) + 100 / 2e-5)) << "layout " << layout << ", " << k;
+        EXPECT_NEAR(with[k], without[k], 1e-12 * (std::fabs(with[k]) + 100 / 2e-5))
+            << "layout " << layout << ", " << k;
     }
   }
 }

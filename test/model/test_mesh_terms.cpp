@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Terms that shape the flanks: openings and slopes, what they make of the mesh, and that they cost no energy.
 #include <gtest/gtest.h>
 

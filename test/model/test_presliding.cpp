@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dahl's law by hand, as a differential equation, and as loops.
 #include <gtest/gtest.h>
 
@@ -222,10 +223,12 @@ TEST(Presliding, TheTermSetsTheDistanceOfItsBody) {
     EXPECT_EQ(friction.motor.forward, 1);
     EXPECT_EQ(term->moves_load(), !motor);
   }
-  EXPECT_THROW(read_term(YamlReader::from_text("{id: presliding, body: gear, distance: 0.01, damping: 3}", "rig.yaml")),
+  EXPECT_THROW(read_term(YamlReader::from_text("{id: presliding, body: gear, distance: 0.01, damping: 3}",
+                                               "rig.yaml")),
                BadData);
-  EXPECT_THROW(read_term(YamlReader::from_text("{id: presliding, body: load, distance: -1, damping: 3}", "rig.yaml")),
-               BadData);
+  EXPECT_THROW(
+      read_term(YamlReader::from_text("{id: presliding, body: load, distance: -1, damping: 3}", "rig.yaml")),
+      BadData);
   const TermSearch& search = *term_type("presliding").search;
   MotionRange range;
   range.from = -1, range.to = 2;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -49,9 +50,11 @@ Rig parse(const std::string& text) {
 TEST(Rig, SensorShowsTheSpringUnlessTheFileSaysOtherwise) {
   EXPECT_FALSE(parse(kRig).sensor_with_damper);
   EXPECT_FALSE(parse(changed("inertia: 4e-6}", "inertia: 4e-6, output: spring}")).sensor_with_damper);
-  EXPECT_TRUE(parse(changed("inertia: 4e-6}", "inertia: 4e-6, output: spring_and_damper}")).sensor_with_damper);
+  EXPECT_TRUE(
+      parse(changed("inertia: 4e-6}", "inertia: 4e-6, output: spring_and_damper}")).sensor_with_damper);
   EXPECT_THROW(parse(changed("inertia: 4e-6}", "inertia: 4e-6, output: damper}")), BadData);
-  EXPECT_THROW(parse(changed("damping: 0.05}", "damping: 0.05, output: spring}")), BadData);  // no sensor there
+  EXPECT_THROW(parse(changed("damping: 0.05}", "damping: 0.05, output: spring}")),
+               BadData);  // no sensor there
 }
 
 TEST(Rig, ReadsEveryValue) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The modes of one body under dry friction, and how a gear train keeps them.
 #include <gtest/gtest.h>
 

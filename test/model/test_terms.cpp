@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All terms of the registry: what the search for missing effects may try of each, and that nothing of it is
 // nothing.
 #include <gtest/gtest.h>

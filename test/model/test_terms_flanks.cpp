@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Terms that open or load the flanks: values by hand, slopes, and that they cost no energy.
 #include <gtest/gtest.h>
 
@@ -108,7 +109,8 @@ TEST(FlankTerms, ForcesAreTheSameWithFlanksThatAreKnown) {
     for (double x = -3 * kHalf; x < 3 * kHalf; x += 0.021 * kHalf) {
       const Motion motion{0, load + x, 0.3, load, 0.2};
       const GearTrain::Flanks flanks = train.flanks(motion.motor_position, load);
-      const GearTrain::LoadForces known = train.load_forces(motion, flanks), asked = train.load_forces(motion);
+      const GearTrain::LoadForces known = train.load_forces(motion, flanks),
+                                  asked = train.load_forces(motion);
       ASSERT_EQ(known.net, asked.net) << load << " " << x;
       ASSERT_EQ(known.mesh_on_motor, asked.mesh_on_motor) << load << " " << x;
       for (const FlankShift& at : flanks) far += std::isinf(at.opening);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Terms that are torque or friction on one end: values by hand, and motions with a closed form.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The look-up table as torque: its curve, its coordinates, what a rig makes of it.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Bad input: the diagnoser stays alive, counts what it left out, and answers from what was good."""
 import copy
 import shutil

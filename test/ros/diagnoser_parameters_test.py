@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Wrong parameters are refused at the start, with a message that names them; files that parameters name are used."""
 import os
 import shutil

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the tests of the diagnoser node share: the node as a process, a coarse curve, records to publish."""
 import copy
 import csv

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The diagnoser beside a running simulator: distributions, estimates, services, action, /diagnostics."""
 import math
 import shutil

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Bags into the running diagnoser: any rate, pause and loop, and offline, give the same numbers."""
 import json
 import math

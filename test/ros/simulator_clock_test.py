@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The simulator node at five times real time: it provides /clock and the other nodes follow it."""
 import unittest
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The simulator node with a /clock from elsewhere, here the test: it simulates that far and no further."""
 import unittest
 

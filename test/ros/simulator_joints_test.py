@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Several joints in one simulator: each is as it would be alone, and all are in the same messages."""
 import shutil
 import tempfile

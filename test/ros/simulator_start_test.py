@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Simulators started with parameters of their own: what is refused, followed and repeatable."""
 import math
 import re

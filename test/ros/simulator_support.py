@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the tests of the simulator node share: waiting for messages, starting the node, rig files."""
 import bisect
 import os

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The simulator node with its built-in rig: topics, stamps, services, diagnostics."""
 import math
 import unittest

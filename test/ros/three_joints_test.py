@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """three_joints.launch: one diagnoser tells three joints apart that one simulator moves."""
 import unittest
 

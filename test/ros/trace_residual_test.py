@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """The action TraceResidual of the diagnoser, and the simulator with the rig that it leaves."""
 import json
 import os

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The load that follows a recorded motor, against the other integrator: the whole train simulated with
 // SUNDIALS.
 #include <gtest/gtest.h>
@@ -79,7 +80,7 @@ TEST(DrivenLoad, HeldMotorUnderContactBalances) {
   EXPECT_NEAR(driven.mesh_torque.front(), 400e3 * (6e-4 - 3.15e-4),
               1e-6);  // spring, motor ahead: drives forward
   EXPECT_NEAR(driven.mesh_on_motor.front(), -driven.mesh_torque.front(), 20);  // falls within the sample
-  EXPECT_LT(std::fabs(driven.load.back()), 3.15e-4 + 1e-9);  // ends in the gap
+  EXPECT_LT(std::fabs(driven.load.back()), 3.15e-4 + 1e-9);                    // ends in the gap
 }
 
 TEST(DrivenLoad, LockedLoadStands) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sticking and sliding in motion, against closed forms and a time-stepping of its own.
 #include <gtest/gtest.h>
 

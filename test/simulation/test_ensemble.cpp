@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Several rigs at once against the same rigs one by one, moved by other code: Plant, SUNDIALS and Verner's
 // pair.
 #include <gtest/gtest.h>

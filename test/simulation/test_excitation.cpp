@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -346,9 +347,11 @@ TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
        "rig.yaml:4: upper_frequency = 9: must be > lower_frequency"},
       {"type: random\nrms: 1\nlower_frequency: 1\nupper_frequency: 9\nlines: 3\nseed: 1\n",
        "rig.yaml:5: lines = 3: must be"},
-      {"{type: stepped_sine, amplitude: 1, start_frequency: 3, end_frequency: 2, step_frequency: 1, cycles: 1}",
+      {"{type: stepped_sine, amplitude: 1, start_frequency: 3, end_frequency: 2, step_frequency: 1, cycles: "
+       "1}",
        "rig.yaml:1: end_frequency = 2: must be >= start_frequency"},
-      {"{type: stepped_sine, amplitude: 1, start_frequency: 1, end_frequency: 2, step_frequency: 1, cycles: 1.5}",
+      {"{type: stepped_sine, amplitude: 1, start_frequency: 1, end_frequency: 2, step_frequency: 1, cycles: "
+       "1.5}",
        "rig.yaml:1: cycles = 1.5: must be an integer"},
       {"type: constant_speed\nspeed: 1\nramp: 1\n", "rig.yaml:1: controller: is missing"},
       {"type: constant_speed\ncontroller: {rate: 1, proportional: 1, integral: 1, torque_limit: 0}\n",

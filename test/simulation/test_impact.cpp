@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Single impacts against a wall, each with a closed form.
 #include <gtest/gtest.h>
 

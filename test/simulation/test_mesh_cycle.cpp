@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Mesh stiffness that varies with position, seen in the motion of whole rigs.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Switching, restarting, changing and resetting a plant; its motion is tested in test_plant_motion.cpp.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The whole gear train in motion against energy, statics, refinement and an integration of its own.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Bodies under presliding friction in motion, against an integration of Dahl's equation of its own, closed
 // forms and the balance of energy.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Terms that change what sensors show: the scale of the load encoder, the delay of the torque.
 #include <gtest/gtest.h>
 

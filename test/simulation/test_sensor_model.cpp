@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -197,7 +198,8 @@ TEST(SensorModel, CurrentAndAccelerationAreMeasuredWhereTheRigDeclaresThem) {
   EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).motor_current));
   EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).acceleration));
   const SensorsSettings both = read_sensors(YamlReader::from_text(
-      "{sampling_rate: 1, seed: 1, motor_current: {offset: 0.5}, acceleration: {resolution: 7}}", "rig.yaml"));
+      "{sampling_rate: 1, seed: 1, motor_current: {offset: 0.5}, acceleration: {resolution: 7}}",
+      "rig.yaml"));
   EXPECT_EQ(SensorModel(both).measure(exact).motor_current, 2.5);
   EXPECT_EQ(SensorModel(both).measure(exact).acceleration, 301);
 }

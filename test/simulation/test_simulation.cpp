@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -81,7 +82,8 @@ TEST(Simulation, RecordsCurrentAndAccelerationOnlyWhereDeclared) {
   EXPECT_FALSE(without.has(Channel::acceleration));
   SimulationSettings settings = shipped_settings();
   settings.sensors.sampling_rate = 20000;  // fine enough to integrate the acceleration
-  settings.sensors.of(Channel::motor_current).declared = settings.sensors.of(Channel::acceleration).declared = true;
+  settings.sensors.of(Channel::motor_current).declared = settings.sensors.of(Channel::acceleration).declared =
+      true;
   rig.link_locked = true;
   rig.output_coupling = Coupling{};  // the gear is fixed: the acceleration is the pinion's
   rig.input_coupling = Coupling{};   // and motor and pinion are one body
@@ -89,9 +91,11 @@ TEST(Simulation, RecordsCurrentAndAccelerationOnlyWhereDeclared) {
   ASSERT_EQ(record.column(Channel::motor_current).size(), record.size());
   ASSERT_EQ(record.column(Channel::acceleration).size(), record.size());
   for (std::size_t k = 0; k < record.size(); ++k)
-    EXPECT_DOUBLE_EQ(record.column(Channel::motor_current)[k], record.column(Channel::motor_torque)[k] / 0.02);
-  // Its integral is the speed, here in the free flight to the first contact: 30 um at 0.05 N m on 4.34e-5 kg m^2
-  // take 1.9 ms. With drag 0.0048 N m s/rad the trapezoidal rule errs by (h c / J)^2 / 12 = 2.5e-6; twice that allowed.
+    EXPECT_DOUBLE_EQ(record.column(Channel::motor_current)[k],
+                     record.column(Channel::motor_torque)[k] / 0.02);
+  // Its integral is the speed, here in the free flight to the first contact: 30 um at 0.05 N m on 4.34e-5 kg
+  // m^2 take 1.9 ms. With drag 0.0048 N m s/rad the trapezoidal rule errs by (h c / J)^2 / 12 = 2.5e-6; twice
+  // that allowed.
   const auto& a = record.column(Channel::acceleration);
   const auto& w = record.column(Channel::motor_velocity);
   double speed = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Speed control of the motor, torque on the load and the motor brake.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How the plant finds touches for laws that depend on the impact speed, and what it makes of them.
 #include <gtest/gtest.h>
 

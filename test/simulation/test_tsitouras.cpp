@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The coefficients, against the conditions that make a Runge-Kutta pair one of order 5(4) (Butcher 2008,
 // Table 302(I)).
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Impacts of two free bodies: the restitution that comes out against what each law predicts, tension, lost
 // energy.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Counts what is asked of the heap while an AllocationCount lives. Replaces operator new of a whole test
 // binary: include it in one file of each.
 #pragma once

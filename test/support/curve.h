@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A monitoring curve that can be written down: skewness falls linearly with backlash.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where tests find their files: measured records that may be absent, and files of the package itself.
 #pragma once
 
@@ -8,8 +9,8 @@
 
 namespace backlash::test {
 
-/// Path of a measured record ("rig/rig_halfgap_30um.csv"): in $BACKLASH_DIAGNOSIS_DATA, else in ../shared/data
-/// beside the repository. Without it a test calls GTEST_SKIP with the reason.
+/// Path of a measured record ("rig/rig_halfgap_30um.csv"): in $BACKLASH_DIAGNOSIS_DATA, else in
+/// ../shared/data beside the repository. Without it a test calls GTEST_SKIP with the reason.
 inline std::optional<std::string> find_data(const std::string& relative) {
   namespace fs = std::filesystem;
   const char* folder = std::getenv("BACKLASH_DIAGNOSIS_DATA");

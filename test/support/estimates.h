@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Finding the estimate of a method among those of a diagnosis.
 #pragma once
 

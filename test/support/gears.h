@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Gear pairs that several tests share.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Records of a rig that can be written down: square torque, a sensor and a motor that ring after each switch.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rigs, excitations and tolerances that several tests share.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The servo with two inertias, and records of it whose truth is known.
 #pragma once
 

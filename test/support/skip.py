@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Skipping a test of a rostest so that the summary counts it (rosunit's result file calls a skip a success)."""
 
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Two inertias with play between them, integrated by a plain Runge-Kutta scheme that shares nothing with the
 // package: the machine that the identification of play and damping is tried on.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Records of two inertias with a spring and a damper between them, integrated here by Runge and Kutta's
 // classical method: an oracle that shares nothing with the package's models and simulation.
 #pragma once

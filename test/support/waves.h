@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Periodic signals in closed form, sampled with noise and jitter.
 #pragma once
 

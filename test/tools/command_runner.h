@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Runs the commands of the package as a user would, in a folder of its own that vanishes with the test.
 #pragma once
 

@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs trace_residual on machines that it has never seen and says how often it names what they lack.
 
 Makes a seeded suite of machines with make_machine (one, two, three or no undeclared effects, and effects that no

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include "tools/common/command_line.h"
@@ -11,7 +12,8 @@ Command command() {
   c.name = "saw";
   c.summary = "Saws.";
   c.positional = {"WOOD"};
-  c.options = {{"length", "M", "length [m]", true}, {"count", "N", "pieces; default: 1"}, {"dry", "", "no oil"}};
+  c.options = {
+      {"length", "M", "length [m]", true}, {"count", "N", "pieces; default: 1"}, {"dry", "", "no oil"}};
   c.examples = {"saw oak --length 2"};
   c.exit_codes = "  0   done\n";
   return c;
@@ -101,8 +103,8 @@ TEST(CommandLine, ComplaintsNameOptionValueAndLimit) {
 TEST(CommandLine, HelpNamesEverythingWithinThePage) {
   const std::string help = help_text(command());
   for (const char* part :
-       {"Usage: saw WOOD --length M [--count N] [--dry]", "Saws.", "length [m]", "default: 1", "--help", "--version",
-        "saw oak --length 2", "0   done", "64", "65", "66", "70", "73"})
+       {"Usage: saw WOOD --length M [--count N] [--dry]", "Saws.", "length [m]", "default: 1", "--help",
+        "--version", "saw oak --length 2", "0   done", "64", "65", "66", "70", "73"})
     EXPECT_NE(help.find(part), std::string::npos) << help << " lacks " << part;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The commands as their users run them: exit codes, files, messages.
 #include <algorithm>
 #include <cmath>
@@ -51,10 +52,10 @@ class Commands : public CommandTest {
 };
 
 TEST_F(Commands, HelpAndVersion) {
-  for (const std::string& command :
-       std::vector<std::string>{"simulate", "build_curve", "compare_models", "diagnose_record", "convert_record",
-                                "gear_geometry", "identify", "integrator_study", "search_parameters",
-                                "separability_map", "trace_residual", "uncertainty_study"}) {
+  for (const std::string& command : std::vector<std::string>{
+           "simulate", "build_curve", "compare_models", "diagnose_record", "convert_record", "gear_geometry",
+           "identify", "integrator_study", "search_parameters", "separability_map", "trace_residual",
+           "uncertainty_study"}) {
     const std::string help = done(command + " --help").out;
     expect_contains(help, "Usage: " + command);
     for (const char* part : {"Options:", "rosrun", "Exit codes"}) expect_contains(help, part);
@@ -370,7 +371,8 @@ TEST_F(Commands, RepeatedStampsAreTold) {
 TEST_F(Commands, EachMethodAloneGetsWhatItNeeds) {
   done("simulate rig.yaml --duration 1 --backlash 6e-5 --out a.csv");
   for (const std::string& method : diagnosis_methods()) {
-    const Json json = Json::parse(run("diagnose_record a.csv --rig rig.yaml --method " + method + " --json -").out);
+    const Json json =
+        Json::parse(run("diagnose_record a.csv --rig rig.yaml --method " + method + " --json -").out);
     ASSERT_EQ(json["estimates"].size(), 1u);
     EXPECT_EQ(json["estimates"][0]["method"], method);
     const std::string message = json["estimates"][0]["message"];
@@ -411,8 +413,10 @@ TEST_F(Commands, KnownGapsLieInTheIntervals) {
     for (const Json& estimate : json["estimates"]) {
       const Json& interval = estimate["interval"];
       if (interval.is_null()) continue;  // a null end is an open one
-      EXPECT_TRUE(interval[0].is_null() || interval[0].get<double>() <= truth) << half_gap << estimate.dump(1);
-      EXPECT_TRUE(interval[1].is_null() || interval[1].get<double>() >= truth) << half_gap << estimate.dump(1);
+      EXPECT_TRUE(interval[0].is_null() || interval[0].get<double>() <= truth)
+          << half_gap << estimate.dump(1);
+      EXPECT_TRUE(interval[1].is_null() || interval[1].get<double>() >= truth)
+          << half_gap << estimate.dump(1);
     }
     const Json& chosen = json["estimates"][json["verdict"]["estimate"].get<int>()];
     EXPECT_NEAR(chosen["backlash"].get<double>(), truth, 3e-6) << half_gap;  // the accuracy that is asked for

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // compare_models as its users run it.
 #include <nlohmann/json.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The command gear_geometry: figures as printed in the reference, JSON, refusals.
 #include <cmath>
 #include <nlohmann/json.hpp>

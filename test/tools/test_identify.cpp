@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // `identify` as its users run it.
 #include <cmath>
 #include <nlohmann/json.hpp>

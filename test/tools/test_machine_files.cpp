@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Limits, baselines and other signals from the command line.
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The generator of test machines against Newton's law, written down here anew: for a torque that is held
 // between samples, second differences of J_M q_M + J_L q_L are exact, so nothing but noise and quantisation
 // may remain.

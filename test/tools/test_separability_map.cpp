@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // separability_map and the pictures of Sarkar et al. as their users run them.
 #include <nlohmann/json.hpp>
 

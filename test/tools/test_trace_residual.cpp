@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // `trace_residual` as its users run it, on records of machines that have an effect more than the rig
 // declares.
 #include <nlohmann/json.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The printed configurations of Yumrukcal (2013), their test runs simulated with the sensors of the rig
 // files, and each procedure's findings against the parameters that were simulated.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 #include <sched.h>
 
@@ -112,10 +113,10 @@ TEST(BuildCurve, IsDeterministicOnAnyNumberOfProcessors) {
   }
 }
 
-// The mean at a point does not depend on its neighbours or on the order in which the points are worked on (its
-// scatter does: neighbours share theirs).
-// Points that are moved at once share their steps, so that their runs differ by errors of the solver; where a gap is
-// chaotic these decide which of many like motions is run, and so the mean within its own scatter.
+// The mean at a point does not depend on its neighbours or on the order in which the points are worked on
+// (its scatter does: neighbours share theirs). Points that are moved at once share their steps, so that their
+// runs differ by errors of the solver; where a gap is chaotic these decide which of many like motions is run,
+// and so the mean within its own scatter.
 TEST(BuildCurve, PointsDependOnTheOthersByTheSolversErrorOnly) {
   const MonitoringCurve three = build_curve(default_rig_file(), quick(3)),
                         two = build_curve(default_rig_file(), quick(2));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The figures of the integrator study, against closed forms, energy and an integrator that shares no code
 // with SUNDIALS.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Motor current and acceleration as the signal of the diagnosis, from rig file to answer.
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The whole chain on simulated records of the Sarkar rig: rig file, curve, record, diagnosis.
 #include <gtest/gtest.h>
 

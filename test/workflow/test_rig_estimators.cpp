@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Estimators of play that need no monitoring curve, on simulated rigs and on records of a separate program.
 #include <gtest/gtest.h>
 

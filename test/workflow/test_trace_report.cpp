@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The report of a trace that was put together by hand.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The augmented rig file: what is written is what was found, and can be simulated.
 #include <gtest/gtest.h>
 
@@ -125,7 +126,8 @@ TEST(TracedRig, OfOneInertiaAndOfALockedLink) {
 TEST(TracedRig, OtherTeethReplaceTheDeclaredLaw) {
   const RigFile declared = rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
   Trace trace = found(declared.rig, kServo, {gravity()});
-  trace.augmented.mesh.contact_spec = {"hunt_crossley", {{"stiffness", 2.1e7}, {"exponent", 1.5}, {"alpha", 0.8}}};
+  trace.augmented.mesh.contact_spec = {"hunt_crossley",
+                                       {{"stiffness", 2.1e7}, {"exponent", 1.5}, {"alpha", 0.8}}};
   trace.parameters.erase("mesh_damping");
   trace.parameters["mesh_stiffness"] = {2.1e7, 1e5};
   trace.parameters["mesh_alpha"] = {0.8, 0.01};

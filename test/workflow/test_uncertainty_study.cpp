@@ -1,11 +1,11 @@
-#include "backlash_diagnosis/workflow/uncertainty_study.h"
-
+// SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/workflow/curve_builder.h"
+#include "backlash_diagnosis/workflow/uncertainty_study.h"
 #include "support/estimates.h"
 
 namespace backlash {
@@ -27,11 +27,11 @@ StudyTrial trial(double truth, double estimate, double lower, double upper, Stat
 
 TEST(SummariseStudy, CountsByHand) {
   std::vector<StudyTrial> trials = {
-      trial(1e-5, 1.1e-5, 0.9e-5, 1.2e-5),                    // holds, error 1 um
-      trial(2e-5, 2.3e-5, 2.1e-5, 2.5e-5),                    // misses by 1 um, error 3 um, width 4 um
-      trial(3e-5, 5e-5, 4.9e-5, 5.1e-5),                      // 20 um off, width 2 um: confident
-      trial(4e-5, kNaN, kNaN, kNaN, Status::out_of_domain),   // cannot tell
-      trial(9e-5, 9e-5, 8e-5, 10e-5)};                        // half gap 45 um: beyond the group
+      trial(1e-5, 1.1e-5, 0.9e-5, 1.2e-5),                   // holds, error 1 um
+      trial(2e-5, 2.3e-5, 2.1e-5, 2.5e-5),                   // misses by 1 um, error 3 um, width 4 um
+      trial(3e-5, 5e-5, 4.9e-5, 5.1e-5),                     // 20 um off, width 2 um: confident
+      trial(4e-5, kNaN, kNaN, kNaN, Status::out_of_domain),  // cannot tell
+      trial(9e-5, 9e-5, 8e-5, 10e-5)};                       // half gap 45 um: beyond the group
   const std::vector<StudyRow> rows = summarise_study(trials, true, 30e-6);
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].trials, 4);
@@ -83,7 +83,8 @@ TEST(UncertaintyStudy, IntervalsHoldWhatTheyPromise) {
         EXPECT_LE((1 - row.coverage) * row.told, 7.001) << row.method;
       }
     }
-  // The goals are 1 um with position and 6 um from torque alone, in the median at 2 % noise; here at all levels.
+  // The goals are 1 um with position and 6 um from torque alone, in the median at 2 % noise; here at all
+  // levels.
   const auto rows = summarise_study(trials, true, 70e-6), alone = summarise_study(trials, false, 70e-6);
   EXPECT_EQ(rows.back().method, "combined");
   EXPECT_LT(rows.back().median_error, 1e-6);
@@ -108,7 +109,8 @@ TEST(UncertaintyStudy, WrongConditionsAreRecognised) {
 TEST(UncertaintyStudy, IsDeterministicForASeedAndRefusesNonsense) {
   StudyRequest request;
   request.records = 2;
-  const auto first = run_study(default_rig_file(), curve(), request), again = run_study(default_rig_file(), curve(), request);
+  const auto first = run_study(default_rig_file(), curve(), request),
+             again = run_study(default_rig_file(), curve(), request);
   for (std::size_t i = 0; i < first.size(); ++i) {
     EXPECT_EQ(first[i].backlash, again[i].backlash);
     EXPECT_EQ(test::by("lost_motion", first[i].estimates).message,
@@ -118,9 +120,10 @@ TEST(UncertaintyStudy, IsDeterministicForASeedAndRefusesNonsense) {
   }
   request.seed = 2;
   EXPECT_NE(run_study(default_rig_file(), curve(), request)[0].backlash, first[0].backlash);
-  for (const auto& spoil : {+[](StudyRequest& r) { r.records = 0; }, +[](StudyRequest& r) { r.max_backlash = -1; },
-                            +[](StudyRequest& r) { r.noise.clear(); }, +[](StudyRequest& r) { r.noise = {-0.1}; },
-                            +[](StudyRequest& r) { r.most_periods = 1; }}) {
+  for (const auto& spoil :
+       {+[](StudyRequest& r) { r.records = 0; }, +[](StudyRequest& r) { r.max_backlash = -1; },
+        +[](StudyRequest& r) { r.noise.clear(); }, +[](StudyRequest& r) { r.noise = {-0.1}; },
+        +[](StudyRequest& r) { r.most_periods = 1; }}) {
     StudyRequest bad;
     spoil(bad);
     EXPECT_THROW(run_study(default_rig_file(), curve(), bad), InvalidParameter);

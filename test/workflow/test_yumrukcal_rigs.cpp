@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The rig files of Yumrukcal (2013) against his tables, and their test runs against the limits of his
 // machine.
 #include <gtest/gtest.h>
@@ -181,7 +182,8 @@ TEST(YumrukcalRigs, ExternalExcitationCrossesTheGapWithTheMotorStill) {
   }
   const double gap = 0.0307 * kDegree;
   EXPECT_GT(highest - lowest, gap);
-  EXPECT_LT(highest - lowest, gap + deepest(80 + 15 - 16.8, gap, 460e3) + deepest(80 + 15 - 13.3, gap, 460e3));
+  EXPECT_LT(highest - lowest,
+            gap + deepest(80 + 15 - 16.8, gap, 460e3) + deepest(80 + 15 - 13.3, gap, 460e3));
 }
 
 }  // namespace

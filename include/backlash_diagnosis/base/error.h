@@ -1,5 +1,7 @@
-// The exceptions of the core. Each carries what an operator needs to act: the name, the value and the limit, or
-// the place in the file. Boundaries (tools, nodes) turn them into exit codes, log lines and service answers.
+// SPDX-License-Identifier: BSD-3-Clause
+// The exceptions of the core. Each carries what an operator needs to act: the name, the value and the limit,
+// or the place in the file. Boundaries (tools, nodes) turn them into exit codes, log lines and service
+// answers.
 #pragma once
 
 #include <stdexcept>

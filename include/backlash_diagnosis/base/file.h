@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Opening files for reading and writing them whole, with errors that name the file and the reason.
 #pragma once
 

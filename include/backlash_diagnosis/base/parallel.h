@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Long work on all processors, with one progress for all of them.
 #pragma once
 
@@ -28,7 +29,8 @@ class Ticker {
   std::atomic<bool> stop_{false};
 };
 
-/// Calls job(0) .. job(count - 1) on all processors, in any order; the first exception stops them and is thrown.
+/// Calls job(0) .. job(count - 1) on all processors, in any order; the first exception stops them and is
+/// thrown.
 void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job);
 
 /// The same without progress.

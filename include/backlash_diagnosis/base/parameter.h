@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Named physical parameters: how contact laws and terms declare what they need, so that one loader checks
 // them all.
 #pragma once

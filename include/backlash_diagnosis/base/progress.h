@@ -1,5 +1,6 @@
-// How long work reports how far it is and learns that it should stop. One type for progress bars, action feedback
-// and cancel.
+// SPDX-License-Identifier: BSD-3-Clause
+// How long work reports how far it is and learns that it should stop. One type for progress bars, action
+// feedback and cancel.
 #pragma once
 
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Running the package's Python scripts, which are installed beside its executables.
 #pragma once
 

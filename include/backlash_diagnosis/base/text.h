@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Text as it comes from files and as it goes into messages. Independent of the locale.
 #pragma once
 

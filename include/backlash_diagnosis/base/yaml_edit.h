@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Changing single values of a YAML file while its layout and its other comments stay: how a program writes a
 // rig file that a person can still read.
 #pragma once

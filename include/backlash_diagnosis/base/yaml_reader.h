@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Strict reading of YAML configuration: every value is checked for presence, type and range, every key must
 // be known. Errors name the file, the line, the full key, the value and the limit, e.g.
 //   rig.yaml:12: gear_train.motor.inertia = -1: must be > 0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A YAML document as a plain tree with line numbers: what YamlReader reads. Stricter than YAML: one document
 // with a map at the top, text keys without duplicates, no tags, no cycles, bounded size and depth.
 #pragma once

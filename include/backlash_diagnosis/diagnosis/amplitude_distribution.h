@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Amplitude probability distribution (APD): which share of the time a signal spends in each amplitude class.
 //
 //   class k covers [lower + k w, lower + (k+1) w),   w = (upper - lower) / classes,   k = 0 .. classes - 1
@@ -73,8 +74,8 @@ class AmplitudeDistribution {
   std::size_t samples_ = 0, below_ = 0, above_ = 0;
 };
 
-/// Mean and standard deviation of a signal, sample by sample, by sums of the differences from the first sample: no
-/// division per sample, and nothing is lost to an offset.
+/// Mean and standard deviation of a signal, sample by sample, by sums of the differences from the first
+/// sample: no division per sample, and nothing is lost to an offset.
 class RunningMoments {
  public:
   void add(double value) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The family of amplitude probability distributions that a rig shows as its backlash grows, in their
 // cumulative form, and how far a record's distribution is from it.
 //
@@ -50,7 +51,8 @@ struct ApdFamily {
   std::shared_ptr<NoisyFamilies> compared;
 };
 
-/// The members as noise of standard deviation sigma >= 0 shows them, ready for being compared with many records.
+/// The members as noise of standard deviation sigma >= 0 shows them, ready for being compared with many
+/// records.
 class NoisyFamily {
  public:
   NoisyFamily(const ApdFamily& family, double sigma);
@@ -68,8 +70,8 @@ class NoisyFamily {
   Eigen::VectorXd neighbours_;  // product of each with the next of its phase
 };
 
-/// A family with the noise of the records that it was compared with lately, so that the next record of the same
-/// machine costs no more than its distances. Safe to use from several threads.
+/// A family with the noise of the records that it was compared with lately, so that the next record of the
+/// same machine costs no more than its distances. Safe to use from several threads.
 class NoisyFamilies {
  public:
   /// With the noise nearest to sigma >= 0 of levels 3 % apart; noise is known less precisely than that.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Backlash from the whole APD: which member of the rig's family of distributions a record resembles most.
 //
 // Where skewness is one number of the APD, its shape keeps apart what skewness confuses: the curve may be

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Backlash from the skewness of the APD, period by period, through a monitoring curve.
 #pragma once
 

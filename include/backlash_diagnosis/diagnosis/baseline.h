@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The healthy machine, to compare with: what a verdict said of it once, kept as a YAML file.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All estimators on one record. The live node and the offline command call this and give the same numbers.
 #pragma once
 

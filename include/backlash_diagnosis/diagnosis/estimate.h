@@ -1,4 +1,6 @@
-// What an estimator answers. "Cannot tell" is an answer: a status other than ok, with its reason in plain words.
+// SPDX-License-Identifier: BSD-3-Clause
+// What an estimator answers. "Cannot tell" is an answer: a status other than ok, with its reason in plain
+// words.
 #pragma once
 
 #include <limits>
@@ -20,7 +22,8 @@ Status status_from_string(const std::string& text);  ///< throws InvalidParamete
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Parts of the play between the two flanks, by estimators that can separate them. Angles at the motor_position axis.
+/// Parts of the play between the two flanks, by estimators that can separate them. Angles at the
+/// motor_position axis.
 struct PlayComponents {
   double gap = kNaN;         ///< rad, free play without elastic deflection
   double compliance = kNaN;  ///< rad/(N m), elastic deflection per torque on one flank
@@ -28,17 +31,18 @@ struct PlayComponents {
   double at_torque = kNaN;   ///< N m, torque at which backlash_angle holds
 };
 
-/// An estimate of backlash. NaN where not known: `backlash` for a rig without base radius, all where status says so.
+/// An estimate of backlash. NaN where not known: `backlash` for a rig without base radius, all where status
+/// says so.
 struct Estimate {
   std::string method;
   Status status = Status::insufficient_data;
-  double backlash = kNaN;              ///< m, total free play along the line of action
-  double lower = kNaN, upper = kNaN;   ///< m, 95 % interval of backlash
-  double backlash_angle = kNaN;        ///< rad, the same as an angle on the axis of motor_position
+  double backlash = kNaN;                         ///< m, total free play along the line of action
+  double lower = kNaN, upper = kNaN;              ///< m, 95 % interval of backlash
+  double backlash_angle = kNaN;                   ///< rad, the same as an angle on the axis of motor_position
   double angle_lower = kNaN, angle_upper = kNaN;  ///< rad, 95 % interval of backlash_angle
-  double skewness = kNaN;              ///< of the class values of the APD, where the method uses it
+  double skewness = kNaN;  ///< of the class values of the APD, where the method uses it
   std::optional<PlayComponents> components;
-  std::string message;                 ///< the reason of the status, or how the value came about
+  std::string message;  ///< the reason of the status, or how the value came about
 };
 
 }  // namespace backlash

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where in the family of distributions a record belongs.
 #pragma once
 
@@ -9,8 +10,8 @@ struct FamilyMatch {
   double backlash = kNaN;             // m (angular mesh: rad), of the nearest distribution on the curve
   double lower = kNaN, upper = kNaN;  // 95 % interval, see apd_family.h; at most the end of the curve
   bool touches_end = false;           // the end of the curve or more lies in the interval
-  double misfit = kNaN;                // rms distance from the nearest distribution, unit of the signal
-  double usual_misfit = kNaN;          // the largest among the simulated records there
+  double misfit = kNaN;               // rms distance from the nearest distribution, unit of the signal
+  double usual_misfit = kNaN;         // the largest among the simulated records there
 
   /// Whether the record is farther from the whole family than chance explains: the machine does something
   /// that the rig does not contain.

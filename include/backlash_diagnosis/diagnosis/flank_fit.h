@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Two parallel flanks in the plane of deflection and torque, fitted to a record with two encoders.
 //
 //   phi = f(q_L) + side * b / 2 + g e(T) + c (w_M - w_L),    T = tau - J a_M - d w_M - C sign(w_M)

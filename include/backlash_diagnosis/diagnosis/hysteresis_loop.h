@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Parts of the play from the hysteresis loop of torque against motor position, output locked.
 //
 // With play g, flank stiffness k and Coulomb torque Fc, the motor moves at

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What backlash is too much: the limits by which a verdict grades.
 #pragma once
 

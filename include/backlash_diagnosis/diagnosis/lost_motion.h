@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Play from torque against motor position with the output locked: the hysteresis curve of a gear unit.
 //
 // Lost motion is the angle between the positions at +T and -T when torque is led slowly (or switched)
@@ -22,8 +23,8 @@
 // - settling: 0.3 times the extrapolation,
 // - resolution: one step of the position,
 // - elastic deflection, where subtracted: its uncertainty, and for ramps what friction on the flanks carries.
-// The shares of ringing and settling hold 95 % of the errors in simulations of a ringing rig (half gap 0 to 150 um,
-// square wave 7 to 15 Hz, sine and triangle 1 to 10 Hz).
+// The shares of ringing and settling hold 95 % of the errors in simulations of a ringing rig (half gap 0 to
+// 150 um, square wave 7 to 15 Hz, sine and triangle 1 to 10 Hz).
 //
 // Positive torque must move towards positive position, and the motor must come to rest before torque returns.
 // Torque is motor_torque where present, else sensor_torque (equal where the motion is quasi-static).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Play from the momentum that the motor side gathers while it crosses the gap and loses at the impact, from
 // the speed of the motor and its torque alone (idea: Stein and Wang, cited by Sarkar, Ellis and Moore 1997,
 // Section 2; their formula is not available here, this one follows from the momentum balance).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Monitoring curve: skewness of the APD as a function of backlash, with its scatter and the conditions it
 // holds for.
 //
@@ -58,7 +59,7 @@ class MonitoringCurve {
   std::optional<ApdFamily> family;   // at the same backlash values; for apd_shape
   /// Standard deviations within which 95 % of simulated records lie about the curve; normal by default.
   double coverage_factor = 1.959964;
-  double backlash_to_angle = kNaN;   // rad (at the axis of motor_position) per unit of backlash
+  double backlash_to_angle = kNaN;  // rad (at the axis of motor_position) per unit of backlash
 
   /// Marks points that rise, and widens the scatter of all points by what runs in the middle between two
   /// points teach (middle[i][level] lies between points i and i + 1): their own scatter, and how far they are
@@ -71,8 +72,9 @@ class MonitoringCurve {
   /// Standard deviation of the mean skewness over `periods` periods.
   static double deviation(const SkewnessCell& cell, int periods);
 
-  /// Whether skewness does not depend on backlash: at the declared noise no two points differ by more than the 95 %
-  /// scatter of their runs. True of a signal that is commanded, like the current of an ideally controlled motor.
+  /// Whether skewness does not depend on backlash: at the declared noise no two points differ by more than
+  /// the 95 % scatter of their runs. True of a signal that is commanded, like the current of an ideally
+  /// controlled motor.
   bool flat() const;
 
   /// At the declared noise: what a plot of the curve shows.
@@ -84,7 +86,8 @@ class MonitoringCurve {
   ///   below_range  skewness is higher than at the smallest backlash: no interval
   ///   above_range  the largest backlash of the curve explains it, so may an even larger one; or it is lower
   ///                than anywhere on the curve: a lower bound only
-  ///   ambiguous    the interval is longer than half of the curve; no upper bound where it reaches the end; or the
+  ///   ambiguous    the interval is longer than half of the curve; no upper bound where it reaches the end;
+  ///   or the
   ///                curve is flat
   Estimate invert(double skewness, int periods, const NoiseRange& noise) const;
   Estimate invert(double skewness, int periods, double noise) const {

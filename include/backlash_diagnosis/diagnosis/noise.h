@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // White noise on a periodic signal whose motion need not repeat exactly.
 #pragma once
 
-#include <limits>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 namespace backlash {

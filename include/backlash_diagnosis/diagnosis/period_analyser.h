@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Cuts a signal into whole excitation periods by its stamps and computes the APD of each, sample by sample.
 //
 // Window k holds the samples with origin + k T <= t < origin + (k+1) T, where the origin lies half a sample
@@ -86,7 +87,8 @@ class PeriodAnalyser {
   long last_index_ = -1;
   bool known_ = false, open_ = false;
   double last_time_ = 0;
-  double calm_until_ = -std::numeric_limits<double>::infinity();  // stamps before it only belong to the open window
+  double calm_until_ =
+      -std::numeric_limits<double>::infinity();  // stamps before it only belong to the open window
 };
 
 }  // namespace backlash

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Play from two encoders: what motor_position and load_position differ by when torque presses one flank and
 // the other, less the elastic deflection. Model and fit: see flank_fit.h. The load may be locked or move.
 //
@@ -54,7 +55,8 @@ struct PositionDifferenceSettings {
 /// Estimates play as above, in time linear in the samples. Throws InvalidParameter for settings outside the
 /// ranges above. Everything that lies in the record is answered by the status:
 ///   insufficient_data  no motor_position, no load_position, no torque, too few samples or changes of flank
-///   out_of_domain      the output moves although it is locked; torque does not press both flanks; the deflection does not follow the torque; the
+///   out_of_domain      the output moves although it is locked; torque does not press both flanks; the
+///   deflection does not follow the torque; the
 ///                      encoders differ by more than 1 % in scale; the play is negative beyond the interval
 /// Torque is motor_torque where present, else sensor_torque.
 Estimate estimate_position_difference(const Record& record, const PositionDifferenceSettings& settings);

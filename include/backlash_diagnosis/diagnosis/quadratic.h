@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Quadratic inequalities, of which intervals on a curve with straight pieces consist.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Statistics that few wrong values cannot spoil.
 #pragma once
 

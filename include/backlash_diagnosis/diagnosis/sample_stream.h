@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Samples of one joint as they arrive: keeps the most recent ones as a Record, counts whole excitation
 // periods, and says what was wrong with those it had to leave out. Knows stamps only, no clock: replayed at
 // any rate it does the same.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a signal itself tells about the conditions it was taken under: period, amplitude, saturation.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One answer from several estimates: those that agree combined, those that do not named, and what to do.
 #pragma once
 

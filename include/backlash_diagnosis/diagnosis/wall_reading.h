@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where the motor comes to lie at the two walls of the play, excursion by excursion of the torque.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From the readings of single walls to one travel from wall to wall, with what makes it uncertain.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How far up in frequency a recorded motion says something, and the noise above it.
 #pragma once
 

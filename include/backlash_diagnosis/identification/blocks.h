@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Standard errors where neighbouring samples share their error: everything in blocks longer than that
 // sharing.
 #pragma once

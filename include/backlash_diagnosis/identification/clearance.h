@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Clearance from external excitation: the motor braked, the load pushed to and fro by hand (Yumrukcal 2013,
 // Section 5.3.1, who reads the load's travel while the motor stands).
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Runs at constant speed: where they are in a record, their mean speed and torque.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Mesh damping from the ringing that follows an engagement: how fast it dies (Yumrukcal 2013, Section 5.3.3).
 //
 // While the teeth stay in contact and friction keeps its sign, the difference between motor and load

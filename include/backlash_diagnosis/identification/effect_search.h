@@ -1,14 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the model of a machine lacks: from the residual of records to the effect that explains it.
 //
-// The declared rig is fitted to the training records; then every term that says how it is sought (model/term.h) is
-// tried on what is left, and the best is fitted with all parameters of the machine together. An effect is
-// accepted where it makes blocks of the record that the fit has not seen, and the later part of it, better
-// predicted. That is repeated until the residual is at the floor that noise alone leaves, or nothing helps.
-// Then a learned map may say what no named effect does.
+// The declared rig is fitted to the training records; then every term that says how it is sought
+// (model/term.h) is tried on what is left, and the best is fitted with all parameters of the machine
+// together. An effect is accepted where it makes blocks of the record that the fit has not seen, and the
+// later part of it, better predicted. That is repeated until the residual is at the floor that noise alone
+// leaves, or nothing helps. Then a learned map may say what no named effect does.
 //
-// Three kinds of rig: two inertias with a mesh between them and two encoders (the load is simulated, driven by
-// the recorded motor; residuals of torque and deflection), one inertia (mesh: rigid) and a locked link (torque
-// over the recorded motion). Errors are norm(r) / norm(y - mean(y)) of low-passed signals on the test record.
+// Three kinds of rig: two inertias with a mesh between them and two encoders (the load is simulated, driven
+// by the recorded motor; residuals of torque and deflection), one inertia (mesh: rigid) and a locked link
+// (torque over the recorded motion). Errors are norm(r) / norm(y - mean(y)) of low-passed signals on the test
+// record.
 #pragma once
 
 #include <map>
@@ -47,15 +49,16 @@ struct Evidence {
 /// One step: an effect that was added.
 struct FoundEffect {
   std::string id;
-  std::string channel;              // that gains most
-  std::vector<std::size_t> terms;   // places in the augmented rig's terms
+  std::string channel;                       // that gains most
+  std::vector<std::size_t> terms;            // places in the augmented rig's terms
   std::map<std::string, std::string> words;  // choices of the term: body, ...
   std::vector<EffectParameter> parameters;   // of a learned map: range and size of its curve
-  std::vector<double> curve_x, curve_y;      // of a learned map, in the units of its coordinate and its torque or angle
-  std::vector<std::string> nearest;          // of a learned map: ids that explain part of the same
+  std::vector<double> curve_x,
+      curve_y;  // of a learned map, in the units of its coordinate and its torque or angle
+  std::vector<std::string> nearest;  // of a learned map: ids that explain part of the same
   Evidence evidence;
   double test_error_before = 0, test_error_after = 0;  // of the channel
-  std::vector<std::string> equivalent_to;  // ids that reach most of the gain
+  std::vector<std::string> equivalent_to;              // ids that reach most of the gain
 };
 
 struct TraceChannel {
@@ -90,8 +93,8 @@ enum class TraceVerdict { effect_found, nothing_missing, unexplained };
 
 struct Trace {
   TraceVerdict verdict = TraceVerdict::nothing_missing;
-  double cutoff = 0;     // Hz
-  Rig base, augmented;   // fitted, load side
+  double cutoff = 0;                                            // Hz
+  Rig base, augmented;                                          // fitted, load side
   std::map<std::string, Measured> base_parameters, parameters;  // of the machine, without and with effects
   std::map<std::string, std::string> units;
   std::map<std::string, TraceChannel> channels;

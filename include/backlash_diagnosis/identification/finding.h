@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the procedures find, in one form, so that they can be put together: a linear combination of parameters
 // has a value.
 #pragma once

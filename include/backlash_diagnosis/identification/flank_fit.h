@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Flanks, seen from the motion of a load that flies between them: the fit behind identify_clearance(), which
 // has the equation. Linear but for the place of the flanks.
 #pragma once

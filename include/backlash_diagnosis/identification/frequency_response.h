@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Frequency response from motor torque to speed, from records (Yumrukcal 2013, Sections 2.4 and 5.3.2).
 //
 //   H(f) = speed / motor torque, rad/s per N m, for exp(+j 2 pi f t); an inertia J alone has 1/(j w J)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Friction from runs at constant speed: torque without acceleration is friction. Yumrukcal (2013), Sections
 // 5.1.1 and 5.2.1: one straight line per direction, T_f = a + b w; motor alone, whole drive, the difference
 // is the load.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Backlash as a function of load position, from one run at constant speed each way (Yumrukcal 2013,
 // Section 5.4).
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A measured gap map as terms of the model: a rig whose backlash varies as the map says.
 //
 //   backlash(q) = b (1 + sum a_n sin(n q + p_n)),  b the mean gap, a_n = A_n / b      (term varying_backlash)

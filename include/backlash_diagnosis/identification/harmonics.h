@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A quantity that repeats every turn as a short series: y = mean + sum A_n sin(n angle + phi_n), with only
 // those orders that the values call for.
 #pragma once

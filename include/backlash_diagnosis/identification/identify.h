@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From records to the parameters of the machine: chooses the procedures that the records allow, and puts
 // together what they find.
 #pragma once

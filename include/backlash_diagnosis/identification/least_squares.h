@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Least squares with what belongs to it: standard errors, residuals, and answers that a few outliers do not
 // spoil.
 #pragma once
@@ -45,15 +46,16 @@ struct NonlinearOptions {
 LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::VectorXd& start,
                               const Eigen::VectorXd& scale, const NonlinearOptions& options = {});
 
-/// Jacobian and covariance anew, with central differences over `steps` > 0 (in units of the parameters). Where
-/// the model stumbles - a touch or a standstill more or less - a difference over a tiny step takes that for
-/// sensitivity.
+/// Jacobian and covariance anew, with central differences over `steps` > 0 (in units of the parameters).
+/// Where the model stumbles - a touch or a standstill more or less - a difference over a tiny step takes that
+/// for sensitivity.
 void widen_jacobian(LeastSquaresFit& fit, const ResidualFunction& residuals, const Eigen::VectorXd& steps,
                     bool parallel = false);
 
 /// Covariance of the values where neighbouring rows are not independent: the gradients of the sum of squares
 /// are summed over blocks of `block` successive rows, which count as independent (Liang and Zeger 1986), each
-/// as if the fit had been made without it (Bell and McCaffrey 2002, their jackknife form). The last `known` rows are independent and of variance 1. Needs `jacobian`.
+/// as if the fit had been made without it (Bell and McCaffrey 2002, their jackknife form). The last `known`
+/// rows are independent and of variance 1. Needs `jacobian`.
 Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block, Eigen::Index known = 0);
 
 }  // namespace backlash

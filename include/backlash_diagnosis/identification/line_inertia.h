@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Inertia from sine runs: torque over speed at the line of the excitation. Yumrukcal (2013), Sections 5.1.2
 // and 5.2.2.
 //

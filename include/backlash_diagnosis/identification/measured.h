@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A number from data is nothing without its error.
 #pragma once
 

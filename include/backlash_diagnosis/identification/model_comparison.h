@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How well one model or another says what a record shows, as in Chapter 6 of Yumrukcal (2013): speed
 // difference and position difference between motor and load, for a mesh without gap, with a constant one,
 // with one that varies with the load position.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the noise of the sensors alone leaves of the residuals of an output-error fit.
 //
 // White noise of the torque; noise n_M of the motor position and n_L of the load position through the

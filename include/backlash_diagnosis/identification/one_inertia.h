@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A machine that is one inertia with friction, from any record of motion (inverse dynamics):
 //
 //   inertia a + viscous v + coulomb sign(v) + offset = torque

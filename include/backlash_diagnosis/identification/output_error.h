@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // All parameters of a servo with two inertias and two encoders together, from the raw record.
 //
 // The load is simulated driven by the recorded motor position (simulation/driven_load.h). Two residuals
@@ -6,8 +7,9 @@
 //   samples near
 //               standstill do not count, there dry friction takes any value
 //   deflection  (motor - load) recorded - simulated, through the same low-pass
-// A torque that is held between samples acts half a sample later than its stamp; whether it is, the fitted delay tells. A further
-// delay of a part of a sample is calibration and fitted. So is the constant difference of the two encoders.
+// A torque that is held between samples acts half a sample later than its stamp; whether it is, the fitted
+// delay tells. A further delay of a part of a sample is calibration and fitted. So is the constant difference
+// of the two encoders.
 #pragma once
 
 #include <map>
@@ -27,7 +29,7 @@ struct OutputErrorSettings {
   std::vector<std::string> parameters;  // of servo_parameters(), to be fitted
   std::vector<Finding> findings;        // of other records, which count by their standard errors
   int iterations = 20;
-  double step = 1e-3;                   // of the differences, relative
+  double step = 1e-3;  // of the differences, relative
 };
 
 /// Relative error norm(r) / norm(y - mean(y)), and what noise alone leaves.
@@ -39,7 +41,8 @@ struct ChannelError {
 struct Calibration {
   double torque_delay = 0;    // samples, beyond that of the hold
   double encoder_offset = 0;  // rad, load encoder minus motor encoder in the middle of the gap
-  bool held = true;           // the torque is held from its sample to the next, as loops command it; else it is that of the moment
+  bool held = true;  // the torque is held from its sample to the next, as loops command it; else it is that
+                     // of the moment
 };
 
 struct OutputError {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The parameters of a rig that can be fitted to a record, each with its name in reports, its place in the rig
 // file and how a Rig holds it. All in the units of the rig file.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One stretch of ringing: a damped sine about a straight line, from raw samples and from its peaks.
 //   y(t) = c0 + c1 t + exp(-a t) (p cos(wd t) + q sin(wd t)),  a = z w0,  wd = w0 sqrt(1 - z^2)
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One number from several measurements of it, of which some may be wrong.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Scale and offset between the sensors of motor and load, from runs one way. Yumrukcal (2013), Section 3.2:
 // the load sensor is the standard; the flank that drives stays in contact, so both sides turn together.
 #pragma once

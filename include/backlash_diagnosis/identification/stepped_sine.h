@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One sine of torque at a time: where they are in a record, and the response at each (Yumrukcal 2013, Section
 // 3.3: 0.25 to 100 Hz in steps of 0.25 Hz, ten cycles each).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Two inertias with a spring and a damper between them, and what the frequency response says about them
 // (Yumrukcal 2013, Sections 2.4 and 5.3.2; corrected forms). Motor side JM, load side JL, both seen from the
 // load side of the reduction; s = j 2 pi f.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Units of a linear axis, where registries name those of a rotary one.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From the stop of a hinged pinion bracket to backlash and what a sensor sees of it: the appendix of
 // Yumrukcal (2013), Eqs. A.1 to A.4. First order in the change, as printed; the exact play at a centre
 // distance is that of gear_geometry(), which exceeds A.3 by the fraction dC / (2 C tan^2 phi) in next order

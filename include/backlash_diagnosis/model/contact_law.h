@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The force between two teeth that touch.
 //
 // A new law: one file in src/model/contact/ with its equation, and one line in contact_law.cpp.

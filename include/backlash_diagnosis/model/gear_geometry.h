@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Geometry of a pair of external involute spur gears: how the teeth meet and how much play they have.
 //
 // Standard involute theory; base pitch, contact ratio and operating pressure angle as in Sarkar, Ellis and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Equations of motion of one gear train, in absolute angles at the load side of the reduction.
 //
 //   J_M a_M = tau_M - c_M w_M - F_M - T_I      T_I = k_I (q_M - q_P) + c_I (w_M - w_P)
@@ -6,11 +7,12 @@
 //   J_L a_L = T_O - c_L w_L - F_L + terms      T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
 //
 // Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its
-// neighbours one body, so does a rigid mesh; a locked link has q_L = 0. F_M and F_L are dry friction with sticking, see StickSlip;
-// a braked motor sticks whatever the torque. Terms may shift either flank by an opening o(q_M, q_L, torque);
-// then its penetration is side x - backlash / 2 - r o, and the mesh torque acts on both ends through the
-// slopes of o, so that no energy is lost or gained (but see terms that follow the torque). After Sarkar,
-// Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute instead of relative coordinates.
+// neighbours one body, so does a rigid mesh; a locked link has q_L = 0. F_M and F_L are dry friction with
+// sticking, see StickSlip; a braked motor sticks whatever the torque. Terms may shift either flank by an
+// opening o(q_M, q_L, torque); then its penetration is side x - backlash / 2 - r o, and the mesh torque acts
+// on both ends through the slopes of o, so that no energy is lost or gained (but see terms that follow the
+// torque). After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute instead of relative
+// coordinates.
 #pragma once
 
 #include <array>
@@ -35,8 +37,8 @@ struct Observation {
   // says so; NaN if rigid
   double sensor_torque;
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
-  double load_position, load_velocity;  // as a load encoder of wrong scale shows them (Sensing)
-  double load_torque;  // N m, spring torque of the output coupling; NaN if rigid
+  double load_position, load_velocity;     // as a load encoder of wrong scale shows them (Sensing)
+  double load_torque;                      // N m, spring torque of the output coupling; NaN if rigid
   double
       motor_current;  // A, motor_torque / torque constant: an ideal current control; NaN without the constant
   double acceleration;  // rad/s^2, of the gear; of the pinion (as motor_position) where the gear cannot move
@@ -60,8 +62,8 @@ class GearTrain {
 
   /// What moves the two ends, without their dry friction.
   struct EndForces {
-    double motor, load;  // N m, sum of all other torques
-    double mesh_torque;  // N m, through the teeth, > 0 drives the load forward
+    double motor, load;    // N m, sum of all other torques
+    double mesh_torque;    // N m, through the teeth, > 0 drives the load forward
     EndFriction friction;  // where both ends are one body, all of it at the motor
   };
   EndForces end_forces(double t, const double* state, AppliedTorque applied) const;
@@ -97,7 +99,9 @@ class GearTrain {
 
   /// The same equations, where nothing but springs, dampers and teeth without memory acts; null elsewhere.
   const SmoothTrain<double>* smooth() const { return smooth_ ? &*smooth_ : nullptr; }
-  std::optional<PowerContact> power_contact() const { return contact_ ? contact_->power_contact() : std::nullopt; }
+  std::optional<PowerContact> power_contact() const {
+    return contact_ ? contact_->power_contact() : std::nullopt;
+  }
   const TrainLayout& layout() const { return layout_; }
   double ratio() const { return ratio_; }  // load-side torque per torque of the records
 
@@ -141,7 +145,8 @@ class GearTrain {
   void begin_friction(double t, double* state, AppliedTorque applied);
   bool update_friction(double t, double* state, AppliedTorque applied);
   /// Time [s] in which the fastest body on the spring of presliding friction swings by 1 rad of its period;
-  /// infinite where none moves. Steps above it pass over turns of a motion that is smaller than the solver's tolerance.
+  /// infinite where none moves. Steps above it pass over turns of a motion that is smaller than the solver's
+  /// tolerance.
   double presliding_time(double t, const double* state, AppliedTorque applied) const;
   /// Puts each body that sticks where it came to rest: a solver's interpolation moves it by roundings.
   void hold(double* state) const;
@@ -174,7 +179,8 @@ class GearTrain {
   Slots unpack(const double* state) const;
   Motion motion_of(double t, const Slots& s, double mesh_torque, AppliedTorque applied) const {
     const double motor_torque = applied.motor * ratio_;
-    return {t,           s.q[kMotor],  s.w[kMotor], s.q[kLink], s.w[kLink], contact_ ? mesh_torque : motor_torque,
+    return {t,           s.q[kMotor], s.w[kMotor],
+            s.q[kLink],  s.w[kLink],  contact_ ? mesh_torque : motor_torque,
             motor_torque};
   }
   double net_torques(double t, const Slots& s, AppliedTorque applied, double* net) const;
@@ -223,9 +229,9 @@ class GearTrain {
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;
   TrainLayout layout_;
-  std::optional<SmoothTrain<double>> smooth_;  // the same equations, where they are that simple
+  std::optional<SmoothTrain<double>> smooth_;          // the same equations, where they are that simple
   std::vector<const Term*> flank_terms_, load_terms_;  // of terms_, that shape flanks and that push the load
-  double load_gain_;  // -, of the load encoder
+  double load_gain_;                                   // -, of the load encoder
   static constexpr int kFixed = -1;
 };
 

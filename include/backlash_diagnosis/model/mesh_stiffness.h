@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stiffness of a pair of spur gears along the mesh cycle: pairs of teeth come into and leave contact, and
 // each is softer near its tip than in the middle of its life.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dry friction that builds up over a short path after each reversal, by the law of Dahl (1968, Aerospace
 // Corp. TOR-0158(3107-18)-1, exponent 1), in closed form:
 //
@@ -38,10 +39,10 @@ class Presliding {
 /// The same along a recorded motion: friction [N m] of each sample, > 0 against forward motion, from a start
 /// without load. Limits without presliding give Coulomb friction.
 ///
-/// A rate [rad/s] counts by its sign (0: as before) and for the damping; with the interval [s] also as the speed
-/// that tells where between two samples the body turned, without (0) it turned at the sample before. Noise dithers friction
-/// away: both columns are to be smooth to within a small part of x_s. Columns of equal length, or
-/// InvalidParameter.
+/// A rate [rad/s] counts by its sign (0: as before) and for the damping; with the interval [s] also as the
+/// speed that tells where between two samples the body turned, without (0) it turned at the sample before.
+/// Noise dithers friction away: both columns are to be smooth to within a small part of x_s. Columns of equal
+/// length, or InvalidParameter.
 std::vector<double> presliding_friction(const std::vector<double>& positions,
                                         const std::vector<FrictionLimits>& limits,
                                         const std::vector<double>& rates, double interval = 0);

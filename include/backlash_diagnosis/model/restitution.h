@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Restitution of impacts whose damping is proportional to the elastic force, and the published
 // approximations.
 //

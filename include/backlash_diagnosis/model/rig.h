@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the machine is: the declared parameters of one gear train, as its rig file gives them.
 //
 //   motor - [input coupling = torque sensor] - pinion | mesh | gear - [output coupling] - link

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The equations of motion of gear_train.h for a train that nothing but its teeth makes other than linear: no
 // terms, no dry friction, no law that needs touches. Written once for one rig (Real = double) and for several
 // that differ in their numbers (Real = Lanes, see lanes.h).

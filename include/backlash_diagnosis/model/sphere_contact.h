@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Hertz contact of two spheres, F = K d^(3/2): the stiffness of `power_law` and its kin with exponent 1.5,
 // where bodies are taken for spheres (Yumrukcal 2013, Eqs. 2.25 to 2.27, after Goldsmith). Small
 // penetrations, radius of the touching circle sqrt(R d) well below both radii. Teeth touch along a line

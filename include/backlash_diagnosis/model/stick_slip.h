@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sticking and sliding of one body under dry friction, without any regularisation of the friction law.
 //
 //   sliding  J a = net - s F_s, s = +-1 the direction, F_s > 0 the friction in that direction
@@ -8,7 +9,8 @@
 // Control 107:100, with the zero of the speed found as an event instead of his interval of speeds).
 //
 // Where friction has a presliding distance (Presliding) it goes on from what it is where the speed crosses
-// zero. Such a body sticks only where it is at rest with all torques in balance to a millionth of its friction.
+// zero. Such a body sticks only where it is at rest with all torques in balance to a millionth of its
+// friction.
 #pragma once
 
 #include "backlash_diagnosis/model/presliding.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Mesh stiffness that varies with position in a simulation: the contact law's force times a factor whose mean
 // over a mesh cycle is 1.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An effect is a term of the model: an extra torque on the motor or on the load, dry friction, another shape
 // or another stiffness of the flanks, or a sensor that does not show what it should.
 //
@@ -96,7 +97,8 @@ class Term {
   virtual bool shapes_flanks() const { return false; }
   virtual bool shape_follows_torque() const { return false; }
   virtual void shape(const FlankPoint&, FlankShift&) const {}
-  /// The least opening [rad] that it gives a flank anywhere, with this half gap; -infinity if that is not known.
+  /// The least opening [rad] that it gives a flank anywhere, with this half gap; -infinity if that is not
+  /// known.
   virtual double least_opening(double /*half_gap*/) const { return -std::numeric_limits<double>::infinity(); }
 
   /// Adds to the torque >= 0 with which a flank resists [N m], and nothing else then; the sum of all never

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A term as it stands in a rig file: how a program writes what read_term() reads.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Records as comma separated values: the first line names the columns (`time` and the names of the channels),
 // every further line is one sample. SI units, decimal point, any order of columns.
 //

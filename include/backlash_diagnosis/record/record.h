@@ -1,5 +1,6 @@
-// What was measured: time series with a common time base, as columns. SI units, rotary (N m, rad) or, for a linear
-// axis, force and length (N, m).
+// SPDX-License-Identifier: BSD-3-Clause
+// What was measured: time series with a common time base, as columns. SI units, rotary (N m, rad) or, for a
+// linear axis, force and length (N, m).
 #pragma once
 
 #include <array>
@@ -12,7 +13,7 @@ namespace backlash {
 /// The channels a record may have. `motor_*` and `sensor_torque` are seen from the load side of the reduction
 /// (angle divided by the ratio, torque multiplied by it) unless the rig file says `motor_side: true`.
 enum class Channel {
-  motor_torque,        // N m, torque that the motor applies (a current in A is allowed where the rig file says so)
+  motor_torque,  // N m, torque that the motor applies (a current in A is allowed where the rig file says so)
   motor_position,      // rad
   motor_velocity,      // rad/s
   load_position,       // rad
@@ -20,7 +21,7 @@ enum class Channel {
   sensor_torque,       // N m, torque in the input coupling
   reference_position,  // rad
   motor_current,       // A, of the motor
-  acceleration,        // rad/s^2 (linear axis: m/s^2), of the load gear or whatever part carries the accelerometer
+  acceleration,  // rad/s^2 (linear axis: m/s^2), of the load gear or whatever part carries the accelerometer
 };
 constexpr std::size_t kChannelCount = 9;
 extern const std::array<Channel, kChannelCount> kChannels;
@@ -51,7 +52,9 @@ class Record {
   bool has(Channel channel) const { return !column(channel).empty(); }
 
   /// Values of a channel; empty when the record does not have it.
-  const std::vector<double>& column(Channel channel) const { return columns_[static_cast<std::size_t>(channel)]; }
+  const std::vector<double>& column(Channel channel) const {
+    return columns_[static_cast<std::size_t>(channel)];
+  }
   std::vector<double>& column(Channel channel) { return columns_[static_cast<std::size_t>(channel)]; }
 
   /// Whether it has one of kTellingChannels.

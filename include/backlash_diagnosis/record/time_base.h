@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What is allowed in a time base, and what is said about it. One policy for CSV, bags and live topics: a
 // stamp that goes back is refused, a repeated stamp loses the later sample, gaps and jitter are kept and
 // reported.

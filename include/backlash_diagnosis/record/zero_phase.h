@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Filters that do not delay: an evenly sampled signal of the past may be filtered forward and backward.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Records in bags: sensor_msgs/JointState messages, no roscore needed.
 //
 // Only header stamps count, never the time at which a message was received. A bag written here says by a

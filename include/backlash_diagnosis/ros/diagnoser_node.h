@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The node `diagnoser`: joint_states in, distributions, estimates and answers out.
 #pragma once
 
@@ -22,8 +23,8 @@ namespace backlash {
 /// Parameters of the node, validated.
 struct DiagnoserSettings {
   std::vector<MonitorSettings> joints;
-  int queue = 20000;      // messages waiting at most
-  double stale = 2;       // s of wall time without a message before /diagnostics says so
+  int queue = 20000;  // messages waiting at most
+  double stale = 2;   // s of wall time without a message before /diagnostics says so
 };
 
 /// Throws InvalidParameter, BadData, MissingInput.
@@ -34,7 +35,8 @@ const char* diagnoser_help();
 
 class DiagnoserNode {
  public:
-  DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle, DiagnoserSettings settings);
+  DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle,
+                DiagnoserSettings settings);
   ~DiagnoserNode();
 
   /// Serves until ROS shuts down.
@@ -45,13 +47,15 @@ class DiagnoserNode {
 
   void on_joint_state(const sensor_msgs::JointState::ConstPtr& message);
   void publish(const JointMonitor& monitor, const PeriodReport& report);
-  bool on_diagnose(backlash_diagnosis::Diagnose::Request& request, backlash_diagnosis::Diagnose::Response& response);
+  bool on_diagnose(backlash_diagnosis::Diagnose::Request& request,
+                   backlash_diagnosis::Diagnose::Response& response);
   bool on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
                        backlash_diagnosis::SetBaseline::Response& response);
   /// Takes the diagnosis of all that is kept as baseline, or forgets it; and the same in its file.
   void set_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response);
   void clear_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response);
-  bool on_get_curve(backlash_diagnosis::GetCurve::Request& request, backlash_diagnosis::GetCurve::Response& response);
+  bool on_get_curve(backlash_diagnosis::GetCurve::Request& request,
+                    backlash_diagnosis::GetCurve::Response& response);
   void on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal);
   void advertise();
   void add_diagnostics();

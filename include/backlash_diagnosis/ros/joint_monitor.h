@@ -1,7 +1,7 @@
-// One joint as the diagnoser sees it: its samples, its curve, its baseline, its latest diagnosis. Thread-safe: the
-// subscriber feeds it from one thread while services ask from others.
+// SPDX-License-Identifier: BSD-3-Clause
+// One joint as the diagnoser sees it: its samples, its curve, its baseline, its latest diagnosis.
+// Thread-safe: the subscriber feeds it from one thread while services ask from others.
 #pragma once
-
 
 #include <condition_variable>
 #include <functional>
@@ -38,13 +38,13 @@ struct PeriodReport {
 
 struct MonitorState {
   StreamCounters counters;
-  long bad_messages = 0;          // wrong array sizes, infinite values, names twice
+  long bad_messages = 0;  // wrong array sizes, infinite values, names twice
   std::string last_problem;
-  std::string curve_state;        // "loaded", "building, 40 %", "built", "none: ..."
+  std::string curve_state;            // "loaded", "building, 40 %", "built", "none: ..."
   std::vector<std::string> warnings;  // about curve and baseline: of another version of the rig file
-  double rate = 0;                // Hz, of the samples kept
-  double period = 0;              // s
-  long periods = 0;               // whole settled ones at hand
+  double rate = 0;                    // Hz, of the samples kept
+  double period = 0;                  // s
+  long periods = 0;                   // whole settled ones at hand
   bool any_sample = false;
   ros::WallTime last_arrival;
   std::optional<Diagnosis> latest;
@@ -59,13 +59,13 @@ class JointMonitor {
   const RigFile& rig() const { return settings_.rig; }
   const std::string& baseline_path() const { return settings_.baseline_path; }
 
-  /// Takes what a message says of the joint, or what is wrong with it (see JointStateReader); a report when it completes
-  /// a period. Bad content is counted and told by state().
-  std::optional<PeriodReport> take(const ros::Time& stamp, const ChannelValues& values, const std::string& problem,
-                                   const std::string& topic);
+  /// Takes what a message says of the joint, or what is wrong with it (see JointStateReader); a report when
+  /// it completes a period. Bad content is counted and told by state().
+  std::optional<PeriodReport> take(const ros::Time& stamp, const ChannelValues& values,
+                                   const std::string& problem, const std::string& topic);
 
-  /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s] of wall time,
-  /// then diagnoses the latest `periods` (0: all kept).
+  /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s]
+  /// of wall time, then diagnoses the latest `periods` (0: all kept).
   Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
 
   void set_baseline(const std::optional<Baseline>& baseline);

@@ -1,4 +1,6 @@
-// A record as sensor_msgs/JointState and back: which joint name carries which channel, and how stamps become seconds.
+// SPDX-License-Identifier: BSD-3-Clause
+// A record as sensor_msgs/JointState and back: which joint name carries which channel, and how stamps become
+// seconds.
 //
 //   <joint>_motor       position = motor_position    velocity = motor_velocity   effort = motor_torque
 //   <joint>_sensor      position = twist of the input coupling (not recorded)    effort = sensor_torque
@@ -7,10 +9,11 @@
 //   <joint>_current         effort = motor_current [A]
 //   <joint>_accelerometer   effort = acceleration [rad/s^2]
 //
-// sensor_msgs/JointState has no field for a current or an acceleration; these two are put where a torque would be.
+// sensor_msgs/JointState has no field for a current or an acceleration; these two are put where a torque
+// would be.
 //
-// A joint whose name is absent has none of its channels; a NaN, or an empty position, velocity or effort array, means
-// "this joint does not have that quantity".
+// A joint whose name is absent has none of its channels; a NaN, or an empty position, velocity or effort
+// array, means "this joint does not have that quantity".
 #pragma once
 
 #include <ros/time.h>
@@ -49,12 +52,12 @@ class JointStateReader {
  public:
   explicit JointStateReader(const std::vector<std::string>& joints);
 
-  /// The joints that a message speaks of, by their place in `joints` (the topic may carry others). This and what
-  /// follows are valid until the next call.
+  /// The joints that a message speaks of, by their place in `joints` (the topic may carry others). This and
+  /// what follows are valid until the next call.
   const std::vector<std::size_t>& read(const sensor_msgs::JointState& message);
   const ChannelValues& values(std::size_t joint) const { return readings_[joint].values; }
-  /// What is wrong with a joint: position, velocity or effort neither empty nor as long as `name` (array and sizes),
-  /// a name twice, an infinite value. Empty where nothing is.
+  /// What is wrong with a joint: position, velocity or effort neither empty nor as long as `name` (array and
+  /// sizes), a name twice, an infinite value. Empty where nothing is.
   const std::string& problem(std::size_t joint) const { return readings_[joint].problem; }
 
  private:
@@ -80,7 +83,8 @@ ChannelValues read_joint_state(const sensor_msgs::JointState& message, const std
                                const std::string& topic);
 
 /// Adds a simulated sample to a message, which may have those of other joints.
-void add_joint_state(const Observation& observation, const JointNames& names, sensor_msgs::JointState& message);
+void add_joint_state(const Observation& observation, const JointNames& names,
+                     sensor_msgs::JointState& message);
 
 /// Message for a simulated sample, without stamp.
 sensor_msgs::JointState make_joint_state(const Observation& observation, const JointNames& names);

@@ -1,4 +1,6 @@
-// Results of the core as messages. Core types live in namespace backlash, generated messages in backlash_diagnosis.
+// SPDX-License-Identifier: BSD-3-Clause
+// Results of the core as messages. Core types live in namespace backlash, generated messages in
+// backlash_diagnosis.
 #pragma once
 
 #include <backlash_diagnosis/AmplitudeDistribution.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // When a sample of a simulation is due on a clock. Knows no ROS and reads no clock itself.
 #pragma once
 

@@ -1,5 +1,6 @@
-// The one loader for node parameters: private parameters with type, range and known names. What is wrong is refused with
-// an InvalidParameter that names it; an absent parameter has the documented default of the call.
+// SPDX-License-Identifier: BSD-3-Clause
+// The one loader for node parameters: private parameters with type, range and known names. What is wrong is
+// refused with an InvalidParameter that names it; an absent parameter has the documented default of the call.
 #pragma once
 
 #include <ros/node_handle.h>

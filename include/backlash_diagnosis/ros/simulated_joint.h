@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One joint of the simulator node: a Simulation with its topics and services.
 #pragma once
 
@@ -19,9 +20,10 @@ namespace backlash {
 
 class SimulatedJoint {
  public:
-  /// Topics rig_description, true_backlash and torque_command are relative to `handle`, the service set_backlash to
-  /// `private_handle`.
-  SimulatedJoint(const JointSettings& settings, const ros::NodeHandle& handle, const ros::NodeHandle& private_handle);
+  /// Topics rig_description, true_backlash and torque_command are relative to `handle`, the service
+  /// set_backlash to `private_handle`.
+  SimulatedJoint(const JointSettings& settings, const ros::NodeHandle& handle,
+                 const ros::NodeHandle& private_handle);
   SimulatedJoint(const SimulatedJoint&) = delete;  // callbacks refer to this object
   SimulatedJoint& operator=(const SimulatedJoint&) = delete;
 

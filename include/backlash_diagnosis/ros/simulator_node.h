@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The simulator as a ROS node: simulated joints, paced by a clock.
 //
 // One thread: bursts of samples that are due, then the callbacks, then the next burst. So a service or a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the simulator node is told by its private parameters.
 #pragma once
 

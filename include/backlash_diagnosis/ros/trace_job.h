@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From paths to a folder with the report: what the command trace_residual and the action TraceResidual do.
 #pragma once
 

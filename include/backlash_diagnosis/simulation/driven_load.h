@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The load of a gear train whose motor moves as it was recorded.
 //
 //   J_L w' = T_mesh(q_M, w_M, q_L, w_L) - friction + terms + J_L k (w_rec - w)

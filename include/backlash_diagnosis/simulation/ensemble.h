@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Several rigs that differ in their numbers only, under the same torque, moved at once: a curve, a family of
 // distributions and the differences of a fit need the same machine again and again with one value changed.
 #pragma once

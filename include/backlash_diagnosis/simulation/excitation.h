@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Motor torque as a function of time, smooth between switching times that are known exactly.
 //
 // Time is cut into segments 0, 1, 2, ... at the switching times. Inside a segment the torque is a smooth

@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Initial value problems by SUNDIALS, whose types stay inside the .cpp.
 //
-// Explicit Runge-Kutta (ARKODE) is the default: a geared joint with play is a sequence of short impacts, each of which
-// makes the history of a multistep method worthless. Multistep methods need fewer evaluations, but these are cheap here
-// and their own work is not (doc/integrators.md). Sarkar, Ellis and Moore (1997, Section 6.3) found BDF wrong for the
-// contact and Verner's pair right; so it is at tolerances that are loose against the penetration.
+// Explicit Runge-Kutta (ARKODE) is the default: a geared joint with play is a sequence of short impacts, each
+// of which makes the history of a multistep method worthless. Multistep methods need fewer evaluations, but
+// these are cheap here and their own work is not (doc/integrators.md). Sarkar, Ellis and Moore (1997,
+// Section 6.3) found BDF wrong for the contact and Verner's pair right; so it is at tolerances that are loose
+// against the penetration.
 #pragma once
 
 #include <functional>
@@ -23,8 +25,8 @@ struct SolverSettings {
   double velocity_tolerance = 1e-7;       // absolute, rad/s
 };
 
-/// ARKODE explicit pairs: bogacki_shampine, cash_karp, dormand_prince, fehlberg, tsitouras (2011), verner (6(5), the
-/// pair of DVERK); CVODE: bdf, adams.
+/// ARKODE explicit pairs: bogacki_shampine, cash_karp, dormand_prince, fehlberg, tsitouras (2011), verner
+/// (6(5), the pair of DVERK); CVODE: bdf, adams.
 const std::vector<std::string>& integrator_methods();
 
 SolverSettings read_solver(const YamlReader& yaml);
@@ -33,8 +35,8 @@ struct IntegratorStatistics {
   long steps = 0, evaluations = 0, error_test_failures = 0;
 };
 
-/// What an error of one state is measured by: absolute + relative_tolerance * min(|state|, largest). An angle that has turned
-/// far is to be known no less precisely than one that has not.
+/// What an error of one state is measured by: absolute + relative_tolerance * min(|state|, largest). An angle
+/// that has turned far is to be known no less precisely than one that has not.
 struct StateTolerance {
   StateTolerance(double absolute_error, double largest_size = std::numeric_limits<double>::infinity())
       : absolute(absolute_error), largest(largest_size) {}

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A gear train in motion: excitation, equations of motion and integrator, without sensors.
 #pragma once
 

@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // From exact to measured values: offset, noise, saturation, quantisation.
 //
 //   measured = round(clamp(exact + offset + noise, -limit, limit) / resolution) * resolution
 //
-// Each channel draws from a generator of its own, so that a sensor added or removed leaves the others' noise unchanged.
+// Each channel draws from a generator of its own, so that a sensor added or removed leaves the others' noise
+// unchanged.
 #pragma once
 
 #include <array>

@@ -1,8 +1,10 @@
-// A rig under test: plant, sensors and sampling clock. The simulator node and the command `simulate` step this.
+// SPDX-License-Identifier: BSD-3-Clause
+// A rig under test: plant, sensors and sampling clock. The simulator node and the command `simulate` step
+// this.
 //
-// Where the torque acts later than its stamp says (Sensing::torque_delay d > 0), a sample of time t holds the torque of t
-// and all else as it was at t - d; where it acts earlier, the torque of t - |d| and all else of t. Both moments are
-// simulated, not interpolated. Before time 0 the rig was at rest without torque.
+// Where the torque acts later than its stamp says (Sensing::torque_delay d > 0), a sample of time t holds the
+// torque of t and all else as it was at t - d; where it acts earlier, the torque of t - |d| and all else of
+// t. Both moments are simulated, not interpolated. Before time 0 the rig was at rest without torque.
 #pragma once
 
 #include <deque>
@@ -27,8 +29,8 @@ class Simulation {
  public:
   Simulation(const Rig& rig, const SimulationSettings& settings);
 
-  /// Measures sample number index() at time index() / sampling_rate, then moves on to the next one. The first sample is
-  /// the rig at rest in the middle of its gap at time 0. Throws IntegrationError.
+  /// Measures sample number index() at time index() / sampling_rate, then moves on to the next one. The first
+  /// sample is the rig at rest in the middle of its gap at time 0. Throws IntegrationError.
   Observation step();
 
   long index() const { return index_; }
@@ -46,9 +48,9 @@ class Simulation {
   Plant plant_;
   SensorModel sensors_;
   double rate_;
-  double delay_;                 // s, Sensing::torque_delay
-  long late_samples_;            // |delay| is so many samples
-  double after_sample_;          // s, less this
+  double delay_;                  // s, Sensing::torque_delay
+  long late_samples_;             // |delay| is so many samples
+  double after_sample_;           // s, less this
   std::deque<Observation> past_;  // the next late_samples_ as they were |delay| before their stamps
   long index_ = 0;
 };

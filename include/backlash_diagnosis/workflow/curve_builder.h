@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Builds a monitoring curve: simulates the rig over a grid of backlash values, with several sensor noise
 // seeds and sampling phases at each, and stores mean and scatter of the skewness.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The rig file with what an identification has found: its layout, its other values and comments stay.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A diagnosis kept as the baseline of the healthy machine.
 #pragma once
 

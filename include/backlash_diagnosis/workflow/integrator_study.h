@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Which integrator, at which tolerance? Every method on single teeth (what goes wrong at contacts, and from
 // which tolerance on it goes right) and on a whole rig (work against precision).
 //

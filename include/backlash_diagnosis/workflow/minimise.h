@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Global minimum of a function that has no derivative, is rough and is expensive: differential evolution.
 //
 //   start:      `population` points of a Latin hypercube in [0, 1)^n

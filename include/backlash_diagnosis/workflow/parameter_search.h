@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Open search for the unprinted parameters of a published monitoring curve: one rig that gives the printed
 // skewness values and whose curve never rises.
 //

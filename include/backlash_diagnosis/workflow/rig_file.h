@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A whole rig file: the machine, its test run and its diagnosis. The one loader for it.
 #pragma once
 
@@ -15,9 +16,9 @@ struct RigFile {
   SimulationSettings simulation;
   DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
   std::vector<TestRun> test_runs;
-  std::string source;           // path, or "built-in sarkar_1997"
-  std::string text;             // as read
-  std::string digest;           // 64-bit FNV-1a of the text, hexadecimal
+  std::string source;  // path, or "built-in sarkar_1997"
+  std::string text;    // as read
+  std::string digest;  // 64-bit FNV-1a of the text, hexadecimal
 };
 
 /// Throws MissingInput, BadData (file, line, key, value, limit), InvalidParameter.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where skewness can separate backlash from something else that changes the signal, and where it cannot.
 //
 // At each backlash of a grid and each level of one disturbance that the curve does not know of, the machine

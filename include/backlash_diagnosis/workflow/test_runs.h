@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Named test runs of a rig: what moves it and for how long, so that a procedure of a page, a node and a
 // command mean the same by a name.
 //

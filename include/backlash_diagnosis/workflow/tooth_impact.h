@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One tooth between two flanks: the smallest machine with backlash, and one with closed forms to judge an
 // integrator by.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The folder that a search for missing effects leaves behind.
 #pragma once
 

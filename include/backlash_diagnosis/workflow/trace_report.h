@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the search for missing effects has found, in words and as JSON. Values are those of the load side of
 // the reduction; units are those of a linear axis where the rig is one.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The rig file with what the search for missing effects has found: fitted machine, and one entry of `terms:`
 // per effect.
 #pragma once

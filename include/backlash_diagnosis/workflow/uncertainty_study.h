@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the estimates are worth: many simulated records of known backlash, diagnosed and counted.
 //
 // Every record has its own backlash (uniform from 0 to the largest of the request), sensor noise (one of the
@@ -16,9 +17,9 @@
 namespace backlash {
 
 struct StudyRequest {
-  int records = 600;            // >= 1
-  double max_backlash = 2e-4;   // m (angular mesh: rad), > 0
-  double sampling_rate = 0;     // Hz; 0: the rig file's. The curve must have been made for it.
+  int records = 600;           // >= 1
+  double max_backlash = 2e-4;  // m (angular mesh: rad), > 0
+  double sampling_rate = 0;    // Hz; 0: the rig file's. The curve must have been made for it.
   int fewest_periods = 5, most_periods = 20;
   std::vector<double> noise = {0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the signal's rms, >= 0
   std::uint64_t seed = 1;
@@ -26,9 +27,9 @@ struct StudyRequest {
 
 /// One record and what was said about it. The last estimate, "combined", is that of the verdict.
 struct StudyTrial {
-  std::string variant;   // what was done to the conditions; empty in the study itself
-  double backlash = 0;   // m, true
-  double noise = 0;      // of the signal's rms
+  std::string variant;  // what was done to the conditions; empty in the study itself
+  double backlash = 0;  // m, true
+  double noise = 0;     // of the signal's rms
   int periods = 0;
   bool position = true;  // false: the signal alone
   std::vector<Estimate> estimates;
@@ -42,12 +43,12 @@ std::vector<StudyTrial> run_study(const RigFile& file, const MonitoringCurve& cu
 /// What a method made of a group of trials.
 struct StudyRow {
   std::string method;
-  int trials = 0, told = 0;                 // told: status ok
+  int trials = 0, told = 0;                      // told: status ok
   double median_error = kNaN, p95_error = kNaN;  // m, of |estimate - truth|, where told
-  double median_width = kNaN;               // m, of the interval, where told
-  double coverage = kNaN;                   // share of intervals that hold the truth, where told
-  int confident_misses = 0;                 // told, and the truth more than two widths off the interval's value
-  double cannot_tell = kNaN;                // share of trials without status ok
+  double median_width = kNaN;                    // m, of the interval, where told
+  double coverage = kNaN;                        // share of intervals that hold the truth, where told
+  int confident_misses = 0;   // told, and the truth more than two widths off the interval's value
+  double cannot_tell = kNaN;  // share of trials without status ok
 };
 
 /// One row per method, for the trials with (or without) position, half gaps up to `max_half_gap` and a noise

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Work against precision of all integration methods on one problem (Hairer, Norsett and Wanner, Solving
 // Ordinary Differential Equations I, Section II.10).
 #pragma once

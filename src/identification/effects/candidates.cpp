@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "candidates.h"
 
 #include <Eigen/QR>
@@ -12,7 +13,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kProbe = 0.02;    // of the typical strength, of the differences that the sensitivities are taken from
+constexpr double kProbe =
+    0.02;  // of the typical strength, of the differences that the sensitivities are taken from
 constexpr double kTelling = 1e-3;  // of a column that is left after what the machine itself can explain
 
 double deviation(const std::vector<double>& x) {
@@ -123,7 +125,8 @@ Candidate pair(const Probed& a, const Probed& b, const Remainder& remainder) {
   return c;
 }
 
-void keep_better(std::map<std::string, Candidate>& best, const std::string& group, const Candidate& candidate) {
+void keep_better(std::map<std::string, Candidate>& best, const std::string& group,
+                 const Candidate& candidate) {
   const auto [at, first] = best.try_emplace(group, candidate);
   if (!first && candidate.gain > at->second.gain) at->second = candidate;
 }
@@ -184,7 +187,8 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, c
     keep_better(best, all[i].group, single(all[i], remainder));
     if (!all[i].type->search->pairs) continue;
     for (std::size_t j = 0; j < i; ++j)
-      if (all[j].group == all[i].group) keep_better(best, all[i].group + " pair", pair(all[j], all[i], remainder));
+      if (all[j].group == all[i].group)
+        keep_better(best, all[i].group + " pair", pair(all[j], all[i], remainder));
   }
   std::vector<Candidate> sorted;
   for (const auto& [group, candidate] : best)

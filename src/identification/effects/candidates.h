@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the search tries: terms of the registry with values, and how much each would explain.
 #pragma once
 
@@ -13,7 +14,7 @@ namespace backlash {
 struct Candidate {
   std::string id;
   std::vector<ParameterValues> terms;
-  double gain = 0;  // predicted: relative decrease of the norm of all residuals
+  double gain = 0;        // predicted: relative decrease of the norm of all residuals
   double smoothness = 0;  // of a learned map, see learned.h
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Another law for the teeth: a wrong one looks like hardening, and hides what else is missing.
 #pragma once
 

@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "independence.h"
 
-#include <cmath>
 #include <algorithm>
+#include <cmath>
 
 namespace backlash {
 namespace {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whether a residual still knows the input: a model that has everything leaves noise that follows nothing.
 #pragma once
 
@@ -5,9 +6,10 @@
 
 namespace backlash {
 
-/// Share of the lags 0, +-1 ... +-`lags` at which the correlation coefficient of residual and input lies outside
-/// its 99 % band. The band allows for the colour of both (Bartlett 1955): variance sum rho_r(k) rho_u(k) / n.
-/// About 0.01 where they are independent. Columns of equal length, evenly sampled; what does not count is 0.
+/// Share of the lags 0, +-1 ... +-`lags` at which the correlation coefficient of residual and input lies
+/// outside its 99 % band. The band allows for the colour of both (Bartlett 1955): variance sum rho_r(k)
+/// rho_u(k) / n. About 0.01 where they are independent. Columns of equal length, evenly sampled; what does
+/// not count is 0.
 double share_outside_band(const std::vector<double>& residual, const std::vector<double>& input, int lags);
 
 }  // namespace backlash

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "learned.h"
 
 #include <Eigen/Cholesky>
@@ -13,29 +14,38 @@ namespace backlash {
 namespace {
 
 constexpr int kPoints = 40;
-constexpr double kTail = 0.002;   // of the samples, beyond the outer points
-constexpr double kProbe = 0.05;   // of a strength that would show clearly
-constexpr double kShowing = 0.05; // of the torque: such a strength
+constexpr double kTail = 0.002;      // of the samples, beyond the outer points
+constexpr double kProbe = 0.05;      // of a strength that would show clearly
+constexpr double kShowing = 0.05;    // of the torque: such a strength
 constexpr double kGapShowing = 0.1;  // of the deflection
 constexpr double kStiffnessShowing = 0.1;
 constexpr double kSoftest = -0.9;  // share that a flank's stiffness may start with
 constexpr int kBlocks = 12;
-constexpr double kRidge = 1e-6;   // of the mean squared sensitivity: decides what nothing else does
+constexpr double kRidge = 1e-6;  // of the mean squared sensitivity: decides what nothing else does
 
 struct MapKind {
   const char *acts_on, *coordinate;
   bool needs_load;
 };
 
-// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque itself
-// would explain everything, and so would time where the torque is commanded in ramps.
+// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque
+// itself would explain everything, and so would time where the torque is commanded in ramps.
 constexpr MapKind kKinds[] = {
-    {"motor", "motor_position", false}, {"motor", "motor_velocity", false}, {"motor", "motor_torque", true},
-    {"motor", "mesh_torque", true},     {"motor", "time", true},           {"load", "load_position", true},
-    {"load", "load_velocity", true},    {"load", "mesh_torque", true},      {"load", "time", true},
-    {"gap", "load_position", true},     {"gap", "mesh_torque", true},
-    {"forward_flank", "load_position", true},     {"backward_flank", "load_position", true},
-    {"forward_stiffness", "load_position", true}, {"backward_stiffness", "load_position", true},
+    {"motor", "motor_position", false},
+    {"motor", "motor_velocity", false},
+    {"motor", "motor_torque", true},
+    {"motor", "mesh_torque", true},
+    {"motor", "time", true},
+    {"load", "load_position", true},
+    {"load", "load_velocity", true},
+    {"load", "mesh_torque", true},
+    {"load", "time", true},
+    {"gap", "load_position", true},
+    {"gap", "mesh_torque", true},
+    {"forward_flank", "load_position", true},
+    {"backward_flank", "load_position", true},
+    {"forward_stiffness", "load_position", true},
+    {"backward_stiffness", "load_position", true},
 };
 
 std::vector<double> coordinate(const std::string& name, const RecordSet& records, const Machine& machine) {
@@ -79,7 +89,8 @@ double clear_strength(const std::string& acts_on, const MotionRange& range) {
   return is_stiffness(acts_on) ? kStiffnessShowing : kGapShowing * range.deflection;
 }
 
-ParameterValues map_values(const MapKind& kind, const std::vector<double>& points, std::vector<double> values) {
+ParameterValues map_values(const MapKind& kind, const std::vector<double>& points,
+                           std::vector<double> values) {
   ParameterValues p;
   p.set_choice("acts_on", kind.acts_on);
   p.set_choice("coordinate", kind.coordinate);
@@ -89,8 +100,9 @@ ParameterValues map_values(const MapKind& kind, const std::vector<double>& point
 }
 
 /// What is left of the sensitivities to each value of a map.
-Eigen::MatrixXd columns(const MapKind& kind, const std::vector<double>& points, double step, const MachineFit& fit,
-                        const RecordSet& records, const Remainder& remainder, const Eigen::VectorXd& now) {
+Eigen::MatrixXd columns(const MapKind& kind, const std::vector<double>& points, double step,
+                        const MachineFit& fit, const RecordSet& records, const Remainder& remainder,
+                        const Eigen::VectorXd& now) {
   Eigen::MatrixXd all(now.size(), kPoints);
   for_each_in_parallel(kPoints, [&](int i) {
     std::vector<double> values(kPoints, 0.0);
@@ -123,7 +135,8 @@ Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const Re
   for (Eigen::Index i = 0; i < c.rows(); ++i) {
     const RecordSet::Row& row = records.layout()[std::size_t(i)];
     const ServoData& d = records.records()[row.record].data();
-    const auto at = std::min<std::size_t>(kBlocks - 1, std::size_t(kBlocks * row.time / (double(d.size()) * d.interval)));
+    const auto at =
+        std::min<std::size_t>(kBlocks - 1, std::size_t(kBlocks * row.time / (double(d.size()) * d.interval)));
     b.normal[at].noalias() += c.row(i).transpose() * c.row(i);
     b.gradient[at] -= c.row(i).transpose() * left[i];
     b.square[at] += left[i] * left[i];
@@ -157,7 +170,8 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
   const double mean = all.trace() / kPoints;
   LearnedCandidate best;
   if (!(mean > 0)) return best;
-  const Eigen::MatrixXd rough = roughness(), ridge = kRidge * mean * Eigen::MatrixXd::Identity(kPoints, kPoints);
+  const Eigen::MatrixXd rough = roughness(),
+                        ridge = kRidge * mean * Eigen::MatrixXd::Identity(kPoints, kPoints);
   double least = INFINITY;
   for (double weight = 1e-4 * mean; weight < 1e5 * mean; weight *= 10) {
     const Eigen::MatrixXd belief = weight * rough + ridge;
@@ -185,8 +199,8 @@ std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet&
     const std::vector<double> points = points_over(coordinate(kind.coordinate, records, fit.machine));
     if (points.empty()) continue;
     const double step = kProbe * clear_strength(kind.acts_on, range);
-    const LearnedCandidate one =
-        learn(kind, points, columns(kind, points, step, fit, records, remainder, now), remainder.left(), records);
+    const LearnedCandidate one = learn(
+        kind, points, columns(kind, points, step, fit, records, remainder, now), remainder.left(), records);
     if (one.gain > 0) all.push_back(one);
   }
   std::stable_sort(all.begin(), all.end(),
@@ -202,7 +216,8 @@ Machine with_map(Machine machine, const LearnedCandidate& candidate, const Motio
     machine.parameters.push_back(list_parameter(place, "values", i, scale));
   const double root = std::sqrt(candidate.smoothness), ridge = std::sqrt(kRidge * candidate.smoothness);
   for (std::size_t i = 0; i < kPoints; ++i) {
-    machine.beliefs.push_back([=](const Rig& rig) { return ridge * rig.terms[place]->values.list("values")[i]; });
+    machine.beliefs.push_back(
+        [=](const Rig& rig) { return ridge * rig.terms[place]->values.list("values")[i]; });
     if (i + 2 < kPoints)
       machine.beliefs.push_back([=](const Rig& rig) {
         const std::vector<double>& v = rig.terms[place]->values.list("values");

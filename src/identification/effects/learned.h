@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Where no named effect explains a residual: a smooth map over the coordinate that it follows best.
 #pragma once
 
@@ -13,8 +14,8 @@ struct LearnedCandidate {
   double gain = 0;        // held out: relative decrease of the norm of all residuals
 };
 
-/// A map over every coordinate, best first: values by least squares on what the machine's own parameters leave,
-/// as smooth as cross-validation over blocks of the records says.
+/// A map over every coordinate, best first: values by least squares on what the machine's own parameters
+/// leave, as smooth as cross-validation over blocks of the records says.
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
                                          const MotionRange& range);
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the machine's own parameters leave of residuals and of sensitivities.
 #pragma once
 
@@ -12,8 +13,8 @@ class Remainder {
  public:
   /// Of the first `rows` rows of the fit, those of the records.
   Remainder(const MachineFit& fit, Eigen::Index rows)
-      : qr_((fit.fit.jacobian.topRows(rows) *
-             fit.fit.jacobian.colwise().norm().cwiseInverse().asDiagonal()).householderQr()),
+      : qr_((fit.fit.jacobian.topRows(rows) * fit.fit.jacobian.colwise().norm().cwiseInverse().asDiagonal())
+                .householderQr()),
         columns_(fit.fit.jacobian.cols()),
         left_(without(fit.fit.residuals.head(rows))) {}
 

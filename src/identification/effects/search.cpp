@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "search.h"
 
 #include <algorithm>
@@ -14,25 +15,26 @@
 namespace backlash {
 namespace {
 
-constexpr double kRoughCutoff = 15;       // Hz, of the first round: what moves slowly has fewer wrong minima
-constexpr double kAtFloor = 1.03;         // times the floor: nothing can be found
-constexpr double kNoise = 0.01;           // of the signal: a floor above may hide something, what is left below may stay
-constexpr double kLeastInNoise = 0.012;   // gain
-constexpr double kSure = 5.5;             // standard deviations, that noise alone does not reach in a thousand trials
-constexpr double kLessThanNoise = 0.8;    // times the floor: a residual cannot be that small
-constexpr double kLeastPredicted = 0.3;   // of the least gain, for a candidate to be fitted
-constexpr std::size_t kTrials = 6;        // candidates that are fitted with the machine
-constexpr double kWorthTrying = 0.2;      // of the best predicted gain
-constexpr double kAlike = 0.8;            // of the best gain: another name for the same
-constexpr double kTie = 0.005;            // of the misfit: then the term with the fewest shapes, gravity before cogging
-constexpr double kMostBlocks = 0.6;       // of the blocks must get better
-constexpr double kSomethingLeft = 1.25;   // times the floor: worth a learned map
+constexpr double kRoughCutoff = 15;  // Hz, of the first round: what moves slowly has fewer wrong minima
+constexpr double kAtFloor = 1.03;    // times the floor: nothing can be found
+constexpr double kNoise =
+    0.01;  // of the signal: a floor above may hide something, what is left below may stay
+constexpr double kLeastInNoise = 0.012;  // gain
+constexpr double kSure = 5.5;  // standard deviations, that noise alone does not reach in a thousand trials
+constexpr double kLessThanNoise = 0.8;   // times the floor: a residual cannot be that small
+constexpr double kLeastPredicted = 0.3;  // of the least gain, for a candidate to be fitted
+constexpr std::size_t kTrials = 6;       // candidates that are fitted with the machine
+constexpr double kWorthTrying = 0.2;     // of the best predicted gain
+constexpr double kAlike = 0.8;           // of the best gain: another name for the same
+constexpr double kTie = 0.005;  // of the misfit: then the term with the fewest shapes, gravity before cogging
+constexpr double kMostBlocks = 0.6;      // of the blocks must get better
+constexpr double kSomethingLeft = 1.25;  // times the floor: worth a learned map
 constexpr std::size_t kMapTrials = 2;
 constexpr std::size_t kNearest = 3;
-constexpr double kHopeless = 1.2;         // times a misfit, after the rough half of a fit
+constexpr double kHopeless = 1.2;  // times a misfit, after the rough half of a fit
 constexpr int kOtherStarts = 4;
-constexpr double kBeside = 0.4;           // of the logarithm of a parameter
-constexpr double kSame = 0.03;            // relative difference of what two starts leave in the same minimum
+constexpr double kBeside = 0.4;  // of the logarithm of a parameter
+constexpr double kSame = 0.03;   // relative difference of what two starts leave in the same minimum
 
 /// Another start not far away, the same for the same number.
 Machine beside(Machine machine, int number) {
@@ -58,7 +60,8 @@ std::vector<std::vector<double>> places(const Candidate& candidate) {
 
 /// A map over the recorded torque may take it away, and all inertia with it: no residual, less than noise.
 bool takes_noise_away(const std::vector<Accepted>& effects, const Leftover& left) {
-  return left.torque < kLessThanNoise && std::any_of(effects.begin(), effects.end(), [](const Accepted& effect) {
+  return left.torque < kLessThanNoise &&
+         std::any_of(effects.begin(), effects.end(), [](const Accepted& effect) {
            return effect.candidate.id == kLearned &&
                   effect.candidate.terms.front().choice("coordinate") == "motor_torque";
          });
@@ -85,7 +88,8 @@ void Search::declare_parameters() {
   for (const std::string& name : parameter_names()) {
     FitParameter p = machine_parameter(name, rig);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
-    if (p.positive && is_friction(name) && !rig.link_locked) {  // there damping is hardly told and stays where it is
+    if (p.positive && is_friction(name) &&
+        !rig.link_locked) {  // there damping is hardly told and stays where it is
       p.positive = false;
       p.scale = p.get(rig);
     }
@@ -156,8 +160,11 @@ double Search::share(const std::string& id) const {
                              [&](const auto& term) { return term->id == id; }),
               terms.end());
   const Leftover with = stage_->leftover, less = stage_->records.leftover(without);
-  const auto change = [](double before, double after) { return std::sqrt(std::max(0.0, before * before - after * after)); };
-  return std::max(change(less.torque_share, with.torque_share), change(less.deflection_share, with.deflection_share));
+  const auto change = [](double before, double after) {
+    return std::sqrt(std::max(0.0, before * before - after * after));
+  };
+  return std::max(change(less.torque_share, with.torque_share),
+                  change(less.deflection_share, with.deflection_share));
 }
 
 Machine Search::extended(Machine machine, const Candidate& candidate) const {
@@ -172,8 +179,8 @@ Stage Search::rough_base() const {
   for (int i = 0; i <= kOtherStarts; ++i) {
     report("fit of the declared machine");
     try {
-      Stage other = fit_stage(data_, i == 0 ? declared_ : beside(declared_, i), std::min(kRoughCutoff, cutoff_),
-                              kRoughTolerance);
+      Stage other = fit_stage(data_, i == 0 ? declared_ : beside(declared_, i),
+                              std::min(kRoughCutoff, cutoff_), kRoughTolerance);
       const double least = best ? size(best->leftover) : INFINITY, left = size(other.leftover);
       if (left < least) best = std::move(other);
       if (left < kNearFloor || std::fabs(left / least - 1) < kSame) break;
@@ -221,10 +228,12 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate, double wa
 std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& candidates) const {
   std::vector<Trial> trials;
   for (std::size_t i = 0; i < std::min(kTrials, candidates.size()); ++i) {
-    if (candidates[i].gain < std::max(kWorthTrying * candidates.front().gain, kLeastPredicted * least_gain_in_noise()))
+    if (candidates[i].gain <
+        std::max(kWorthTrying * candidates.front().gain, kLeastPredicted * least_gain_in_noise()))
       break;
     char text[96];
-    std::snprintf(text, sizeof text, "trying %s (predicted gain %.3g)", candidates[i].id.c_str(), candidates[i].gain);
+    std::snprintf(text, sizeof text, "trying %s (predicted gain %.3g)", candidates[i].id.c_str(),
+                  candidates[i].gain);
     report(text);
     if (auto trial = tried(candidates[i])) trials.push_back(std::move(*trial));
   }
@@ -234,7 +243,8 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
   const auto tied = std::find_if(trials.begin(), trials.end(), [&](const Trial& t) {
     return t.misfit > (1 + kTie) * trials.front().misfit;
   });
-  std::stable_sort(trials.begin(), tied, [&](const Trial& a, const Trial& b) { return shapes(a) < shapes(b); });
+  std::stable_sort(trials.begin(), tied,
+                   [&](const Trial& a, const Trial& b) { return shapes(a) < shapes(b); });
   return trials;
 }
 
@@ -243,7 +253,8 @@ std::vector<Search::Trial> Search::tried_best(const std::vector<Candidate>& cand
 std::optional<Candidate> Search::neighbour(const Candidate& candidate, std::size_t t, const TermShape& shape,
                                            long step) const {
   const std::vector<double> grid = shape.values(range_);
-  const long at = std::find(grid.begin(), grid.end(), candidate.terms[t].at(shape.name)) - grid.begin() + step;
+  const long at =
+      std::find(grid.begin(), grid.end(), candidate.terms[t].at(shape.name)) - grid.begin() + step;
   if (at < 0 || at >= long(grid.size())) return std::nullopt;
   for (const ParameterValues& term : candidate.terms)
     if (term.at(shape.name) == grid[std::size_t(at)]) return std::nullopt;
@@ -279,18 +290,20 @@ Search::Trial Search::best_neighbour(Trial trial) const {
   return trial;
 }
 
-/// Of a residual that is mostly noise a clear effect is a small part: as much as noise itself hardly ever gains
-/// is enough.
+/// Of a residual that is mostly noise a clear effect is a small part: as much as noise itself hardly ever
+/// gains is enough.
 double Search::least_gain_in_noise() const {
   const double rows = 0.5 * double(stage_->records.layout().size());  // of a channel
-  return std::clamp(kSure * kSure / (2 * rows), std::min(kLeastInNoise, settings_.least_gain), settings_.least_gain);
+  return std::clamp(kSure * kSure / (2 * rows), std::min(kLeastInNoise, settings_.least_gain),
+                    settings_.least_gain);
 }
 
 bool Search::convinces(const Gain& gain, const Machine& after) const {
   const Leftover left = stage_->records.leftover(after);
   const bool clear = (gain.deflection ? left.deflection : left.torque) < kNearFloor;
   const bool noise = (gain.deflection ? left.deflection_share : left.torque_share) > kNoise;
-  const bool one_channel = !load_moves_freely(declared_.rig);  // friction is never quite what a term says, and shows
+  const bool one_channel =
+      !load_moves_freely(declared_.rig);  // friction is never quite what a term says, and shows
   const double least = !clear || one_channel ? settings_.least_gain_unclear
                        : noise               ? least_gain_in_noise()
                                              : settings_.least_gain;
@@ -329,11 +342,12 @@ bool Search::adopt(std::vector<Accepted> effects) {
 
 bool Search::add_one() {
   const Leftover& left = stage_->leftover;
-  if (std::max(left.torque, left.deflection) < kAtFloor && std::max(left.torque_share, left.deflection_share) < kNoise)
+  if (std::max(left.torque, left.deflection) < kAtFloor &&
+      std::max(left.torque_share, left.deflection_share) < kNoise)
     return false;
   char text[96];
-  std::snprintf(text, sizeof text, "screening (torque %.3g, deflection %.3g times the noise floor)", left.torque,
-                left.deflection);
+  std::snprintf(text, sizeof text, "screening (torque %.3g, deflection %.3g times the noise floor)",
+                left.torque, left.deflection);
   report(text);
   const std::vector<Trial> trials = tried_best(screen(stage_->fit, stage_->records, range_));
   const HeldOut now = held_out(stage_->fit, stage_->start, stage_->records);
@@ -347,7 +361,8 @@ bool Search::add_one() {
       const Gain its = compare(now, held_out(other.fit, other.start, stage_->records));
       if (its.total < kAlike * gain.total) continue;
       auto& names = effect.equivalent_to;
-      if (std::find(names.begin(), names.end(), other.candidate.id) == names.end()) names.push_back(other.candidate.id);
+      if (std::find(names.begin(), names.end(), other.candidate.id) == names.end())
+        names.push_back(other.candidate.id);
       effect.alternatives.push_back(other.candidate);
     }
     std::vector<Accepted> effects = effects_;
@@ -366,7 +381,8 @@ bool Search::add_map() {
     const auto trial = tried({kLearned, {maps[i].values}, maps[i].gain, maps[i].smoothness});
     if (!trial) continue;
     const Gain gain = compare(now, held_out(trial->fit, trial->start, stage_->records));
-    if (gain.evidence.gain_held_out < settings_.least_gain_unclear || !convinces(gain, trial->fit.machine)) continue;
+    if (gain.evidence.gain_held_out < settings_.least_gain_unclear || !convinces(gain, trial->fit.machine))
+      continue;
     Accepted effect{trial->candidate, gain, {}, {}, {}, {}};
     for (const Candidate& named : screen(stage_->fit, stage_->records, range_))
       if (effect.nearest.size() < kNearest) effect.nearest.push_back(named.id);
@@ -382,7 +398,8 @@ bool Search::add_map() {
 void Search::add_learned() {
   const Leftover& left = stage_->leftover;
   const double before = size(left);
-  if (std::max(left.torque, left.deflection) < kSomethingLeft || std::max(left.torque_share, left.deflection_share) < kNoise)
+  if (std::max(left.torque, left.deflection) < kSomethingLeft ||
+      std::max(left.torque_share, left.deflection_share) < kNoise)
     return;
   const std::vector<Accepted> named = effects_;
   const Stage stage = *stage_;

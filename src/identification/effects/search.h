@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The search for named effects: stage after stage, one effect each.
 #pragma once
 
@@ -20,13 +21,13 @@ struct Accepted {
   Gain gain;
   std::vector<std::string> equivalent_to;
   std::vector<Candidate> alternatives;  // those, as fitted
-  std::vector<std::string> nearest;  // of a learned map: named effects that explain part of the same
-  Machine after;  // fitted with this effect and those before it
+  std::vector<std::string> nearest;     // of a learned map: named effects that explain part of the same
+  Machine after;                        // fitted with this effect and those before it
 };
 
-constexpr double kNearFloor = 2;        // times the floor: what is left is mostly noise
-constexpr double kClearlyRight = 1.3;   // times the floor: no other order, no other set needs to be tried
-constexpr double kHalf = 0.5;           // of a residual: an effect that explains less may stand in for another
+constexpr double kNearFloor = 2;       // times the floor: what is left is mostly noise
+constexpr double kClearlyRight = 1.3;  // times the floor: no other order, no other set needs to be tried
+constexpr double kHalf = 0.5;          // of a residual: an effect that explains less may stand in for another
 
 const char* const kLearned = "learned_map";
 const char* const kHardening = "mesh_hardening";
@@ -35,8 +36,8 @@ bool is_friction(const std::string& parameter);
 
 class Search {
  public:
-  Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff, const TraceSettings& settings,
-         const Progress& progress);
+  Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff,
+         const TraceSettings& settings, const Progress& progress);
 
   void run();
   /// The declared machine, fitted.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the search takes back: effects that others explain as well, that stood in for another or for what has
 // no name.
 #include <algorithm>
@@ -42,13 +43,15 @@ void Search::drop_superfluous() {
   }
 }
 
-/// Tried when hardening is found and once more beside all other effects, without which their shape may not show.
+/// Tried when hardening is found and once more beside all other effects, without which their shape may not
+/// show.
 bool Search::try_other_teeth() {
   std::vector<Accepted> others = effects_;
   others.erase(std::remove_if(others.begin(), others.end(),
                               [](const Accepted& effect) { return effect.candidate.id == kHardening; }),
                others.end());
-  const auto teeth = with_hertzian_teeth(base_->fit.machine.rig, range_.torque);  // hardening has its own stiffness
+  const auto teeth =
+      with_hertzian_teeth(base_->fit.machine.rig, range_.torque);  // hardening has its own stiffness
   const bool news = others.size() < effects_.size() && teeth_tried_with_ != effects_.size();
   const bool right = stage_->leftover.torque < kClearlyRight && stage_->leftover.deflection < kClearlyRight;
   if (teeth_settled_ || !news || right || !teeth) return false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "signature.h"
 
 #include <algorithm>
@@ -25,7 +26,7 @@ struct Samples {
 
 Samples samples(const Machine& machine, const RecordSet& records, bool deflection) {
   Samples s;
-  s.coordinates = {{"motor position", {}}, {"motor velocity", {}}, {"motor acceleration", {}},
+  s.coordinates = {{"motor position", {}}, {"motor velocity", {}},     {"motor acceleration", {}},
                    {"applied torque", {}}, {"transmitted torque", {}}, {"time", {}}};
   for (std::size_t i = 0; i < records.records().size(); ++i) {
     const PreparedServo& record = records.records()[i];
@@ -36,7 +37,7 @@ Samples samples(const Machine& machine, const RecordSet& records, bool deflectio
       if (!(deflection ? record.settled : record.counts)[k]) continue;
       s.residual.push_back(channel[k]);
       s.fold.push_back(int(std::min<std::size_t>(kFolds - 1, kFolds * k / d.size())));
-      const double values[] = {d.motor[k],  d.motor_rate[k],       d.motor_acceleration[k],
+      const double values[] = {d.motor[k],  d.motor_rate[k],        d.motor_acceleration[k],
                                d.torque[k], r.load->mesh_torque[k], double(k) * d.interval};
       for (std::size_t c = 0; c < s.coordinates.size(); ++c) s.coordinates[c].second.push_back(values[c]);
     }
@@ -102,7 +103,8 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
   for (const auto& [name, values] : s.coordinates) shares.emplace_back(followed(s, values), name);
   const auto [order, share] = strongest_order(s, s.coordinates.front().second);
   shares.emplace_back(share, "order " + std::to_string(order) + " of the motor position");
-  std::stable_sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::stable_sort(shares.begin(), shares.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
   char text[160];
   const std::string unit = axis_unit(deflection ? "rad" : "N m", machine.rig.linear);
   std::snprintf(text, sizeof text, "%.3g %s rms, %.1f times the noise floor", s.rms, unit.c_str(),
@@ -114,8 +116,8 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
   }
   u.signature += "; follows";
   for (std::size_t i = 0; i < 3 && shares[i].first >= kWorthNaming; ++i) {
-    std::snprintf(text, sizeof text, "%s %s (%.0f %% of its variance)", i ? "," : "", shares[i].second.c_str(),
-                  100 * shares[i].first);
+    std::snprintf(text, sizeof text, "%s %s (%.0f %% of its variance)", i ? "," : "",
+                  shares[i].second.c_str(), 100 * shares[i].first);
     u.signature += text;
   }
   return u;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a residual that nothing explains looks like: which channel, how large, what it follows.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // One fit of the machine at one bandwidth, and what belongs to it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "validation.h"
 
 #include <Eigen/Cholesky>
@@ -36,7 +37,8 @@ Eigen::VectorXd without(const LeastSquaresFit& fit, const Eigen::MatrixXd& norma
 void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& r,
                  double& torque, double& deflection) {
   for (std::size_t i = 0; i < rows.size(); ++i)
-    (records.layout()[std::size_t(rows[i])].deflection ? deflection : torque) += r[Eigen::Index(i)] * r[Eigen::Index(i)];
+    (records.layout()[std::size_t(rows[i])].deflection ? deflection : torque) +=
+        r[Eigen::Index(i)] * r[Eigen::Index(i)];
 }
 
 double gain(double before, double after) {
@@ -93,21 +95,22 @@ HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& r
   return out;
 }
 
-// A block that alone tells a parameter may be predicted arbitrarily badly without it, before or after; then the
-// gain seems larger than that of the fit itself, which it never is.
+// A block that alone tells a parameter may be predicted arbitrarily badly without it, before or after; then
+// the gain seems larger than that of the fit itself, which it never is.
 Gain compare(const HeldOut& a, const HeldOut& b) {
   Gain g;
-  const Squares torque = all_but_worst(a.torque, b.torque), deflection = all_but_worst(a.deflection, b.deflection),
-                torque_fit{a.torque_train, b.torque_train}, deflection_fit{a.deflection_train, b.deflection_train},
-                fit = torque_fit + deflection_fit;
+  const Squares torque = all_but_worst(a.torque, b.torque),
+                deflection = all_but_worst(a.deflection, b.deflection),
+                torque_fit{a.torque_train, b.torque_train},
+                deflection_fit{a.deflection_train, b.deflection_train}, fit = torque_fit + deflection_fit;
   g.deflection = deflection_fit.decrease() > torque_fit.decrease();
   const std::vector<double>&before = g.deflection ? a.deflection : a.torque,
-      &after = g.deflection ? b.deflection : b.torque;
+        &after = g.deflection ? b.deflection : b.torque;
   Evidence& e = g.evidence;
   e.gain = (g.deflection ? deflection_fit : torque_fit).gain();
   e.gain_held_out = std::min(e.gain, (g.deflection ? deflection : torque).gain());
-  e.gain_forward =
-      g.deflection ? gain(a.deflection_forward, b.deflection_forward) : gain(a.torque_forward, b.torque_forward);
+  e.gain_forward = g.deflection ? gain(a.deflection_forward, b.deflection_forward)
+                                : gain(a.torque_forward, b.torque_forward);
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (before[i] == 0) continue;
     ++e.blocks;

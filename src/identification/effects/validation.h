@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Whether an effect helps where the fit has not seen the record.
 #pragma once
 

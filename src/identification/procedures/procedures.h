@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The procedures of Yumrukcal (2013, Chapter 5) as steps that read the records of a case and add findings to
 // it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Scale and offset between the sensors of motor and load.
 #include <algorithm>
 #include <cmath>

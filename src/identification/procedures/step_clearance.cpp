@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Backlash from a load that is rocked while the motor is braked.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Mesh damping from the ringing after engagements.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Friction lines of motor and drive; the difference is the load.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Backlash over load position from runs both ways.
 #include <algorithm>
 #include <cmath>

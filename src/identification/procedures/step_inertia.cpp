@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Inertia of motor and drive from sine runs.
 #include <algorithm>
 #include <cmath>

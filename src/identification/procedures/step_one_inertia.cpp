@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The one procedure for a machine of one inertia.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The last step of an identification: everything together, on the raw records.
 #include <algorithm>
 #include <cmath>
@@ -10,10 +11,10 @@
 namespace backlash {
 namespace {
 
-// Errors fall with the root of the time, while another motion tells apart what one motion mixes. So the time that
-// a fit may take goes in equal parts to the few records in which the teeth change flanks most.
-constexpr double kTellingCutoff = 5;    // Hz, of the deflection
-constexpr double kMostSeconds = 60;     // of all records
+// Errors fall with the root of the time, while another motion tells apart what one motion mixes. So the time
+// that a fit may take goes in equal parts to the few records in which the teeth change flanks most.
+constexpr double kTellingCutoff = 5;  // Hz, of the deflection
+constexpr double kMostSeconds = 60;   // of all records
 constexpr std::size_t kMostRecords = 3;
 constexpr double kTellingShare = 0.3;  // of the most telling record, from which another is worth its time
 constexpr double kFewestSeconds = 2;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Two inertias from the frequency response.
 #include <algorithm>
 #include <cmath>

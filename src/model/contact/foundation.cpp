@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Elastic contact with the damping of a viscous layer (foundation), clamped so that it never pulls:
 //   F = max(0, K d^n + lambda d d'),  lambda = 2 pi R (eta / h) g1 / (g1 + g2)
 // Yumrukcal (2013), Eq. 2.20: a sphere of radius R [m] > 0 pressed by d into a layer of thickness h [m] > 0

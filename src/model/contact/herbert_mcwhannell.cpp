@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Damping solved exactly for a restitution that falls with speed (Herbert and McWhannell 1977; Sarkar, Ellis
 // and Moore 1997, Section 4.2):
 //   e = 1 - alpha v^beta,  D (1+e) = ln((1+D)/(1-e D)),  F = max(0, K d^n (1 + D d' / v))

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Elastic contact with damping proportional to the elastic force, clamped so that it never pulls:
 //   F = max(0, K d^n (1 + 3/2 alpha d'))        K [N/m^n] > 0, 1 <= n <= 1.5, alpha [s/m] >= 0
 // The restitution of an impact at approach speed v is e = 1 - alpha v to first order in alpha v (Hunt and

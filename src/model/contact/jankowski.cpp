@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Elastic contact that is damped on approach only, so it never pulls (Jankowski 2005; Yumrukcal 2013,
 // Section 2.2.2.2):
 //   F = K d^(3/2) + c d' for d' > 0, K d^(3/2) else;  c = 2 xi sqrt(K m sqrt(d))                (2.21)

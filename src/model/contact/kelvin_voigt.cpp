@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Spring and damper side by side, as the theory has it and not as teeth do:
 //   F = K d + c d'        K [N/m] > 0, c [N s/m] >= 0
 // The force jumps to c v at a touch with approach speed v (Yumrukcal 2013, Eqs. 2.13 and 2.14), and PULLS at

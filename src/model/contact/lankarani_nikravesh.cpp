@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Damping for a restitution that does not depend on speed (Lankarani and Nikravesh 1990; "Hertz-damp" of
 // Yumrukcal 2013, Eq. 2.19, there with n = 3/2):
 //   D = 3/4 (1 - e^2),  F = max(0, K d^n (1 + D d' / v))        0 <= e <= 1

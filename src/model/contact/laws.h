@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The laws that the registry in contact_law.cpp lists; one file each in this folder.
 #pragma once
 

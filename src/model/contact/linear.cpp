@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Linear spring and damper (Kelvin-Voigt), clamped so that it never pulls:
 //   F = max(0, K d + c d')        K [N/m] > 0, c [N s/m] >= 0
 // With c = 0 it is the line contact of Sarkar, Ellis and Moore (1997), Eq. 9. With c > 0 the force jumps by c
@@ -16,7 +17,9 @@ class Linear : public ContactLaw {
   double force(double d, double rate, double) const override {
     return std::max(0.0, stiffness_ * d + damping_ * rate);
   }
-  std::optional<PowerContact> power_contact() const override { return PowerContact{stiffness_, 1, 0, damping_}; }
+  std::optional<PowerContact> power_contact() const override {
+    return PowerContact{stiffness_, 1, 0, damping_};
+  }
   double elastic_energy(double d) const override { return 0.5 * stiffness_ * d * d; }
   double static_penetration(double force) const override { return force / stiffness_; }
 

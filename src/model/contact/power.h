@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The elastic part that most laws share: K d^n.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Elastic contact without loss:
 //   F = K d^n        K [N/m^n] > 0, 1 <= n <= 1.5
 // n = 1 for line contact, 3/2 for point contact (Hertz), in between for gear teeth.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the laws share whose damping is set for a wanted restitution at each touch:
 //   F = max(0, K d^n (1 + D(e) d' / v))        K [N/m^n] > 0, 1 <= n <= 1.5
 // v [m/s] is the approach speed latched at the last touch, e(v) the wanted restitution, D [-] differs from

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Rigid impact as the reference: at a touch faster than `resting_speed` [m/s] > 0 the speeds jump,
 //   (v1' - v2') = -e (v1 - v2), momentum conserved        0 <= e <= 1
 // (Yumrukcal 2013, Eqs. 2.15 and 2.16; speeds_after_impact() of model/restitution.h). Slower touches do not

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Damping from the energy balance with the undamped speed profile, for a restitution that falls with speed
 // (Yang and Sun 1985, after Herbert and McWhannell 1977; Sarkar, Ellis and Moore 1997, Eq. 13):
 //   e = 1 - alpha v^beta,  D = 6 (1-e) / ((2e-1)^2 + 3),  F = max(0, K d^n (1 + D d' / v))

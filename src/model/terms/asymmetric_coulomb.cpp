@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dry friction that differs between the directions:
 //   forward F + b, backward F - b        b [N m], F: that of the rig file and the other terms, never below 0
 // While a body moves this is a constant torque -b; at rest it holds nothing. Armstrong-Helouvry, Dupont and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Viscous friction that differs between the directions:
 //   torque = -a |w|        a [N m s/rad]: damping c + a forward, c - a backward, w speed of the body
 // Where a exceeds the damping of the machine a direction is driven instead of braked. Yumrukcal (2013, Table

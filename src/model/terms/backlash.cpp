@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Free play beside that of the rig file, the same in every position: both flanks are farther away,
 //   o = b / 2      opening [rad at the load], b additional backlash [rad at the load]
 // For a rig that declares none; where it declares some, b < 0 takes of it.

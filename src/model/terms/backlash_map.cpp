@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Backlash from a look-up table over the load position, repeated every load turn:
 //   flanks at position q:  centre(q) +- backlash(q) / 2      [rad at the load], linear between the table's
 //   points

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Cogging: teeth of the motor's stator pull at its magnets,
 //   motor torque = -A sin(n q + p)        A [N m], q = motor position at the load side, n periods per turn of
 // it, hence periods per motor turn times the reduction ratio. Conservative. Holtz and Springob (1996, IEEE

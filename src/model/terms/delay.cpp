@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A motor torque that acts later than its stamp says, by d [s]; earlier for d < 0:
 //   J_M a_M(t) = tau_M(t - d) - ...
 // A drive that takes time to build up current, a command recorded in place of the torque, or channels that

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A wheel that runs out of true by eps [m]: along the line of action, at pressure angle phi, the flank of
 // side s = +-1 moves by eps sin(a - s phi) with the angle a = n q + p of its high spot, that is
 //   o_s = eps / r_b (sin(phi) cos(a) - s cos(phi) sin(a))      opening [rad at the load], r_b base radius of

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A load encoder whose scale is wrong: it shows (1 + s) q_L and (1 + s) w_L, s [-].
 // A line count or a ratio between encoder and load that is not what the rig file's maker thought.
 #include <algorithm>

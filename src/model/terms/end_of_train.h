@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the terms share that act on one end of the gear train and are tried on both: `body: motor | load`.
 #pragma once
 

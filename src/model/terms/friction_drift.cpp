@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dry friction that changes as the machine runs (warms up):
 //   added friction = A (1 - exp(-r t)) / (1 - exp(-r S))        A [N m] at t = S [s], r [1/s], t time
 // With a time constant tau = 1 / r: A_end (1 - exp(-t / tau)), A_end = A / (1 - exp(-r S)). Of A_end and tau

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Gravity on a link whose centre of mass lies off the axis:
 //   load torque = -A sin(q + p)        A = m g d [N m], p [rad], q = load position, q + p = 0 hanging down
 // Sarkar, Ellis and Moore (1997), Table 1 (m_L d_L sin(theta_L) g).

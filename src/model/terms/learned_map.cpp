@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // An effect without a name, as a look-up table over one coordinate x, f(x):
 //   acts_on motor, load:  torque f on that end [N m]
 //   acts_on gap:          the mesh is displaced by f [rad at the load], x = q_P - q_G + f: both flanks move
@@ -150,7 +151,8 @@ class LearnedStiffness : public Term {
   bool loads_flanks() const override { return true; }
   void load_flank(const FlankLoad& load, double& torque) const override {
     if (load.at.side == side_)
-      torque *= std::max(0.0, 1 + curve_.at(of_motor_ ? load.at.motor_position : load.at.load_position).value);
+      torque *=
+          std::max(0.0, 1 + curve_.at(of_motor_ ? load.at.motor_position : load.at.load_position).value);
   }
 
  private:
@@ -171,8 +173,13 @@ void check(const std::vector<double>& points, const std::vector<double>& values)
 
 TermType learned_map_term() {
   return {"learned_map",
-          {{"acts_on", "-", Range::any(), "what it is added to", false,
-            {"motor", "load", "gap", "forward_flank", "backward_flank", "forward_stiffness", "backward_stiffness"}},
+          {{"acts_on",
+            "-",
+            Range::any(),
+            "what it is added to",
+            false,
+            {"motor", "load", "gap", "forward_flank", "backward_flank", "forward_stiffness",
+             "backward_stiffness"}},
            {"coordinate", "-", Range::any(), "x", false, coordinates()},
            {"points", "rad, rad/s, N m or s", Range::any(), "of x, increasing", true},
            {"values", "N m, of a gap or flank rad, of a stiffness -", Range::any(), "f at each point", true}},

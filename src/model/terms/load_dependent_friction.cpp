@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dry friction in proportion to the torque that the teeth carry (loss of the gear under load):
 //   added friction = mu |T|        mu [-], T torque through the mesh [N m]; of a rigid mesh that of the motor
 // Hamon, Gautier and Garrec (2010, IROS), "Dynamic identification of robots with a dry friction model

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A damaged tooth: where the load stands there, once per turn, a flank is farther away (or nearer, A < 0),
 //   o = A exp(-(c / w)^2 / 2),  c = 2 sin((q - q0) / 2)      opening [rad at the load], q = load position
 // on the forward flank (that touches where the motor drives forward), the backward one or both. c is q - q0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Teeth that get stiffer, or softer (A < 0), the farther they are pressed together:
 //   added flank torque = A (d / D)^e        A [N m] at the penetration D, d penetration, both [rad at the
 // load], D > 0; that is h d^e with h = A / D^e. Softening takes at most half of what the flank bears without

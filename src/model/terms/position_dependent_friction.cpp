@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dry friction that varies with the position:
 //   added friction = A sin(n q + p)        A [N m], q position of the body, n periods per turn of the load
 // (motor positions are those at the load side). Armstrong-Helouvry, Dupont and Canudas de Wit (1994,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Dry friction of a body builds up over a distance x_s [rad at the load] after each reversal, instead of at
 // once: Dahl's law, with damping that of LuGre, see presliding.h. The limits that it tends to are those of
 // the body and of the other terms.
@@ -45,7 +46,8 @@ TermType presliding_term() {
            {"distance", "rad", Range::not_negative(), "x_s, at the load"},
            {"damping", "N m s/rad", Range::not_negative(), "of the bristles; 0: Dahl's law"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"), p.at("damping"));
+            return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"),
+                                                    p.at("damping"));
           },
           TermSearch{"distance", "", typical, {{"damping", dampings, true}}}};
 }

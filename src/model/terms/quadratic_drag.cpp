@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Drag of turbulent air or oil (windage, churning):
 //   torque = -A w |w|        A [N m s^2/rad^2], w speed of the body
 // A < 0 beside a viscous friction: friction that grows less than the speed, as the rig of Yumrukcal (2013,

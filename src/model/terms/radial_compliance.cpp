@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The separating force of the teeth presses the wheels apart: with the torque T through the mesh the centre
 // distance grows by dC = h |T| tan(phi) / r and either flank recedes along the line of action by dC sin(phi),
 //   o = dC sin(phi) / r_b = h |T| sin(phi)^2 / r_b^2     opening [rad at the load]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Stribeck effect: dry friction is larger at low speed,
 //   added friction = A exp(-|w / ws|^e)        A [N m], ws [rad/s] > 0, w speed of the body, at rest A
 // e = 2 (Gaussian) or e = 1 (Tustin); Armstrong-Helouvry, Dupont and Canudas de Wit (1994, Automatica

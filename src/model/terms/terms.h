@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The terms that the registry in term.cpp lists; one file each in this folder.
 #pragma once
 

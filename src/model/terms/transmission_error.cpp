@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Transmission error: the mesh is displaced by a function of the load position,
 //   x = q_P - q_G + A sin(n q + p)     A [rad at the load], q = load position, n periods per load turn
 // Both flanks move together: one opens where the other closes.

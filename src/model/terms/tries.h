@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Strengths and shapes that several terms give the search for missing effects to try.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Backlash that varies with the load position, a Fourier series by one entry per order:
 //   backlash(q) = b (1 + sum a sin(n q + p))      b: backlash of the rig file, q = load position
 // Both flanks move alike. Yumrukcal (2013, Section 5.4) measured up to 15 percent.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A reduction ratio that varies with the transmitted torque, as Yumrukcal (2013, Section 6.2.1) suspects: the
 // motor angle at the load side is q_P (1 + a T), T the torque through the mesh,
 //   o_s = -s a T q_P      opening of the flank of side s = +-1 [rad at the load]

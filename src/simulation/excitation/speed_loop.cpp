@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A drive under speed control: a sampled PI controller whose torque is held from one of its samples to the
 // next. It sees the motor's exact speed; the sensors of the rig belong to the record.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Sine torque whose frequency goes up in steps, whole cycles at each: every step begins and ends at the bias,
 // so that the torque is continuous.
 #include <cmath>

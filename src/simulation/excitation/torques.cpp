@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Excitations whose torque is one formula of time, and that from outside.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Command lines of the tools: one description gives the parser, the help text and the messages.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 #include "tools/common/diagnosis_report.h"
 
 #include <cmath>
@@ -163,7 +164,8 @@ Json to_json(const DiagnosisReport& report) {
   json["record"] = report.record->name;
   json["estimates"] = Json::array();
   for (const Estimate& e : report.diagnosis.estimates) json["estimates"].push_back(estimate_json(e));
-  if (report.diagnosis.coherence) json["detectors"] = Json::array({coherence_json(*report.diagnosis.coherence)});
+  if (report.diagnosis.coherence)
+    json["detectors"] = Json::array({coherence_json(*report.diagnosis.coherence)});
   json["verdict"] = verdict_json(report.diagnosis.verdict, report.diagnosis.estimates);
   const bool has_apd = report.diagnosis.apd && report.apd_settings;
   json["apd"] = has_apd ? apd_json(*report.diagnosis.apd, *report.apd_settings) : Json(nullptr);

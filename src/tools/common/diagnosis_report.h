@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What diagnose_record tells: as JSON for programs and as text for people.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How the commands end: the verdict, or after sysexits.h what went wrong.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Plots are drawn by the package's Python scripts (matplotlib), found beside the executable.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How far long work is, on standard error when that is a terminal.
 #pragma once
 

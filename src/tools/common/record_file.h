@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Records as files whose extension tells the format, and what is checked about files before long work begins.
 #pragma once
 

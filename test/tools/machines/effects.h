@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What a machine may have that the declared model lacks: the named effects of the dictionary, and such as no
 // dictionary holds. Each draws its own strength, noticeable but no larger than in the records of undeclared/.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A two-inertia geared servo, and everything that may be odd about it. All at the load side of the reduction:
 //   J_M w_M' = tau - friction_M - cogging - T
 //   J_L w_L' = T - friction_L - gravity

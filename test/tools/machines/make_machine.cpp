@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Makes one test machine: two records of it and what it truly is. Deterministic for its arguments.
 #include <algorithm>
 #include <boost/program_options.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // How a machine moves: Verlet steps with friction as in Moreau's time stepping (the impulse of friction stops
 // a body exactly, and holds it). Shares nothing with the package that is tested.
 #pragma once

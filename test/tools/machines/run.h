@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // A run of a machine under speed control, and what its sensors write down.
 #pragma once
 
