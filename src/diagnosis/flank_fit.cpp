@@ -112,7 +112,7 @@ class Fitter {
   const FlankModel& model_;
   Eigen::Index n_;
   MatrixXd common_, gap_, f_basis_;
-  VectorXd phi_, side_, offset_;  // offset: of the linearisation
+  VectorXd phi_, side_;
   std::vector<char> use_;
   double slow_;
   std::optional<Slope> slope_;

@@ -128,7 +128,7 @@ std::optional<GapPassage> measure(const Run& run, const Stretch& s, const FlankC
   p.motor_travel = travel_of(run.motor, s.begin, s.end);
   const auto [low, high] = std::minmax_element(run.smooth.begin() + s.begin, run.smooth.begin() + s.end);
   try {
-    const FlankFit fit = fit_flanks({passage_of(run, s, push)}, *low, *high, contact);
+    const PassageFit fit = fit_flanks({passage_of(run, s, push)}, *low, *high, contact);
     p.lower = fit.flanks.lower;
     p.upper = fit.flanks.lower + fit.flanks.gap;
     p.gap = fit.gap;
@@ -170,10 +170,10 @@ void require_brake(const Run& run, const std::vector<Stretch>& stretches, double
 struct Passages {
   std::vector<Stretch> stretches;
   std::vector<GapPassage> measured;
-  FlankFit fit;
+  PassageFit fit;
 };
 
-FlankFit fit_all(const Run& run, const std::vector<Stretch>& stretches, double stiffness, int push) {
+PassageFit fit_all(const Run& run, const std::vector<Stretch>& stretches, double stiffness, int push) {
   std::vector<FlankPassage> passages;
   Values lows, highs;
   for (const Stretch& s : stretches) {

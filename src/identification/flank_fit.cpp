@@ -83,8 +83,8 @@ Eigen::VectorXd FlankPassage::without_polynomial(const Eigen::VectorXd& y) const
 }
 
 /// fitted.
-FlankFit fit_flanks(const std::vector<FlankPassage>& passages, double low, double high,
-                    const FlankContact& known) {
+PassageFit fit_flanks(const std::vector<FlankPassage>& passages, double low, double high,
+                      const FlankContact& known) {
   const auto contact_at = [&](const Flanks& f) {
     return std::isfinite(known.damping) ? known : contact_of(passages, f, known.stiffness);
   };
@@ -106,7 +106,7 @@ FlankFit fit_flanks(const std::vector<FlankPassage>& passages, double low, doubl
       start = p;
     }
   const LeastSquaresFit fit = fit_nonlinear(residuals, start, Eigen::Vector2d::Constant(0.1 * travel));
-  FlankFit f;
+  PassageFit f;
   f.flanks = {fit.values[0], fit.values[1]};
   f.contact = contact_at(f.flanks);
   const double unknowns = 2 + passages[0].polynomial() * double(passages.size()) + 2;

@@ -39,10 +39,11 @@ struct FamilySegment {
   std::vector<double> misfit;     // per noise level: largest root of T_min among the records
 };
 
+class NoisyFamilies;
+
 /// Members by backlash value and phase, free of noise; one segment between each two backlash values of the
 /// curve. Members beyond those of the curve's points, as far apart as the last two, only serve to recognise
 /// backlash that is larger than the curve covers.
-class NoisyFamilies;
 struct ApdFamily {
   ApdFamily();
   std::vector<std::vector<Quantiles>> members;

@@ -44,7 +44,7 @@ class FlankPassage {
   Eigen::MatrixXd basis_;
 };
 
-struct FlankFit {
+struct PassageFit {
   Flanks flanks;
   FlankContact contact;
   Measured gap;               // rad
@@ -56,7 +56,7 @@ struct FlankFit {
 /// The flanks common to all passages, which reach from `low` to `high` [rad]; of the contact what is not
 /// `known`, its damping >= 0. Starts from the best of a grid of flanks. Throws CannotIdentify where nothing
 /// fits.
-FlankFit fit_flanks(const std::vector<FlankPassage>& passages, double low, double high,
-                    const FlankContact& known);
+PassageFit fit_flanks(const std::vector<FlankPassage>& passages, double low, double high,
+                      const FlankContact& known);
 
 }  // namespace backlash
