@@ -138,6 +138,7 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
   if (settings.apd) diagnosis.apd = analyse_apd(record, *settings.apd);
   CurveMatch match;
   if (settings.apd) match = match_curve(record, *diagnosis.apd, *settings.apd, curve);
+  diagnosis.mismatch = match.mismatch;
   const DiagnosisInput input{record, settings, curve, diagnosis.apd, match};
   for (const DiagnosisMethod& each : diagnosis_method_table()) {
     if (!method.empty() && method != each.name) continue;

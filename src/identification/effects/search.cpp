@@ -8,6 +8,7 @@
 #include <set>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/interruption.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "learned.h"
@@ -108,6 +109,8 @@ void Search::start_in_travel() {
 }
 
 void Search::run() {
+  // Fits of minutes have nothing new to report, but end when asked to.
+  const Interruption interruption([this] { return !progress_ || progress_(share_done(), phase_); });
   fit_base();
   declared_base_ = base_;
   add_effects();
@@ -121,9 +124,16 @@ void Search::run() {
   hold_friction();
 }
 
-void Search::report(const std::string& phase) const {
+/// Effects that are taken back do not turn it back.
+double Search::share_done() const {
   const double share = (double(effects_.size()) + (stage_ ? 1 : 0)) / double(settings_.most_effects + 1);
-  if (progress_ && !progress_(std::min(1.0, share), phase)) throw Cancelled();
+  done_ = std::max(done_, std::min(1.0, share));
+  return done_;
+}
+
+void Search::report(const std::string& phase) const {
+  phase_ = phase;
+  if (progress_ && !progress_(share_done(), phase)) throw Cancelled();
 }
 
 /// All that the rig declares and such records can tell.
