@@ -42,6 +42,7 @@ Subscribes
 Services
   ~set_backlash         backlash_diagnosis/SetBacklash; acts from the last sample on
   ~reset                std_srvs/Trigger; at rest in the middle of the gap, backlash as at start; stamps go on
+  ~live, ~JOINT/live    dynamic_reconfigure: backlash, noise of each sensor; what is wrong is refused
 
 Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the
 simulation follows that clock, otherwise wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a
