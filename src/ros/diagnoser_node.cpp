@@ -310,11 +310,17 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
     return;
   }
   const ros::WallTime start = ros::WallTime::now();
+  std::mutex told;  // the points and the progress may come from two threads
+  std::string best;
   const auto progress = [&](double fraction, const std::string& phase) {
     backlash_diagnosis::BuildCurveFeedback feedback;
     feedback.phase = phase;
     feedback.fraction = fraction;
     feedback.elapsed = (ros::WallTime::now() - start).toSec();
+    {
+      const std::lock_guard<std::mutex> lock(told);
+      feedback.best = best;
+    }
     curve_server_->publishFeedback(feedback);
     return ros::ok() && !curve_server_->isPreemptRequested();
   };
@@ -324,6 +330,10 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
     if (goal->max_backlash != 0) request.max_backlash = goal->max_backlash;
     if (goal->periods > 0) request.periods = static_cast<int>(goal->periods);
     request.sampling_rate = goal->sampling_rate;
+    request.best_so_far = [&](const std::string& found) {
+      const std::lock_guard<std::mutex> lock(told);
+      best = found;
+    };
     std::string path;
     if (!goal->save_as.empty()) path = folder_.inside("save_as", goal->save_as);
     const MonitoringCurve curve = build_curve(monitor->rig(), request, progress);

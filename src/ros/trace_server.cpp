@@ -73,11 +73,14 @@ Result TraceServer::trace(const backlash_diagnosis::TraceResidualGoal& goal) {
   }
   job.settings.cutoff = goal.cutoff;
   const ros::WallTime start = ros::WallTime::now();
+  std::string best;
+  job.settings.best_so_far = [&](const std::string& found) { best = found; };
   return to_result(run_trace(job, [&](double fraction, const std::string& phase) {
     backlash_diagnosis::TraceResidualFeedback feedback;
     feedback.phase = phase;
     feedback.fraction = fraction;
     feedback.elapsed = (ros::WallTime::now() - start).toSec();
+    feedback.best = best;
     server_->publishFeedback(feedback);
     return ros::ok() && !server_->isPreemptRequested();
   }));

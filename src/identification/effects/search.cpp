@@ -210,6 +210,17 @@ void Search::fit_base() {
   base_ = fit_stage(data_, machine, cutoff_, kRoughTolerance);
   base_ = fit_stage(data_, base_->fit.machine, cutoff_, kFineTolerance);
   stage_ = base_;
+  tell_best();
+}
+
+void Search::tell_best() const {
+  if (!settings_.best_so_far) return;
+  std::string names;
+  for (const Accepted& effect : effects_) names += (names.empty() ? "" : " + ") + effect.candidate.id;
+  char left[96];
+  std::snprintf(left, sizeof left, ": torque %.3g, deflection %.3g times the noise floor",
+                stage_->leftover.torque, stage_->leftover.deflection);
+  settings_.best_so_far((names.empty() ? "the declared machine" : names) + left);
 }
 
 /// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
@@ -347,6 +358,7 @@ bool Search::adopt(std::vector<Accepted> effects) {
   effects.back().after = stage.fit.machine;
   stage_ = std::move(stage);
   effects_ = std::move(effects);
+  tell_best();
   return true;
 }
 

@@ -84,6 +84,7 @@ class Search {
   void declare_parameters();
   void start_in_travel();
   double share_done() const;
+  void tell_best() const;
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
   Machine with_effects(const std::vector<Accepted>& effects) const;
