@@ -108,10 +108,12 @@ Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note
   const auto ready = [&] { return stop_ || (stream_.periods() >= wanted_periods(periods) && !building_); };
   changed_.wait_for(lock, std::chrono::duration<double>(timeout), ready);
   const long available = stream_.periods();
-  if (available < wanted_periods(periods))
+  const Record record = stream_.latest(periods);
+  // Without an APD all that is kept will do, whether it has periods or not.
+  const bool any_length = periods == 0 && !settings_.rig.diagnosis.apd && !record.time.empty();
+  if (available < wanted_periods(periods) && !any_length)
     note = "only " + std::to_string(available) + " of " + std::to_string(wanted_periods(periods)) +
            " whole periods arrived" + (last_problem_.empty() ? "" : "; last problem: " + last_problem_);
-  const Record record = stream_.latest(periods);
   const auto curve = curve_;
   const auto baseline = baseline_;
   const std::string curve_state = curve_state_;
