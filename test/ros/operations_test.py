@@ -104,7 +104,7 @@ class OperationsTest(unittest.TestCase):
         with open(os.path.join(self.history, "joint.csv"), "a") as stream:
             stream.write("1000000001.5,cut off by the po")  # as a power cut leaves a line
         second = self.start(**parameters)
-        self.assertIn("cut off", second.output())
+        self.assertIn("joint.csv:%d: " % (len(kept) + 2), second.output())
         self.send_run(10)
         self.wait_for_entries(second, 3)
         self.diagnostics.wait_for(second.name[1:] + ": joint: backlash", lambda l, m, v: "no trend" in v.get("Trend", ""),
