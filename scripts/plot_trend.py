@@ -67,7 +67,8 @@ def draw(trend):
     end, reaches = trend["time"], trend["reaches"]
     if reaches and reaches["time"] is not None:
         # As far as the date, but not so far that the points become a dot.
-        end = max(end, min(reaches["time"] + 0.1 * trend["span"], trend["time"] + 10 * trend["span"]))
+        latest = (reaches["interval"] or [None, None])[1] or reaches["time"]
+        end = max(end, min(latest, trend["time"] + 10 * trend["span"]))
     if trend["rate"] is not None:
         draw_line(axes, trend, end, scale)
     if trend["limit"] is not None:

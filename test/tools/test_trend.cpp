@@ -56,10 +56,10 @@ class TrendCommand : public CommandTest {
 };
 
 TEST_F(TrendCommand, ExitCodesSayHowFarTheLimitIs) {
-  write_history(40, 0.5);  // 139 um at its end: 150 um after 61 days more
+  write_history(40, 0.5);  // 119.5 um at its end: 150 um after 61 days more
   EXPECT_EQ(run("backlash_trend elbow.csv --limit 150e-6").code, 1);
-  EXPECT_EQ(run("backlash_trend elbow.csv --limit 150e-6 --horizon 30").code, 1);
-  EXPECT_EQ(run("backlash_trend elbow.csv --limit 150e-6 --horizon 15").code, 0);
+  EXPECT_EQ(run("backlash_trend elbow.csv --limit 150e-6 --horizon 70").code, 1);
+  EXPECT_EQ(run("backlash_trend elbow.csv --limit 150e-6 --horizon 50").code, 0);
   EXPECT_EQ(run("backlash_trend elbow.csv --limit 190e-6").code, 0);
   EXPECT_EQ(run("backlash_trend elbow.csv --limit 110e-6").code, 2);
   EXPECT_EQ(run("backlash_trend elbow.csv").code, 0);  // it grows, but no limit is given
