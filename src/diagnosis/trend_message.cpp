@@ -50,7 +50,7 @@ std::string date(const Trend::Crossing& c) {
 }
 
 std::string span_text(double span) {
-  return span < kDay ? number(span / 3600) + " h" : number(span / kDay) + " days";
+  return span < 2 * kDay ? number(span / 3600) + " h" : number(span / kDay) + " days";
 }
 
 std::string no_trend(const Trend& t, std::size_t times, const Words& words) {

@@ -27,6 +27,7 @@ Private parameters; unknown ones are refused. In brackets: units of values that 
   duration              0 s; simulated time after which the node ends, 0 is endless
   publish_clock         true if real_time_factor is not 1, else false; others follow with /use_sim_time true
   wait_for_subscriber   false; true: the simulation starts when joint_states has a subscriber
+  live                  where dynamic_reconfigure keeps what is in force; overwritten at the start
   diagnostic_period     1 s; wall time between two messages on /diagnostics
 
 Publishes
