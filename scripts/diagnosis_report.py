@@ -16,22 +16,21 @@ try:
 except ImportError as error:
     plotting.fail(70, error)
 
-COLOURS = {"motor_torque": "#9aa7b5", "sensor_torque": "#1f6fb4", "motor_current": "#1f6fb4", "motor_position": "#1f6fb4",
-           "load_position": "#d98200", "acceleration": "#1f6fb4"}
 MEASURED, GOOD, PALE, BAD = "#1f6fb4", "#2a8a3e", "#9aa7b5", "#b3261e"
+COLOURS = {"motor_torque": PALE, "load_position": "#d98200"}  # beside MEASURED
 LIMITS = {"watch": "#d9b200", "service": "#d98200", "stop": BAD}
 
 
 class Data:
     def __init__(self, series):
         self.report, self.curve, self.limits = series["report"], series["curve"], series["limits"]
-        self.linear, self.locked = series["linear"], series["locked"]
+        self.linear, self.locked, self.rigid = series["linear"], series["locked"], series["rigid"]
         record = series["record"]
         self.period = record["period"]
         self.time = np.array(record["time"], float)
         self.channels = {name: np.array(c["values"], float) for name, c in record["channels"].items()}
         self.units = {name: c["unit"] for name, c in record["channels"].items()}
-        shown = [e for e in self.report["estimates"] + [self.report["verdict"]]]
+        shown = [*self.report["estimates"], self.report["verdict"]]
         # What the answers are compared in: along the line of action, or as an angle where the rig has no base radius.
         self.lengths = self.linear or any(e["backlash"] is not None for e in shown)
         self.key = "backlash" if self.lengths and not self.linear else "backlash_angle"
@@ -42,20 +41,19 @@ class Data:
         return next((name for name in ("sensor_torque", "motor_torque") if name in self.channels), None)
 
     def deflection(self):
-        """Values and label of the position across the teeth, where the record has it."""
+        """Values and label of the position across the teeth, where there are teeth and the record has it."""
         motor, load = self.channels.get("motor_position"), self.channels.get("load_position")
-        if motor is not None and load is not None:
-            return motor - load, "motor - load position [%s]" % self.units["motor_position"]
         if motor is not None and self.locked:
             return motor, "motor position [%s], output locked" % self.units["motor_position"]
+        if motor is not None and load is not None and not self.rigid:
+            return motor - load, "motor - load position [%s]" % self.units["motor_position"]
         return None
 
 
 def interval(answer, key):
     """Value and 95 % interval of an estimate or the verdict; what is not known is NaN."""
-    both = answer.get({"backlash": "interval", "backlash_angle": "interval_angle"}[key],
-                      answer.get("angle_interval")) or [None, None]
-    return [np.nan if v is None else v for v in [answer[key], *both]]
+    ends = answer["interval"] if key == "backlash" else answer.get("interval_angle") or answer.get("angle_interval")
+    return [np.nan if v is None else v for v in [answer[key], *(ends or [None, None])]]
 
 
 def new_figure(height=1.0):
@@ -67,7 +65,8 @@ def over_time(data, names):
     figure, axes = new_figure()
     start = data.time[0]
     for name in names:
-        axes.plot(data.time - start, data.channels[name], color=COLOURS[name], linewidth=0.8, label=name)
+        axes.plot(data.time - start, data.channels[name], color=COLOURS.get(name, MEASURED), linewidth=0.8,
+                  label=name.replace("_", " "))
     axes.set_xlabel("time [s], from %.6g s of the record on" % start)
     axes.set_ylabel("%s [%s]" % (names[-1].split("_")[-1], data.units[names[-1]]))
     axes.margins(y=0.18)
@@ -84,10 +83,11 @@ def time_pictures(data):
                   ("motor_position", "load_position")):
         present = [name for name in names if name in data.channels]
         if present:
-            yield plotting.picture(over_time(data, present), "%s %s" % (" and ".join(present).replace("_", " "), span(data)))
-    if "load_position" in data.channels and "motor_position" in data.channels:
-        figure, axes = new_figure()
+            caption = "%s %s" % (" and ".join(present).replace("_", " "), span(data))
+            yield plotting.picture(over_time(data, present), caption[0].upper() + caption[1:])
+    if data.deflection() is not None and not data.locked:
         values, label = data.deflection()
+        figure, axes = new_figure()
         axes.plot(data.time - data.time[0], values, color=MEASURED, linewidth=0.8)
         axes.set_xlabel("time [s]")
         axes.set_ylabel(label)
@@ -132,14 +132,16 @@ def curve_picture(data):
     x = np.array(data.curve["backlash"], float) * (to_axis or np.nan) / scale
     y, scatter = np.array(data.curve["skewness"], float), np.array(data.curve["scatter"], float)
     figure, axes = new_figure()
-    axes.fill_between(x, y - scatter, y + scatter, color=MEASURED, alpha=0.15, linewidth=0, label="95 % of single periods")
+    axes.fill_between(x, y - scatter, y + scatter, color=MEASURED, alpha=0.15, linewidth=0,
+                      label="95 % of single periods")
     axes.plot(x, y, color=MEASURED, linewidth=1.2, label="monitoring curve")
     estimate = next((e for e in data.report["estimates"] if e["method"] == "apd_skewness"), None)
     if estimate and estimate["skewness"] is not None:
         value, low, high = (v / scale for v in interval(estimate, key))
         axes.axhline(estimate["skewness"], color=BAD, linewidth=0.7, linestyle=":")
-        axes.axvspan(low if np.isfinite(low) else x[0], high if np.isfinite(high) else x[-1], color=BAD, alpha=0.1,
-                     linewidth=0) if np.isfinite([low, high]).any() else None
+        if np.isfinite(low) or np.isfinite(high):
+            axes.axvspan(low if np.isfinite(low) else x[0], high if np.isfinite(high) else x[-1], color=BAD, alpha=0.1,
+                         linewidth=0)
         label = "this record: %s" % estimate["status"].replace("_", " ")
         if np.isfinite(value):
             label = "this record: %.4g %s [%.4g, %.4g]" % (value, unit, low, high)

@@ -234,7 +234,8 @@ def fragment(report, series):
     data = Data(series)
     text = ""
     for channel in data.channels:
-        text += "<h3>Residual of %s (measured - model) in the test record</h3>\n" % html.escape(data.words(channel)) + channel_figures(data, channel)
+        text += "<h3>Residual of %s (measured - model) in the test record</h3>\n" % html.escape(data.words(channel))
+        text += channel_figures(data, channel)
     for step, drawn in zip(report["steps"], series["steps"]):
         figure = effect_figure(data, step, drawn["contributions"])
         if figure:

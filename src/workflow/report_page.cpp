@@ -29,14 +29,14 @@ th { font-weight: normal; color: #666; white-space: nowrap; } tr + tr td { borde
 .good, .nothing_missing { border-color: #2a8a3e; } .watch, .effect_found { border-color: #d98200; }
 .service, .stop, .unexplained { border-color: #b3261e; } .cannot_tell { border-color: #888; }
 .number { white-space: nowrap; font-variant-numeric: tabular-nums; }
-.text { min-width: 18em; overflow-wrap: anywhere; } .together td { font-weight: bold; }
+.text { min-width: 18em; overflow-wrap: anywhere; } .facts .text { min-width: 0; } .together td { font-weight: bold; }
 .bars td { padding-top: 0; padding-bottom: 0; border: 0; } .bars .wide { width: 32em; }
 .bar { height: 0.9em; min-width: 1px; }
 .before { background: #9aa7b5; } .after { background: #1f6fb4; } .floor { background: #d5d5d5; }
 .small { color: #666; font-size: 0.9em; overflow-wrap: anywhere; }
 pre { background: #f6f6f6; padding: 0.8em 1em; margin: 0.5em 0; max-height: 32em; overflow: auto; font-size: 0.85em; }
 pre.command { white-space: pre-wrap; overflow-wrap: anywhere; }
-.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 28em), 1fr)); gap: 0.5em 1.5em; }
+.figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 28em), 1fr)); gap: 0.5em 1.5em; }
 figure { margin: 0.5em 0; } figure img { display: block; width: 100%; max-width: 46em; height: auto; }
 figcaption { color: #666; font-size: 0.9em; }
 )";

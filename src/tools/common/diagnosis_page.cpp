@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tools/common/diagnosis_page.h"
 
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 
@@ -46,9 +47,33 @@ std::string value_cells(const Answer& a, bool linear) {
 }
 
 std::string parts_text(const PlayComponents& parts) {
-  return "gap " + number_text(parts.gap) + " rad, compliance " + number_text(parts.compliance) +
-         " rad/(N m), Coulomb friction " + number_text(parts.coulomb) + " N m, at torque " +
-         number_text(parts.at_torque) + " N m";
+  std::vector<std::string> known;
+  const auto add = [&known](const char* name, double value, const char* unit) {
+    if (std::isfinite(value)) known.push_back(std::string(name) + " " + number_text(value) + " " + unit);
+  };
+  add("gap", parts.gap, "rad");
+  add("compliance", parts.compliance, "rad/(N m)");
+  add("Coulomb friction", parts.coulomb, "N m");
+  add("at torque", parts.at_torque, "N m");
+  return joined(known);
+}
+
+/// "Good: 79.98 um of backlash, 95 % interval 77.93 to 82.17 um." where that is known, and the verdict's own
+/// words.
+std::string verdict_section(const Verdict& v, bool linear) {
+  const bool angle = linear || (!std::isfinite(v.backlash) && !std::isfinite(v.lower));
+  const double value = angle ? v.backlash_angle : v.backlash;
+  const double lower = angle ? v.angle_lower : v.lower, upper = angle ? v.angle_upper : v.upper;
+  const double scale = angle && !linear ? kDegree : kMicrometre;
+  const std::string unit = angle && !linear ? " deg" : " &micro;m";
+  std::string text = to_string(v.grade);
+  text[0] = char(std::toupper(text[0]));
+  if (std::isfinite(value))
+    text += ": " + number_text(value / scale) + unit + " of backlash, 95 % interval " +
+            number_text(lower / scale) + " to " + number_text(upper / scale) + unit + ".";
+  return html_tag("p", (std::isfinite(value) ? html_tag("b", text) + "<br>" : "") + html_text(v.message),
+                  "class=\"verdict " + std::string(to_string(v.grade)) + "\"") +
+         "\n";
 }
 
 std::string estimates_section(const Diagnosis& diagnosis, bool linear) {
@@ -58,7 +83,7 @@ std::string estimates_section(const Diagnosis& diagnosis, bool linear) {
              : html_heads({"method", "status", um, "angle [rad]", "angle [deg]", "how, or why not"});
   for (const Estimate& e : diagnosis.estimates) {
     std::string message = html_text(e.message);
-    if (std::isfinite(e.skewness))
+    if (std::isfinite(e.skewness) && e.message.find("skewness") == std::string::npos)
       message = "skewness " + number_text(e.skewness) + (message.empty() ? "" : "; ") + message;
     if (e.components) message += (message.empty() ? "" : "<br>") + html_text(parts_text(*e.components));
     rows += html_row(html_cell(html_text(e.method)) + html_cell(to_string(e.status)) +
@@ -105,7 +130,7 @@ std::string record_section(const DiagnosisReport& report) {
   if (report.diagnosis.coherence) row("coherence", report.diagnosis.coherence->message);
   std::string items;
   for (const std::string& warning : report.warnings) items += html_tag("li", html_text(warning)) + "\n";
-  return html_tag("h2", "Record") + "\n" + html_table(rows) +
+  return html_tag("h2", "Record") + "\n" + html_table(rows, "facts") +
          (items.empty() ? html_tag("p", "No warnings.")
                         : html_tag("h3", "Warnings") + "\n" + html_tag("ul", items)) +
          "\n";
@@ -124,14 +149,12 @@ std::string plots_of(const DiagnosisReport& report, const RigFile* rig) {
 }  // namespace
 
 std::string diagnosis_page(const DiagnosisReport& report, const RigFile* rig, const Provenance& provenance) {
-  const Verdict& verdict = report.diagnosis.verdict;
   const bool linear = rig && rig->rig.linear;
   const std::string of = report.rig.empty() ? report.record->name : report.rig + ", " + report.record->name;
-  return report_page("Backlash of " + of,
-                     html_tag("p", html_text(verdict.message),
-                              "class=\"verdict " + std::string(to_string(verdict.grade)) + "\"") +
-                         "\n" + estimates_section(report.diagnosis, linear) + html_tag("h2", "Plots") + "\n" +
-                         plots_of(report, rig) + record_section(report) + provenance_sections(provenance));
+  return report_page("Backlash of " + of, verdict_section(report.diagnosis.verdict, linear) +
+                                              estimates_section(report.diagnosis, linear) +
+                                              html_tag("h2", "Plots") + "\n" + plots_of(report, rig) +
+                                              record_section(report) + provenance_sections(provenance));
 }
 
 }  // namespace backlash::tools

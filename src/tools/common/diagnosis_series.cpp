@@ -74,6 +74,7 @@ std::string diagnosis_series(const DiagnosisReport& report, const RigFile* rig) 
                      {"report", to_json(report)},
                      {"linear", linear},
                      {"locked", locked},
+                     {"rigid", rig && rig->rig.mesh.rigid},
                      {"record", record_json(*report.record, period_of(report), linear)},
                      {"curve", report.curve ? curve_json(*report.curve) : Json(nullptr)},
                      {"limits", limits_json(report)}};
