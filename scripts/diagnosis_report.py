@@ -65,8 +65,8 @@ def over_time(data, names):
     figure, axes = new_figure()
     start = data.time[0]
     for name in names:
-        axes.plot(data.time - start, data.channels[name], color=COLOURS.get(name, MEASURED), linewidth=0.8,
-                  label=name.replace("_", " "))
+        colour = COLOURS.get(name, MEASURED) if len(names) > 1 else MEASURED
+        axes.plot(data.time - start, data.channels[name], color=colour, linewidth=0.8, label=name.replace("_", " "))
     axes.set_xlabel("time [s], from %.6g s of the record on" % start)
     axes.set_ylabel("%s [%s]" % (names[-1].split("_")[-1], data.units[names[-1]]))
     axes.margins(y=0.18)

@@ -15,22 +15,29 @@ import tempfile
 BROWSER, DRIVER = "/usr/bin/chromium", "/usr/bin/chromedriver"
 WIDTHS = (1200, 400)  # px: a desk and a phone
 
-# What an image shows: its size, how many colours, and the share of pixels of the most frequent one.
+# What an image shows: its size, how many colours, the share of pixels of the most frequent one, and that of pixels which
+# are not grey: curves are, axes and words are not.
 PLOTS = """
 return Promise.all(Array.from(document.images, async image => {
   await image.decode().catch(() => null);
   const canvas = document.createElement('canvas');
   canvas.width = image.naturalWidth;
   canvas.height = image.naturalHeight;
-  if (!canvas.width || !canvas.height) return {alt: image.alt, width: 0, height: 0, colours: 0, background: 1};
+  const box = image.getBoundingClientRect();
+  const seen = {alt: image.alt, width: canvas.width, height: canvas.height, shown: [box.width, box.height]};
+  if (!canvas.width || !canvas.height) return {...seen, colours: 0, background: 1, coloured: 0};
   const context = canvas.getContext('2d');
   context.drawImage(image, 0, 0);
-  const pixels = new Uint32Array(context.getImageData(0, 0, canvas.width, canvas.height).data.buffer);
-  const counts = new Map();
+  const bytes = context.getImageData(0, 0, canvas.width, canvas.height).data;
+  const pixels = new Uint32Array(bytes.buffer), counts = new Map();
   for (const pixel of pixels) counts.set(pixel, (counts.get(pixel) || 0) + 1);
-  const box = image.getBoundingClientRect();
-  return {alt: image.alt, width: canvas.width, height: canvas.height, shown: [box.width, box.height],
-          colours: counts.size, background: Math.max(...counts.values()) / pixels.length};
+  let coloured = 0;
+  for (let i = 0; i < bytes.length; i += 4) {
+    const rgb = [bytes[i], bytes[i + 1], bytes[i + 2]];
+    coloured += Math.max(...rgb) - Math.min(...rgb) > 60;
+  }
+  return {...seen, colours: counts.size, background: Math.max(...counts.values()) / pixels.length,
+          coloured: coloured / pixels.length};
 }));
 """
 TABLES = """

@@ -82,7 +82,8 @@ void expect_drawn(const Json& page, std::size_t plots) {
     EXPECT_GT(plot.at("width"), 100) << plot;
     EXPECT_GT(plot.at("shown")[0], 100) << plot;
     EXPECT_GT(plot.at("colours"), 10) << plot;
-    EXPECT_LT(plot.at("background"), 0.995) << plot;  // axes alone leave more than that
+    EXPECT_LT(plot.at("background"), 0.995) << plot;
+    EXPECT_GT(plot.at("coloured"), 0.001) << plot;  // a curve of 1 px across half of the width has more
     EXPECT_GT(plot.at("background"), 0.3) << plot;
   }
 }
