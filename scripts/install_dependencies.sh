@@ -17,6 +17,7 @@ packages=(
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
   libgtest-dev
   python3-matplotlib python3-numpy python3-yaml                   # plots
+  chromium chromium-driver python3-selenium                       # tests that look at the pages in a browser
 )
 packages+=("$@")
 
