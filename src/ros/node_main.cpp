@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/ros/master_watch.h"
 
 namespace backlash {
 namespace {
@@ -51,6 +52,7 @@ int node_main(int argc, char** argv, const std::string& name, const char* help,
   if (refused) return refused;
   // The log closes with the last handle; the reason for an early end must still get into it.
   const ros::NodeHandle alive;
+  const MasterWatch watch;
   return guarded(run);
 }
 
