@@ -3,6 +3,7 @@
 
 #include <ros/connection_manager.h>
 #include <ros/console.h>
+#include <ros/init.h>
 #include <ros/master.h>
 #include <ros/network.h>
 #include <ros/publication.h>
@@ -123,16 +124,16 @@ void MasterWatch::look() {
   if (!here) return;
   const Registrations now = {names_of_this_node(state[0]), names_of_this_node(state[1]),
                              names_of_this_node(state[2])};
-  if (!now.empty()) {
+  if (!now.empty() && complete_) {
     known_ = now;
     return;
   }
   if (known_.empty() || !ros::ok()) return;
-  if (register_again(known_))
+  complete_ = register_again(known_);
+  if (complete_)
     ROS_WARN("the ROS master did not know this node any more (it was started again): registered again");
   else
-    ROS_ERROR(
-        "the ROS master does not know this node any more and refuses what it is told; start the node again");
+    ROS_ERROR("the ROS master does not know this node any more and refuses a part of what it is told");
 }
 
 }  // namespace backlash

@@ -33,7 +33,8 @@ class MasterWatch {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool stop_ = false;
-  bool away_ = false;  // the master did not answer the last time
+  bool away_ = false;     // the master did not answer the last time
+  bool complete_ = true;  // it took all that it was told
   Registrations known_;
   std::thread thread_;
 };
