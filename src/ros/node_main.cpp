@@ -28,6 +28,8 @@ int guarded(const std::function<int()>& run) {
     return fatal(e, kUsage);
   } catch (const BadData& e) {
     return fatal(e, kBadData);
+  } catch (const IntegrationError& e) {  // of a machine that the rig file states
+    return fatal(e, kBadData);
   } catch (const MissingInput& e) {
     return fatal(e, kMissingInput);
   } catch (const std::exception& e) {

@@ -11,6 +11,7 @@
 #include "tools/common/command_line.h"
 #include "tools/common/diagnosis_report.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
 
@@ -138,9 +139,9 @@ void build_own_curve(Inputs& in) {
             << to_text(request.sampling_rate) << " Hz (build_curve keeps one)" << std::endl;
   try {
     ProgressBar bar;
-    in.curve = build_curve(*in.rig, request, bar.progress());
+    in.curve = of_file(in.rig->source, [&] { return build_curve(*in.rig, request, bar.progress()); });
     in.curve_source = "built for this record";
-  } catch (const InvalidParameter& e) {  // the other methods need no curve
+  } catch (const BadData& e) {  // the other methods need no curve
     in.no_curve = e.what();
   }
 }

@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/workflow/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
 
@@ -94,7 +95,8 @@ int simulate(const Arguments& arguments) {
   Record record;
   {
     ProgressBar bar;
-    record = simulate_record(file.rig, file.simulation, duration, bar.progress());
+    record = of_file(file.source,
+                     [&] { return simulate_record(file.rig, file.simulation, duration, bar.progress()); });
   }
   write_record(record, out, file.rig.joint);
   std::cout << out << ": " << record.size() << " samples at "

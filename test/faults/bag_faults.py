@@ -11,8 +11,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from case import BAD, Case, RIGHT
-from clean import judge_diagnosis
-from csv_faults import flipped, judge_answered, lenient_rows
+from clean import judge_diagnosis, table_of
+from csv_faults import flipped, judge_answered
 
 START = 1_000_000_000  # s, stamp of time 0
 NAN, INF = float("nan"), float("inf")
@@ -216,15 +216,21 @@ GENERATORS = [undamaged, truncated, truncated_and_reindexed, not_indexed, not_in
               two_recordings_in_one]
 
 
+def values_of(header, rows):
+    """What a bag has of a record, without its times."""
+    places = [header.index(name) for name in ("motor_torque", "motor_position", "sensor_torque")]
+    return {tuple(float(row[place]) for place in places) for row in rows}
+
+
 def judge_conversion(clean, exact):
     """Every row that comes out went in; of a bag with flipped bits (it has no check sums) all but some rows."""
     def judge(folder, code, err):
-        with open(folder + "/out.csv", "rb") as stream:
-            out = lenient_rows(stream.read())
-        strange = out - lenient_rows(clean.record)
-        if not out or (strange if exact else len(strange) > 64):
-            return BAD, "%d of %d rows are not in the input" % (len(strange), len(out))
-        return RIGHT, "%d rows" % len(out)
+        header, rows = table_of(read(folder + "/out.csv"))
+        times = [float(row[0]) for row in rows]
+        strange = values_of(header, rows) - values_of(clean.header, clean.rows)
+        if not rows or times != sorted(set(times)) or (strange if exact else len(strange) > 64):
+            return BAD, "%d of %d rows are not in the input" % (len(strange), len(rows))
+        return RIGHT, "%d rows" % len(rows)
     return judge
 
 

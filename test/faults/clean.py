@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The clean inputs that faults are put into, and what is known of them: the oracle of the campaign."""
+import copy
 import csv
 import io
 import math
@@ -24,7 +25,14 @@ class Clean:
         self.rig = self.config["sarkar_1997.yaml"]
         with tempfile.TemporaryDirectory() as folder:
             self._make(folder)
-        self.header, *self.rows = [row for row in csv.reader(io.StringIO(self.record.decode()))]
+        self.header, self.rows = table_of(self.record)
+
+    def servo(self):
+        """The same view of a motor and load with an encoder each."""
+        other = copy.copy(self)
+        other.record, other.rig = self.servo_record, self.config["two_inertia_servo.yaml"]
+        other.header, other.rows = table_of(other.record)
+        return other
 
     def _make(self, folder):
         def path(name):
@@ -37,6 +45,10 @@ class Clean:
                   "--seeds", 4, "--sample-rate", RATE)
         self._run("diagnose_record", path("record.csv"), "--rig", path("rig.yaml"), "--curve", path("curve.yaml"),
                   "--json", path("out.json"), "--save-baseline", path("baseline.yaml"))
+        with open(path("servo.yaml"), "wb") as out:
+            out.write(self.config["two_inertia_servo.yaml"])
+        self._run("simulate", path("servo.yaml"), "--duration", 3, "--out", path("servo.csv"))
+        self.servo_record = read_bytes(path("servo.csv"))
         self.record, self.curve, self.baseline = (read_bytes(path(name)) for name in
                                                   ("record.csv", "curve.yaml", "baseline.yaml"))
 
@@ -45,6 +57,11 @@ class Clean:
                        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
     limits = b"schema_version: 1\nbacklash: {watch: 1.0e-4, service: 1.5e-4, stop: 2.0e-4}  # m\n"
+
+
+def table_of(record):
+    header, *rows = csv.reader(io.StringIO(record.decode()))
+    return header, rows
 
 
 def read_bytes(path):

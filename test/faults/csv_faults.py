@@ -2,7 +2,7 @@
 """Damaged CSV records. A generator takes (random, clean) and returns (what, bytes, must be refused, message parts)."""
 import gzip
 
-from case import BAD, Case, RIGHT
+from case import BAD, CANNOT_TELL, Case, RIGHT
 from clean import judge_diagnosis
 
 SEPARATORS = [";", "\t", " ", "|", ":"]
@@ -251,23 +251,31 @@ def judge_answered(folder, code, err):
 
 
 def judge_done(folder, code, err):
+    """No oracle of the campaign's knows this answer; it has ended in an orderly way."""
+    if code == 3:
+        return (CANNOT_TELL, err.strip()[-300:]) if err.strip() else (BAD, "cannot tell, but not why")
     return RIGHT, ""
 
 
 def case(rng, clean, generate):
+    use = rng.random()
+    if use > 0.85:
+        clean = clean.servo()
     what, body, refuse, says = generate(rng, clean)
     files = {"record.csv": body, "rig.yaml": clean.rig, "curve.yaml": clean.curve}
     kind = "csv: " + generate.__name__.replace("_", " ")
-    use = rng.random()
     if use < 0.65:
         judge = judge_answered if generate in ANSWERED else judge_diagnosis
         command = ["diagnose_record", "record.csv", "--rig", "rig.yaml", "--curve", "curve.yaml", "--json", "out.json"]
         outputs = ["out.json"]
     elif use < 0.85:
         command, judge, outputs = ["convert_record", "record.csv", "out.csv"], judge_conversion(body), ["out.csv"]
-    else:
+    elif use < 0.92:
         command, judge, outputs = ["compare_models", "record.csv", "rig.yaml", "--json", "out.json"], judge_done, [
             "out.json"]
+    else:
+        command, judge, outputs = ["identify", "record.csv", "--rig", "rig.yaml", "--out", "out.yaml", "--json",
+                                   "out.json"], judge_done, ["out.yaml", "out.json"]
     return Case(kind, what, files, "record.csv", command, outputs, judge, refuse, says)
 
 

@@ -3,6 +3,7 @@
 import re
 
 from case import BAD, Case, RIGHT
+from csv_faults import judge_done
 from clean import DURATION, RATE, finite_rows, judge_diagnosis
 
 SCALAR = re.compile(r"^( *)(- )?([a-z_]+):( +)([^#\s'\"\[{|>&*][^#,]*?)( *(?:#.*)?)$")
@@ -192,10 +193,6 @@ def judge_simulation(folder, code, err):
     """Of a machine that the damaged file states: a whole record of finite numbers, however it moves."""
     rows = finite_rows(folder + "/out.csv")
     return (RIGHT, "%d rows" % rows) if rows else (BAD, "no rows, or numbers that are not finite")
-
-
-def judge_done(folder, code, err):
-    return RIGHT, ""
 
 
 def uses_of(rng, clean):
