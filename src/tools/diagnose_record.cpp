@@ -181,7 +181,10 @@ Inputs read_inputs(const Arguments& arguments) {
   if (arguments.has("curve")) {
     in.curve_source = arguments.text("curve");
     in.curve = read_curve(in.curve_source);
-    if (!in.rig) in.settings.apd = settings_of(*in.curve);
+    if (!in.rig)
+      in.settings.apd = settings_of(*in.curve);
+    else if (const std::string warning = check_curve(*in.curve, *in.rig, in.curve_source); !warning.empty())
+      in.warnings.push_back(warning);
   }
   read_machine_files(in, arguments);
   in.record = read_record(arguments.positional(0), place);
@@ -239,8 +242,6 @@ int diagnose_record(const Arguments& arguments) {
   if (in.curve) {
     report.curve = &*in.curve;
     report.curve_source = in.curve_source;
-    if (in.rig && in.curve->conditions.rig_digest != in.rig->digest)
-      report.warnings.push_back("the curve was made from another version of the rig file; build it again");
   }
   report.diagnosis = diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);

@@ -90,7 +90,9 @@ int simulate(const Arguments& arguments) {
   const double samples = std::round(duration * file.simulation.sensors.sampling_rate);
   if (samples < 1 || samples > kMostSamples)
     throw UsageError("a duration of " + to_text(duration) + " s at " +
-                     to_text(file.simulation.sensors.sampling_rate) + " Hz: must give from 1 to 1e9 samples");
+                     to_text(file.simulation.sensors.sampling_rate) +
+                     " Hz (--sample-rate, or sensors.sampling_rate of " + file.source +
+                     "): must give from 1 to 1e9 samples");
   check_output(out, {arguments.positional(0)});
   Record record;
   {

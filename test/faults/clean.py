@@ -11,6 +11,7 @@ import tempfile
 from case import BAD, CANNOT_TELL, RIGHT, read_json
 
 BACKLASH = 80e-6  # m, simulated
+BASE_RADIUS = 0.014917  # m, of config/sarkar_1997.yaml
 TOLERANCE = 0.05  # of it: the clean record is answered to 1 %, a fault may cost it samples
 DURATION, RATE = 1.2, 1000  # s, Hz: ten periods behind the two of settling
 
@@ -71,18 +72,26 @@ def read_bytes(path):
 
 def judge_diagnosis(folder, code, err):
     """The verdict holds the known backlash, or says that it cannot tell, or that its methods disagree."""
+    return judged(folder, code, "backlash", "interval", BACKLASH)
+
+
+def judge_angle(folder, code, err):
+    return judged(folder, code, "backlash_angle", "angle_interval", BACKLASH / BASE_RADIUS)
+
+
+def judged(folder, code, value_key, interval_key, truth):
     report = read_json(folder, "out.json")
     verdict = report["verdict"]
     if code == 3:
         return (CANNOT_TELL, verdict["message"]) if verdict["message"] else (BAD, "cannot tell, but not why")
-    value, interval = verdict["backlash"], verdict["interval"]
+    value, interval = verdict[value_key], verdict[interval_key]
     if value is None or interval is None:
         return BAD, "graded %s without a value" % verdict["grade"]
     lower = -math.inf if interval[0] is None else interval[0]
     upper = math.inf if interval[1] is None else interval[1]
-    holds = lower <= BACKLASH <= upper or abs(value - BACKLASH) <= TOLERANCE * BACKLASH
-    text = "%.4g [%.4g, %.4g] m by %s; %s" % (value, lower, upper, ", ".join(verdict["members"]), verdict["message"])
-    if verdict["dissenters"] and (holds or lower <= BACKLASH <= upper):
+    holds = lower <= truth <= upper or abs(value - truth) <= TOLERANCE * truth
+    text = "%.4g [%.4g, %.4g] by %s; %s" % (value, lower, upper, ", ".join(verdict["members"]), verdict["message"])
+    if verdict["dissenters"] and (holds or lower <= truth <= upper):
         return CANNOT_TELL, "methods disagree: " + text
     return (RIGHT if holds else BAD), text
 

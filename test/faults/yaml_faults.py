@@ -3,12 +3,12 @@
 import re
 
 from case import BAD, Case, RIGHT
+from clean import finite_rows, judge_angle, judge_diagnosis
 from csv_faults import judge_done
-from clean import DURATION, RATE, finite_rows, judge_diagnosis
 
 SCALAR = re.compile(r"^( *)(- )?([a-z_]+):( +)([^#\s'\"\[{|>&*][^#,]*?)( *(?:#.*)?)$")
 TOKEN = re.compile(r"[A-Za-z_][\w.]*|[-+]?\d[\w.+-]*|[][{}:,#&*!|>'\"%@`-]|\n +")
-FREE_TEXT = {"name", "comment", "source", "rig", "version", "rig_digest", "excitation", "joint"}
+NO_UNIT = {"schema_version", "seed", "seeds", "classes", "periods", "settling_periods", "points", "phases", "population"}
 
 
 class Text:
@@ -66,7 +66,7 @@ def unit_text(rng, name, body):
 
 def value_off_by_1000(rng, name, body):
     text = Text(body)
-    i = rng.choice(text.numbers)
+    i = rng.choice([i for i in text.numbers if text.key(i) not in NO_UNIT] or text.numbers)
     value = repr(float(text.value(i)) * rng.choice([1e3, 1e-3]))
     return "%s: %s instead of %s" % (text.key(i), value, text.value(i)), text.with_value(i, value), False, []
 
@@ -223,13 +223,29 @@ def uses_of(rng, clean):
         "integrator_study", "rig.yaml", "--loop", "loop.yaml", "--json", "out.json"], ["out.json"], judge_done
 
 
+def diagnosis_of_own_curve(rng, clean):
+    """A wrong rig file under a right record, with the curve of the right one or with one built from the wrong one."""
+    command = DIAGNOSE if rng.random() < 0.7 else DIAGNOSE[:4] + ["--json", "out.json"]
+    others = {"record.csv": clean.record, "curve.yaml": clean.curve}
+    return "rig.yaml", clean.rig, others, command, ["out.json"], judge_diagnosis
+
+
+def judged_by_angle(what):
+    """A record tells of angles; metres are those of the base radius that the rig file states."""
+    return "base_radius" in what
+
+
 def is_rig(body):
     return b"\ngear_train:" in body
 
 
 def case(rng, clean, generate):
     name, body, others, command, outputs, judge = uses_of(rng, clean)
+    if generate in (value_off_by_1000, extreme_value) and rng.random() < 0.4:
+        name, body, others, command, outputs, judge = diagnosis_of_own_curve(rng, clean)
     what, changed, refuse, says = generate(rng, name, body)
+    if judge is judge_diagnosis and judged_by_angle(what):
+        judge = judge_angle
     files = dict(others)
     files[name] = changed
     return Case(name_of(generate), "%s: %s" % (name, what), files, name, command, outputs, judge, refuse, says)
