@@ -65,6 +65,15 @@ std::ifstream open_input(const std::string& path) {
   return stream;
 }
 
+std::string read_start(const std::string& path, std::size_t most) {
+  std::ifstream in = open_input(path);
+  std::string text(most, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (in.bad()) throw MissingInput(path + ": cannot be read");
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
 void write_file(const std::string& path, std::string_view content) {
   if (path.empty()) fail_writing("''", "no file name");
   std::string target = path;

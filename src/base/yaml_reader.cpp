@@ -181,13 +181,7 @@ struct YamlReader::Impl {
 };
 
 YamlReader YamlReader::from_file(const std::string& path) {
-  std::ifstream in = open_input(path);
-  std::string text(kLargestYaml + 1,
-                   '\0');  // one more than allowed, so that the parser sees that it is too large
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad()) throw MissingInput(path + ": cannot be read");
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  return from_text(text, path);
+  return from_text(read_start(path, kLargestYaml + 1), path);  // one more than the parser takes
 }
 
 YamlReader YamlReader::from_text(const std::string& text, const std::string& name) {

@@ -121,8 +121,10 @@ CurveConditions read_conditions(const YamlReader& yaml) {
 CurvePoint read_point(const YamlReader& yaml, std::size_t levels) {
   CurvePoint point;
   point.backlash = yaml.number("backlash", Range::not_negative());
-  for (const char* derived : {"half_gap", "skewness", "scatter"})
-    yaml.ignore(derived);  // repeated for readers
+  // Repeated for readers, who may also have edited them.
+  for (const char* derived : {"half_gap", "skewness", "scatter"}) (void)yaml.number(derived, Range::any());
+  if (std::fabs(yaml.number("half_gap", Range::any()) - point.backlash / 2) > 1e-6 * point.backlash)
+    yaml.fail("half_gap", "must be half of backlash");
   point.monotonic = yaml.boolean("monotonic");
   point.signal_level = yaml.number("signal_level", Range::not_negative());
   const auto mean = yaml.numbers("mean", Range::any());

@@ -127,7 +127,10 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
     const std::string own_rig = parameters.text(joint + "/rig", "");
     const std::string own_curve = parameters.text(joint + "/curve", curve);
     monitor.rig = own_rig.empty() ? common : load_rig_file(own_rig);
-    if (!own_curve.empty()) monitor.curve = read_curve(own_curve);
+    if (!own_curve.empty()) {
+      monitor.curve = read_curve(own_curve);
+      monitor.curve_warning = check_curve(*monitor.curve, monitor.rig, own_curve);
+    }
     use_limits(monitor, parameters.text(joint + "/limits", limits));
     use_baseline(monitor, parameters.text(joint + "/baseline", baseline));
     settings.joints.push_back(std::move(monitor));

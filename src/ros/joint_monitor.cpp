@@ -33,8 +33,7 @@ JointMonitor::JointMonitor(MonitorSettings settings)
       stream_(stream_settings(settings_)) {
   if (settings_.baseline) set_baseline(settings_.baseline);
   if (settings_.curve) {
-    if (settings_.curve->conditions.rig_digest != settings_.rig.digest)
-      curve_warning_ = "the curve was made from another version of the rig file; build it again";
+    curve_warning_ = settings_.curve_warning;
     if (!curve_warning_.empty()) ROS_WARN("%s: %s", settings_.joint.c_str(), curve_warning_.c_str());
     curve_ = std::make_shared<MonitoringCurve>(*settings_.curve);
     curve_state_ = "loaded";

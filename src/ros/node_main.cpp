@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/ros/master_watch.h"
 
 namespace backlash {
 namespace {
@@ -26,6 +27,8 @@ int guarded(const std::function<int()>& run) {
   } catch (const InvalidParameter& e) {
     return fatal(e, kUsage);
   } catch (const BadData& e) {
+    return fatal(e, kBadData);
+  } catch (const IntegrationError& e) {  // of a machine that the rig file states
     return fatal(e, kBadData);
   } catch (const MissingInput& e) {
     return fatal(e, kMissingInput);
@@ -53,6 +56,7 @@ int node_main(int argc, char** argv, const std::string& name, const char* help,
   if (refused) return refused;
   // The log closes with the last handle; the reason for an early end must still get into it.
   const ros::NodeHandle alive;
+  const MasterWatch watch;
   return guarded(run);
 }
 

@@ -12,6 +12,7 @@
 #include "lanes.h"
 #include "tolerances.h"
 #include "tsitouras.h"
+#include "work_limit.h"
 
 namespace backlash {
 namespace {
@@ -265,7 +266,13 @@ void Ensemble::Group::interpolate(double t) {
 }
 
 void Ensemble::Group::advance_to(double t, double stop, const Excitation& excitation, long segment) {
-  while (t - (from + step) > rounding(t)) take_step(stop, excitation, segment);
+  const long most = steps + kMaxStepsPerCall;
+  while (t - (from + step) > rounding(t)) {
+    if (steps == most)
+      throw IntegrationError("ensemble: " + std::to_string(kMaxStepsPerCall) +
+                             " steps did not suffice at t = " + std::to_string(from) + " s; " + kTooStiff);
+    take_step(stop, excitation, segment);
+  }
   interpolate(t);
 }
 

@@ -21,11 +21,11 @@
 #include "backlash_diagnosis/base/error.h"
 #include "small_vector.h"
 #include "tsitouras.h"
+#include "work_limit.h"
 
 namespace backlash {
 namespace {
 
-constexpr long kMaxStepsPerCall = 10'000'000;
 // A trial step may reach where the derivative overflows, and a shorter one mends that; more than a few of
 // them are a wall, before which the solvers would try ever shorter steps up to the limit above.
 constexpr long kMaxNotFinitePerCall = 1000;
@@ -244,7 +244,8 @@ void Integrator::Impl::check(int code, const char* function) const {
   char* name = multistep ? CVodeGetReturnFlagName(code) : ERKStepGetReturnFlagName(code);
   const std::string word = name ? name : "?";
   free(name);
-  fail(std::string(function) + " returned " + word + " (" + std::to_string(code) + ")");
+  fail(std::string(function) + " returned " + word + " (" + std::to_string(code) + ")" +
+       (code == (multistep ? CV_TOO_MUCH_WORK : ARK_TOO_MUCH_WORK) ? std::string(", ") + kTooStiff : ""));
 }
 
 void Integrator::Impl::create_explicit(double t) {

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/workflow/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
@@ -95,7 +96,7 @@ int build(const Arguments& arguments) {
   MonitoringCurve curve;
   {
     ProgressBar bar;
-    curve = build_curve(file, request, bar.progress());
+    curve = of_file(rig, [&] { return build_curve(file, request, bar.progress()); });
   }
   write_text(out, curve.to_yaml());
   tell(curve, out);

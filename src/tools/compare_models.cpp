@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/workflow/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
@@ -152,6 +153,12 @@ void check_outputs(const Arguments& arguments) {
   check_output(plot, arguments.positionals());
 }
 
+std::string joined_sources(const std::vector<RigFile>& files) {
+  std::vector<std::string> names;
+  for (const RigFile& file : files) names.push_back(file.source);
+  return joined(names);
+}
+
 int compare(const Arguments& arguments) {
   const std::string path = arguments.positional(0), out = arguments.text("json");
   ComparisonSettings settings;
@@ -171,8 +178,9 @@ int compare(const Arguments& arguments) {
   std::vector<ModelComparison> models;
   try {
     ProgressBar bar;
-    record = compared_record(given, rigs.front(), settings);
-    models = compare_models(rigs, record, settings, bar.progress());
+    record = of_file(files.front().source, [&] { return compared_record(given, rigs.front(), settings); });
+    models = of_file(joined_sources(files),
+                     [&] { return compare_models(rigs, record, settings, bar.progress()); });
   } catch (const CannotIdentify& error) {
     std::cerr << "compare_models: " << error.what() << '\n';
     return kInconclusive;

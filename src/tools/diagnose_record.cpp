@@ -12,6 +12,7 @@
 #include "tools/common/diagnosis_page.h"
 #include "tools/common/diagnosis_report.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
 
@@ -141,9 +142,9 @@ void build_own_curve(Inputs& in) {
             << to_text(request.sampling_rate) << " Hz (build_curve keeps one)" << std::endl;
   try {
     ProgressBar bar;
-    in.curve = build_curve(*in.rig, request, bar.progress());
+    in.curve = of_file(in.rig->source, [&] { return build_curve(*in.rig, request, bar.progress()); });
     in.curve_source = "built for this record";
-  } catch (const InvalidParameter& e) {  // the other methods need no curve
+  } catch (const BadData& e) {  // the other methods need no curve
     in.no_curve = e.what();
   }
 }
@@ -183,7 +184,10 @@ Inputs read_inputs(const Arguments& arguments) {
   if (arguments.has("curve")) {
     in.curve_source = arguments.text("curve");
     in.curve = read_curve(in.curve_source);
-    if (!in.rig) in.settings.apd = settings_of(*in.curve);
+    if (!in.rig)
+      in.settings.apd = settings_of(*in.curve);
+    else if (const std::string warning = check_curve(*in.curve, *in.rig, in.curve_source); !warning.empty())
+      in.warnings.push_back(warning);
   }
   read_machine_files(in, arguments);
   in.record = read_record(arguments.positional(0), place);
@@ -264,8 +268,6 @@ int diagnose_record(const Arguments& arguments) {
   if (in.curve) {
     report.curve = &*in.curve;
     report.curve_source = in.curve_source;
-    if (in.rig && in.curve->conditions.rig_digest != in.rig->digest)
-      report.warnings.push_back("the curve was made from another version of the rig file; build it again");
   }
   report.diagnosis = diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);

@@ -9,6 +9,7 @@
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/identification_report.h"
+#include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
@@ -71,7 +72,7 @@ int identify_machine(const Arguments& arguments) {
   Identification found;
   try {
     ProgressBar bar;
-    found = identify(file.rig, records, bar.progress());
+    found = of_file(file.source, [&] { return identify(file.rig, records, bar.progress()); });
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     return kInconclusive;

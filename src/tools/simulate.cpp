@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/workflow/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
 
@@ -89,12 +90,15 @@ int simulate(const Arguments& arguments) {
   const double samples = std::round(duration * file.simulation.sensors.sampling_rate);
   if (samples < 1 || samples > kMostSamples)
     throw UsageError("a duration of " + to_text(duration) + " s at " +
-                     to_text(file.simulation.sensors.sampling_rate) + " Hz: must give from 1 to 1e9 samples");
+                     to_text(file.simulation.sensors.sampling_rate) +
+                     " Hz (--sample-rate, or sensors.sampling_rate of " + file.source +
+                     "): must give from 1 to 1e9 samples");
   check_output(out, {arguments.positional(0)});
   Record record;
   {
     ProgressBar bar;
-    record = simulate_record(file.rig, file.simulation, duration, bar.progress());
+    record = of_file(file.source,
+                     [&] { return simulate_record(file.rig, file.simulation, duration, bar.progress()); });
   }
   write_record(record, out, file.rig.joint);
   std::cout << out << ": " << record.size() << " samples at "

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "family_builder.h"
 #include "fine_run.h"
@@ -271,6 +272,17 @@ MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, co
   curve.coverage_factor = calibrated_factor(curve, all.middle);
   calibrate_family(plan, all.middle.runs, ticker, *curve.family);
   return curve;
+}
+
+std::string check_curve(const MonitoringCurve& curve, const RigFile& rig, const std::string& source) {
+  constexpr double kSameGeometry = 0.01;  // a base radius may be stated with three digits
+  const double expected = rig.rig.backlash_angle(1);
+  if (!(std::fabs(curve.backlash_to_angle / expected - 1) < kSameGeometry))
+    throw BadData(source, "backlash_to_angle = " + to_text(curve.backlash_to_angle) + ": " + rig.source +
+                              " has " + to_text(expected) +
+                              "; the curve is of another machine, or a value is in another unit");
+  if (curve.conditions.rig_digest == rig.digest) return {};
+  return "the curve was made from another version of the rig file; build it again";
 }
 
 }  // namespace backlash

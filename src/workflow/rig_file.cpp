@@ -2,11 +2,11 @@
 #include "backlash_diagnosis/workflow/rig_file.h"
 
 #include <cmath>
-#include <iterator>
 #include <memory>
 
 #include "backlash_diagnosis/base/digest.h"
 #include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/yaml_tree.h"
 #include "default_rig.h"
 
 namespace backlash {
@@ -70,9 +70,7 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
 }
 
 RigFile load_rig_file(const std::string& path) {
-  std::ifstream in = open_input(path);
-  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  return rig_file_from_text(text, path);
+  return rig_file_from_text(read_start(path, kLargestYaml + 1), path);  // one more than the parser takes
 }
 
 RigFile default_rig_file() {

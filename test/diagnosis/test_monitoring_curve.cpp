@@ -398,6 +398,9 @@ TEST(MonitoringCurve, MalformedFilesAreRefusedWithTheirKey) {
       {"between: [0.05, 0.05]", "between: [0.05, -0.05]", "points[0].between"},
       {"within: [0.1, 0.1]", "spread: [0.1, 0.1]", "points[0].within"},
       {"points:\n", "dots:\n", "points"},
+      // Repeated for readers, who may think that it counts.
+      {"half_gap: 0\n", "half_gap: 1e-5\n", "points[0].half_gap"},
+      {"scatter: ", "scatter: m ", "points[0].scatter"},
   };
   for (const Case& c : cases) {
     std::string text = good;

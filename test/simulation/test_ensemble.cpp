@@ -176,5 +176,13 @@ TEST(Ensemble, RefusesTimesThatItCannotReach) {
   ensemble.advance_to(0.02);
 }
 
+// Damping in another unit: a time constant of 1e-14 s. Given up within seconds instead of going on for years.
+TEST(Ensemble, AMachineThatIsTooStiffIsGivenUp) {
+  Rig rig = test::sarkar_rig(40e-6);
+  rig.motor.viscous_damping = 2e9;
+  Ensemble ensemble({rig}, test::square(0.05, 10), test::solver(1e-6));
+  EXPECT_THROW(ensemble.advance_to(1e-3), IntegrationError);
+}
+
 }  // namespace
 }  // namespace backlash

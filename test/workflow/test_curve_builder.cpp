@@ -213,5 +213,23 @@ TEST(BuildCurve, RefusesWhatItCannotBuild) {
   }
 }
 
+TEST(CheckCurve, AnotherVersionIsToldAnotherGeometryIsRefused) {
+  const RigFile file = default_rig_file();
+  MonitoringCurve curve;
+  curve.backlash_to_angle = 1 / 0.014917;  // the base radius of the default rig
+  curve.conditions.rig_digest = file.digest;
+  EXPECT_EQ(check_curve(curve, file, "curve.yaml"), "");
+  curve.conditions.rig_digest = "another";
+  EXPECT_NE(check_curve(curve, file, "curve.yaml"), "");
+  curve.backlash_to_angle *= 1000;
+  try {
+    check_curve(curve, file, "curve.yaml");
+    ADD_FAILURE() << "a base radius in millimetres was accepted";
+  } catch (const BadData& error) {
+    EXPECT_NE(std::string(error.what()).find("curve.yaml"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("backlash_to_angle"), std::string::npos) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace backlash

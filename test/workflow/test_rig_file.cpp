@@ -146,6 +146,10 @@ TEST(RigFile, MissingAndUnreadableFiles) {
   EXPECT_THROW(load("name: \x01"), BadData);
 }
 
+TEST(RigFile, AFileWithoutEndIsRefused) {
+  EXPECT_THROW(load_rig_file("/dev/zero"), BadData);
+}
+
 TEST(RigFile, MalformedFilesAreRefusedWithFileAndKey) {
   struct Case {
     const char *from, *to, *key;

@@ -12,6 +12,10 @@ namespace backlash {
 /// opened.
 std::ifstream open_input(const std::string& path);
 
+/// The first `most` bytes of a file: a device or a file of another kind must not fill the memory. Throws
+/// MissingInput.
+std::string read_start(const std::string& path, std::size_t most);
+
 /// Writes the file whole or not at all: into a temporary file beside it, then renamed, so that no reader ever
 /// sees half a file and an old one survives a full disk. A symbolic link stays and its target is replaced;
 /// devices and pipes are written directly. Throws CannotWrite and leaves nothing behind.

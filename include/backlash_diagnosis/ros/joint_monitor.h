@@ -24,6 +24,7 @@ struct MonitorSettings {
   std::optional<Baseline> baseline;
   std::string baseline_path;             // where a new baseline is kept; empty: nowhere
   std::optional<MonitoringCurve> curve;  // absent: built from the rig at the sampling rate of the messages
+  std::string curve_warning;             // what check_curve() says of it
   int window = 5;                        // periods that the running estimates look back
   double estimate_interval = 0.25;       // s of stamps at least from one running estimate to the next
   double keep = 60;                      // s of samples kept

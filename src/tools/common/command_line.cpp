@@ -228,6 +228,8 @@ int run_command(const Command& command, int argc, char** argv, int (*body)(const
     return fail(e.what(), kBadData);
   } catch (const InvalidParameter& e) {  // options were checked by their readers: this one came from a file
     return fail(e.what(), kBadData);
+  } catch (const IntegrationError& e) {  // so did this machine
+    return fail(e.what(), kBadData);
   } catch (const CannotWrite& e) {
     return fail(e.what(), kCannotWrite);
   } catch (const std::bad_alloc&) {

@@ -1,0 +1,66 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes what the fuzzers begin with: rig files of the package, a small curve, a baseline, limits, small records."""
+import os
+import random
+import re
+import sys
+
+QUANTILES = 100  # kQuantiles
+
+CONDITIONS = """conditions: {rig: r, rig_digest: d, version: v, signal: sensor_torque, excitation: square, amplitude: 0.05,
+  excitation_level: 0.05, frequency: 10, sampling_rate: 1000, apd: {classes: 4, lower: -1, upper: 1}, periods: 1,
+  settling_periods: 2, seeds: 1, noise: 0, motor_travel: 0.1, output_locked: true, angular: false}"""
+CURVE = """schema_version: 1
+%s
+backlash_to_angle: 67
+coverage_factor: 2
+noise_levels: [0, 0.1]
+points:
+  - {backlash: 0, half_gap: 0, skewness: 1, scatter: 0, monotonic: true, signal_level: 0.1, mean: [1, 1], between: [0, 0], within: [0, 0]}
+  - {backlash: 1e-4, half_gap: 0, skewness: 1, scatter: 0, monotonic: true, signal_level: 0.1, mean: [1, 1], between: [0, 0], within: [0, 0]}
+""" % CONDITIONS
+FAMILY = """family:
+  segments: [{floor: 0, threshold: [1, 1], misfit: [0, 0]}]
+  members: [{quantiles: [%s]}, {quantiles: [%s]}]
+"""
+BASELINE = """schema_version: 1
+rig: r
+rig_digest: d
+methods: [lost_motion]
+backlash: 8e-5
+interval: [7e-5, 9e-5]
+backlash_angle: 5e-3
+angle_interval: [4e-3, 6e-3]
+skewness: 1.5
+"""
+LIMITS = "schema_version: 1\nbacklash: {watch: 1e-4, service: 1.5e-4, stop: 2e-4}\n"
+RECORDS = ["time,motor_torque\n0,1\n0.001,2\n", "time,motor_position,load_position\r\n0,1,2\r\n1,2,3\r\n",
+           "\ufefftime, sensor_torque\n0, -1e-3\n0.5, nan\n", "time,motor_torque\n0,1\n0,1\n1,2\n\n\n", "time;motor_torque\n0;1\n"]
+
+
+def write(folder, name, text):
+    os.makedirs(folder, exist_ok=True)
+    with open(os.path.join(folder, name), "wb") as out:
+        out.write(text if isinstance(text, bytes) else text.encode())
+
+
+def main(config, out):
+    for name in sorted(os.listdir(config)):
+        with open(os.path.join(config, name), encoding="utf-8") as stream:
+            text = stream.read()
+        bare = re.sub(r"(?m) *(#.*)?$\n?", lambda m: "\n" if m.group().endswith("\n") else "", text)
+        write(os.path.join(out, "rig"), name, re.sub(r"\n+", "\n", bare))
+    numbers = ", ".join(str(i) for i in range(QUANTILES))
+    for name, text in (("curve", CURVE), ("family", CURVE + FAMILY % (numbers, numbers)), ("baseline", BASELINE),
+                       ("limits", LIMITS)):
+        write(os.path.join(out, "curve"), name, text)
+    for number, text in enumerate(RECORDS):
+        write(os.path.join(out, "csv"), "record_%d" % number, text)
+    rng = random.Random(1)
+    for number in range(8):
+        write(os.path.join(out, "joint_state"), "messages_%d" % number, bytes(rng.randrange(256) for _ in range(2000)))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
