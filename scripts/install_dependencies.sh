@@ -15,6 +15,7 @@ packages=(
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
   libgtest-dev
   python3-matplotlib python3-numpy python3-yaml                   # plots
+  clang-format clang-tidy doxygen                                 # what scripts/check_style.sh and api_doc.sh call
 )
 packages+=("$@")
 
