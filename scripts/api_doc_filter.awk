@@ -3,27 +3,41 @@
 # Usage: awk -f api_doc_filter.awk HEADER
 # SPDX-License-Identifier: BSD-3-Clause
 
-# Lines wait for the next one, which says whether an equation begins or ends.
-function put(line, equation) {
-  if (equation && !in_equation) held = held " \\verbatim"
-  if (!equation && in_equation) {
-    if (line ~ /^ *\/\/\//) sub(/\/\/\//, "/// \\endverbatim", line)
-    else held = held " \\endverbatim"
-  }
-  in_equation = equation
-  if (NR > 1) print held
-  held = line
+function close_equation() {
+  if (equation) held = held " \\endverbatim"
+  equation = 0
 }
 
 FNR == 1 { top = 1; sub(/^\/\/.*/, "/// \\file") }
 /^#pragma once/ { top = 0 }
 top { sub(/^\/\/( |$)/, "/// ") }
+
+# Comments behind members, which may go on in the next lines.
 /^ *\/\/ / && behind { sub(/\/\/ /, "///< ") }
 !/^ *(\/\/|#|})/ && / +\/\/ / { sub(/\/\/ /, "///< ") }
-{
-  behind = /\/\/\/< /
-  indented = /^ *\/\/\/   / && !behind
+{ behind = /\/\/\/< / }
+
+# Comments in front: as /** ... */, in which doxygen takes equations without the slashes. A line is held until the next
+# one says whether the comment or an equation ends with it.
+/^ *\/\/\/( |$)/ {
+  indented = /^ *\/\/\/   /
   item = /^ *\/\/\/ *(-|[0-9]+\.) / || (item && indented)
-  put($0, indented && !item)
+  if (!indented || item) close_equation()
+  else if (!equation && comment) {
+    held = held " \\verbatim"
+    equation = 1
+  }
+  sub(/\/\/\//, comment ? "   " : "/**")
+  if (NR > 1) print held
+  held = $0
+  comment = 1
+  next
+}
+{
+  close_equation()
+  if (comment) held = held " */"
+  comment = item = 0
+  if (NR > 1) print held
+  held = $0
 }
 END { print held }
