@@ -9,11 +9,12 @@
 
 int main(int argc, char** argv) {
   if (argc != 2) return 64;
-  const backlash::RigFile file = backlash::load_rig_file(argv[1]);
+  backlash::RigFile file = backlash::load_rig_file(argv[1]);
+  const double truth = file.rig.mesh.backlash = 80e-6;  // m
+  file.simulation.sensors.sampling_rate = 5000;         // Hz
   const backlash::Record record = backlash::simulate_record(file.rig, file.simulation, 2.0);
   const backlash::Diagnosis diagnosis = backlash::diagnose(record, file.diagnosis, nullptr);
 
-  const double truth = file.rig.mesh.backlash;
   int answers = 0, right = 0;
   for (const backlash::Estimate& estimate : diagnosis.estimates) {
     const backlash_diagnosis::BacklashEstimate message = backlash::to_message(estimate);
