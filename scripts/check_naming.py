@@ -3,8 +3,8 @@
 """Checks the names in all C++ files that a build compiles, by clang-tidy with the rules of .clang-tidy.
 
 What costs is reading the headers, so files that are compiled alike are checked together, several as one. Names that two
-files both keep to themselves would clash: such files go into different groups, and a group that clang cannot read as one
-is checked file by file. Generated code is left out.
+files both keep to themselves would clash: such files go into different groups, and a group that clang still cannot read
+as one is halved. Generated code is left out.
 """
 import argparse
 import collections
@@ -18,9 +18,10 @@ import sys
 import tempfile
 
 FILES_PER_GROUP = 12
-# Names are declared in column 0, as .clang-format has it, and what follows tells them from types. Aliases may be repeated,
-# and tests of one room have different names anyway.
-OWN_NAME = re.compile(r"^(?!TEST|using|namespace)(?=\w).*?(\w+)(?:\[\w*\])*(?: final)?(?: : .*)? ?[({=;]", re.MULTILINE)
+# What a file defines is in column 0, as .clang-format has it, and what follows tells names from types; constants may come
+# several in a line. Aliases may be repeated, and tests of one room have different names anyway.
+DEFINED = re.compile(r"^(?!TEST|using|namespace)(?=\w).*?(\w+)(?:\[\w*\])*(?: final)?(?: : .*)? ?[({=;]|\b(k[A-Z]\w*) = ",
+                     re.MULTILINE)
 
 
 def compiled_files(database, source):
@@ -39,18 +40,15 @@ def compiled_files(database, source):
     return files
 
 
-def own_names(path):
-    """Names in the anonymous namespaces of a file."""
-    text = open(path).read()
-    return {name for space in re.findall(r"^namespace \{\n(.*?)^\}  // namespace$", text, re.MULTILINE | re.DOTALL)
-            for name in OWN_NAME.findall(space)}
+def defined_names(path):
+    return {first or second for first, second in DEFINED.findall(open(path).read())}
 
 
 def grouped(files):
-    """Lists of files with the same flags and different names of their own."""
-    groups = collections.defaultdict(list)  # flags and folder -> [(files, names)]
+    """Lists of files that have the same flags and define different names."""
+    groups = collections.defaultdict(list)  # flags -> [(files, names)]
     for path, flags in sorted(files.items()):
-        names = own_names(path)
+        names = defined_names(path)
         alike = groups[flags]
         for members, taken in alike:
             if len(members) < FILES_PER_GROUP and not names & taken:
@@ -74,7 +72,8 @@ def tidy(members, flags, source):
     if run.returncode == 0:
         return ""
     if "clang-diagnostic-error" in run.stdout and len(members) > 1:
-        return "".join(tidy([path], flags, source) for path in members)
+        half = len(members) // 2
+        return tidy(members[:half], flags, source) + tidy(members[half:], flags, source)
     return run.stdout or run.stderr
 
 
