@@ -18,6 +18,7 @@ packages=(
   libgtest-dev
   python3-matplotlib python3-numpy python3-yaml                   # plots
   chromium chromium-driver python3-selenium                       # tests that look at the pages in a browser
+  clang-format clang-tidy doxygen                                 # what scripts/check_style.sh and api_doc.sh call
 )
 packages+=("$@")
 
