@@ -47,7 +47,7 @@ Services
 
 Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the
 simulation follows that clock, otherwise wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a
-wrong rig file, 66 for a missing one, 70 where the integration fails.
+wrong rig file or one whose machine cannot be integrated, 66 for a missing one.
 )";
 }
 
