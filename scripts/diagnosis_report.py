@@ -27,8 +27,12 @@ class Data:
         self.linear, self.locked, self.rigid = series["linear"], series["locked"], series["rigid"]
         record = series["record"]
         self.period = record["period"]
-        self.time = np.array(record["time"], float)
-        self.channels = {name: np.array(c["values"], float) for name, c in record["channels"].items()}
+        time = np.array(record["time"], float)
+        steps = np.diff(time)
+        gaps = np.flatnonzero(steps > 2.5 * np.median(steps)) + 1 if steps.size else []  # no line is drawn across them
+        self.time = np.insert(time, gaps, np.nan)
+        self.channels = {name: np.insert(np.array(c["values"], float), gaps, np.nan)
+                         for name, c in record["channels"].items()}
         self.units = {name: c["unit"] for name, c in record["channels"].items()}
         shown = [*self.report["estimates"], self.report["verdict"]]
         # What the answers are compared in: along the line of action, or as an angle where the rig has no base radius.
