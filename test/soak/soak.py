@@ -54,7 +54,7 @@ class Listener:
         rospy.init_node("soak", anonymous=True, disable_signals=True)
         self.status, self.estimates = {}, {}
         self._subscribers = [rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics),
-                             rospy.Subscriber("backlash_estimate", BacklashEstimate, self._on_estimate, tcp_nodelay=True)]
+                             rospy.Subscriber("backlash_estimate", BacklashEstimate, self._on_estimate)]
 
     def _on_diagnostics(self, message):
         for status in message.status:
