@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iterator>
 #include <optional>
+#include <system_error>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
@@ -23,7 +24,8 @@ std::optional<std::string> content_if_any(const std::string& path) {
   try {
     return content_of(path);
   } catch (const MissingInput&) {
-    if (std::filesystem::exists(path)) throw;
+    std::error_code ignored;
+    if (std::filesystem::exists(path, ignored)) throw;
     return std::nullopt;
   }
 }
