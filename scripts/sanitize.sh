@@ -19,7 +19,7 @@ WS=${WS}_${kind}
 make_workspace
 echo "Building in ${WS}"
 # Debug information of lines only: the sanitizers tell places by it, and the build stays small.
-build -DCMAKE_BUILD_TYPE=None "-DCMAKE_CXX_FLAGS=-O1 -g1 -fno-omit-frame-pointer ${flags}"
+build all -DCMAKE_BUILD_TYPE=None "-DCMAKE_CXX_FLAGS=-O1 -g1 -fno-omit-frame-pointer ${flags}"
 use_workspace
 failed=0
 
