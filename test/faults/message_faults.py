@@ -180,7 +180,7 @@ class Bench:
         import diagnoser_support as support
         import rospy
         from sensor_msgs.msg import JointState
-        rospy.init_node("fault_campaign", anonymous=True, disable_signals=True)
+        rospy.init_node("fault_campaign", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
         self.support, self.rospy, self.message_type = support, rospy, JointState
         self.curve = support.build_curve(folder)
         self.times, self.messages = support.simulated_messages(folder, BACKLASH / 2)

@@ -81,7 +81,7 @@ class Bench:
         import rospy
         from diagnostic_msgs.msg import DiagnosticArray
         from backlash_diagnosis.srv import Diagnose, SetBaseline
-        rospy.init_node("fault_campaign", anonymous=True, disable_signals=True)
+        rospy.init_node("fault_campaign", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
         self.folder, self.master, self.rospy = folder, master, rospy
         self.types = {"diagnose": Diagnose, "set_baseline": SetBaseline, "diagnostics": DiagnosticArray}
         self.curve = support.build_curve(folder)
@@ -183,8 +183,10 @@ def diagnoser_killed_while_it_writes_its_baseline(bench, rng):
 def write_until_killed(bench):
     import rospy
     try:
+        bench.rospy.wait_for_service("/diagnoser/set_baseline", WAIT)
+        proxy = bench.rospy.ServiceProxy("/diagnoser/set_baseline", bench.types["set_baseline"])
         while True:
-            bench.call("set_baseline", joint="", clear=False)
+            proxy(joint="", clear=False)
     except (rospy.ServiceException, rospy.ROSException, OSError):
         pass
 
@@ -285,7 +287,8 @@ def full_disk_for_the_commands(bench, rng):
 def roscore_killed_and_restarted(bench, rng):
     """The nodes go on measuring without a master; a new one knows them again, with all that they had kept."""
     with bench.simulator() as simulator, bench.diagnoser() as diagnoser:
-        bench.judged(BACKLASH)
+        bench.after_new_periods(BACKLASH)
+        time.sleep(2)  # nodes look what the master knows of them each second; before that they know nothing to tell
         begin = bench.call("diagnose", joint="", periods=1, timeout=5).distribution.header.stamp.to_sec()
         bench.master.kill()
         time.sleep(rng.choice([0.5, 5]))

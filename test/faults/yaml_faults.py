@@ -223,9 +223,9 @@ def uses_of(rng, clean):
         "integrator_study", "rig.yaml", "--loop", "loop.yaml", "--json", "out.json"], ["out.json"], judge_done
 
 
-def diagnosis_of_own_curve(rng, clean):
+def diagnosis_by_wrong_rig(rng, clean):
     """A wrong rig file under a right record, with the curve of the right one or with one built from the wrong one."""
-    command = DIAGNOSE if rng.random() < 0.7 else DIAGNOSE[:4] + ["--json", "out.json"]
+    command = DIAGNOSE if rng.random() < 0.8 else DIAGNOSE[:4] + ["--json", "out.json"]
     others = {"record.csv": clean.record, "curve.yaml": clean.curve}
     return "rig.yaml", clean.rig, others, command, ["out.json"], judge_diagnosis
 
@@ -241,8 +241,8 @@ def is_rig(body):
 
 def case(rng, clean, generate):
     name, body, others, command, outputs, judge = uses_of(rng, clean)
-    if generate in (value_off_by_1000, extreme_value) and rng.random() < 0.4:
-        name, body, others, command, outputs, judge = diagnosis_of_own_curve(rng, clean)
+    if generate is value_off_by_1000 and rng.random() < 0.5:
+        name, body, others, command, outputs, judge = diagnosis_by_wrong_rig(rng, clean)
     what, changed, refuse, says = generate(rng, name, body)
     if judge is judge_diagnosis and judged_by_angle(what):
         judge = judge_angle

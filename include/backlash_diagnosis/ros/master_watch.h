@@ -21,7 +21,7 @@ struct Registrations {
 /// more, tells it again what it knew last, and says so on the log; so also where the master does not answer.
 class MasterWatch {
  public:
-  explicit MasterWatch(double interval = 2);
+  explicit MasterWatch(double interval = 1);
   ~MasterWatch();
   MasterWatch(const MasterWatch&) = delete;
   MasterWatch& operator=(const MasterWatch&) = delete;
