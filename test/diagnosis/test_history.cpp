@@ -5,19 +5,34 @@
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <random>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/diagnosis/history.h"
+
+namespace {
+
+/// Sees what is asked of the disk; its result is fsync's. Empty: the system's own.
+std::function<int(int descriptor)> on_fsync;
+
+}  // namespace
+
+/// In the place of the C library's, also for the library under test.
+extern "C" int fsync(int descriptor) {
+  return on_fsync ? on_fsync(descriptor) : static_cast<int>(::syscall(SYS_fsync, descriptor));
+}
 
 namespace backlash {
 namespace {
@@ -109,6 +124,40 @@ class HistoryTest : public ::testing::Test {
 
   fs::path folder_;
 };
+
+class FsyncSeen {
+ public:
+  explicit FsyncSeen(std::function<int(int)> seen) { on_fsync = std::move(seen); }
+  ~FsyncSeen() { on_fsync = nullptr; }
+};
+
+TEST_F(HistoryTest, AnEntryIsOnTheDiskBeforeItCountsAsWritten) {
+  History h = history();
+  std::string at_sync;
+  {
+    const FsyncSeen seen([&](int) {
+      at_sync = content();
+      return 0;
+    });
+    h.append(entry(1));
+  }
+  EXPECT_EQ(at_sync, content());  // whole by then, and nothing was written after it
+  expect_entries({1});
+}
+
+TEST_F(HistoryTest, AnEntryThatTheDiskRefusesIsNotWritten) {
+  History h = history();
+  {
+    const FsyncSeen seen([](int) {
+      errno = EIO;
+      return -1;
+    });
+    expect_refusal<CannotWrite>([&] { h.append(entry(1)); }, "Input/output error");
+  }
+  expect_entries({});
+  h.append(entry(1));
+  expect_entries({1});
+}
 
 TEST_F(HistoryTest, EntriesComeBackAsTheyWere) {
   HistoryEntry full = entry(1);
