@@ -178,7 +178,8 @@ int compare(const Arguments& arguments) {
   std::vector<ModelComparison> models;
   try {
     ProgressBar bar;
-    record = of_file(files.front().source, [&] { return compared_record(given, rigs.front(), settings); });
+    record = of_file(path + " with " + files.front().source,
+                     [&] { return compared_record(given, rigs.front(), settings); });
     models = of_file(joined_sources(files),
                      [&] { return compare_models(rigs, record, settings, bar.progress()); });
   } catch (const CannotIdentify& error) {
