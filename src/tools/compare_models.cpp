@@ -180,7 +180,7 @@ int compare(const Arguments& arguments) {
     ProgressBar bar;
     record = of_file(path + " with " + files.front().source,
                      [&] { return compared_record(given, rigs.front(), settings); });
-    models = of_file(joined_sources(files),
+    models = of_file(path + " with " + joined_sources(files),
                      [&] { return compare_models(rigs, record, settings, bar.progress()); });
   } catch (const CannotIdentify& error) {
     std::cerr << "compare_models: " << error.what() << '\n';
