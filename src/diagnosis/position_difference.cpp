@@ -84,6 +84,30 @@ bool load_moves(const TwoEncoders& motion) {
   return moved > 0.5 * travel(deflection) && moved > 20 * smallest_step(motion.load);
 }
 
+/// Between two walls no torque drives the motor faster than if it pushed over the whole travel. Positions
+/// that jump are no positions: columns with exchanged names, or other units. `fastest` has thrice that speed,
+/// and only moves over half the travel count, so that neither noise nor a wrong inertia matters; slow
+/// sampling shows no jumps.
+void require_possible(const TwoEncoders& motion, double inertia) {
+  constexpr double kSurelyTooFast = 3;
+  constexpr std::size_t kOutliers = 6;
+  if (!(inertia > 0)) return;
+  double torque = 0;
+  for (const double t : {quantile(motion.torque, 0.01), quantile(motion.torque, 0.99)})
+    torque = std::max(torque, std::abs(t));
+  const double moved = travel(motion.motor);
+  const double fastest = kSurelyTooFast * std::sqrt(2 * torque * moved / inertia);
+  const auto lag = static_cast<std::size_t>(std::min(1e6, 0.5 * moved / (fastest * motion.interval)));
+  if (lag < 1 || !(fastest > 0)) return;
+  std::size_t jumps = 0;
+  for (std::size_t i = 0; i + lag < motion.motor.size(); ++i)
+    jumps += std::abs(motion.motor[i + lag] - motion.motor[i]) > 0.5 * moved;
+  if (jumps > kOutliers)
+    throw Refusal{Status::out_of_domain, "motor_position jumps faster than a torque of " + text(torque) +
+                                             " N m can drive the motor: columns are exchanged, or a unit is "
+                                             "not as declared"};
+}
+
 struct Fits {
   FlankFit fit, longer;
 };
@@ -139,6 +163,7 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
   if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
     throw Refusal{Status::out_of_domain, "the output moves by " + text(travel(motion.load)) +
                                              " rad although the rig says that it is locked"};
+  if (settings.output_locked) require_possible(motion, settings.motor_inertia);
   FlankModel model;
   model.elastic = settings.elastic_deflection;
   model.inertia = settings.motor_inertia;

@@ -49,13 +49,17 @@ double SampleStream::jump_limit() const {
   return std::max(1.0, 3 * period_);
 }
 
+/// Without it there is nothing to diagnose.
+Channel SampleStream::needed() const {
+  return settings_.apd ? settings_.apd->signal : Channel::motor_torque;
+}
+
 /// A run has the channels of its first sample: every later one must have them, and one that has more begins a
 /// new run.
 SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
   if (!channels_.empty() && present(values) == present_) return Fit::take;
-  const Channel needed = settings_.apd ? settings_.apd->signal : Channel::motor_torque;
-  if (channels_.empty() && !std::isfinite(get(values, needed))) {
-    counters_.last_problem = channel_name(needed) + " is absent or not a number";
+  if (channels_.empty() && !std::isfinite(get(values, needed()))) {
+    counters_.last_problem = channel_name(needed()) + " is absent or not a number";
     return Fit::drop;
   }
   for (const Channel channel : channels_)
@@ -71,6 +75,12 @@ SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
       return Fit::restart;
     }
   return Fit::take;
+}
+
+/// Whether the run waits in vain for a channel that only its beginning had.
+bool SampleStream::has_lost_channel(double time, const ChannelValues& values) const {
+  return !record_.time.empty() && std::isfinite(get(values, needed())) &&
+         time - record_.time.back() > jump_limit();
 }
 
 /// Whether a stamp continues the run; if not, says why.
@@ -93,11 +103,14 @@ SampleStream::Fit SampleStream::fit(double time) {
 
 const PeriodResult* SampleStream::add(double time, const ChannelValues& values) {
   const Fit channels = fit(values);
-  if (channels == Fit::drop) {
+  const bool lost = channels == Fit::drop && has_lost_channel(time, values);
+  if (channels == Fit::drop && !lost) {
     ++counters_.not_a_number;
     return nullptr;
   }
+  const std::string problem = counters_.last_problem;
   const Fit stamp = fit(time);
+  if (lost) counters_.last_problem = problem + " any more: a new run without it";
   if (stamp == Fit::drop) {
     ++counters_.repeated;
     return nullptr;

@@ -178,8 +178,9 @@ int compare(const Arguments& arguments) {
   std::vector<ModelComparison> models;
   try {
     ProgressBar bar;
-    record = of_file(files.front().source, [&] { return compared_record(given, rigs.front(), settings); });
-    models = of_file(joined_sources(files),
+    record = of_file(path + " with " + files.front().source,
+                     [&] { return compared_record(given, rigs.front(), settings); });
+    models = of_file(path + " with " + joined_sources(files),
                      [&] { return compare_models(rigs, record, settings, bar.progress()); });
   } catch (const CannotIdentify& error) {
     std::cerr << "compare_models: " << error.what() << '\n';

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/version.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
@@ -170,7 +171,7 @@ int run_study(const Arguments& arguments) {
   IntegratorStudy study;
   {
     ProgressBar bar;
-    study = study_integrators(file, settings, bar.progress());
+    study = of_file(loop + " with " + rig, [&] { return study_integrators(file, settings, bar.progress()); });
   }
   write_text(out, study_json(study, settings, file).dump() + "\n");
   tell_right(study, settings);

@@ -164,6 +164,22 @@ TEST(PositionDifference, LockedOutputWithDeclaredElasticDeflection) {
   EXPECT_GE(e.angle_upper, 1e-3);
 }
 
+// Names of torque and position exchanged: the "position" is a square wave that no torque could drive.
+TEST(PositionDifference, PositionsThatJumpAreNoPositions) {
+  Record r = locked(5e-3);
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    const double side = std::sin(2 * M_PI * 10 * r.time[i] + 0.01) > 0 ? 1 : -1;
+    r.column(Channel::motor_torque)[i] = 5e-3 * side;
+    r.column(Channel::motor_position)[i] = 0.05 * side;
+  }
+  PositionDifferenceSettings s = locked_settings();
+  s.output_locked = true;
+  s.motor_inertia = 2.2e-5;  // kg m^2: 5 mN m push it over 0.1 rad in 30 ms at best
+  const Estimate e = estimate_position_difference(r, s);
+  EXPECT_EQ(e.status, Status::out_of_domain);
+  EXPECT_NE(e.message.find("jumps"), std::string::npos) << e.message;
+}
+
 TEST(PositionDifference, WhatTheRecordLacksBecomesAStatus) {
   const Record full = Servo().record();
   const auto status_without = [&full](Channel channel) {

@@ -322,6 +322,24 @@ TEST(SampleStream, AChannelThatAppearsStartsANewRun) {
   EXPECT_EQ(run.stream.periods(), 13);
 }
 
+// One stray message with a velocity must not make all later ones useless.
+TEST(SampleStream, AChannelThatIsGoneStartsANewRunAfterASecond) {
+  RecordRecipe recipe;
+  const Record record = make_record(recipe);
+  SampleStream stream({apd_settings(), 60});
+  const double dt = record.time[1] - record.time[0];
+  ChannelValues stray = values_at(record, 0);
+  stray[static_cast<std::size_t>(Channel::load_velocity)] = 0.5;
+  stream.add(0, stray);
+  for (std::size_t i = 0; i < record.size(); ++i) stream.add(record.time[i] + dt, values_at(record, i));
+  const StreamCounters& counters = stream.counters();
+  EXPECT_EQ(counters.restarts, 1);
+  EXPECT_NEAR(counters.not_a_number * dt, stream.jump_limit(), 2 * dt);
+  EXPECT_EQ(counters.accepted + counters.not_a_number, static_cast<long>(record.size()) + 1);
+  EXPECT_NE(counters.last_problem.find("load_velocity"), std::string::npos) << counters.last_problem;
+  EXPECT_FALSE(stream.kept().has(Channel::load_velocity));
+}
+
 TEST(SampleStream, UnknownPeriodIsFoundFromTheSamples) {
   RecordRecipe recipe;
   recipe.frequency = 8;  // 125 samples

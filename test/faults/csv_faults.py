@@ -223,13 +223,17 @@ ANSWERED = {harmless_layout, repeated_times}  # nothing is lost: the answer is t
 
 
 def lenient_rows(body):
-    """The rows of a text as Python reads them: an oracle that shares nothing with the reader under test."""
+    """The rows of a text by column, as Python reads them: an oracle that shares nothing with the reader under test."""
+    header, *lines = body.decode("utf-8-sig", "replace").replace("\r", "").splitlines()
+    names = [name.strip() for name in header.split(",")]
     rows = set()
-    for row in body.decode("utf-8", "replace").replace("\r", "").splitlines()[1:]:
+    for line in lines:
         try:
-            rows.add(tuple(float(field) for field in row.split(",")))
+            row = dict(zip(names, (float(field) for field in line.split(","))))
         except ValueError:
-            pass
+            continue
+        row["time"] = round(row.get("time", 0), 9)  # s; a record's times end with the nanosecond
+        rows.add(tuple(sorted(row.items())))
     return rows
 
 
@@ -237,8 +241,8 @@ def judge_conversion(body):
     """What was converted is what the text says, row by row."""
     def judge(folder, code, err):
         with open(folder + "/out.csv", "rb") as stream:
-            out = stream.read()
-        strange = lenient_rows(out) - lenient_rows(body)
+            out = lenient_rows(stream.read())
+        strange = out - lenient_rows(body)
         if strange or not out:
             return BAD, "rows that are not in the input: %s" % sorted(strange)[:2]
         return RIGHT, ""

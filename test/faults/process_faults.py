@@ -98,6 +98,15 @@ class Bench:
         self.rospy.wait_for_service("/diagnoser/" + name, WAIT)
         return self.rospy.ServiceProxy("/diagnoser/" + name, self.types[name])(**request)
 
+    def status_says(self, words):
+        """Whether any value or message on /diagnostics holds the words."""
+        try:
+            array = self.rospy.wait_for_message("/diagnostics", self.types["diagnostics"], 5)
+        except self.rospy.ROSException:
+            return False
+        return any(words in text for status in array.status
+                   for text in [status.message] + [value.value for value in status.values])
+
     def judged(self, backlash, periods=PERIODS, timeout=WAIT):
         answer = self.call("diagnose", joint="", periods=periods, timeout=timeout)
         if not answer.success:
@@ -189,6 +198,58 @@ def write_until_killed(bench):
             proxy(joint="", clear=False)
     except (rospy.ServiceException, rospy.ROSException, OSError):
         pass
+
+
+def history_text(path):
+    with open(path, "rb") as stream:
+        return stream.read()
+
+
+def torn_lines(text):
+    """Lines of a history that are neither whole (the last cell is in quotes) nor the one that was cut off last."""
+    return [line for line in text.split(b"\n")[1:-1] if line and not line.endswith(b'"')]
+
+
+def diagnoser_killed_while_it_writes_history(bench, rng):
+    """What has been written once is there for good; of the line under way at most a rest is left, which is no entry."""
+    folder = os.path.join(bench.folder, "history_%d" % rng.randrange(10**9))
+    os.makedirs(folder)
+    path, kills = os.path.join(folder, "joint.csv"), 5
+    with bench.simulator(), bench.diagnoser("_history:=" + folder, "_history_interval:=0",
+                                            "_estimate_interval:=0") as diagnoser:
+        lines = 3
+        for _ in range(kills):
+            until(lambda: os.path.exists(path) and history_text(path).count(b"\n") >= lines, "%d lines" % lines)
+            time.sleep(rng.uniform(0, 0.3))  # what is tried: any moment
+            before = history_text(path)
+            diagnoser.kill()
+            diagnoser.start()
+            lines = history_text(path).count(b"\n") + 3
+            if not history_text(path).startswith(before):
+                return BAD, "an entry that was written is lost"
+        until(lambda: history_text(path).count(b"\n") >= lines, "%d lines" % lines)
+        if len(torn_lines(history_text(path))) > kills:
+            return BAD, "torn lines: %s" % torn_lines(history_text(path))[:2]
+        return bench.after_new_periods(BACKLASH)
+
+
+def full_disk_for_the_history(bench, rng):
+    """Entries wait until there is room again; what was written stays."""
+    with SmallDisk(bench.folder) as disk:
+        path = os.path.join(disk.path, "joint.csv")
+        with bench.simulator(), bench.diagnoser("_history:=" + disk.path, "_history_interval:=0",
+                                                "_estimate_interval:=0") as diagnoser:
+            until(lambda: os.path.exists(path) and history_text(path).count(b"\n") >= 3, "three lines")
+            disk.fill()
+            until(lambda: bench.status_says("No space left"), "the full disk on /diagnostics")
+            before = history_text(path)
+            verdict = bench.after_new_periods(BACKLASH)
+            os.remove(os.path.join(disk.path, "filler"))
+            until(lambda: len(history_text(path)) > len(before) + 200, "the entries that waited")
+            after = history_text(path)
+            if not diagnoser.alive() or not after.startswith(before) or torn_lines(after):
+                return BAD, "lines were lost or torn: " + diagnoser.output()[-300:]
+            return verdict
 
 
 def curve_file_changed_while_running(bench, rng):
@@ -328,7 +389,8 @@ def clock_stopped(bench, rng):
 
 CASES = [simulator_killed_and_restarted, simulator_restarted_with_other_backlash, simulator_stopped_and_continued,
          diagnoser_killed_and_restarted, diagnoser_killed_while_it_writes_its_baseline,
-         curve_file_changed_while_running, full_disk_for_the_baseline, full_disk_for_the_commands,
+         diagnoser_killed_while_it_writes_history, full_disk_for_the_history, curve_file_changed_while_running,
+         full_disk_for_the_baseline, full_disk_for_the_commands,
          roscore_killed_and_restarted, clock_stopped]
 
 

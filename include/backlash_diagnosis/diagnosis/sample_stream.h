@@ -24,7 +24,8 @@ struct StreamCounters {
   long accepted = 0;
   long not_a_number = 0;  // samples without a finite value in a channel that the run has
   long repeated = 0;      // stamps equal to the one before
-  long restarts = 0;      // stamps that went back or jumped, or a channel that appeared: a new run begins
+  long restarts =
+      0;  // stamps that went back or jumped, or a channel that appeared or is gone: a new run begins
   std::string last_problem;
 };
 
@@ -33,9 +34,10 @@ class SampleStream {
   explicit SampleStream(const StreamSettings& settings);
 
   /// Adds a sample; returns a settled period with its APD (see PeriodResult::complete) when this sample ends
-  /// it. A stamp that goes back, or jumps by more than `jump_limit()`, or a channel that appears, starts a
-  /// new run: everything kept is forgotten and settling begins again. Null where no period ends here; valid
-  /// until the next call. Throws InvalidParameter for a stamp that is not finite.
+  /// it. A stamp that goes back, or jumps by more than `jump_limit()`, or a channel that appears or
+  /// has been gone for as long, starts a new run: everything kept is forgotten and settling begins again.
+  /// Null where no period ends here; valid until the next call. Throws InvalidParameter for a stamp that is
+  /// not finite.
   const PeriodResult* add(double time, const ChannelValues& values);
 
   /// Whole settled periods at hand.
@@ -60,6 +62,8 @@ class SampleStream {
   };
   Fit fit(const ChannelValues& values);
   Fit fit(double time);
+  Channel needed() const;
+  bool has_lost_channel(double time, const ChannelValues& values) const;
   void find_period();
   const PeriodResult* start_windows();
   void trim();

@@ -17,7 +17,7 @@ auto of_file(const std::string& path, const Work& work) {
   } catch (const InvalidParameter& error) {
     throw BadData(path, error.what());
   } catch (const IntegrationError& error) {
-    throw BadData(path, std::string("this machine cannot be simulated: ") + error.what());
+    throw BadData(path, std::string("the machine cannot be simulated: ") + error.what());
   }
 }
 
