@@ -35,10 +35,10 @@ LostMotionSettings read_lost_motion(const YamlReader& yaml) {
   return lost_motion;
 }
 
-template <Estimate (*estimate)(const ApdResult&, const CurveMatch&, const MonitoringCurve*)>
+template <Estimate (*Estimator)(const ApdResult&, const CurveMatch&, const MonitoringCurve*)>
 Estimate by_apd(const DiagnosisInput& in) {
   if (!in.settings.apd) return not_served("the rig file declares no diagnosis.apd");
-  return estimate(*in.apd, in.match, in.curve);
+  return Estimator(*in.apd, in.match, in.curve);
 }
 
 Estimate by_lost_motion(const DiagnosisInput& in) {
