@@ -258,7 +258,7 @@ def one(bench, generate, rng):
 
 
 def burst(bench, rng):
-    """10 000 messages per second and more, for one second of stamps, several times."""
+    """As fast as rospy can, several runs one after another; the rate that was reached is told."""
     rounds = rng.choice([3, 10])
     publisher, diagnoser = bench.open()
     with diagnoser:
