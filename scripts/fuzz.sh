@@ -26,8 +26,8 @@ quietly fuzz_build make -C "${folder}" "-j$(nproc)"
 fuzz() {
   local corpus=${folder}/corpus/$1 log=${folder}/$1.log code=0
   mkdir -p "${corpus}"
-  (cd "${folder}" && "./fuzz_$1" -max_total_time="${seconds}" -timeout=10 -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
-    -dict="${REPO}/test/fuzz/$2.dict" "${corpus}" "seeds/$1") >"${log}" 2>&1 || code=$?
+  (cd "${folder}" && "./fuzz_$1" -max_total_time="${seconds}" -timeout=10 -rss_limit_mb=2048 -max_len=20000 -len_control=0 \
+    -print_final_stats=1 -dict="${REPO}/test/fuzz/$2.dict" "${corpus}" "seeds/$1") >"${log}" 2>&1 || code=$?
   local executions edges
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "${log}")
   edges=$(grep -o 'cov: [0-9]*' "${log}" | tail -n 1 | cut -d ' ' -f 2)

@@ -84,14 +84,15 @@ def run_files(arguments, table):
             table.add(kind, result.verdict, what, result.why)
 
 
-def run_messages(arguments, table):
+def run_nodes(arguments, table, parts):
+    """One master for both: rospy stays with the first that it meets."""
     import message_faults
-    message_faults.run(arguments, table)
-
-
-def run_processes(arguments, table):
     import process_faults
-    process_faults.run(arguments, table)
+    from ros_master import Master
+    with Master() as master:
+        for part, module in (("messages", message_faults), ("processes", process_faults)):
+            if part in parts:
+                module.run(arguments, table, master)
 
 
 def main():
@@ -106,9 +107,11 @@ def main():
     parser.add_argument("--out", default="", help="file to write the table to, too")
     arguments = parser.parse_args()
     table = Table()
-    for part in PARTS:
-        if arguments.part in (part, "all"):
-            globals()["run_" + part](arguments, table)
+    parts = PARTS if arguments.part == "all" else (arguments.part,)
+    if "files" in parts:
+        run_files(arguments, table)
+    if set(parts) != {"files"}:
+        run_nodes(arguments, table, parts)
     for name, text in ((arguments.log, "\n".join(table.lines)), (arguments.out, table.text())):
         if name:
             with open(name, "w") as stream:

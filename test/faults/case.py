@@ -89,8 +89,10 @@ def judged_refusal(case, code, err):
 
 
 def named_place(name, message):
-    """A line, or that the file as a whole is too short, too large or of something else."""
+    """A line, a key with its value, or that the file as a whole is too short, too large or of something else."""
     whole = r"(no data|larger than|is of the rig|channels|no sample|needs|need|has|samples|record|cannot be simulated)"
+    if re.search(re.escape(name) + r".*: .+ = \S+: ", message):
+        return True
     return re.search(re.escape(name) + r":\d+", message) or re.search(re.escape(name) + r".*" + whole, message)
 
 

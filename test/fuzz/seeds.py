@@ -48,7 +48,7 @@ def write(folder, name, text):
 def main(config, out):
     for name in sorted(os.listdir(config)):
         with open(os.path.join(config, name), encoding="utf-8") as stream:
-            text = stream.read()
+            text = re.sub(r"(?m)^test_runs: .*$", "", stream.read())  # names another file
         bare = re.sub(r"(?m) *(#.*)?$\n?", lambda m: "\n" if m.group().endswith("\n") else "", text)
         write(os.path.join(out, "rig"), name, re.sub(r"\n+", "\n", bare))
     numbers = ", ".join(str(i) for i in range(QUANTILES))

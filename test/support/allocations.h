@@ -39,6 +39,10 @@ void* operator new(std::size_t size) {
 void* operator new[](std::size_t size) {
   return backlash::test::counted(size);
 }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  if (backlash::test::counting_allocations) ++backlash::test::allocations;
+  return std::malloc(size > 0 ? size : 1);
+}
 void operator delete(void* place) noexcept {
   std::free(place);
 }
