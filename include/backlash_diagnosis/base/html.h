@@ -11,7 +11,7 @@ namespace backlash {
 /// With the characters that HTML takes for its own replaced.
 std::string html_text(const std::string& text);
 
-/// <name attributes>content</name>
+/// An element of that name, around the content.
 std::string html_tag(const std::string& name, const std::string& content, const std::string& attributes = "");
 
 /// A cell of a table; `kind` is its class.
