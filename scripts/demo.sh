@@ -69,10 +69,11 @@ roslaunch_pid=
 rosrun "${PACKAGE}" convert_record "${out}/record.bag" "${out}/record.csv" --rig "${rig}"
 status=0
 rosrun "${PACKAGE}" diagnose_record "${out}/record.bag" --rig "${rig}" --curve "${curve}" --json "${out}/diagnosis.json" \
-  >"${out}/diagnosis.txt" || status=$?
+  --report "${out}/diagnosis.html" >"${out}/diagnosis.txt" || status=$?
 ((status <= 3)) || fail "diagnose_record failed with exit code ${status}"
 rosrun "${PACKAGE}" plot_diagnosis.py --record "${out}/record.csv" --diagnosis "${out}/diagnosis.json" \
   --curve "${curve}" --out "${out}/demo.png" --true "${true_backlash}"
 
 /usr/bin/python3 "${REPO}/scripts/print_answer.py" "${out}/answer.yaml" "${true_backlash}"
 echo "Picture: ${out}/demo.png"
+echo "Report: ${out}/diagnosis.html"

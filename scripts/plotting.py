@@ -4,12 +4,16 @@
 Exit codes of all of them: 0 done, 64 usage, 65 not the data, 66 data missing, 70 matplotlib missing, 73 cannot write.
 """
 import argparse
+import base64
+import html
+import io
 import json
 import os
 import sys
 import tempfile
 
 NAME = os.path.basename(sys.argv[0])
+PAGE_FIGURE = (5.6, 3.3)  # inches; the pages set two beside each other where they are wide enough
 
 
 class Parser(argparse.ArgumentParser):
@@ -30,7 +34,7 @@ def fail(code, message):
 def load_json(path, what):
     """A file of schema_version 1; `what` names it for the error."""
     try:
-        with open(path) as stream:
+        with open(path, encoding="utf-8") as stream:
             data = json.load(stream)
         if data["schema_version"] != 1:
             raise ValueError("schema_version is not 1")
@@ -66,13 +70,42 @@ def pyplot():
         fail(70, "%s (Debian: python3-matplotlib)" % error)
 
 
-def save(figure, path, dpi=100):
-    """Whole or not at all."""
+def page_pyplot():
+    """The same, in the style of the pages."""
+    plt = pyplot()
+    plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+                         "grid.color": "#e6e6e6", "axes.axisbelow": True, "legend.frameon": False,
+                         "axes.titlesize": 9, "axes.formatter.limits": (-3, 4), "axes.formatter.use_mathtext": True,
+                         "agg.path.chunksize": 10000})
+    return plt
+
+
+def picture(figure, caption):
+    """As HTML that holds it."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=130)
+    pyplot().close(figure)
+    return '<figure><img alt="%s" src="data:image/png;base64,%s"><figcaption>%s</figcaption></figure>\n' % (
+        html.escape(caption, True), base64.b64encode(stream.getvalue()).decode(), html.escape(caption))
+
+
+def figures(pictures):
+    return '<div class="figures">\n%s</div>\n' % "".join(pictures)
+
+
+def drawn_with():
+    import matplotlib
+    return '<p class="small">Drawn with matplotlib %s, Python %s.</p>\n' % (
+        html.escape(matplotlib.__version__), html.escape(sys.version.split()[0]))
+
+
+def write_whole(path, write):
+    """`write` fills the file whose path it is given; `path` then holds all of it, or is as before."""
     temporary = None
     try:
         handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path) or ".", suffix=os.path.splitext(path)[1])
         os.close(handle)
-        figure.savefig(temporary, dpi=dpi)
+        write(temporary)
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)
@@ -83,6 +116,17 @@ def save(figure, path, dpi=100):
     finally:
         if temporary is not None and os.path.exists(temporary):
             os.unlink(temporary)
+
+
+def save(figure, path, dpi=100):
+    write_whole(path, lambda temporary: figure.savefig(temporary, dpi=dpi))
+
+
+def save_text(text, path):
+    def write(temporary):
+        with open(temporary, "w", encoding="utf-8") as stream:
+            stream.write(text)
+    write_whole(path, write)
 
 
 def run(main):

@@ -34,21 +34,20 @@ echo "Running the tests; their output goes to ${WS}/log/run_tests.log"
 # One at a time: rostests measure rates. The exit code says nothing about the tests, only about the run.
 quietly run_tests catkin_make --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 -j1 run_tests ||
   outside+=(--failed "run_tests: the run broke off")
-if quietly catkin_lint catkin_lint --strict "${REPO}"; then
-  outside+=(--passed catkin_lint)
-else
-  outside+=(--failed "catkin_lint: see above")
-fi
+# check NAME COMMAND...: a test outside the test runners.
+check() {
+  if quietly "$@"; then outside+=(--passed "$1"); else outside+=(--failed "$1: see above"); fi
+}
+check catkin_lint catkin_lint --strict "${REPO}"
+for part in licence format naming; do
+  check "${part}" bash "${REPO}/scripts/check_style.sh" "${part}"
+done
+check api_doc bash "${REPO}/scripts/api_doc.sh" "${WS}/doc"
+check install_space bash "${REPO}/scripts/check_install.sh"
 
 # One seed, one of each class; the long runs are told in doc/reliability.md.
-for part in "fault_campaign --seed 1 --count 1 all" "fuzz 20"; do
-  read -r -a words <<<"${part}"
-  if quietly "${words[0]}" bash "${REPO}/scripts/${words[0]}.sh" "${words[@]:1}"; then
-    outside+=(--passed "${words[0]}")
-  else
-    outside+=(--failed "${words[0]}: see above")
-  fi
-done
+check fault_campaign bash "${REPO}/scripts/fault_campaign.sh" --seed 1 --count 1 all
+check fuzz bash "${REPO}/scripts/fuzz.sh" 20
 grep '^NOT TRIED' "${WS}/log/fault_campaign.log" || true
 
 /usr/bin/python3 "${REPO}/scripts/summarise_tests.py" "${results}" "${outside[@]}"

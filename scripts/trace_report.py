@@ -4,17 +4,14 @@
 
 usage: trace_report.py REPORT.json --series SERIES.json --out FIGURES.html
 """
-import base64
 import html
-import io
 import os
 import sys
-import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import plotting  # noqa: E402
 
-plt = plotting.pyplot()
+plt = plotting.page_pyplot()
 try:
     import numpy as np
 except ImportError as error:
@@ -28,11 +25,6 @@ SMOOTH = 0.95  # share of a contribution that a coordinate explains, from which 
 NAMES = {"time": "time", "motor_position": "motor position", "motor_velocity": "motor velocity",
          "motor_torque": "motor torque", "load_position": "load position", "load_velocity": "load velocity",
          "mesh_torque": "torque through the mesh"}
-
-plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
-                     "grid.color": "#e6e6e6", "axes.axisbelow": True, "legend.frameon": False,
-                     "axes.titlesize": 9, "axes.formatter.limits": (-3, 4), "axes.formatter.use_mathtext": True})
-
 
 class Data:
     def __init__(self, series):
@@ -52,14 +44,6 @@ class Data:
     def label(self, coordinate):
         name = NAMES[coordinate]
         return "%s [%s]" % (name.replace("torque", "force") if self.linear else name, self.coordinates[coordinate][1])
-
-
-def picture(figure, caption):
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=110)
-    plt.close(figure)
-    text = base64.b64encode(stream.getvalue()).decode()
-    return '<figure><img alt="%s" src="data:image/png;base64,%s"></figure>\n' % (html.escape(caption, True), text)
 
 
 def edges_of(x, bins):
@@ -118,33 +102,58 @@ def scatter(axes, data, coordinate, residuals):
     axes.set_xlabel(data.label(coordinate))
 
 
-def channel_figure(data, channel):
-    residuals, unit = data.channels[channel]
-    figure, grid = plt.subplots(2, 2, figsize=(9.6, 6), layout="constrained")
-    over_time, over_velocity, over_position, over_order = grid.flat
+def new_figure():
+    return plt.subplots(figsize=plotting.PAGE_FIGURE, layout="constrained")
+
+
+def scaled(axes, residuals, unit):
+    finite = [r[np.isfinite(r)] for r in residuals.values()]
+    limit = max(np.abs(r).max() if r.size else 0 for r in finite)
+    axes.set_ylim(-1.15 * limit or None, 1.3 * limit or None)
+    axes.set_ylabel("residual [%s]" % unit)
+
+
+def over_time_figure(data, residuals, unit):
+    figure, axes = new_figure()
     for key, colour in (("before", BEFORE), ("after", AFTER)):  # gaps where samples do not count
-        over_time.plot(data.coordinates["time"][0], residuals[key], "-", color=colour, linewidth=0.6, label=key)
-    over_time.set_xlabel(data.label("time"))
-    for line in over_time.legend(loc="upper right", ncol=2).get_lines():
+        axes.plot(data.coordinates["time"][0], residuals[key], "-", color=colour, linewidth=0.6, label=key)
+    axes.set_xlabel(data.label("time"))
+    for line in axes.legend(loc="upper right", ncol=2).get_lines():
         line.set_linewidth(2)
-    scatter(over_velocity, data, "motor_velocity", residuals)
-    over_velocity.legend(loc="upper right", ncol=2)
-    scatter(over_position, data, "motor_position", residuals)
-    for axes in (over_time, over_velocity, over_position):
-        limit = max(np.nanmax(np.abs(r[np.isfinite(r)])) if np.isfinite(r).any() else 0 for r in residuals.values())
-        axes.set_ylim(-1.15 * limit or None, 1.3 * limit or None)
-        axes.set_ylabel("residual [%s]" % unit)
+    scaled(axes, residuals, unit)
+    return figure
+
+
+def over_coordinate_figure(data, coordinate, residuals, unit):
+    figure, axes = new_figure()
+    scatter(axes, data, coordinate, residuals)
+    axes.legend(loc="upper right", ncol=2)
+    scaled(axes, residuals, unit)
+    return figure
+
+
+def over_order_figure(data, residuals, unit):
+    figure, axes = new_figure()
     turn = 1 if data.linear else 2 * np.pi
     for key, colour in (("before", BEFORE), ("after", AFTER)):
         use = np.isfinite(residuals[key])
         lines = spectrum(data.coordinates["motor_position"][0][use], residuals[key][use], turn) if use.any() else None
         if lines is not None:
-            over_order.plot(*lines, color=colour, linewidth=1, label=key)
-    over_order.set_xlabel("cycles per m of motor position" if data.linear else "order [1/turn] of motor position")
-    over_order.set_ylabel("amplitude [%s]" % unit)
-    over_order.set_ylim(bottom=0)
-    figure.suptitle("Residual of %s (measured - model), test record" % data.words(channel))
-    return picture(figure, "Residual of %s over time, velocity, position and order, before and after" % channel)
+            axes.plot(*lines, color=colour, linewidth=1, label=key)
+    axes.set_xlabel("cycles per m of motor position" if data.linear else "order [1/turn] of motor position")
+    axes.set_ylabel("amplitude [%s]" % unit)
+    axes.set_ylim(bottom=0)
+    return figure
+
+
+def channel_figures(data, channel):
+    residuals, unit = data.channels[channel]
+    word = data.words(channel)
+    drawn = [(over_time_figure(data, residuals, unit), "time")]
+    drawn += [(over_coordinate_figure(data, name, residuals, unit), NAMES[name])
+              for name in ("motor_velocity", "motor_position")]
+    drawn.append((over_order_figure(data, residuals, unit), "orders of the motor position"))
+    return plotting.figures(plotting.picture(figure, "Residual of %s over %s" % (word, what)) for figure, what in drawn)
 
 
 def explained(x, y):
@@ -210,41 +219,28 @@ def effect_figure(data, step, contributions):
     count = len(maps) or len(units)
     if count == 0:
         return ""
-    figure, grid = plt.subplots(1, count, figsize=(5.6 * count, 3.2), layout="constrained", squeeze=False)
-    for i, axes in enumerate(grid.flat):
+    pictures = []
+    for i in range(count):
+        figure, axes = new_figure()
         if maps:
             learned_curve(axes, maps[i], data)
         else:
             draw_contributions(axes, [c for c in contributions if c["unit"] == units[i]], data)
-    return picture(figure, "What %s adds" % step["effect"])
+        pictures.append(plotting.picture(figure, "What %s adds" % step["effect"]))
+    return plotting.figures(pictures)
 
 
 def fragment(report, series):
     data = Data(series)
     text = ""
     for channel in data.channels:
-        text += "<h3>Residual of %s</h3>\n" % html.escape(data.words(channel)) + channel_figure(data, channel)
+        text += "<h3>Residual of %s (measured - model) in the test record</h3>\n" % html.escape(data.words(channel))
+        text += channel_figures(data, channel)
     for step, drawn in zip(report["steps"], series["steps"]):
         figure = effect_figure(data, step, drawn["contributions"])
         if figure:
             text += "<h3>What %s adds in the test record</h3>\n" % html.escape(step["effect"]) + figure
-    return text
-
-
-def save_text(text, path):
-    """Whole or not at all."""
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path) or ".", suffix=".html")
-        with os.fdopen(handle, "w") as stream:
-            stream.write(text)
-        os.replace(temporary, path)
-        temporary = None
-    except OSError as error:
-        plotting.fail(73, "%s: cannot be written: %s" % (path, error))
-    finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
+    return text + plotting.drawn_with()
 
 
 def main():
@@ -259,7 +255,7 @@ def main():
         text = fragment(report, series)
     except (KeyError, TypeError, IndexError, ValueError) as error:
         plotting.fail(65, "%s: not a trace: %r" % (arguments.report, error))
-    save_text(text, arguments.out)
+    plotting.save_text(text, arguments.out)
 
 
 if __name__ == "__main__":

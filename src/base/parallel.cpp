@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/interruption.h"
 
 namespace backlash {
 
@@ -23,6 +24,7 @@ void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(in
   std::exception_ptr failure;
   const auto work = [&] {
     for (int i = next++; i < count && !ticker.stopped(); i = next++) try {
+        stop_if_interrupted();
         job(i);
       } catch (...) {
         const std::lock_guard<std::mutex> lock(mutex);
@@ -30,11 +32,15 @@ void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(in
         ticker.stop();
       }
   };
+  const auto helper = [&, interruption = Interruption::current()] {
+    const Interruption::Inherited inherited(interruption);
+    work();
+  };
   std::vector<std::thread> helpers;
   const unsigned workers = std::min<unsigned>(std::thread::hardware_concurrency(), count);
-  for (unsigned i = 1; i < workers; ++i) helpers.emplace_back(work);
+  for (unsigned i = 1; i < workers; ++i) helpers.emplace_back(helper);
   work();
-  for (std::thread& helper : helpers) helper.join();
+  for (std::thread& thread : helpers) thread.join();
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -157,40 +157,70 @@ ApdResult analyse_apd(const Record& record, const ApdSettings& settings) {
   return result;
 }
 
-std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                          const MonitoringCurve& curve) {
-  const CurveConditions& made = curve.conditions;
+namespace {
+
+std::string frequency_mismatch(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                               const CurveConditions& made) {
+  if (!(made.frequency > 0) || apd.periods.size() < 2) return {};
+  const double period = excitation_period(record, settings.signal);
+  if (!(period > 0)) return "no excitation period found in the record";
+  if (differs(1 / period, made.frequency, 0.02 + record.sampling_interval() / period))
+    return mismatch("excitation frequency", 1 / period, made.frequency, "Hz");
+  return {};
+}
+
+std::string noise_mismatch(const ApdResult& apd, const ApdSettings& settings, const MonitoringCurve& curve) {
+  if (!(apd.noise > kNoiseExcess * curve.noise_levels.back())) return {};
+  std::ostringstream text;
+  text.precision(4);
+  text << "sensor noise is " << apd.noise << ' ' << channel_unit(settings.signal)
+       << " (standard deviation), the curve covers noise up to " << curve.noise_levels.back() << ' '
+       << channel_unit(settings.signal);
+  return text.str();
+}
+
+/// Whether the record is of the kind that the curve is for.
+std::string kind_mismatch(const Record& record, const ApdSettings& settings, const CurveConditions& made) {
   if (made.signal != channel_name(settings.signal))
     return "the curve is for the signal " + made.signal + ", not for " + channel_name(settings.signal);
   if (!(made.apd == settings.layout)) return "the curve was made with another class layout of the APD";
   const double interval = record.sampling_interval();
   if (!(interval > 0) || differs(1 / interval, made.sampling_rate, 0.02))
     return mismatch("sampling rate", interval > 0 ? 1 / interval : 0, made.sampling_rate, "Hz");
-  if (range_of(record.column(settings.signal)) <= 0.05 * signal_levels(curve).second)
-    return "the signal does not move: there is no excitation, or the sensor is dead";
-  const double per_period = made.frequency > 0 ? 1 / (made.frequency * interval) : 0;
-  const NoiseRange torque_noise = estimate_noise(record.column(Channel::motor_torque), per_period);
-  std::string reason =
-      excitation_mismatch(record, made, std::isnan(torque_noise.lower) ? 0 : torque_noise.lower);
-  if (reason.empty() && looks_saturated(record.column(settings.signal)))
-    reason = "the signal stays at its extreme value: the sensor is saturated";
-  if (reason.empty()) reason = level_mismatch(record, settings, curve);
-  if (!reason.empty()) return reason;
-  const double period = excitation_period(record, settings.signal);
-  if (made.frequency > 0 && apd.periods.size() >= 2) {
-    if (!(period > 0)) return "no excitation period found in the record";
-    if (differs(1 / period, made.frequency, 0.02 + interval / period))
-      return mismatch("excitation frequency", 1 / period, made.frequency, "Hz");
-  }
-  if (apd.noise > kNoiseExcess * curve.noise_levels.back()) {
-    std::ostringstream text;
-    text.precision(4);
-    text << "sensor noise is " << apd.noise << ' ' << channel_unit(settings.signal)
-         << " (standard deviation), the curve covers noise up to " << curve.noise_levels.back() << ' '
-         << channel_unit(settings.signal);
-    return text.str();
-  }
-  return motion_mismatch(record, curve);
+  return {};
+}
+
+double torque_noise(const Record& record, const CurveConditions& made) {
+  const double per_period = made.frequency > 0 ? 1 / (made.frequency * record.sampling_interval()) : 0;
+  const double noise = estimate_noise(record.column(Channel::motor_torque), per_period).lower;
+  return std::isnan(noise) ? 0 : noise;
+}
+
+}  // namespace
+
+std::optional<Mismatch> out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                                      const MonitoringCurve& curve) {
+  using Concern = Mismatch::Concern;
+  const CurveConditions& made = curve.conditions;
+  const std::vector<double>& signal = record.column(settings.signal);
+  std::string reason = kind_mismatch(record, settings, made);
+  if (!reason.empty()) return Mismatch{Concern::curve, reason};
+  if (range_of(signal) <= 0.05 * signal_levels(curve).second)
+    return Mismatch{Concern::signal,
+                    "the signal does not move: there is no excitation, or the sensor is dead"};
+  reason = excitation_mismatch(record, made, torque_noise(record, made));
+  if (!reason.empty()) return Mismatch{Concern::excitation, reason};
+  if (looks_saturated(signal))
+    return Mismatch{Concern::signal, "the signal stays at its extreme value: the sensor is saturated"};
+  reason = level_mismatch(record, settings, curve);
+  if (!reason.empty()) return Mismatch{Concern::signal, reason};
+  reason = frequency_mismatch(record, apd, settings, made);
+  if (!reason.empty()) return Mismatch{Concern::excitation, reason};
+  reason = noise_mismatch(apd, settings, curve);
+  if (!reason.empty()) return Mismatch{Concern::signal, reason};
+  reason = motion_mismatch(record, curve);
+  if (!reason.empty()) return Mismatch{Concern::curve, reason};
+  return std::nullopt;
 }
 
 namespace {
@@ -202,8 +232,9 @@ Estimate refuse(Status status, const std::string& reason) {
   return estimate;
 }
 
+/// `mismatch` is set where the reason is a condition of the curve.
 std::optional<Estimate> refusal(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                                const MonitoringCurve* curve) {
+                                const MonitoringCurve* curve, std::optional<Mismatch>& mismatch) {
   if (!record.has(settings.signal))
     return refuse(Status::insufficient_data, "the record has no " + channel_name(settings.signal));
   if (!curve) return refuse(Status::insufficient_data, "no monitoring curve");
@@ -213,8 +244,8 @@ std::optional<Estimate> refusal(const Record& record, const ApdResult& apd, cons
   const double expected = curve->conditions.frequency > 0 ? 1 / curve->conditions.frequency : apd.period;
   if (record.size() < kLeadingSamples || record.time.back() - record.time.front() < 0.9 * expected)
     return refuse(Status::insufficient_data, lacking + ": the record is too short");
-  const std::string reason = out_of_domain(record, apd, settings, *curve);
-  if (!reason.empty()) return refuse(Status::out_of_domain, reason);
+  mismatch = out_of_domain(record, apd, settings, *curve);
+  if (mismatch) return refuse(Status::out_of_domain, mismatch->reason);
   if (apd.periods.empty())
     return refuse(Status::insufficient_data, lacking + "; " + std::to_string(apd.incomplete) +
                                                  " had gaps or no sample inside the classes");
@@ -242,7 +273,7 @@ std::vector<double> samples_of(const Record& record, const ApdResult& apd, Chann
 CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSettings& settings,
                        const MonitoringCurve* curve) {
   CurveMatch match;
-  match.refused = refusal(record, apd, settings, curve);
+  match.refused = refusal(record, apd, settings, curve, match.mismatch);
   std::vector<double> samples = samples_of(record, apd, settings.signal);
   match.noise = with_standard_error(apd.noise_range, samples.size());
   if (match.refused || !curve->family) return match;
@@ -253,6 +284,7 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
     text << "the distribution is " << match.family->misfit << " (rms) from the nearest of "
          << curve->conditions.rig << ", simulated records were within " << match.family->usual_misfit
          << ": the machine does something that the rig does not contain";
+    match.mismatch = Mismatch{Mismatch::Concern::curve, text.str()};
     match.refused = refuse(Status::out_of_domain, text.str());
   }
   return match;

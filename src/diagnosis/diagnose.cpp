@@ -35,10 +35,10 @@ LostMotionSettings read_lost_motion(const YamlReader& yaml) {
   return lost_motion;
 }
 
-template <Estimate (*estimate)(const ApdResult&, const CurveMatch&, const MonitoringCurve*)>
+template <Estimate (*Estimator)(const ApdResult&, const CurveMatch&, const MonitoringCurve*)>
 Estimate by_apd(const DiagnosisInput& in) {
   if (!in.settings.apd) return not_served("the rig file declares no diagnosis.apd");
-  return estimate(*in.apd, in.match, in.curve);
+  return Estimator(*in.apd, in.match, in.curve);
 }
 
 Estimate by_lost_motion(const DiagnosisInput& in) {
@@ -138,6 +138,7 @@ Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settin
   if (settings.apd) diagnosis.apd = analyse_apd(record, *settings.apd);
   CurveMatch match;
   if (settings.apd) match = match_curve(record, *diagnosis.apd, *settings.apd, curve);
+  diagnosis.mismatch = match.mismatch;
   const DiagnosisInput input{record, settings, curve, diagnosis.apd, match};
   for (const DiagnosisMethod& each : diagnosis_method_table()) {
     if (!method.empty() && method != each.name) continue;

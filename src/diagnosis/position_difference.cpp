@@ -25,7 +25,9 @@ constexpr double kLockedTravel = 0.05;  // of the motor's travel
 // Share of the rms residual in the interval, of a locked rig and of a moving load.
 constexpr double kLockedResidual = 2, kMovingResidual = 0.15;
 constexpr double kLargestScaleError = 0.01;
-constexpr double kLargestFactor = 5;     // of the compliance against the declared one
+// Of the compliance against the declared one. Where the torque has two values only, as with a slow square
+// wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
+constexpr double kLargestFactor = 2;
 constexpr std::size_t kFewestStays = 6;  // on a flank
 constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
 

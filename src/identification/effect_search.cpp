@@ -273,7 +273,8 @@ std::vector<Independence> independence(const TraceSeries& s, const ServoData& da
   std::vector<Independence> all;
   const std::pair<const char*, std::vector<double>> inputs[] = {{"motor_torque", thinned(s.torque)},
                                                                 {"motor_velocity", thinned(data.motor_rate)}};
-  for (const auto& [name, input] : inputs) {
+  for (const auto& [name, values] : inputs) {
+    const std::vector<double>& input = values;  // a lambda of C++17 captures no name of a binding
     const auto share = [&](const std::vector<double>& r) { return share_outside_band(r, input, kLags); };
     all.push_back({"torque", name, share(residual(s.torque, s.torque_before, s.torque_counts)),
                    share(residual(s.torque, s.torque_after, s.torque_counts))});

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/interruption.h"
 #include "backlash_diagnosis/base/parallel.h"
 
 namespace backlash {
@@ -108,6 +109,7 @@ bool usable(const Eigen::VectorXd& r) {
 
 /// Residuals, or an empty vector where the parameters are refused.
 Eigen::VectorXd try_residuals(const ResidualFunction& f, const Eigen::VectorXd& p) {
+  stop_if_interrupted();
   try {
     Eigen::VectorXd r = f(p);
     return usable(r) ? r : Eigen::VectorXd();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/diagnoser_node.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -13,27 +14,22 @@
 namespace backlash {
 namespace {
 
-using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus;
-
-unsigned char level(Grade grade) {
-  switch (grade) {
-    case Grade::good:
-      return DiagnosticStatus::OK;
-    case Grade::watch:
-      return DiagnosticStatus::WARN;
-    case Grade::service:
-    case Grade::stop:
-      return DiagnosticStatus::ERROR;
-    case Grade::cannot_tell:
-      break;
-  }
-  return DiagnosticStatus::WARN;
-}
-
+constexpr int kTick = 100;  // ms: a change of level is published so soon
+constexpr int kTicks = 10;  // from one report on /diagnostics to the next without a change
 std::vector<std::string> names_of(const std::vector<MonitorSettings>& joints) {
   std::vector<std::string> names;
   for (const MonitorSettings& joint : joints) names.push_back(joint.joint);
   return names;
+}
+
+/// A joint's name may have parts, a file's name may not.
+std::string history_path(const std::string& folder, std::string joint) {
+  std::replace(joint.begin(), joint.end(), '/', '_');
+  return folder + "/" + joint + ".csv";
+}
+
+void require(bool condition, const std::string& name, double value, const std::string& limit) {
+  if (!std::isfinite(value) || !condition) throw InvalidParameter(name, value, limit);
 }
 
 }  // namespace
@@ -42,14 +38,13 @@ DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandl
                              DiagnoserSettings settings)
     : handle_(handle),
       private_handle_(private_handle),
-      stale_(settings.stale),
+      folder_("~folder", settings.folder),
       reader_(names_of(settings.joints)),
       updater_(handle, private_handle) {
-  for (MonitorSettings& joint : settings.joints)
-    monitors_.push_back(std::make_unique<JointMonitor>(std::move(joint)));
   topic_ = handle_.resolveName("joint_states");
+  updater_.setHardwareID(settings.joints.front().rig.rig.name);
+  serve_live(settings);
   advertise();
-  add_diagnostics();
   ros::NodeHandle samples(handle_);
   samples.setCallbackQueue(&sample_queue_);
   subscriber_ = samples.subscribe("joint_states", settings.queue, &DiagnoserNode::on_joint_state, this,
@@ -58,6 +53,73 @@ DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandl
 
 DiagnoserNode::~DiagnoserNode() {
   if (curve_server_) curve_server_->shutdown();
+}
+
+void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings& common) {
+  Joint joint;
+  const Mesh& mesh = settings.rig.rig.mesh;
+  const auto& limits = settings.rig.diagnosis.limits;
+  if (!common.history.empty())
+    joint.history = std::make_unique<JointHistory>(
+        JointHistory::Settings{history_path(common.history, settings.joint), common.history_interval,
+                               limits ? limits->angular : mesh.angular(), settings.rig.digest});
+  joint.monitor = std::make_unique<JointMonitor>(std::move(settings));
+  joint.diagnostics =
+      std::make_unique<JointDiagnostics>(*joint.monitor, joint.history.get(), topic_, common.diagnostics);
+  joint.diagnostics->add_to(updater_);
+  joints_.push_back(std::move(joint));
+}
+
+void DiagnoserNode::serve_live(const DiagnoserSettings& settings) {
+  for (const MonitorSettings& joint : settings.joints) add_joint(joint, settings);
+  Live live = Live::__getDefault__();
+  live.window = settings.joints.front().window;
+  live.estimate_interval = settings.joints.front().estimate_interval;
+  live.stale = settings.diagnostics.stale;
+  live.hold = settings.diagnostics.hold;
+  live.latency_limit = settings.diagnostics.latency_limit;
+  live_ = std::make_unique<LiveServer<Live>>(private_handle_, live,
+                                             [this](const Live& wanted) { apply(wanted); });
+  for (Joint& joint : joints_) {
+    JointLive limits = JointLive::__getDefault__();
+    if (const auto in_force = joint.monitor->limits()) {
+      limits.watch = in_force->watch;
+      limits.service = in_force->service;
+      limits.stop = in_force->stop;
+    }
+    joint.live = std::make_unique<LiveServer<JointLive>>(
+        ros::NodeHandle(private_handle_, joint.monitor->joint()), limits,
+        [this, &joint](const JointLive& wanted) { apply(joint, wanted); });
+  }
+}
+
+void DiagnoserNode::apply(const Live& wanted) {
+  require(wanted.window >= 1, "window", wanted.window, "must be >= 1");
+  require(wanted.estimate_interval >= 0, "estimate_interval", wanted.estimate_interval, "must be >= 0 s");
+  require(wanted.stale > 0, "stale", wanted.stale, "must be > 0 s");
+  require(wanted.hold >= 0, "hold", wanted.hold, "must be >= 0 s");
+  require(wanted.latency_limit > 0, "latency_limit", wanted.latency_limit, "must be > 0 s");
+  for (Joint& joint : joints_) {
+    joint.monitor->set_window(wanted.window, wanted.estimate_interval);
+    joint.diagnostics->set({wanted.stale, wanted.hold, wanted.latency_limit});
+  }
+}
+
+void DiagnoserNode::apply(Joint& joint, const JointLive& wanted) {
+  if (wanted.watch == 0 && wanted.service == 0 && wanted.stop == 0) {
+    joint.monitor->set_limits(std::nullopt);
+    return;
+  }
+  require(wanted.watch > 0, "watch", wanted.watch, "must be > 0 (all three 0: no limits)");
+  require(wanted.service > wanted.watch, "service", wanted.service, "must be > watch");
+  require(wanted.stop > wanted.service, "stop", wanted.stop, "must be > service");
+  const auto& declared = joint.monitor->rig().diagnosis.limits;
+  Limits limits;
+  limits.angular = declared ? declared->angular : joint.monitor->rig().rig.mesh.angular();
+  limits.watch = wanted.watch;
+  limits.service = wanted.service;
+  limits.stop = wanted.stop;
+  joint.monitor->set_limits(limits);
 }
 
 void DiagnoserNode::advertise() {
@@ -70,12 +132,13 @@ void DiagnoserNode::advertise() {
   curve_server_ = std::make_unique<CurveServer>(
       private_handle_, "build_curve", [this](const auto& goal) { on_build_curve(goal); }, false);
   curve_server_->start();
-  trace_server_ =
-      std::make_unique<TraceServer>(private_handle_, "trace_residual",
-                                    [this](const std::string& joint, std::string& why) -> const RigFile* {
-                                      const JointMonitor* monitor = find(joint, why);
-                                      return monitor ? &monitor->rig() : nullptr;
-                                    });
+  trace_server_ = std::make_unique<TraceServer>(
+      private_handle_, "trace_residual",
+      [this](const std::string& joint, std::string& why) -> const RigFile* {
+        const JointMonitor* monitor = find_monitor(joint, why);
+        return monitor ? &monitor->rig() : nullptr;
+      },
+      folder_);
 }
 
 void DiagnoserNode::run() {
@@ -83,23 +146,40 @@ void DiagnoserNode::run() {
   ros::AsyncSpinner requests(4);  // waiting requests each hold a thread
   samples.start();
   requests.start();
-  // Once a second by wall time: also while a simulated clock stands still.
-  for (int tenth = 0; ros::ok(); tenth = (tenth + 1) % 10) {
-    if (tenth == 0) updater_.force_update();
-    ros::WallDuration(0.1).sleep();
+  // By wall time: also while a simulated clock stands still.
+  for (int tick = 0; ros::ok(); tick = (tick + 1) % kTicks) {
+    bool changed = false;
+    for (Joint& joint : joints_) changed = joint.diagnostics->update() || changed;
+    if (changed || tick == 0) updater_.force_update();
+    if (tick == 0) write_histories();
+    ros::WallDuration(1e-3 * kTick).sleep();
+  }
+  samples.stop();
+  write_histories();
+}
+
+void DiagnoserNode::write_histories() {
+  for (Joint& joint : joints_) {
+    if (!joint.history) continue;
+    const auto limits = joint.monitor->limits();
+    const auto baseline = joint.monitor->baseline();
+    std::optional<double> service;
+    if (limits) service = limits->service;
+    if (limits && baseline) *service += limits->angular ? baseline->backlash_angle : baseline->backlash;
+    joint.history->flush(service);
   }
 }
 
 void DiagnoserNode::on_joint_state(const sensor_msgs::JointState::ConstPtr& message) {
   for (const std::size_t joint : reader_.read(*message)) {
-    JointMonitor& monitor = *monitors_[joint];
-    const auto report =
-        monitor.take(message->header.stamp, reader_.values(joint), reader_.problem(joint), topic_);
-    if (report) publish(monitor, *report);
+    const auto report = joints_[joint].monitor->take(message->header.stamp, reader_.values(joint),
+                                                     reader_.problem(joint), topic_);
+    if (report) publish(joints_[joint], *report);
   }
 }
 
-void DiagnoserNode::publish(const JointMonitor& monitor, const PeriodReport& report) {
+void DiagnoserNode::publish(Joint& joint, const PeriodReport& report) {
+  const JointMonitor& monitor = *joint.monitor;
   if (report.period) {
     auto m = to_message(*report.period, *monitor.rig().diagnosis.apd, report.period_length);
     m.header.stamp = report.stamp;
@@ -107,6 +187,7 @@ void DiagnoserNode::publish(const JointMonitor& monitor, const PeriodReport& rep
     distributions_.publish(m);
   }
   if (!report.diagnosis) return;
+  if (joint.history) joint.history->take(report.stamp.toSec(), *report.diagnosis);
   for (const Estimate& estimate : report.diagnosis->estimates) {
     auto m = to_message(estimate);
     m.header.stamp = report.stamp;
@@ -115,22 +196,27 @@ void DiagnoserNode::publish(const JointMonitor& monitor, const PeriodReport& rep
   }
 }
 
-JointMonitor* DiagnoserNode::find(const std::string& joint, std::string& why) {
-  if (joint.empty() && monitors_.size() == 1) return monitors_.front().get();
+DiagnoserNode::Joint* DiagnoserNode::find(const std::string& name, std::string& why) {
+  if (name.empty() && joints_.size() == 1) return &joints_.front();
   std::vector<std::string> names;
-  for (const auto& monitor : monitors_) {
-    if (monitor->joint() == joint) return monitor.get();
-    names.push_back(monitor->joint());
+  for (Joint& joint : joints_) {
+    if (joint.monitor->joint() == name) return &joint;
+    names.push_back(joint.monitor->joint());
   }
-  why = (joint.empty() ? "several joints, name one: " : "unknown joint '" + printable(joint) + "', known: ") +
+  why = (name.empty() ? "several joints, name one: " : "unknown joint '" + printable(name) + "', known: ") +
         joined(names);
   return nullptr;
+}
+
+JointMonitor* DiagnoserNode::find_monitor(const std::string& name, std::string& why) {
+  const Joint* joint = find(name, why);
+  return joint ? joint->monitor.get() : nullptr;
 }
 
 bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
                                 backlash_diagnosis::Diagnose::Response& response) {
   response.verdict = to_message(Verdict(), {});
-  JointMonitor* monitor = find(request.joint, response.message);
+  JointMonitor* monitor = find_monitor(request.joint, response.message);
   if (!monitor) return true;
   if (!(request.timeout >= 0) || request.timeout > 1e6) {
     response.message = "timeout = " + to_text(request.timeout) + ": must be between 0 and 1e6 s";
@@ -150,20 +236,20 @@ bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
   response.distribution.joint = monitor->joint();
   response.success = diagnosis.verdict.estimate >= 0 && note.empty();
   response.message = note.empty() ? diagnosis.verdict.message : note + "; " + diagnosis.verdict.message;
-  for (const std::string& warning : monitor->state().warnings) response.message += "; warning: " + warning;
+  for (const std::string& warning : monitor->state().warnings()) response.message += "; warning: " + warning;
   return true;
 }
 
 bool DiagnoserNode::on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
                                     backlash_diagnosis::SetBaseline::Response& response) {
   response.backlash = response.backlash_angle = response.skewness = kNaN;
-  JointMonitor* monitor = find(request.joint, response.message);
-  if (!monitor) return true;
+  Joint* joint = find(request.joint, response.message);
+  if (!joint) return true;
   try {
     if (request.clear)
-      clear_baseline(*monitor, response);
+      clear_baseline(*joint->monitor, response);
     else
-      set_baseline(*monitor, response);
+      set_baseline(*joint, response);
   } catch (const Error& error) {
     response.message = error.what();
   }
@@ -181,7 +267,8 @@ void DiagnoserNode::clear_baseline(JointMonitor& monitor,
   response.message = "baseline forgotten";
 }
 
-void DiagnoserNode::set_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response) {
+void DiagnoserNode::set_baseline(Joint& joint, backlash_diagnosis::SetBaseline::Response& response) {
+  JointMonitor& monitor = *joint.monitor;
   std::string note;
   ros::Time stamp;
   const Diagnosis diagnosis = monitor.diagnose(0, 0, note, stamp);
@@ -194,6 +281,7 @@ void DiagnoserNode::set_baseline(JointMonitor& monitor, backlash_diagnosis::SetB
   const std::string& path = monitor.baseline_path();
   if (!path.empty()) write_baseline(baseline, path);  // first: what is not kept is not used either
   monitor.set_baseline(baseline);
+  if (joint.history) joint.history->take_baseline(stamp.toSec(), diagnosis);
   response.success = true;
   response.message = "baseline by " + joined(baseline.methods) + (path.empty() ? "" : ", kept in " + path);
   response.backlash = baseline.backlash;
@@ -203,30 +291,36 @@ void DiagnoserNode::set_baseline(JointMonitor& monitor, backlash_diagnosis::SetB
 
 bool DiagnoserNode::on_get_curve(backlash_diagnosis::GetCurve::Request& request,
                                  backlash_diagnosis::GetCurve::Response& response) {
-  JointMonitor* monitor = find(request.joint, response.message);
+  JointMonitor* monitor = find_monitor(request.joint, response.message);
   if (!monitor) return true;
   const auto curve = monitor->curve();
   response.success = curve != nullptr;
   const MonitorState state = monitor->state();
   response.message = state.curve_state;
-  for (const std::string& warning : state.warnings) response.message += "; warning: " + warning;
+  for (const std::string& warning : state.warnings()) response.message += "; warning: " + warning;
   if (curve) response.curve = to_message(*curve);
   return true;
 }
 
 void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal) {
   backlash_diagnosis::BuildCurveResult result;
-  JointMonitor* monitor = find(goal->joint, result.message);
+  JointMonitor* monitor = find_monitor(goal->joint, result.message);
   if (!monitor) {
     curve_server_->setAborted(result, result.message);
     return;
   }
   const ros::WallTime start = ros::WallTime::now();
+  std::mutex told;  // the points and the progress may come from two threads
+  std::string best;
   const auto progress = [&](double fraction, const std::string& phase) {
     backlash_diagnosis::BuildCurveFeedback feedback;
     feedback.phase = phase;
     feedback.fraction = fraction;
     feedback.elapsed = (ros::WallTime::now() - start).toSec();
+    {
+      const std::lock_guard<std::mutex> lock(told);
+      feedback.best = best;
+    }
     curve_server_->publishFeedback(feedback);
     return ros::ok() && !curve_server_->isPreemptRequested();
   };
@@ -236,8 +330,17 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
     if (goal->max_backlash != 0) request.max_backlash = goal->max_backlash;
     if (goal->periods > 0) request.periods = static_cast<int>(goal->periods);
     request.sampling_rate = goal->sampling_rate;
+    request.best_so_far = [&](const std::string& found) {
+      const std::lock_guard<std::mutex> lock(told);
+      best = found;
+    };
+    std::string path;
+    if (!goal->save_as.empty()) path = folder_.inside("save_as", goal->save_as);
     const MonitoringCurve curve = build_curve(monitor->rig(), request, progress);
-    if (!goal->save_as.empty()) write_curve(curve, goal->save_as);
+    if (!path.empty()) {
+      folder_.create();
+      write_curve(curve, path);
+    }
     monitor->set_curve(curve);
     result.success = true;
     result.message = "built with " + std::to_string(curve.points.size()) + " points";
@@ -250,62 +353,6 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
     result.message = error.what();
     curve_server_->setAborted(result, result.message);
   }
-}
-
-void DiagnoserNode::add_diagnostics() {
-  updater_.setHardwareID(monitors_.front()->rig().rig.name);
-  for (const auto& monitor : monitors_) {
-    JointMonitor* m = monitor.get();
-    updater_.add(m->joint() + ": backlash", [this, m](auto& status) { report_backlash(*m, status); });
-    updater_.add(m->joint() + ": input", [this, m](auto& status) { report_input(*m, status); });
-  }
-}
-
-void DiagnoserNode::report_backlash(JointMonitor& monitor,
-                                    diagnostic_updater::DiagnosticStatusWrapper& status) const {
-  const MonitorState state = monitor.state();
-  status.add("Monitoring curve", state.curve_state);
-  for (const std::string& warning : state.warnings) status.add("Warning", warning);
-  status.add("Whole periods kept", state.periods);
-  status.add("Excitation period (s)", state.period);
-  if (!state.latest) {
-    status.summary(DiagnosticStatus::WARN, "no whole excitation period yet");
-    return;
-  }
-  const Verdict& verdict = state.latest->verdict;
-  status.summary(level(verdict.grade), verdict.message);
-  status.add("Grade", to_string(verdict.grade));
-  status.add("Agreement", verdict.agreement);
-  for (const Estimate& e : state.latest->estimates) {
-    status.add(e.method + " status", to_string(e.status));
-    status.add(e.method + " backlash (m)", e.backlash);
-    status.add(e.method + " backlash angle (rad)", e.backlash_angle);
-  }
-}
-
-void DiagnoserNode::report_input(JointMonitor& monitor,
-                                 diagnostic_updater::DiagnosticStatusWrapper& status) const {
-  const MonitorState state = monitor.state();
-  const StreamCounters& c = state.counters;
-  const double age = state.any_sample ? (ros::WallTime::now() - state.last_arrival).toSec() : 0;
-  if (!state.any_sample && state.bad_messages + c.not_a_number == 0)
-    status.summary(DiagnosticStatus::WARN,
-                   "no message on " + topic_ + " has named " + monitor.joint() + " yet");
-  else if (!state.any_sample)
-    status.summary(DiagnosticStatus::ERROR, "no usable sample; " + state.last_problem);
-  else if (age > stale_)
-    status.summary(DiagnosticStatus::STALE, "no message for " + to_text(std::round(age)) + " s");
-  else if (!state.last_problem.empty())
-    status.summary(DiagnosticStatus::WARN, "samples were left out; last: " + state.last_problem);
-  else
-    status.summary(DiagnosticStatus::OK, "receiving");
-  status.add("Sampling rate (Hz)", state.rate);
-  status.add("Samples accepted", c.accepted);
-  status.add("Samples with NaN", c.not_a_number);
-  status.add("Repeated stamps", c.repeated);
-  status.add("Clock jumps", c.restarts);
-  status.add("Malformed messages", state.bad_messages);
-  status.add("Last problem", state.last_problem);
 }
 
 }  // namespace backlash

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Parameters of the node `diagnoser`.
+#include <cstdlib>
 #include <filesystem>
 
 #include "backlash_diagnosis/base/error.h"
@@ -32,6 +33,19 @@ void use_baseline(MonitorSettings& monitor, const std::string& path) {
   check_baseline(*monitor.baseline, monitor.rig.rig.name, monitor.rig.digest, path);
 }
 
+std::string read_history_folder(Parameters& parameters) {
+  const std::string folder = parameters.text("history", "");
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    throw InvalidParameter("~history", folder, "must be a folder that exists");
+  return folder;
+}
+
+std::string default_folder() {
+  if (const char* ros_home = std::getenv("ROS_HOME")) return std::string(ros_home) + "/backlash_diagnosis";
+  const char* home = std::getenv("HOME");
+  return std::string(home ? home : ".") + "/.ros/backlash_diagnosis";
+}
+
 }  // namespace
 
 const char* diagnoser_help() {
@@ -54,6 +68,13 @@ parameters (private)
   keep      s of samples kept for the service; default 60
   queue     messages waiting at most; default 20000
   stale     s of wall time without a message before /diagnostics says so; default 2
+  hold      s that a level on /diagnostics must be better before it falls; default 5
+  latency_limit   s from stamp to arrival before /diagnostics warns; default 1
+  history   folder, which must exist, for a file JOINT.csv with the estimates over months, and their
+            trend on /diagnostics; default: none is kept
+  history_interval   s at least from one entry to the next, by the stamps; default 60
+  folder    the only folder in which goals of actions may name files, relative to it or absolute;
+            default: backlash_diagnosis in ROS_HOME (~/.ros)
 
 subscribes
   joint_states             sensor_msgs/JointState: JOINT_motor, JOINT_sensor, JOINT_load,
@@ -64,6 +85,8 @@ publishes
   /diagnostics             diagnostic_msgs/DiagnosticArray
 services
   ~diagnose  ~set_baseline  ~get_curve
+  ~live, ~JOINT/live       dynamic_reconfigure while it runs: window, estimate_interval, stale, hold,
+                           latency_limit; limits of a joint. What is wrong is refused: see `refused`
 actions
   ~build_curve             backlash_diagnosis/BuildCurve
   ~trace_residual          backlash_diagnosis/TraceResidual: what the rig's model lacks, from records
@@ -81,7 +104,13 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   defaults.estimate_interval = parameters.number("estimate_interval", 0.25, Range::not_negative());
   defaults.keep = parameters.number("keep", 60, Range::positive());
   settings.queue = static_cast<int>(parameters.integer("queue", 20000, 1, 10'000'000));
-  settings.stale = parameters.number("stale", 2, Range::positive());
+  settings.diagnostics.stale = parameters.number("stale", 2, Range::positive());
+  settings.diagnostics.hold = parameters.number("hold", 5, Range::not_negative());
+  settings.diagnostics.latency_limit = parameters.number("latency_limit", 1, Range::positive());
+  settings.folder = parameters.text("folder", default_folder());
+  settings.history = read_history_folder(parameters);
+  settings.history_interval = parameters.number("history_interval", 60, Range::not_negative());
+  parameters.allow("live");
   parameters.allow("diagnostic_period");  // of diagnostic_updater
   const std::string limits = parameters.text("limits", "");
   const std::string baseline = parameters.text("baseline", "");
@@ -94,6 +123,7 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
       if (other.joint == joint) throw InvalidParameter("~joints", joint, "is named twice");
     MonitorSettings monitor = defaults;
     monitor.joint = joint;
+    parameters.allow(joint + "/live");
     const std::string own_rig = parameters.text(joint + "/rig", "");
     const std::string own_curve = parameters.text(joint + "/curve", curve);
     monitor.rig = own_rig.empty() ? common : load_rig_file(own_rig);

@@ -20,6 +20,13 @@ StreamSettings stream_settings(const MonitorSettings& settings) {
 
 }  // namespace
 
+std::vector<std::string> MonitorState::warnings() const {
+  std::vector<std::string> all;
+  for (const std::string& warning : {curve_warning, baseline_warning})
+    if (!warning.empty()) all.push_back(warning);
+  return all;
+}
+
 JointMonitor::JointMonitor(MonitorSettings settings)
     : settings_(std::move(settings)),
       diagnosis_settings_(without_settling(settings_.rig.diagnosis)),
@@ -55,6 +62,7 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const Cha
     last_problem_ = BadData(topic, stamp.isZero() ? "the header stamp is zero" : problem).what();
     return std::nullopt;
   }
+  latency_ = (ros::Time::now() - stamp).toSec();
   const long restarts = stream_.counters().restarts;
   const double time = clock_.seconds(stamp);
   const PeriodResult* period = stream_.add(time, values);
@@ -89,8 +97,8 @@ std::optional<PeriodReport> JointMonitor::report(double time, const PeriodResult
   if (window.time.empty()) return std::nullopt;
   estimated_ = time;
   report.stamp = clock_.stamp(window.time.back());
-  latest_ = diagnose_settled(window, diagnosis_settings_, curve_.get(), baseline_);
-  report.diagnosis = latest_;
+  report.diagnosis = diagnose_settled(window, diagnosis_settings_, curve_.get(), baseline_);
+  latest_ = std::make_shared<const Diagnosis>(*report.diagnosis);
   return report;
 }
 
@@ -99,16 +107,19 @@ Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note
   const auto ready = [&] { return stop_ || (stream_.periods() >= wanted_periods(periods) && !building_); };
   changed_.wait_for(lock, std::chrono::duration<double>(timeout), ready);
   const long available = stream_.periods();
-  if (available < wanted_periods(periods))
+  const Record record = stream_.latest(periods);
+  // Without an APD all that is kept will do, whether it has periods or not.
+  const bool any_length = periods == 0 && !settings_.rig.diagnosis.apd && !record.time.empty();
+  if (available < wanted_periods(periods) && !any_length)
     note = "only " + std::to_string(available) + " of " + std::to_string(wanted_periods(periods)) +
            " whole periods arrived" + (last_problem_.empty() ? "" : "; last problem: " + last_problem_);
-  const Record record = stream_.latest(periods);
   const auto curve = curve_;
   const auto baseline = baseline_;
   const std::string curve_state = curve_state_;
+  const DiagnosisSettings settings = diagnosis_settings_;
   stamp = record.time.empty() ? ros::Time() : clock_.stamp(record.time.back());
   lock.unlock();  // the subscriber goes on while this computes
-  Diagnosis diagnosis = diagnose_settled(record, diagnosis_settings_, curve.get(), baseline);
+  Diagnosis diagnosis = diagnose_settled(record, settings, curve.get(), baseline);
   for (Estimate& estimate : diagnosis.estimates)
     if (needs_curve(estimate.method) && !curve) estimate.message += " (" + curve_state + ")";
   return diagnosis;
@@ -164,6 +175,27 @@ void JointMonitor::set_curve(MonitoringCurve curve) {
   changed_.notify_all();
 }
 
+void JointMonitor::set_window(int periods, double estimate_interval) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  settings_.window = periods;
+  settings_.estimate_interval = estimate_interval;
+}
+
+void JointMonitor::set_limits(const std::optional<Limits>& limits) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  diagnosis_settings_.limits = limits;
+}
+
+std::optional<Limits> JointMonitor::limits() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return diagnosis_settings_.limits;
+}
+
+std::optional<Baseline> JointMonitor::baseline() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return baseline_;
+}
+
 std::shared_ptr<const MonitoringCurve> JointMonitor::curve() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return curve_;
@@ -176,8 +208,11 @@ MonitorState JointMonitor::state() const {
   state.bad_messages = bad_messages_;
   state.last_problem = last_problem_;
   state.curve_state = curve_state_;
-  for (const std::string& warning : {curve_warning_, baseline_warning_})
-    if (!warning.empty()) state.warnings.push_back(warning);
+  state.curve_warning = curve_warning_;
+  state.baseline_warning = baseline_warning_;
+  state.baseline = baseline_.has_value();
+  state.building_curve = building_;
+  state.latency = latency_;
   const double interval = stream_.sampling_interval();
   state.rate = interval > 0 ? 1 / interval : 0;
   state.period = stream_.period();

@@ -14,7 +14,7 @@ namespace backlash {
 namespace {
 
 // As in sysexits.h, like the offline commands.
-constexpr int kUsage = 64, kBadData = 65, kMissingInput = 66, kInternal = 70;
+constexpr int kUsage = 64, kBadData = 65, kMissingInput = 66, kInternal = 70, kCannotWrite = 73;
 
 int fatal(const std::exception& e, int code) {
   ROS_FATAL_STREAM(e.what());
@@ -32,6 +32,8 @@ int guarded(const std::function<int()>& run) {
     return fatal(e, kBadData);
   } catch (const MissingInput& e) {
     return fatal(e, kMissingInput);
+  } catch (const CannotWrite& e) {
+    return fatal(e, kCannotWrite);
   } catch (const std::exception& e) {
     return fatal(e, kInternal);
   }

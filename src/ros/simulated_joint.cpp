@@ -6,12 +6,31 @@
 
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
 namespace backlash {
 namespace {
 
 constexpr std::chrono::seconds kWarningInterval{1};
+
+struct LiveNoise {
+  Channel channel;
+  double backlash_diagnosis::SimulatedJointLiveConfig::*value;
+};
+
+using Config = backlash_diagnosis::SimulatedJointLiveConfig;
+const LiveNoise kLiveNoise[] = {{Channel::motor_torque, &Config::noise_motor_torque},
+                                {Channel::motor_position, &Config::noise_motor_position},
+                                {Channel::motor_velocity, &Config::noise_motor_velocity},
+                                {Channel::sensor_torque, &Config::noise_sensor_torque},
+                                {Channel::load_position, &Config::noise_load_position},
+                                {Channel::load_velocity, &Config::noise_load_velocity}};
+
+void require_not_negative(const std::string& name, double value) {
+  if (!std::isfinite(value) || value < 0)
+    throw InvalidParameter(name, to_text(value), "must be finite and >= 0");
+}
 
 }  // namespace
 
@@ -33,11 +52,13 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
     torque_command_ = handle_.subscribe("torque_command", 100, &SimulatedJoint::set_torque, this);
   ros::NodeHandle services(private_handle);
   set_backlash_ = services.advertiseService("set_backlash", &SimulatedJoint::set_backlash, this);
+  live_ = std::make_unique<LiveServer<Live>>(services, live(), [this](const Live& wanted) { apply(wanted); });
 }
 
 void SimulatedJoint::reset() {
   simulation_.reset();
   publish_true_backlash();
+  live_->update(live());
 }
 
 void SimulatedJoint::publish_true_backlash() {
@@ -50,21 +71,43 @@ std::string SimulatedJoint::true_backlash() const {
   return to_text(simulation_.plant().gear_train().backlash()) + (angular_ ? " rad" : " m");
 }
 
-bool SimulatedJoint::set_backlash(backlash_diagnosis::SetBacklash::Request& request,
-                                  backlash_diagnosis::SetBacklash::Response& response) {
-  const double backlash = request.backlash;
-  if (!std::isfinite(backlash) || backlash < 0) {
-    response.success = false;
-    response.message = "backlash = " + to_text(backlash) + ": must be finite and >= 0";
-    ROS_WARN_STREAM(name_ << ": set_backlash refused: " << response.message);
-    return true;
-  }
+void SimulatedJoint::change_backlash(double backlash) {
+  require_not_negative("backlash", backlash);
+  if (backlash == simulation_.plant().gear_train().backlash()) return;
   simulation_.plant().set_backlash(backlash);
   publish_true_backlash();
-  response.success = true;
-  response.message = "backlash is " + true_backlash();
-  ROS_INFO_STREAM(name_ << ": " << response.message);
+  ROS_INFO_STREAM(name_ << ": backlash is " << true_backlash());
+}
+
+bool SimulatedJoint::set_backlash(backlash_diagnosis::SetBacklash::Request& request,
+                                  backlash_diagnosis::SetBacklash::Response& response) {
+  try {
+    change_backlash(request.backlash);
+    live_->update(live());
+    response.success = true;
+    response.message = "backlash is " + true_backlash();
+  } catch (const Error& error) {
+    response.success = false;
+    response.message = error.what();
+    ROS_WARN_STREAM(name_ << ": set_backlash refused: " << response.message);
+  }
   return true;
+}
+
+SimulatedJoint::Live SimulatedJoint::live() const {
+  Live live = Live::__getDefault__();
+  live.backlash = simulation_.plant().gear_train().backlash();
+  for (const LiveNoise& noise : kLiveNoise)
+    live.*noise.value = simulation_.sensors().settings().of(noise.channel).noise;
+  return live;
+}
+
+void SimulatedJoint::apply(const Live& wanted) {
+  for (const LiveNoise& noise : kLiveNoise)
+    require_not_negative("noise_" + std::string(channel_name(noise.channel)), wanted.*noise.value);
+  change_backlash(wanted.backlash);
+  for (const LiveNoise& noise : kLiveNoise)
+    simulation_.sensors().set_noise(noise.channel, wanted.*noise.value);
 }
 
 void SimulatedJoint::set_torque(const std_msgs::Float64& message) {

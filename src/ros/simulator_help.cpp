@@ -27,6 +27,7 @@ Private parameters; unknown ones are refused. In brackets: units of values that 
   duration              0 s; simulated time after which the node ends, 0 is endless
   publish_clock         true if real_time_factor is not 1, else false; others follow with /use_sim_time true
   wait_for_subscriber   false; true: the simulation starts when joint_states has a subscriber
+  live                  where dynamic_reconfigure keeps what is in force; overwritten at the start
   diagnostic_period     1 s; wall time between two messages on /diagnostics
 
 Publishes
@@ -42,10 +43,11 @@ Subscribes
 Services
   ~set_backlash         backlash_diagnosis/SetBacklash; acts from the last sample on
   ~reset                std_srvs/Trigger; at rest in the middle of the gap, backlash as at start; stamps go on
+  ~live, ~JOINT/live    dynamic_reconfigure: backlash, noise of each sensor; what is wrong is refused
 
 Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the
 simulation follows that clock, otherwise wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a
-wrong rig file, 66 for a missing one, 70 where the integration fails.
+wrong rig file or one whose machine cannot be integrated, 66 for a missing one.
 )";
 }
 

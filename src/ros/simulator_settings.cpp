@@ -161,6 +161,7 @@ std::vector<JointSettings> read_joints(Parameters& parameters, const RigFile& co
     overrides.apply("");
     overrides.joint(name, int(joints.size()));
     overrides.apply(name + "/");
+    parameters.allow(name + "/live");
     joint.description = overrides.description();
     const double rate = joint.file.simulation.sensors.sampling_rate;
     if (!joints.empty() && rate != joints.front().file.simulation.sensors.sampling_rate)
@@ -190,6 +191,7 @@ long read_samples(Parameters& parameters, double sampling_rate) {
 
 SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle) {
   Parameters parameters(private_handle);
+  parameters.allow("live");
   SimulatorSettings settings;
   const RigFile common = read_rig_parameter(parameters, "rig", default_rig_file());
   parameters.allow("joints");

@@ -12,10 +12,6 @@ namespace {
 
 using Result = backlash_diagnosis::TraceResidualResult;
 
-void require(const std::string& name, const std::string& value) {
-  if (value.empty()) throw InvalidParameter(name, "''", "must be a path");
-}
-
 Result to_result(const TraceDone& done) {
   Result result;
   result.success = true;
@@ -46,8 +42,10 @@ Result to_result(const TraceDone& done) {
 
 }  // namespace
 
-TraceServer::TraceServer(const ros::NodeHandle& handle, const std::string& name, FindRig find_rig)
+TraceServer::TraceServer(const ros::NodeHandle& handle, const std::string& name, FindRig find_rig,
+                         FileFolder folder)
     : find_rig_(std::move(find_rig)),
+      folder_(std::move(folder)),
       server_(std::make_unique<Server>(
           handle, name, [this](const auto& goal) { execute(goal); }, false)) {
   server_->start();
@@ -60,9 +58,9 @@ TraceServer::~TraceServer() {
 Result TraceServer::trace(const backlash_diagnosis::TraceResidualGoal& goal) {
   TraceJob job;
   if (goal.train.empty()) throw InvalidParameter("train", "[]", "must name at least one record");
-  for (const std::string& path : goal.train) require("train", path);
-  require("test", goal.test);
-  require("out", goal.out);
+  for (const std::string& path : goal.train) job.train.push_back(folder_.inside("train", path));
+  job.test = folder_.inside("test", goal.test);
+  job.folder = folder_.inside("out", goal.out);
   if (!(goal.cutoff >= 0) || !std::isfinite(goal.cutoff))
     throw InvalidParameter("cutoff", goal.cutoff, "must be >= 0 Hz");
   if (goal.rig.empty()) {
@@ -71,18 +69,18 @@ Result TraceServer::trace(const backlash_diagnosis::TraceResidualGoal& goal) {
     if (!rig) throw InvalidParameter("joint", goal.joint, why);
     job.rig = *rig;
   } else {
-    job.rig = load_rig_file(goal.rig);
+    job.rig = load_rig_file(folder_.inside("rig", goal.rig));
   }
-  job.train = goal.train;
-  job.test = goal.test;
-  job.folder = goal.out;
   job.settings.cutoff = goal.cutoff;
   const ros::WallTime start = ros::WallTime::now();
+  std::string best;
+  job.settings.best_so_far = [&](const std::string& found) { best = found; };
   return to_result(run_trace(job, [&](double fraction, const std::string& phase) {
     backlash_diagnosis::TraceResidualFeedback feedback;
     feedback.phase = phase;
     feedback.fraction = fraction;
     feedback.elapsed = (ros::WallTime::now() - start).toSec();
+    feedback.best = best;
     server_->publishFeedback(feedback);
     return ros::ok() && !server_->isPreemptRequested();
   }));

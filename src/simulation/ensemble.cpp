@@ -76,16 +76,16 @@ struct Attempt {
 template <int Mask>
 BACKLASH_LANES void attempt(Attempt& a) {
   constexpr FixedLayout<Mask> layout;
-  constexpr int States = 2 * layout.dof();
+  constexpr int kStates = 2 * layout.dof();
   Lanes(*const k)[kMaxStates] = a.rates;
   const auto force = [&](const Lanes& x, const Lanes& v) __attribute__((always_inline)) {
     return a.contact.force(x, v);
   };
 #pragma GCC unroll 8
   for (int stage = 1; stage < kStages; ++stage) {
-    Lanes y[States];
+    Lanes y[kStates];
 #pragma GCC unroll 8
-    for (int i = 0; i < States; ++i) {
+    for (int i = 0; i < kStates; ++i) {
       Lanes sum = kA[stage][0] * k[0][i];
 #pragma GCC unroll 8
       for (int j = 1; j < stage; ++j) sum += kA[stage][j] * k[j][i];
@@ -94,11 +94,11 @@ BACKLASH_LANES void attempt(Attempt& a) {
     a.train.derivative(layout, y, a.torques[stage] * a.torque_gain[0], a.torques[stage] * a.torque_gain[1],
                        a.contact.half_gap, force, k[stage]);
     if (stage == kStages - 1)
-      for (int i = 0; i < States; ++i) a.end[i] = y[i];
+      for (int i = 0; i < kStates; ++i) a.end[i] = y[i];
   }
   Lanes square = {};
 #pragma GCC unroll 8
-  for (int i = 0; i < States; ++i) {
+  for (int i = 0; i < kStates; ++i) {
     Lanes sum = kError[0] * k[0][i];
 #pragma GCC unroll 8
     for (int j = 1; j < kStages; ++j) sum += kError[j] * k[j][i];
@@ -109,7 +109,7 @@ BACKLASH_LANES void attempt(Attempt& a) {
   }
   a.error = 0;
   for (int lane = 0; lane < kLanes; ++lane) {
-    const double error = std::sqrt(square[lane] / States);
+    const double error = std::sqrt(square[lane] / kStates);
     a.error = error > a.error || std::isnan(error) ? error : a.error;
   }
 }

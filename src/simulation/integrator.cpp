@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/simulation/integrator.h"
 
-#include <arkode/arkode_erkstep.h>
-#include <cvode/cvode.h>
 #include <nvector/nvector_serial.h>
-#include <sundials/sundials_context.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
@@ -20,6 +17,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "small_vector.h"
+#include "sundials_versions.h"
 #include "tsitouras.h"
 #include "work_limit.h"
 
@@ -89,9 +87,6 @@ IntegratorStatistics operator+(const IntegratorStatistics& a, const IntegratorSt
   return {a.steps + b.steps, a.evaluations + b.evaluations, a.error_test_failures + b.error_test_failures};
 }
 
-// Errors are reported through return codes; the library's own printing to stderr would only repeat them.
-void silence(int, const char*, const char*, char*, void*) {}
-
 }  // namespace
 
 const std::vector<std::string>& integrator_methods() {
@@ -154,8 +149,8 @@ struct Integrator::Impl {
   std::exception_ptr thrown;            // by the derivative: it must not pass through the solver's C frames
   IntegratorStatistics before_restart;  // the solvers' counters start again at each reset
 
-  static int evaluate(realtype t, N_Vector y, N_Vector ydot, void* user);
-  static int evaluate_events(realtype t, N_Vector y, realtype* values, void* user);
+  static int evaluate(sunrealtype t, N_Vector y, N_Vector ydot, void* user);
+  static int evaluate_events(sunrealtype t, N_Vector y, sunrealtype* values, void* user);
   static int weigh(N_Vector y, N_Vector weights, void* user);
 };
 
@@ -171,7 +166,7 @@ int Integrator::Impl::guarded(Function function) {
   }
 }
 
-int Integrator::Impl::evaluate(realtype t, N_Vector y, N_Vector ydot, void* user) {
+int Integrator::Impl::evaluate(sunrealtype t, N_Vector y, N_Vector ydot, void* user) {
   Impl& self = *static_cast<Impl*>(user);
   return self.guarded([&] {
     double* const rate = NV_DATA_S(ydot);
@@ -183,7 +178,7 @@ int Integrator::Impl::evaluate(realtype t, N_Vector y, N_Vector ydot, void* user
   });
 }
 
-int Integrator::Impl::evaluate_events(realtype t, N_Vector y, realtype* values, void* user) {
+int Integrator::Impl::evaluate_events(sunrealtype t, N_Vector y, sunrealtype* values, void* user) {
   Impl& self = *static_cast<Impl*>(user);
   return self.guarded([&] { self.events(t, NV_DATA_S(y), values); });
 }
@@ -214,7 +209,7 @@ Integrator::Impl::Impl(Derivative f, std::vector<StateTolerance> t, const Solver
   require_tolerance("solver.relative_tolerance", s.relative_tolerance);
   for (const StateTolerance& each : t) require_tolerance("solver absolute tolerance", each.absolute);
   tolerances = std::move(t);
-  check(SUNContext_Create(nullptr, &context), "SUNContext_Create");
+  check(sundials::create_context(&context), "SUNContext_Create");
   const auto length = static_cast<sunindextype>(tolerances.size());
   state = multistep ? N_VNew_Serial(length, context) : new_small_vector(length, context);
   if (!state) throw IntegrationError("N_VNew_Serial: out of memory");
@@ -251,7 +246,7 @@ void Integrator::Impl::check(int code, const char* function) const {
 void Integrator::Impl::create_explicit(double t) {
   memory = ERKStepCreate(evaluate, t, state, context);
   if (!memory) throw IntegrationError("ERKStepCreate failed");
-  check(ERKStepSetErrHandlerFn(memory, silence, nullptr), "ERKStepSetErrHandlerFn");
+  check(sundials::silence_explicit(memory), "silencing ERKStep");
   if (const auto own = own_tables().find(settings.method); own != own_tables().end()) {
     const std::unique_ptr<ARKodeButcherTableMem, void (*)(ARKodeButcherTable)> table(own->second(),
                                                                                      ARKodeButcherTable_Free);
@@ -268,7 +263,7 @@ void Integrator::Impl::create_multistep(double t) {
   const bool stiff = settings.method == "bdf";
   memory = CVodeCreate(stiff ? CV_BDF : CV_ADAMS, context);
   if (!memory) throw IntegrationError("CVodeCreate failed");
-  check(CVodeSetErrHandlerFn(memory, silence, nullptr), "CVodeSetErrHandlerFn");
+  check(sundials::silence_multistep(memory), "silencing CVODE");
   check(CVodeInit(memory, evaluate, t, state), "CVodeInit");
   check(CVodeWFtolerances(memory, weigh), "CVodeWFtolerances");
   check(CVodeSetUserData(memory, this), "CVodeSetUserData");

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
+
 namespace backlash {
 namespace {
 
@@ -34,13 +36,25 @@ SensorModel::SensorModel(const SensorsSettings& settings) : settings_(settings) 
 }
 
 void SensorModel::reset() {
-  for (std::size_t i = 0; i < kChannelCount; ++i) {
-    if (!(settings_.channels[i].noise > 0)) continue;  // its generator is never asked, and seeding costs
-    std::seed_seq sequence{static_cast<std::uint32_t>(settings_.seed),
-                           static_cast<std::uint32_t>(settings_.seed >> 32), static_cast<std::uint32_t>(i)};
-    generators_[i].seed(sequence);
-    normal_[i].reset();
-  }
+  for (std::size_t i = 0; i < kChannelCount; ++i)
+    if (settings_.channels[i].noise > 0) seed(i);  // else its generator is never asked, and seeding costs
+}
+
+void SensorModel::seed(std::size_t channel) {
+  std::seed_seq sequence{static_cast<std::uint32_t>(settings_.seed),
+                         static_cast<std::uint32_t>(settings_.seed >> 32),
+                         static_cast<std::uint32_t>(channel)};
+  generators_[channel].seed(sequence);
+  normal_[channel].reset();
+}
+
+void SensorModel::set_noise(Channel channel, double noise) {
+  const Range range = Range::not_negative();
+  if (!std::isfinite(noise) || !range.contains(noise))
+    throw InvalidParameter(channel_name(channel) + " noise", noise, range.text());
+  double& present = settings_.of(channel).noise;
+  if (present == 0 && noise > 0) seed(static_cast<std::size_t>(channel));
+  present = noise;
 }
 
 double SensorModel::measure(Channel channel, double exact) {

@@ -54,7 +54,7 @@ void combine(sunindextype length, int count, const double* c, double* const* x, 
   }
 }
 
-int linear_combination(int count, realtype* c, N_Vector* x, N_Vector z) {
+int linear_combination(int count, sunrealtype* c, N_Vector* x, N_Vector z) {
   if (count < 1 || count > kMostVectors) return -1;
   double* numbers[kMostVectors];
   for (int i = 0; i < count; ++i) numbers[i] = data(x[i]);
@@ -62,18 +62,18 @@ int linear_combination(int count, realtype* c, N_Vector* x, N_Vector z) {
   return 0;
 }
 
-void linear_sum(realtype a, N_Vector x, realtype b, N_Vector y, N_Vector z) {
+void linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y, N_Vector z) {
   const double c[] = {a, b};
   double* const numbers[] = {data(x), data(y)};
   combine(NV_LENGTH_S(z), 2, c, numbers, data(z));
 }
 
-void scale(realtype c, N_Vector x, N_Vector z) {
+void scale(sunrealtype c, N_Vector x, N_Vector z) {
   double* const numbers[] = {data(x)};
   combine(NV_LENGTH_S(z), 1, &c, numbers, data(z));
 }
 
-realtype weighted_rms(N_Vector x, N_Vector w) {
+sunrealtype weighted_rms(N_Vector x, N_Vector w) {
   const double *a = data(x), *b = data(w);
   const sunindextype n = NV_LENGTH_S(x);
   double sum = 0;

@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/workflow/curve_builder.h"
 #include "backlash_diagnosis/workflow/healthy_machine.h"
 #include "tools/common/command_line.h"
+#include "tools/common/diagnosis_page.h"
 #include "tools/common/diagnosis_report.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"
@@ -35,6 +36,7 @@ Command command() {
   c.positional = {"RECORD.{csv,bag}"};
   c.options = {
       {"json", "OUT.json", "report to write; '-' writes it to standard output instead of the summary", true},
+      {"report", "OUT.html", "page for people: verdict, estimates, plots, and how it came about"},
       {"rig", "RIG.yaml",
        "rig file: what to look for and which limits hold; without it only what the curve allows"},
       {"curve", "CURVE.yaml",
@@ -56,10 +58,11 @@ Command command() {
                 "angle on "
                 "the axis of motor_position [rad]; intervals hold with 95 %. ") +
             needs_of_methods();
-  c.examples = {"diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json",
-                "diagnose_record run.bag --joint elbow --curve curve.yaml --json -",
-                "diagnose_record new.csv --rig rig.yaml --save-baseline healthy.yaml --json new.json",
-                "diagnose_record old.csv --rig rig.yaml --baseline healthy.yaml --json old.json"};
+  c.examples = {
+      "diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json --report report.html",
+      "diagnose_record run.bag --joint elbow --curve curve.yaml --json -",
+      "diagnose_record new.csv --rig rig.yaml --save-baseline healthy.yaml --json new.json",
+      "diagnose_record old.csv --rig rig.yaml --baseline healthy.yaml --json old.json"};
   c.exit_codes =
       "  0   healthy\n"
       "  1   watch\n"
@@ -213,6 +216,28 @@ void check_outputs(const Arguments& arguments) {
   if (!saved.empty() && saved == out) throw UsageError("--json and --save-baseline name the same file");
   if (arguments.has("baseline")) inputs.push_back(arguments.text("baseline"));
   if (out != kStandardOutput) check_output(out, inputs);
+  if (!arguments.has("report")) return;
+  const std::string page = arguments.text("report");
+  check_output(page, inputs);
+  if (page == out || page == saved) throw UsageError("--report names the same file as another output");
+}
+
+Provenance provenance_of(const Arguments& arguments, const Inputs& in) {
+  Provenance p;
+  p.command = {"diagnose_record"};
+  p.command.insert(p.command.end(), arguments.words().begin(), arguments.words().end());
+  p.files = {{"record", arguments.positional(0)}};
+  for (const char* option : {"rig", "curve", "limits", "baseline"})
+    if (arguments.has(option)) p.files.push_back({option, arguments.text(option)});
+  if (in.rig) {
+    p.rig_source = in.rig->source;
+    p.rig_text = in.rig->text;
+  }
+  if (in.curve)
+    p.seeds = "Drawn at random: only the runs of the monitoring curve, " +
+              std::to_string(in.curve->conditions.seeds) +
+              " per backlash with fixed seeds; the same rig file gives the same curve.";
+  return p;
 }
 
 /// False where this diagnosis is no baseline, which is told.
@@ -238,6 +263,7 @@ int diagnose_record(const Arguments& arguments) {
   report.warnings = in.record.warnings;
   report.warnings.insert(report.warnings.end(), in.warnings.begin(), in.warnings.end());
   report.apd_settings = in.settings.apd;
+  report.limits = in.settings.limits;
   if (in.rig) report.rig = in.rig->rig.name;
   if (in.curve) {
     report.curve = &*in.curve;
@@ -253,6 +279,9 @@ int diagnose_record(const Arguments& arguments) {
     write_text(out, json);
     print_summary(report, std::cout);
   }
+  if (arguments.has("report"))
+    write_text(arguments.text("report"),
+               diagnosis_page(report, in.rig ? &*in.rig : nullptr, provenance_of(arguments, in)));
   if (arguments.has("save-baseline") && !save_baseline(report.diagnosis, in, arguments.text("save-baseline")))
     return kInconclusive;
   return exit_code(report.diagnosis.verdict.grade);

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <mutex>
 #include <numeric>
+#include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -149,6 +152,30 @@ void take(const CurvePlan& plan, std::size_t i, double backlash, FineRun run, Ce
   }
 }
 
+/// Tells what of the curve is there.
+class PointsDone {
+ public:
+  explicit PointsDone(const CurveRequest& request) : request_(request) {}
+
+  void add(const CurvePoint& point) {
+    if (!request_.best_so_far) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    lowest_ = std::min(lowest_, point.cells.front().mean);
+    highest_ = std::max(highest_, point.cells.front().mean);
+    std::ostringstream text;
+    text.precision(3);
+    text << ++done_ << " of " << request_.points << " points, skewness " << lowest_ << " to " << highest_;
+    request_.best_so_far(text.str());
+  }
+
+ private:
+  const CurveRequest& request_;
+  std::mutex mutex_;
+  int done_ = 0;
+  double lowest_ = std::numeric_limits<double>::infinity(),
+         highest_ = -std::numeric_limits<double>::infinity();
+};
+
 Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   const int count = plan.request.points;
   Cells all;
@@ -159,12 +186,15 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   all.middle.runs.resize(count - 1);
   all.beyond.resize(count_beyond(plan));
   const std::vector<Rig> machines = machines_of(plan);
+  PointsDone points(plan.request);
   const std::size_t chunks = (machines.size() + kTogether - 1) / kTogether;
   for_each_in_parallel(static_cast<int>(chunks), ticker, [&](int chunk) {
     const std::size_t begin = chunk * kTogether, end = std::min(begin + kTogether, machines.size());
     std::vector<FineRun> runs = run_fine(plan, {machines.begin() + begin, machines.begin() + end}, ticker);
-    for (std::size_t i = begin; i < end; ++i)
+    for (std::size_t i = begin; i < end; ++i) {
       take(plan, i, machines[i].mesh.backlash, std::move(runs[i - begin]), all);
+      if (i < all.points.size()) points.add(all.points[i].point);
+    }
   });
   return all;
 }

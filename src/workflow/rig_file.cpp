@@ -4,21 +4,13 @@
 #include <cmath>
 #include <memory>
 
+#include "backlash_diagnosis/base/digest.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
 #include "default_rig.h"
 
 namespace backlash {
 namespace {
-
-std::string digest_of(const std::string& text) {
-  std::uint64_t hash = 14695981039346656037ULL;
-  for (const unsigned char c : text) hash = (hash ^ c) * 1099511628211ULL;
-  static const char* const hex = "0123456789abcdef";
-  std::string digest;
-  for (int shift = 60; shift >= 0; shift -= 4) digest += hex[(hash >> shift) & 15];
-  return digest;
-}
 
 /// What the estimators need to know of the rig.
 void fill_from_rig(const Rig& rig, DiagnosisSettings& settings) {

@@ -6,12 +6,11 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <iterator>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
-#include "backlash_diagnosis/base/script.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/workflow/report_page.h"
 #include "backlash_diagnosis/workflow/traced_rig.h"
 
 namespace backlash {
@@ -25,23 +24,20 @@ const char* const kScript = "trace_report.py";
   throw CannotWrite(printable(path, 4096) + ": cannot be written: " + reason);
 }
 
-/// Figures as a piece of HTML, or why there are none.
-std::string drawn(const TraceFiles& files, const std::string& folder) {
-  const std::string out = (fs::path(folder) / ".figures.html").string();
-  std::string plots;
-  try {
-    const int code = run_script(kScript, {"--series", files.series, "--out", out, "--", files.report});
-    if (code != 0)
-      throw Error(std::string(kScript) + " ended with exit code " + std::to_string(code) +
-                  (code == 70 ? ": matplotlib or numpy is missing (Debian: python3-matplotlib)" : ""));
-    std::ifstream in = open_input(out);
-    plots.assign(std::istreambuf_iterator<char>(in), {});
-  } catch (const Error& error) {
-    plots = "<p>No plots were drawn: " + html_text(error.what()) + ".</p>\n";
-  }
-  std::error_code ignored;
-  fs::remove(out, ignored);
-  return plots;
+/// The command that traces the same again; what was asked of an action as well.
+Provenance provenance_of(const Trace& trace, const RigFile& declared, const TraceInputs& inputs,
+                         const std::string& folder) {
+  Provenance p;
+  p.command = {"trace_residual", "--rig", inputs.rig, "--train"};
+  p.command.insert(p.command.end(), inputs.train.begin(), inputs.train.end());
+  p.command.insert(p.command.end(),
+                   {"--test", inputs.test, "--cutoff", to_text(trace.cutoff), "--out", folder});
+  p.files.push_back({"rig, as declared", inputs.rig});
+  for (const std::string& record : inputs.train) p.files.push_back({"record for training", record});
+  p.files.push_back({"record for the test", inputs.test});
+  p.rig_source = inputs.rig + ", as declared; with the effects added it is rig.yaml beside this page";
+  p.rig_text = declared.text;
+  return p;
 }
 
 }  // namespace
@@ -74,7 +70,9 @@ void TraceFolder::write(const Trace& trace, const RigFile& declared, const Trace
   write_file(files_.report, trace_report_json(trace, inputs));
   write_file(files_.series, trace_series_json(trace));
   write_file(files_.rig, traced_rig_text(declared, trace));
-  write_file(files_.page, trace_page(trace, inputs, drawn(files_, folder_)));
+  const std::string plots = drawn_figures(kScript, {"--series", files_.series, "--", files_.report});
+  const std::string provenance = provenance_sections(provenance_of(trace, declared, inputs, folder_));
+  write_file(files_.page, trace_page(trace, inputs, plots, provenance));
 }
 
 }  // namespace backlash

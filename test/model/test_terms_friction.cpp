@@ -193,12 +193,13 @@ TEST(EndTermsInMotion, FrictionTakesItsShareOfTheLoad) {
 }
 
 TEST(EndTermsInMotion, FrictionThatVariesWithPositionTakesItsWork) {
-  const double F = 1.5, A = 1, n = 4, p = 0.3;
+  const double friction = 1.5, a = 1, n = 4, p = 0.3;
   for (const char* body : {"motor", "load"}) {
     const auto [w, q] =
-        moved(one_body("id: position_dependent_friction, amplitude: 1, order: 4, phase: 0.3", body, F), 2, 2);
+        moved(one_body("id: position_dependent_friction, amplitude: 1, order: 4, phase: 0.3", body, friction),
+              2, 2);
     EXPECT_GT(q, 2.5);
-    const double work = F * q + A / n * (std::cos(p) - std::cos(n * q + p));
+    const double work = friction * q + a / n * (std::cos(p) - std::cos(n * q + p));
     EXPECT_NEAR(0.5 * 3 * (4 - w * w), work, 10 * kClose);
   }
 }

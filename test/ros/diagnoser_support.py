@@ -62,7 +62,8 @@ class Diagnoser:
     def __init__(self, parameters=None, joint_states="/joint_states"):
         Diagnoser._count += 1
         self.name = "/diagnoser_%d" % Diagnoser._count
-        for key, value in (parameters or {}).items():
+        self._folder = tempfile.TemporaryDirectory()
+        for key, value in {"folder": self._folder.name, **(parameters or {})}.items():
             rospy.set_param("%s/%s" % (self.name, key), value)
         program = roslib.packages.find_node(PACKAGE, "diagnoser")[0]
         self._log = tempfile.TemporaryFile(mode="w+")
@@ -74,6 +75,10 @@ class Diagnoser:
 
     def topic(self, name):
         return "%s/%s" % (self.name, name)
+
+    def file(self, name):
+        """In the folder for files that goals name."""
+        return os.path.join(self._folder.name, name)
 
     def distributions(self):
         return Inbox(self.topic("amplitude_distribution"), AmplitudeDistribution)
@@ -101,6 +106,11 @@ class Diagnoser:
     def alive(self):
         return self._process.poll() is None
 
+    def kill(self):
+        """As a power cut would end it."""
+        self._process.kill()
+        self._process.wait(TIMEOUT)
+
     def output(self):
         """What it has printed so far; its descriptor is shared, so its place is left alone."""
         return os.pread(self._log.fileno(), 1 << 20, 0).decode()
@@ -122,6 +132,7 @@ class Diagnoser:
                 self._process.kill()
                 self._process.wait()
         self._log.close()
+        self._folder.cleanup()
 
 
 class Connected(rospy.SubscribeListener, threading.Event):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The diagnoser beside a running simulator: distributions, estimates, services, action, /diagnostics."""
 import math
+import os
 import shutil
 import tempfile
 import threading
@@ -178,11 +179,14 @@ class DiagnoserTest(unittest.TestCase):
         with Diagnoser({"curve": self.curve}, self.states) as diagnoser:
             client = actionlib.SimpleActionClient(diagnoser.topic("build_curve"), BuildCurveAction)
             self.assertTrue(client.wait_for_server(rospy.Duration(TIMEOUT)))
-            fractions = []
-            client.send_goal(BuildCurveGoal(points=5, periods=2, sampling_rate=1000),
-                             feedback_cb=lambda feedback: fractions.append(feedback.fraction))
+            feedback = []
+            client.send_goal(BuildCurveGoal(points=5, periods=2, sampling_rate=1000, save_as="built.yaml"),
+                             feedback_cb=feedback.append)
             result = result_of(client)
             self.assertTrue(result.success, result.message)
+            self.assertTrue(os.path.exists(diagnoser.file("built.yaml")))
+            fractions = [f.fraction for f in feedback]
+            self.assertTrue(any("of 5 points" in f.best for f in feedback))
             self.assertEqual(len(result.curve.points), 5)
             self.assertEqual(len(diagnoser.curve().curve.points), 5)
             self.assertTrue(fractions)
@@ -194,6 +198,10 @@ class DiagnoserTest(unittest.TestCase):
             result_of(client)
             self.assertEqual(client.get_state(), actionlib.GoalStatus.PREEMPTED)
             self.assertEqual(len(diagnoser.curve().curve.points), 5)
+            client.send_goal(BuildCurveGoal(points=5, save_as="../built.yaml"))
+            result_of(client)
+            self.assertEqual(client.get_state(), actionlib.GoalStatus.ABORTED)
+            self.assertIn("save_as = ../built.yaml: must lie in", client.get_result().message)
             client.send_goal(BuildCurveGoal(max_backlash=-1))
             result_of(client)
             self.assertEqual(client.get_state(), actionlib.GoalStatus.ABORTED)

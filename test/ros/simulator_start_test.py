@@ -162,7 +162,7 @@ class SimulatorStartTest(unittest.TestCase):
     def test_a_failing_integration_ends_the_node(self):
         path = self.rig(solver={"relative_tolerance": 1e-13, "position_tolerance": 1e-300,
                                 "velocity_tolerance": 1e-300})
-        self.assert_refused({"rig": path}, 70, "FATAL")
+        self.assert_refused({"rig": path}, 65, "FATAL")
 
 
 if __name__ == "__main__":

@@ -256,7 +256,7 @@ class TimeStepping {
       }
     }
   }
-  double q_[2] = {0, 0}, w_[2] = {0, 0};
+  double position(int body) const { return q_[body]; }
 
  private:
   static double stopped(double before, double after) { return before * after < 0 ? 0 : after; }
@@ -282,6 +282,7 @@ class TimeStepping {
     }
   }
 
+  double q_[2] = {0, 0}, w_[2] = {0, 0};
   Body body_[2];
   double half_;
   std::function<double(double)> torque_;
@@ -301,10 +302,10 @@ TEST(DryFriction, TwoInertiasWithBacklashAgreeWithATimeStepping) {
     plant.advance_to(k * 1e-3);
     oracle.advance_to(k * 1e-3);
     const auto& s = plant.state();
-    travel = std::max(travel, std::fabs(oracle.q_[0]));
-    error = std::max(error, std::fabs(s[0] - oracle.q_[0]));
-    twist = std::max(twist, std::fabs(oracle.q_[0] - oracle.q_[1]));
-    twist_error = std::max(twist_error, std::fabs(s[0] - s[1] - oracle.q_[0] + oracle.q_[1]));
+    travel = std::max(travel, std::fabs(oracle.position(0)));
+    error = std::max(error, std::fabs(s[0] - oracle.position(0)));
+    twist = std::max(twist, std::fabs(oracle.position(0) - oracle.position(1)));
+    twist_error = std::max(twist_error, std::fabs(s[0] - s[1] - oracle.position(0) + oracle.position(1)));
     (s[2] != 0 && s[3] != 0 ? both_moving : s[2] == 0 && s[3] == 0 ? both_stuck : one_stuck)++;
   }
   EXPECT_GT(both_moving, 100);

@@ -75,7 +75,8 @@ TEST(Tsitouras, InterpolantIsOfOrderFourAndEndsAtTheSolution) {
     double weights[kStages];
     interpolant(u, weights);
     p.expect_order_4(Stages(weights), u);
-    if (u == 1) EXPECT_NEAR((Stages(weights) - p.b).cwiseAbs().maxCoeff(), 0, kRounding);
+    if (u < 1) continue;
+    EXPECT_NEAR((Stages(weights) - p.b).cwiseAbs().maxCoeff(), 0, kRounding);
   }
 }
 

@@ -31,9 +31,13 @@ class CommandTest : public testing::Test {
   /// `line` is a command of the package with its arguments, as in a shell; `before` is put in front of it. No
   /// argument may hold a quote.
   Outcome run(const std::string& line, const std::string& before = "") const {
-    const std::string shell = "cd '" + path("") + "' && " + before + " '" BACKLASH_DIAGNOSIS_BIN_DIR "'/" +
-                              line + " >../out 2>../err </dev/null";
-    const int status = std::system(shell.c_str());
+    return shell(before + " '" BACKLASH_DIAGNOSIS_BIN_DIR "'/" + line);
+  }
+
+  /// Any line of a shell, in the folder of the test.
+  Outcome shell(const std::string& line) const {
+    const int status =
+        std::system(("cd '" + path("") + "' && " + line + " >../out 2>../err </dev/null").c_str());
     Outcome outcome;
     if (WIFEXITED(status)) outcome.code = WEXITSTATUS(status);
     outcome.out = content((folder_ / "out").string());

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "backlash_diagnosis/diagnosis/coherence.h"
+#include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 #include "backlash_diagnosis/record/csv.h"
@@ -279,6 +280,24 @@ TEST(RigEstimators, CoherenceFallsWithTheGap) {
   settings.segment = 0.256;
   EXPECT_EQ(detect_nonlinearity(simulate_record(square.rig, square.simulation, 6), settings).status,
             Status::out_of_domain);
+}
+
+/// The torque of a slow square wave has two values: play and compliance have the same effect on the
+/// deflection.
+TEST(RigEstimators, WhereTorqueDoesNotTellPlayFromComplianceNoPlayIsInvented) {
+  const RigFile declared =
+      load_rig_file(std::string(BACKLASH_DIAGNOSIS_SOURCE_DIR) + "/config/two_inertia_servo.yaml");
+  std::string softer = declared.text;  // as far from it as the file says that machines are
+  softer.replace(softer.find("460e3"), 5, "400e3");
+  RigFile machine = rig_file_from_text(softer, "softer");
+  machine.rig.mesh.backlash = 7e-4;
+  machine.rig.link.inertia = 125;
+  machine.rig.motor.coulomb_friction = 52;
+  const Record record = simulate_record(machine.rig, machine.simulation, 20);
+  for (const Estimate& e : diagnose(record, declared.diagnosis, nullptr).estimates) {
+    if (e.method != "position_difference") continue;
+    EXPECT_TRUE(e.status != Status::ok || (e.angle_lower <= 7e-4 && 7e-4 <= e.angle_upper)) << e.message;
+  }
 }
 
 }  // namespace

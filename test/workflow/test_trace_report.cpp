@@ -181,7 +181,7 @@ TEST(TraceReport, ALearnedMapIsSaidToBeOne) {
   EXPECT_NE(verdict_sentence(t).find("lacks a function of motor_torque that is not one of the named effects"),
             std::string::npos);
   EXPECT_NE(trace_summary(t).find("nearest named effects: cogging"), std::string::npos);
-  EXPECT_NE(trace_page(t, kInputs, "").find("nearest named effects: cogging"), std::string::npos);
+  EXPECT_NE(trace_page(t, kInputs, "", "").find("nearest named effects: cogging"), std::string::npos);
   EXPECT_EQ(Json::parse(trace_report_json(t, kInputs))["steps"][0]["nearest"], Json{"cogging"});
 }
 
@@ -195,11 +195,11 @@ TEST(TraceReport, NumbersHaveAsManyDigitsAsTheirErrorLeaves) {
 }
 
 TEST(TraceReport, PageHoldsEverythingAndAsksForNothing) {
-  const std::string page = trace_page(trace(), kInputs, "<p>the plots</p>");
+  const std::string page = trace_page(trace(), kInputs, "<p>the plots</p>", "<p>the rig</p>");
   for (const char* part : {"a &lt; b &amp; &quot;c&quot;", "b&lt;i&gt;.csv", "quadratic_drag", "body: motor",
                            "2 N m s^2/rad^2", "5 % &rarr; 0.4 %", "11 of 12 better", "asymmetric_viscous",
-                           "6.312 &plusmn; 0.012 kg m^2", "<p>the plots</p>", "b.csv: 3 gaps", "noise alone",
-                           "61 %", "1.2 %", "class=\"verdict effect_found\""})
+                           "6.312 &plusmn; 0.012 kg m^2", "<p>the plots</p>", "<p>the rig</p>",
+                           "b.csv: 3 gaps", "noise alone", "61 %", "1.2 %", "class=\"verdict effect_found\""})
     EXPECT_NE(page.find(part), std::string::npos) << part;
   for (const char* part : {"http:", "https:", "<script", "<link", "nan", "url("})
     EXPECT_EQ(page.find(part), std::string::npos) << part;

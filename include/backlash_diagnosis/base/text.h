@@ -25,7 +25,7 @@ std::string to_text(double value);
 /// The text without spaces and tabs at both ends.
 std::string_view trimmed(std::string_view text);
 
-/// For messages: control characters and bytes that are not UTF-8 as \xHH, cut after `limit` characters with
+/// For messages: control characters and bytes that are not UTF-8 as `\xHH`, cut after `limit` characters with
 /// "...".
 std::string printable(std::string_view text, std::size_t limit = 60);
 

@@ -55,20 +55,29 @@ std::optional<Record> whole_periods(const Record& record, const ApdSettings& set
 /// periods.
 ApdResult analyse_apd(const Record& record, const ApdSettings& settings);
 
-/// Why a record was not taken under the conditions of a curve; empty where it was. Compares sampling rate
+/// A condition of a curve that a record does not meet: what it is about, for an operator who wants to know
+/// where to look, and the reason in words.
+struct Mismatch {
+  enum class Concern { curve, excitation, signal };
+  Concern concern = Concern::curve;
+  std::string reason;
+};
+
+/// Why a record was not taken under the conditions of a curve; nothing where it was. Compares sampling rate
 /// (2 %), excitation amplitude and shape (5 %, from motor_torque where recorded), the signal's own level
 /// (12 % beyond those on the curve), frequency (2 %, with two periods or more), noise, saturation, and
 /// whether the output moves although it should be locked. What cannot be told: without motor_torque, other
 /// amplitudes within about 12 % and another shape with the same median magnitude; without motor_position,
 /// backlash beyond the end of the curve; without it and load_position, an output that moves but leaves the
 /// signal's level alone.
-std::string out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                          const MonitoringCurve& curve);
+std::optional<Mismatch> out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+                                      const MonitoringCurve& curve);
 
 /// What a curve says about a record before an estimator inverts it.
 struct CurveMatch {
   NoiseRange noise;                   // of the record, with the error of its estimate
   std::optional<Estimate> refused;    // why no estimate can be made: status and reason
+  std::optional<Mismatch> mismatch;   // where that is a condition of the curve
   std::optional<FamilyMatch> family;  // where none was refused and the curve has a family
 };
 

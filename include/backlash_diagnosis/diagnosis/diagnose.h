@@ -33,6 +33,7 @@ struct Diagnosis {
   std::vector<Estimate>
       estimates;  // one per method of diagnosis_methods(), in that order, or the one asked for
   std::optional<ApdResult> apd;
+  std::optional<Mismatch> mismatch;             // of the record and the conditions of the curve
   std::optional<CoherenceDetection> coherence;  // where the settings ask for it
   Verdict verdict;
 };

@@ -29,6 +29,7 @@ struct TraceSettings {
   double least_gain = 0.03;         // of a residual that an effect brings near its floor
   double least_gain_unclear = 0.1;  // of one that stays far above its floor, as on real machines
   std::size_t most_effects = 6;
+  BestSoFar best_so_far;  // effects in the model and what they leave; may be empty
 };
 
 /// A parameter of an effect, as found.

@@ -12,10 +12,16 @@
 #include <ros/ros.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/DiagnosedJointLiveConfig.h"
+#include "backlash_diagnosis/DiagnoserLiveConfig.h"
+#include "backlash_diagnosis/base/file_folder.h"
+#include "backlash_diagnosis/ros/joint_diagnostics.h"
 #include "backlash_diagnosis/ros/joint_monitor.h"
+#include "backlash_diagnosis/ros/live_server.h"
 #include "backlash_diagnosis/ros/trace_server.h"
 
 namespace backlash {
@@ -24,7 +30,10 @@ namespace backlash {
 struct DiagnoserSettings {
   std::vector<MonitorSettings> joints;
   int queue = 20000;  // messages waiting at most
-  double stale = 2;   // s of wall time without a message before /diagnostics says so
+  DiagnosticsSettings diagnostics;
+  std::string folder;            // in which goals may name files
+  std::string history;           // folder with a file per joint; empty: none is kept
+  double history_interval = 60;  // s
 };
 
 /// Throws InvalidParameter, BadData, MissingInput.
@@ -44,31 +53,45 @@ class DiagnoserNode {
 
  private:
   using CurveServer = actionlib::SimpleActionServer<backlash_diagnosis::BuildCurveAction>;
+  using Live = backlash_diagnosis::DiagnoserLiveConfig;
+  using JointLive = backlash_diagnosis::DiagnosedJointLiveConfig;
+
+  /// All that belongs to a joint; its address stays.
+  struct Joint {
+    std::unique_ptr<JointMonitor> monitor;
+    std::unique_ptr<JointHistory> history;  // null where none is kept
+    std::unique_ptr<JointDiagnostics> diagnostics;
+    std::unique_ptr<LiveServer<JointLive>> live;
+  };
 
   void on_joint_state(const sensor_msgs::JointState::ConstPtr& message);
-  void publish(const JointMonitor& monitor, const PeriodReport& report);
+  void publish(Joint& joint, const PeriodReport& report);
   bool on_diagnose(backlash_diagnosis::Diagnose::Request& request,
                    backlash_diagnosis::Diagnose::Response& response);
   bool on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
                        backlash_diagnosis::SetBaseline::Response& response);
   /// Takes the diagnosis of all that is kept as baseline, or forgets it; and the same in its file.
-  void set_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response);
+  void set_baseline(Joint& joint, backlash_diagnosis::SetBaseline::Response& response);
   void clear_baseline(JointMonitor& monitor, backlash_diagnosis::SetBaseline::Response& response);
   bool on_get_curve(backlash_diagnosis::GetCurve::Request& request,
                     backlash_diagnosis::GetCurve::Response& response);
   void on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal);
   void advertise();
-  void add_diagnostics();
-  void report_backlash(JointMonitor& monitor, diagnostic_updater::DiagnosticStatusWrapper& status) const;
-  void report_input(JointMonitor& monitor, diagnostic_updater::DiagnosticStatusWrapper& status) const;
+  void add_joint(MonitorSettings settings, const DiagnoserSettings& common);
+  void serve_live(const DiagnoserSettings& settings);
+  void apply(const Live& wanted);
+  /// Throws InvalidParameter.
+  void apply(Joint& joint, const JointLive& wanted);
+  void write_histories();
 
-  /// The monitor of a joint; with an empty name the only one. Null with the reason in `why`.
-  JointMonitor* find(const std::string& joint, std::string& why);
+  /// A joint; with an empty name the only one. Null with the reason in `why`.
+  Joint* find(const std::string& joint, std::string& why);
+  JointMonitor* find_monitor(const std::string& joint, std::string& why);
 
   ros::NodeHandle handle_, private_handle_;
-  double stale_;
-  std::vector<std::unique_ptr<JointMonitor>> monitors_;
-  JointStateReader reader_;  // its joints are the monitors
+  FileFolder folder_;
+  std::vector<Joint> joints_;  // as many as at the start, so that their addresses stay
+  JointStateReader reader_;    // of the same joints
   std::string topic_;
   ros::CallbackQueue sample_queue_;  // samples have a thread of their own, services never hold them up
   ros::Subscriber subscriber_;
@@ -77,6 +100,7 @@ class DiagnoserNode {
   std::unique_ptr<CurveServer> curve_server_;
   std::unique_ptr<TraceServer> trace_server_;
   diagnostic_updater::Updater updater_;
+  std::unique_ptr<LiveServer<Live>> live_;
 };
 
 }  // namespace backlash

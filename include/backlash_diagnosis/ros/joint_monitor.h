@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/ros/joint_state.h"
@@ -41,14 +42,19 @@ struct MonitorState {
   StreamCounters counters;
   long bad_messages = 0;  // wrong array sizes, infinite values, names twice
   std::string last_problem;
-  std::string curve_state;            // "loaded", "building, 40 %", "built", "none: ..."
-  std::vector<std::string> warnings;  // about curve and baseline: of another version of the rig file
-  double rate = 0;                    // Hz, of the samples kept
-  double period = 0;                  // s
-  long periods = 0;                   // whole settled ones at hand
+  std::string curve_state;                      // "loaded", "building, 40 %", "built", "none: ..."
+  std::string curve_warning, baseline_warning;  // of another version of the rig file
+  double rate = 0;                              // Hz, of the samples kept
+  double period = 0;                            // s
+  long periods = 0;                             // whole settled ones at hand
   bool any_sample = false;
   ros::WallTime last_arrival;
-  std::optional<Diagnosis> latest;
+  double latency = 0;  // s from stamp to arrival by ROS time, of the latest message
+  std::shared_ptr<const Diagnosis> latest;
+  bool building_curve = false;
+  bool baseline = false;
+
+  std::vector<std::string> warnings() const;
 };
 
 class JointMonitor {
@@ -71,6 +77,10 @@ class JointMonitor {
 
   void set_baseline(const std::optional<Baseline>& baseline);
   void set_curve(MonitoringCurve curve);
+  void set_window(int periods, double estimate_interval);  ///< as in MonitorSettings
+  void set_limits(const std::optional<Limits>& limits);
+  std::optional<Limits> limits() const;
+  std::optional<Baseline> baseline() const;
   std::shared_ptr<const MonitoringCurve> curve() const;
   MonitorState state() const;
 
@@ -90,11 +100,12 @@ class JointMonitor {
   std::optional<double> estimated_;  // s, when the last running estimate was due
   std::shared_ptr<const MonitoringCurve> curve_;
   std::optional<Baseline> baseline_;
-  std::optional<Diagnosis> latest_;
+  std::shared_ptr<const Diagnosis> latest_;
   std::string curve_state_, last_problem_;
   std::string curve_warning_, baseline_warning_;
   long bad_messages_ = 0;
   ros::WallTime last_arrival_;
+  double latency_ = 0;
   bool building_ = false, build_tried_ = false, stop_ = false;
   std::thread builder_;
 };

@@ -9,10 +9,13 @@
 #include <std_msgs/Float64.h>
 
 #include <chrono>
+#include <memory>
 #include <string>
 
 #include "backlash_diagnosis/SetBacklash.h"
+#include "backlash_diagnosis/SimulatedJointLiveConfig.h"
 #include "backlash_diagnosis/ros/joint_state.h"
+#include "backlash_diagnosis/ros/live_server.h"
 #include "backlash_diagnosis/ros/simulator_settings.h"
 #include "backlash_diagnosis/simulation/simulation.h"
 
@@ -21,7 +24,7 @@ namespace backlash {
 class SimulatedJoint {
  public:
   /// Topics rig_description, true_backlash and torque_command are relative to `handle`, the service
-  /// set_backlash to `private_handle`.
+  /// set_backlash and the live parameters to `private_handle`.
   SimulatedJoint(const JointSettings& settings, const ros::NodeHandle& handle,
                  const ros::NodeHandle& private_handle);
   SimulatedJoint(const SimulatedJoint&) = delete;  // callbacks refer to this object
@@ -35,7 +38,13 @@ class SimulatedJoint {
   const Simulation& simulation() const { return simulation_; }
 
  private:
+  using Live = backlash_diagnosis::SimulatedJointLiveConfig;
+
   void publish_true_backlash();
+  /// Throws InvalidParameter, and changes nothing then.
+  void change_backlash(double backlash);
+  Live live() const;
+  void apply(const Live& wanted);
   bool set_backlash(backlash_diagnosis::SetBacklash::Request& request,
                     backlash_diagnosis::SetBacklash::Response& response);
   void set_torque(const std_msgs::Float64& message);
@@ -49,6 +58,7 @@ class SimulatedJoint {
   ros::Publisher rig_description_, true_backlash_;
   ros::Subscriber torque_command_;
   ros::ServiceServer set_backlash_;
+  std::unique_ptr<LiveServer<Live>> live_;
 };
 
 }  // namespace backlash

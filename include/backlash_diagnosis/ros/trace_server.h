@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 
+#include "backlash_diagnosis/base/file_folder.h"
 #include "backlash_diagnosis/workflow/rig_file.h"
 
 namespace backlash {
@@ -19,8 +20,8 @@ class TraceServer {
   /// The rig of a joint; null with the reason in `why`.
   using FindRig = std::function<const RigFile*(const std::string& joint, std::string& why)>;
 
-  /// Serves `name` from then on, in a thread of its own.
-  TraceServer(const ros::NodeHandle& handle, const std::string& name, FindRig find_rig);
+  /// Serves `name` from then on, in a thread of its own; all paths of a goal must lie in `folder`.
+  TraceServer(const ros::NodeHandle& handle, const std::string& name, FindRig find_rig, FileFolder folder);
   ~TraceServer();
 
  private:
@@ -30,6 +31,7 @@ class TraceServer {
   backlash_diagnosis::TraceResidualResult trace(const backlash_diagnosis::TraceResidualGoal& goal);
 
   FindRig find_rig_;
+  FileFolder folder_;
   std::unique_ptr<Server> server_;
 };
 

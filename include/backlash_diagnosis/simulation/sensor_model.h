@@ -44,12 +44,18 @@ class SensorModel {
   /// Starts the noise again from the seed.
   void reset();
 
+  /// Another standard deviation from the next value on; throws InvalidParameter unless it is >= 0.
+  void set_noise(Channel channel, double noise);
+  const SensorsSettings& settings() const { return settings_; }
+
   double measure(Channel channel, double exact);
 
   /// Every value of an observation through its sensor; a NaN (no such sensor) stays NaN.
   Observation measure(const Observation& exact);
 
  private:
+  void seed(std::size_t channel);
+
   SensorsSettings settings_;
   std::array<std::mt19937_64, kChannelCount> generators_;
   std::array<std::normal_distribution<double>, kChannelCount> normal_;

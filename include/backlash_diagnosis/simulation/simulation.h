@@ -37,6 +37,8 @@ class Simulation {
   double sampling_rate() const { return rate_; }
   Plant& plant() { return plant_; }
   const Plant& plant() const { return plant_; }
+  SensorModel& sensors() { return sensors_; }
+  const SensorModel& sensors() const { return sensors_; }
 
   /// Back to sample 0 with the rig file's backlash; the noise starts again from its seed.
   void reset();

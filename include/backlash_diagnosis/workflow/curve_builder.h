@@ -20,6 +20,7 @@ struct CurveRequest {
   double sampling_rate = 0;    // Hz; 0: the rig file's
   int periods = 10;            // per seed, after settling
   int seeds = 8;
+  BestSoFar best_so_far;  // points that are there; may be empty
 };
 
 /// Sampling rate [Hz] of a recorder whose samples are `interval` [s] apart, to four significant digits: the

@@ -41,10 +41,8 @@ class TraceFolder {
   bool new_ = false;
 };
 
-/// The page; `plots` is what the script drew, or a sentence on why there is nothing.
-std::string trace_page(const Trace& trace, const TraceInputs& inputs, const std::string& plots);
-
-/// With the characters that HTML takes for its own replaced.
-std::string html_text(const std::string& text);
+/// The page; `plots` is what the script drew, or a sentence on why there is nothing; `provenance` ends it.
+std::string trace_page(const Trace& trace, const TraceInputs& inputs, const std::string& plots,
+                       const std::string& provenance);
 
 }  // namespace backlash

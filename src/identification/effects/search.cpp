@@ -8,6 +8,7 @@
 #include <set>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/interruption.h"
 #include "backlash_diagnosis/identification/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "learned.h"
@@ -108,6 +109,8 @@ void Search::start_in_travel() {
 }
 
 void Search::run() {
+  // Fits of minutes have nothing new to report, but end when asked to.
+  const Interruption interruption([this] { return !progress_ || progress_(share_done(), phase_); });
   fit_base();
   declared_base_ = base_;
   add_effects();
@@ -121,9 +124,16 @@ void Search::run() {
   hold_friction();
 }
 
-void Search::report(const std::string& phase) const {
+/// Effects that are taken back do not turn it back.
+double Search::share_done() const {
   const double share = (double(effects_.size()) + (stage_ ? 1 : 0)) / double(settings_.most_effects + 1);
-  if (progress_ && !progress_(std::min(1.0, share), phase)) throw Cancelled();
+  done_ = std::max(done_, std::min(1.0, share));
+  return done_;
+}
+
+void Search::report(const std::string& phase) const {
+  phase_ = phase;
+  if (progress_ && !progress_(share_done(), phase)) throw Cancelled();
 }
 
 /// All that the rig declares and such records can tell.
@@ -200,6 +210,17 @@ void Search::fit_base() {
   base_ = fit_stage(data_, machine, cutoff_, kRoughTolerance);
   base_ = fit_stage(data_, base_->fit.machine, cutoff_, kFineTolerance);
   stage_ = base_;
+  tell_best();
+}
+
+void Search::tell_best() const {
+  if (!settings_.best_so_far) return;
+  std::string names;
+  for (const Accepted& effect : effects_) names += (names.empty() ? "" : " + ") + effect.candidate.id;
+  char left[96];
+  std::snprintf(left, sizeof left, ": torque %.3g, deflection %.3g times the noise floor",
+                stage_->leftover.torque, stage_->leftover.deflection);
+  settings_.best_so_far((names.empty() ? "the declared machine" : names) + left);
 }
 
 /// Fits machine and candidate together, with the weights of the present stage so that fits can be compared.
@@ -337,6 +358,7 @@ bool Search::adopt(std::vector<Accepted> effects) {
   effects.back().after = stage.fit.machine;
   stage_ = std::move(stage);
   effects_ = std::move(effects);
+  tell_best();
   return true;
 }
 

@@ -83,6 +83,8 @@ class Search {
   void hold_friction();
   void declare_parameters();
   void start_in_travel();
+  double share_done() const;
+  void tell_best() const;
   void report(const std::string& phase) const;
   std::vector<std::string> parameter_names() const;
   Machine with_effects(const std::vector<Accepted>& effects) const;
@@ -108,6 +110,8 @@ class Search {
   double cutoff_;
   TraceSettings settings_;
   const Progress& progress_;
+  mutable std::string phase_;  // latest reported
+  mutable double done_ = 0;    // share of the work
   MotionRange range_;
   Machine declared_;
   std::optional<Stage> declared_base_, base_, stage_;

@@ -191,7 +191,7 @@ Arguments parse_arguments(const Command& command, const std::vector<std::string>
     else if (option.required)
       throw UsageError("missing " + spelling(option));
   }
-  return {std::move(positional), std::move(options)};
+  return {words, std::move(positional), std::move(options)};
 }
 
 std::string help_text(const Command& command) {

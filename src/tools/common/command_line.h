@@ -38,8 +38,11 @@ struct Command {
 /// What the user wrote. The readers throw UsageError naming option, value and limit.
 class Arguments {
  public:
-  Arguments(std::vector<std::string> positional, std::map<std::string, std::vector<std::string>> options)
-      : positional_(std::move(positional)), options_(std::move(options)) {}
+  Arguments(std::vector<std::string> words, std::vector<std::string> positional,
+            std::map<std::string, std::vector<std::string>> options)
+      : words_(std::move(words)), positional_(std::move(positional)), options_(std::move(options)) {}
+
+  const std::vector<std::string>& words() const { return words_; }  ///< as given
 
   const std::string& positional(std::size_t i) const { return positional_.at(i); }
   const std::vector<std::string>& positionals() const { return positional_; }
@@ -51,7 +54,7 @@ class Arguments {
                         std::uint64_t upper) const;
 
  private:
-  std::vector<std::string> positional_;
+  std::vector<std::string> words_, positional_;
   std::map<std::string, std::vector<std::string>> options_;
 };
 

@@ -16,6 +16,7 @@ struct DiagnosisReport {
   const Record* record = nullptr;
   std::vector<std::string> warnings;  ///< of the record and of the curve
   std::optional<ApdSettings> apd_settings;
+  std::optional<Limits> limits;            ///< that the verdict grades by
   std::string rig;                         ///< name; empty: none
   const MonitoringCurve* curve = nullptr;  ///< may be null
   std::string curve_source;                ///< path, or "built for this record"

@@ -54,4 +54,8 @@ void plot_separability_map(const std::string& json_path, const std::string& pict
   draw("plot_separability_map.py", picture_path, json_path, "the map");
 }
 
+void plot_trend(const std::string& json_path, const std::string& picture_path) {
+  draw("plot_trend.py", picture_path, json_path, "the trend");
+}
+
 }  // namespace backlash::tools

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What /diagnostics says of a joint, one status per concern (REP 107): backlash, input, excitation, signal
+// quality, curve domain.
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+
+#include <atomic>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/held_level.h"
+#include "backlash_diagnosis/ros/joint_history.h"
+#include "backlash_diagnosis/ros/joint_monitor.h"
+
+namespace backlash {
+
+struct DiagnosticsSettings {
+  double stale = 2;          // s of wall time without a message, > 0
+  double hold = 5;           // s that a level must be better before it falls, >= 0
+  double latency_limit = 1;  // s from stamp to arrival, > 0
+};
+
+class JointDiagnostics {
+ public:
+  /// `history` may be null.
+  JointDiagnostics(const JointMonitor& monitor, const JointHistory* history, std::string topic,
+                   const DiagnosticsSettings& settings);
+
+  void add_to(diagnostic_updater::Updater& updater);
+  void set(const DiagnosticsSettings& settings);
+
+  /// Looks at the joint; true where a level differs from that at the last call: to be published at once.
+  bool update();
+
+ private:
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+  using Describe = void (JointDiagnostics::*)(const MonitorState&, Status&);
+  struct Concern {
+    std::string name;
+    Describe describe;
+    HeldLevel held;
+    Status status;  // as of the last update
+  };
+
+  void describe_backlash(const MonitorState& state, Status& status);
+  void describe_input(const MonitorState& state, Status& status);
+  void describe_excitation(const MonitorState& state, Status& status);
+  void describe_signal(const MonitorState& state, Status& status);
+  void describe_curve(const MonitorState& state, Status& status);
+  void add_history(Status& status) const;
+  void summarise_input(const MonitorState& state, double age, Status& status);
+
+  const JointMonitor& monitor_;
+  const JointHistory* history_;
+  std::string topic_;
+  DiagnosticsSettings settings_;
+  std::vector<Concern> concerns_;
+  long problems_ = 0, not_a_number_ = 0;  // counted up to the last update
+  std::mutex mutex_;
+};
+
+}  // namespace backlash

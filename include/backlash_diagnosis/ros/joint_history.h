@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The history of a joint as the diagnoser keeps it: entries go to a file from a thread that may wait for the
+// disk, those that could not be written yet are kept and tried again; and the trend of all of them.
+#pragma once
+
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/history.h"
+#include "backlash_diagnosis/diagnosis/limits.h"
+#include "backlash_diagnosis/diagnosis/trend.h"
+
+namespace backlash {
+
+class JointHistory {
+ public:
+  struct Settings {
+    std::string path;
+    double interval = 60;  // s of stamps at least from one entry to the next
+    bool angular = false;  // whether the trend is of angles [rad] instead of [m]
+    std::string rig_digest;
+  };
+  struct State {
+    std::string path;
+    long entries = 0;     // written since the start
+    long waiting = 0;     // not written yet
+    long left_out = 0;    // older than the last one: a looped bag, or a clock set back
+    long lost = 0;        // given up, as too many waited
+    std::string problem;  // why the last attempt to write failed; empty: it did not
+    Trend trend;
+  };
+
+  /// Opens the file and reads what it holds. Throws CannotWrite, BadData.
+  explicit JointHistory(const Settings& settings);
+
+  /// Takes the verdict at a stamp [s since 1970] where one is due; does not wait for the disk.
+  void take(double stamp, const Diagnosis& diagnosis);
+  /// Marks where the healthy machine was taken: the trend begins anew.
+  void take_baseline(double stamp, const Diagnosis& diagnosis);
+
+  /// Writes what waits, and finds the trend towards `limit` (service, in the unit of the trend) where there
+  /// is something new. From one thread only.
+  void flush(std::optional<double> limit);
+
+  State state() const;
+
+ private:
+  void add(HistoryEntry entry);
+  void add_points(const std::vector<HistoryEntry>& entries);
+
+  Settings settings_;
+  History history_;
+  mutable std::mutex mutex_;
+  std::deque<HistoryEntry> waiting_;
+  std::optional<double> last_;  // s, of the latest entry
+  State state_;
+  std::vector<TrendPoint> points_;  // since the last baseline; of the flushing thread
+  std::optional<double> limit_;
+  bool stale_trend_ = true;
+};
+
+}  // namespace backlash

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Simulates a rig, estimates its backlash and puts the answers into messages. Exit code 0 where at least two
+// estimators answer and every answer's interval holds the backlash that was simulated. Usage:
+// backlash_downstream RIG.yaml
+#include <iostream>
+
+#include "backlash_diagnosis/ros/messages.h"
+#include "backlash_diagnosis/workflow/rig_file.h"
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 64;
+  backlash::RigFile file = backlash::load_rig_file(argv[1]);
+  const double truth = file.rig.mesh.backlash = 80e-6;  // m
+  file.simulation.sensors.sampling_rate = 5000;         // Hz
+  const backlash::Record record = backlash::simulate_record(file.rig, file.simulation, 2.0);
+  const backlash::Diagnosis diagnosis = backlash::diagnose(record, file.diagnosis, nullptr);
+
+  int answers = 0, right = 0;
+  for (const backlash::Estimate& estimate : diagnosis.estimates) {
+    const backlash_diagnosis::BacklashEstimate message = backlash::to_message(estimate);
+    std::cout << message.method << ": " << message.status_name << ", " << message.lower << " to "
+              << message.upper << " m of " << truth << " m\n";
+    if (message.status != backlash_diagnosis::BacklashEstimate::OK) continue;
+    ++answers;
+    if (message.lower <= truth && truth <= message.upper) ++right;
+  }
+  return answers >= 2 && right == answers ? 0 : 1;
+}
