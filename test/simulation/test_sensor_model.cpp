@@ -113,6 +113,19 @@ TEST(SensorModel, IsDeterministicForASeedAndAcrossReset) {
   EXPECT_NE(first, draw(b, Channel::load_position, 1001));
 }
 
+TEST(SensorModel, NoiseSetWhileItRunsIsThatOfTheSeed) {
+  const Channel channel = Channel::motor_position;
+  SensorModel quiet{SensorsSettings()}, noisy(with(channel, SensorSettings{0.25}));
+  EXPECT_EQ(quiet.measure(channel, 1), 1);
+  quiet.set_noise(channel, 0.25);
+  EXPECT_EQ(draw(quiet, channel, 100), draw(noisy, channel, 100));
+  for (const double wrong : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+    EXPECT_THROW(quiet.set_noise(channel, wrong), InvalidParameter);
+  EXPECT_EQ(draw(quiet, channel, 100), draw(noisy, channel, 100));  // what was refused changed nothing
+  quiet.set_noise(channel, 0);
+  EXPECT_EQ(quiet.measure(channel, 1), 1);
+}
+
 TEST(SensorModel, EverySeedGivesOtherNoise) {
   std::vector<double> first;
   for (std::uint64_t seed : {0ULL, 1ULL, 2ULL, 1ULL << 32, (1ULL << 32) + 1, 1ULL << 53}) {
