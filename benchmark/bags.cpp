@@ -13,9 +13,9 @@
 #include <string>
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "backlash_diagnosis/simulation/simulation.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
 
 namespace {
 

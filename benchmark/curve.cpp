@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "backlash_diagnosis/workflow/curve_builder.h"
+#include "backlash_diagnosis/studies/curve_builder.h"
 #include "peer.h"
 
 namespace {

@@ -25,9 +25,9 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "backlash_diagnosis/simulation/simulation.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <vector>
 
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace peer {
 

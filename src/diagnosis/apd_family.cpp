@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/diagnosis/quadratic.h"
+#include "backlash_diagnosis/signal/quadratic.h"
 
 namespace backlash {
 namespace {

@@ -7,8 +7,8 @@
 #include <sstream>
 #include <utility>
 
-#include "backlash_diagnosis/diagnosis/robust.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -41,8 +41,8 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
   if (range_of(torque) <= 0.05 * made.amplitude) return "motor_torque is constant: there is no excitation";
   // A level that a tenth of the time is exceeded stands for the amplitude: a few spikes or noise do not
   // change it.
-  if (differs(median_magnitude(torque), made.excitation_level, 0.05))
-    return mismatch("excitation level (median of |motor_torque|)", median_magnitude(torque),
+  if (differs(signal_level(torque), made.excitation_level, 0.05))
+    return mismatch("excitation level (median of |motor_torque|)", signal_level(torque),
                     made.excitation_level, "N m");
   std::vector<double> magnitude;
   for (const double v : torque) magnitude.push_back(std::fabs(v));
@@ -84,7 +84,7 @@ std::pair<double, double> signal_levels(const MonitoringCurve& curve) {
 /// Level of the signal: with the output locked it follows the torque, whether that was recorded or not.
 std::string level_mismatch(const Record& record, const ApdSettings& settings, const MonitoringCurve& curve) {
   const auto [low, high] = signal_levels(curve);
-  const double level = median_magnitude(record.column(settings.signal));
+  const double level = signal_level(record.column(settings.signal));
   const char* unit = channel_unit(settings.signal);
   if (level < 0.88 * low) return mismatch("signal level (median magnitude)", level, low, unit);
   if (level > 1.12 * high) return mismatch("signal level (median magnitude)", level, high, unit);

@@ -8,7 +8,6 @@
 #include <unsupported/Eigen/FFT>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/diagnosis/robust.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "refusal.h"
 

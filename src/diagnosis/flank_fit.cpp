@@ -9,7 +9,7 @@
 #include <numeric>
 #include <optional>
 
-#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {

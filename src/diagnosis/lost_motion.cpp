@@ -10,10 +10,10 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/hysteresis_loop.h"
-#include "backlash_diagnosis/diagnosis/robust.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "backlash_diagnosis/diagnosis/wall_reading.h"
 #include "backlash_diagnosis/diagnosis/wall_to_wall.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
 
 namespace backlash {
@@ -57,7 +57,7 @@ void check(const LostMotionSettings& settings) {
 }
 
 double travel(const std::vector<double>& values) {
-  return quantile(values, 0.99) - quantile(values, 0.01);
+  return quantile_range(values, 0.01);
 }
 
 LockedMotion collect(const Record& record, const LostMotionSettings& settings) {

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/robust.h"
 #include "refusal.h"
 
 namespace backlash {
@@ -135,7 +136,7 @@ Motor collect(const Record& record, const MomentumTransferSettings& settings) {
                            record.column(tachometer ? Channel::motor_velocity : Channel::motor_position),
                            tachometer, interval);
   if (settings.output_locked && record.has(Channel::load_position)) {
-    const auto travel = [](const std::vector<double>& x) { return quantile(x, 0.99) - quantile(x, 0.01); };
+    const auto travel = [](const std::vector<double>& x) { return quantile_range(x, 0.01); };
     const double moved = settings.load_ratio * travel(record.column(Channel::load_position));
     if (moved > kLockedTravel * travel(motor.position))
       throw Refusal{Status::out_of_domain,
@@ -290,15 +291,6 @@ double noise_gain(bool of_torque, bool tachometer, double interval, std::size_t 
   for (const double f : flank_torque(reconstruct(motor, s, half), inertia_at_flank(s), interval, half))
     squares += f * f;
   return std::sqrt(squares);
-}
-
-double smallest_step(const std::vector<double>& x) {
-  double smallest = 0;
-  for (std::size_t i = 1; i < x.size(); ++i) {
-    const double step = std::abs(x[i] - x[i - 1]);
-    if (step > 0 && (smallest == 0 || step < smallest)) smallest = step;
-  }
-  return smallest;
 }
 
 /// The shortest averages that noise does not spoil.

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/diagnosis/quadratic.h"
+#include "backlash_diagnosis/signal/quadratic.h"
 
 namespace backlash {
 namespace {

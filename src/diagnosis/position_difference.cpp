@@ -8,7 +8,8 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
-#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/robust.h"
 #include "refusal.h"
 
 namespace backlash {
@@ -75,7 +76,7 @@ TwoEncoders collect(const Record& record, const PositionDifferenceSettings& sett
 }
 
 double travel(const std::vector<double>& values) {
-  return quantile(values, 0.99) - quantile(values, 0.01);
+  return quantile_range(values, 0.01);
 }
 
 /// A load that travels farther than the deflection varies shows friction with both signs of its speed.

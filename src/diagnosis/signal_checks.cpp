@@ -10,6 +10,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "backlash_diagnosis/record/time_base.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -116,25 +117,13 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
   }
 }
 
-double median_magnitude(std::vector<double> signal) {
+double signal_level(std::vector<double> signal) {
   signal.erase(std::remove_if(signal.begin(), signal.end(), [](double v) { return std::isnan(v); }),
                signal.end());
-  if (signal.empty()) return 0;
-  for (double& v : signal) v = std::fabs(v);
-  std::nth_element(signal.begin(), signal.begin() + signal.size() / 2, signal.end());
-  return signal[signal.size() / 2];
+  return signal.empty() ? 0 : median_magnitude(std::move(signal));
 }
 
 namespace {
-
-/// Smallest step of a signal: its resolution, where it has one.
-double smallest_step(const std::vector<double>& signal) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < signal.size(); ++i)
-    if (const double step = std::fabs(signal[i] - signal[i - 1]); step > 0)
-      smallest = std::min(smallest, step);
-  return smallest;
-}
 
 /// Runs of at least 3 samples at one value.
 struct Runs {

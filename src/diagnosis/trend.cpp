@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/robust.h"
 #include "error_memory.h"
-#include "sen_slope.h"
+#include "signal/sen_slope.h"
 #include "trend_message.h"
 
 namespace backlash {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "backlash_diagnosis/diagnosis/robust.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/robust.h"
 
 namespace backlash {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 
 namespace backlash {
 std::map<std::string, Measured> combine_findings(const std::vector<Finding>& findings, const Rig& rig,

@@ -6,10 +6,10 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/identification/gap_terms.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/identification/procedures/gap_terms.h"
+#include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/record/time_base.h"
-#include "backlash_diagnosis/record/zero_phase.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures/procedures.h"
 
 namespace backlash {

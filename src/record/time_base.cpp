@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -58,33 +59,30 @@ double median_interval(const std::vector<double>& time) {
   if (time.size() < 2) return 0;
   std::vector<double> intervals(time.size() - 1);
   for (std::size_t i = 0; i < intervals.size(); ++i) intervals[i] = time[i + 1] - time[i];
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  if (intervals.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(intervals.begin(), middle));
+  return median(std::move(intervals));
 }
 
 std::vector<std::string> describe_time_base(const std::vector<double>& time) {
   if (time.size() < 3) return {};
-  const double median = median_interval(time);
+  const double usual = median_interval(time);
   std::size_t gaps = 0, uneven = 0, longest_gap = 0, most_uneven = 0, regular = 0;
   double longest = 0, largest_deviation = 0, sum = 0, sum_of_squares = 0;  // of the deviation from the median
   for (std::size_t i = 0; i + 1 < time.size(); ++i) {
     const double interval = time[i + 1] - time[i];
-    if (interval > kGapFactor * median) {
+    if (interval > kGapFactor * usual) {
       ++gaps;
       if (interval > longest) longest = interval, longest_gap = i;
       continue;
     }
-    const double deviation = interval - median;
+    const double deviation = interval - usual;
     ++regular;
     sum += deviation;
     sum_of_squares += deviation * deviation;
-    if (std::abs(deviation) > kJitterFraction * median) ++uneven;
+    if (std::abs(deviation) > kJitterFraction * usual) ++uneven;
     if (std::abs(deviation) > largest_deviation) largest_deviation = std::abs(deviation), most_uneven = i;
   }
   std::vector<std::string> warnings;
-  const std::string against = "median interval " + short_text(median) + " s";
+  const std::string against = "median interval " + short_text(usual) + " s";
   if (gaps > 0) {
     warnings.push_back(counted(gaps, "time gap") + ": the longest " + short_text(longest) +
                        " s after time = " + seconds(time[longest_gap]) + " (" + against + ")");
@@ -92,9 +90,9 @@ std::vector<std::string> describe_time_base(const std::vector<double>& time) {
   const double mean = sum / static_cast<double>(regular);  // at least half of the intervals are no gap
   const double deviation =
       std::sqrt(std::max(0.0, sum_of_squares / static_cast<double>(regular) - mean * mean));
-  if (deviation > kJitterFraction * median) {
+  if (deviation > kJitterFraction * usual) {
     warnings.push_back("time jitter: standard deviation of the interval " +
-                       short_text(100 * deviation / median, 3) + " % of the " + against + ", " +
+                       short_text(100 * deviation / usual, 3) + " % of the " + against + ", " +
                        counted(uneven, "interval") + " off by more than " +
                        short_text(100 * kJitterFraction) + " %, the largest by " +
                        short_text(largest_deviation) + " s after time = " + seconds(time[most_uneven]));

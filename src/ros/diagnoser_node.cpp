@@ -7,9 +7,9 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/diagnosis/healthy_machine.h"
 #include "backlash_diagnosis/ros/messages.h"
 #include "backlash_diagnosis/ros/parameters.h"
-#include "backlash_diagnosis/workflow/healthy_machine.h"
 
 namespace backlash {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <filesystem>
 
+#include "backlash_diagnosis/identification/effects/traced_rig.h"
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/ros/bag_record.h"
-#include "backlash_diagnosis/workflow/traced_rig.h"
 
 namespace backlash {
 namespace {

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/utc.h"
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/diagnosis/trend.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/plot.h"

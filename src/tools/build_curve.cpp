@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/workflow/curve_builder.h"
+#include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"

@@ -2,7 +2,7 @@
 // CSV to bag and back.
 #include <iostream>
 
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/record_file.h"

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <iostream>
 
-#include "backlash_diagnosis/workflow/fitted_rig.h"
+#include "backlash_diagnosis/identification/fitted_rig.h"
+#include "backlash_diagnosis/report/identification_report.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
-#include "tools/common/identification_report.h"
 #include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"

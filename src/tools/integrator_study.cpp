@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Which integrator at which tolerance: tables as JSON and text, pictures where asked.
-#include "backlash_diagnosis/workflow/integrator_study.h"
+#include "backlash_diagnosis/studies/integrator_study.h"
 
 #include <cmath>
 #include <iomanip>

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
-#include "backlash_diagnosis/workflow/parameter_search.h"
+#include "backlash_diagnosis/studies/parameter_search.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/progress_bar.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where skewness can separate backlash from noise, friction and load: table, JSON and picture.
-#include "backlash_diagnosis/workflow/separability_map.h"
+#include "backlash_diagnosis/studies/separability_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
-#include "backlash_diagnosis/workflow/curve_builder.h"
+#include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/plot.h"

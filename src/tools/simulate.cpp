@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"

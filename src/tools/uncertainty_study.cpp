@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the estimates are worth: a seeded study over random backlash, noise and length of record.
-#include "backlash_diagnosis/workflow/uncertainty_study.h"
+#include "backlash_diagnosis/studies/uncertainty_study.h"
 
 #include <cmath>
 #include <iomanip>
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "backlash_diagnosis/base/version.h"
-#include "backlash_diagnosis/workflow/curve_builder.h"
+#include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/plot.h"

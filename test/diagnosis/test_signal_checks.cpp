@@ -117,10 +117,10 @@ TEST(DetectPeriod, NothingWhereNothingRepeats) {
 }
 
 TEST(MedianMagnitude, OddEvenNegativeAndNaN) {
-  EXPECT_EQ(median_magnitude({}), 0);
-  EXPECT_EQ(median_magnitude({std::nan("")}), 0);
-  EXPECT_EQ(median_magnitude({-3, 1, 2}), 2);
-  EXPECT_EQ(median_magnitude({-5, std::nan(""), 1, -5, 1e9, std::nan(""), -5}), 5);
+  EXPECT_EQ(signal_level({}), 0);
+  EXPECT_EQ(signal_level({std::nan("")}), 0);
+  EXPECT_EQ(signal_level({-3, 1, 2}), 2);
+  EXPECT_EQ(signal_level({-5, std::nan(""), 1, -5, 1e9, std::nan(""), -5}), 5);
 }
 
 std::vector<double> clipped(std::vector<double> signal, double low, double high) {

@@ -4,8 +4,8 @@
 // backlash_downstream RIG.yaml
 #include <iostream>
 
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/ros/messages.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
 
 int main(int argc, char** argv) {
   if (argc != 2) return 64;

@@ -2,7 +2,7 @@
 // Bytes as a rig file.
 #include <cmath>
 
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "fuzz.h"
 
 using namespace backlash;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/identification/finding.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "support/servo.h"
 
 namespace backlash {

@@ -373,7 +373,14 @@ TEST(Csv, MeasuredRecordsAreReadWhole) {
     std::ifstream in(entry.path());
     std::string line;
     std::size_t lines = 0;
-    while (std::getline(in, line)) ++lines;
+    std::string header;
+    while (std::getline(in, line)) {
+      if (lines++ == 0) header = line;
+    }
+    if (header.find('/') != std::string::npos) {  // several joints, which a Record of one joint cannot hold
+      EXPECT_THROW(read_csv(entry.path().string()), BadData) << entry.path();
+      continue;
+    }
     const Record record = read_csv(entry.path().string());
     EXPECT_EQ(record.size() + 1, lines) << entry.path();  // none of them has repeated stamps
     EXPECT_GT(record.sampling_interval(), 0) << entry.path();

@@ -14,8 +14,8 @@
 #include <set>
 #include <sstream>
 
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/ros/joint_state.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
 #include "support/data.h"
 
 namespace backlash::test {

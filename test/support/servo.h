@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/simulation/simulation.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
 #include "support/data.h"
 
 namespace backlash::test {

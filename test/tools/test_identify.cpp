@@ -9,7 +9,7 @@
 namespace backlash::test {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 const std::string kServo = package_file("config/two_inertia_servo.yaml");
 

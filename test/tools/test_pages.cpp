@@ -11,7 +11,7 @@
 namespace backlash::test {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 const std::string kFolderWithGaps = "it's <b> & \"co\"";  // a name that HTML and shells could misread
 

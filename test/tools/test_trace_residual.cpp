@@ -10,7 +10,7 @@
 namespace backlash::test {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 const std::string kAsymmetry = "\nterms:\n  - id: asymmetric_viscous\n    body: motor\n    damping: 30\n";
 const std::string kGravity = "\nterms:\n  - id: gravity\n    amplitude: 60\n    phase: 0.4\n";

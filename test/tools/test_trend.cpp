@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/history.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
 #include "tools/command_runner.h"
 

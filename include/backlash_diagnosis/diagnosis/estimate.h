@@ -3,9 +3,10 @@
 // words.
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <string>
+
+#include "backlash_diagnosis/base/not_a_number.h"
 
 namespace backlash {
 
@@ -19,8 +20,6 @@ enum class Status {
 };
 const char* to_string(Status status);
 Status status_from_string(const std::string& text);  ///< throws InvalidParameter
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Parts of the play between the two flanks, by estimators that can separate them. Angles at the
 /// motor_position axis.

@@ -17,7 +17,7 @@
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 #include "backlash_diagnosis/diagnosis/apd_family.h"
 #include "backlash_diagnosis/diagnosis/estimate.h"
-#include "backlash_diagnosis/diagnosis/noise.h"
+#include "backlash_diagnosis/signal/noise.h"
 
 namespace backlash {
 

@@ -15,7 +15,7 @@ namespace backlash {
 std::optional<double> detect_period(const std::vector<double>& time, const std::vector<double>& signal);
 
 /// Median of |x|; the size of a signal that a few peaks or outliers cannot change.
-double median_magnitude(std::vector<double> signal);
+double signal_level(std::vector<double> signal);
 
 /// True when the extreme values repeat in runs as a saturated sensor's do: at least 3 samples in a row at
 /// exactly the largest (or smallest) value, making up more than 0.5 % of the record, where a third of the

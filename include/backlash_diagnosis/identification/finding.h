@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/identification/measured.h"
 #include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/signal/measured.h"
 
 namespace backlash {
 

@@ -9,17 +9,17 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/progress.h"
-#include "backlash_diagnosis/identification/clearance.h"
-#include "backlash_diagnosis/identification/decay.h"
 #include "backlash_diagnosis/identification/finding.h"
-#include "backlash_diagnosis/identification/friction_lines.h"
-#include "backlash_diagnosis/identification/gap_map.h"
-#include "backlash_diagnosis/identification/line_inertia.h"
-#include "backlash_diagnosis/identification/one_inertia.h"
-#include "backlash_diagnosis/identification/output_error.h"
-#include "backlash_diagnosis/identification/robust_mean.h"
-#include "backlash_diagnosis/identification/sensor_calibration.h"
-#include "backlash_diagnosis/identification/two_mass.h"
+#include "backlash_diagnosis/identification/fit/output_error.h"
+#include "backlash_diagnosis/identification/procedures/clearance.h"
+#include "backlash_diagnosis/identification/procedures/decay.h"
+#include "backlash_diagnosis/identification/procedures/friction_lines.h"
+#include "backlash_diagnosis/identification/procedures/gap_map.h"
+#include "backlash_diagnosis/identification/procedures/line_inertia.h"
+#include "backlash_diagnosis/identification/procedures/one_inertia.h"
+#include "backlash_diagnosis/identification/procedures/sensor_calibration.h"
+#include "backlash_diagnosis/identification/procedures/two_mass.h"
+#include "backlash_diagnosis/signal/robust_mean.h"
 
 namespace backlash {
 

@@ -14,7 +14,7 @@
 
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/ros/joint_state.h"
-#include "backlash_diagnosis/workflow/curve_builder.h"
+#include "backlash_diagnosis/studies/curve_builder.h"
 
 namespace backlash {
 

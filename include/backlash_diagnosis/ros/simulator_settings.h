@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace backlash {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/workflow/trace_files.h"
+#include "backlash_diagnosis/report/trace_files.h"
 
 namespace backlash {
 

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "backlash_diagnosis/base/file_folder.h"
-#include "backlash_diagnosis/workflow/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace backlash {
 

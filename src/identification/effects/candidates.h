@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "../joint_fit.h"
+#include "../fit/joint_fit.h"
 #include "backlash_diagnosis/model/term.h"
 
 namespace backlash {

@@ -2,7 +2,7 @@
 // Where no named effect explains a residual: a smooth map over the coordinate that it follows best.
 #pragma once
 
-#include "../joint_fit.h"
+#include "../fit/joint_fit.h"
 #include "backlash_diagnosis/model/term.h"
 
 namespace backlash {

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/QR>
 
-#include "../joint_fit.h"
+#include "../fit/joint_fit.h"
 
 namespace backlash {
 

@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/interruption.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "learned.h"
 

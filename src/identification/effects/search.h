@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/progress.h"
-#include "backlash_diagnosis/identification/effect_search.h"
+#include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "candidates.h"
 #include "stage.h"
 #include "validation.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "contact_shape.h"
 #include "search.h"

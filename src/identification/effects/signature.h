@@ -4,8 +4,8 @@
 
 #include <optional>
 
-#include "../joint_fit.h"
-#include "backlash_diagnosis/identification/effect_search.h"
+#include "../fit/joint_fit.h"
+#include "backlash_diagnosis/identification/effects/effect_search.h"
 
 namespace backlash {
 

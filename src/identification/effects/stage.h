@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "../joint_fit.h"
+#include "../fit/joint_fit.h"
 #include "backlash_diagnosis/base/error.h"
 
 namespace backlash {

@@ -2,8 +2,8 @@
 // Whether an effect helps where the fit has not seen the record.
 #pragma once
 
-#include "../joint_fit.h"
-#include "backlash_diagnosis/identification/effect_search.h"
+#include "../fit/joint_fit.h"
+#include "backlash_diagnosis/identification/effects/effect_search.h"
 
 namespace backlash {
 

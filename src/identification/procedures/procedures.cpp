@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 
 namespace backlash {
 std::string plus_minus(const Measured& m, const std::string& unit) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "backlash_diagnosis/identification/rig_parameters.h"
-#include "backlash_diagnosis/record/zero_phase.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
 #include "procedures.h"
 
 namespace backlash {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/identification/rig_parameters.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
 namespace backlash {

@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/base/script.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/report/script.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 

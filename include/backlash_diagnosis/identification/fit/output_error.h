@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// All parameters of a servo with two inertias and two encoders together, from the raw record.
+//
+// The load is simulated driven by the recorded motor position (simulation/driven_load.h). Two residuals
+// count, each divided by its noise floor, which the record itself tells:
+//   torque      recorded - [J_M a_M + friction + mesh torque], both through the same zero-phase low-pass;
+//   samples near
+//               standstill do not count, there dry friction takes any value
+//   deflection  (motor - load) recorded - simulated, through the same low-pass
+// A torque that is held between samples acts half a sample later than its stamp; whether it is, the fitted
+// delay tells. A further delay of a part of a sample is calibration and fitted. So is the constant difference
+// of the two encoders.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/finding.h"
+#include "backlash_diagnosis/identification/fit/servo_data.h"
+#include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
+
+namespace backlash {
+
+struct OutputErrorSettings {
+  double cutoff = 60;                   // Hz, low-pass of both residuals
+  double feedback = kLoadFeedback;      // 1/s
+  std::vector<std::string> parameters;  // of servo_parameters(), to be fitted
+  std::vector<Finding> findings;        // of other records, which count by their standard errors
+  int iterations = 20;
+  double step = 1e-3;  // of the differences, relative
+};
+
+/// Relative error norm(r) / norm(y - mean(y)), and what noise alone leaves.
+struct ChannelError {
+  double error = 0, floor = 0;
+};
+
+/// What belongs to a record and not to the machine.
+struct Calibration {
+  double torque_delay = 0;    // samples, beyond that of the hold
+  double encoder_offset = 0;  // rad, load encoder minus motor encoder in the middle of the gap
+  bool held = true;  // the torque is held from its sample to the next, as loops command it; else it is that
+                     // of the moment
+};
+
+struct OutputError {
+  Rig rig;                                       // fitted
+  std::map<std::string, Measured> parameters;    // in the units of the rig file
+  std::vector<Calibration> calibrations;         // one per record
+  std::vector<ChannelError> torque, deflection;  // one per record
+};
+
+/// What a rig predicts for a record; no deflection where the load has no motion of its own.
+struct ServoPrediction {
+  DrivenLoad load;
+  std::vector<double> torque, measured_torque;          // N m, both low-passed
+  std::vector<double> deflection, measured_deflection;  // rad
+  std::vector<char> settled, counts;                    // whether the sample of deflection and torque counts
+  double torque_floor, deflection_floor;  // N m, rad: standard deviation of what noise alone leaves
+  ChannelError torque_error, deflection_error;
+};
+
+ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+                              const Calibration& calibration);
+
+/// Fits the calibration alone and predicts: what a rig says of a record that it has not seen.
+ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+                                   Calibration& calibration);
+
+/// Starts from the values in `rig`. Throws CannotIdentify, InvalidParameter.
+OutputError fit_output_error(const Rig& rig, const std::vector<ServoData>& records,
+                             const OutputErrorSettings& settings);
+
+}  // namespace backlash

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A measured gap map as terms of the model: a rig whose backlash varies as the map says.
+//
+//   backlash(q) = b (1 + sum a_n sin(n q + p_n)),  b the mean gap, a_n = A_n / b      (term varying_backlash)
+//
+// The thesis (Yumrukcal 2013, Section 6.3) used the separation of the flanks in the constant-speed runs
+// directly and found the gap too large by a nearly constant ratio. That separation is gap + 2 T_load / k: the
+// load's friction winds the mesh up (gap_map.h). GapUse::directly is that use, for comparison.
+#pragma once
+
+#include <string>
+
+#include "backlash_diagnosis/identification/procedures/gap_map.h"
+#include "backlash_diagnosis/model/rig.h"
+
+namespace backlash {
+
+/// Which mean gap goes with the orders of the map.
+enum class GapUse {
+  corrected,  // the map's, less the wind-up where the map knows it
+  directly,   // the map's, as the runs show it
+  variation,  // the rig's own: A_n are the map's, b is not
+};
+
+/// The map with the wind-up that the friction of the rig's load and its contact stiffness make at the speeds
+/// of the runs: for a rig that was fitted after the map was made. Errors of the rig are not known here and
+/// not included. Throws InvalidParameter for a contact law without stiffness.
+GapMap with_wind_up(GapMap map, const Rig& rig);
+
+/// Whether a term says how the backlash depends on the position of the load: varying_backlash, backlash_map.
+bool gap_varies(const Rig& rig);
+
+/// The rig (load side) with the orders of the map as terms varying_backlash instead of any that gap_varies()
+/// asks for, and the mean gap as `use` says; the other terms stay. Throws InvalidParameter where the mean is
+/// not > 0.
+Rig with_gap_map(Rig rig, const GapMap& map, GapUse use = GapUse::corrected);
+
+/// The entries of `terms:` for a rig file whose backlash_angle is `mean_gap` [rad], indented by two; empty
+/// where the map has no orders.
+std::string gap_terms_yaml(const GapMap& map, double mean_gap);
+
+/// The text of a rig file with these entries instead of its varying_backlash and backlash_map; its
+/// backlash_angle must be, or be made, `mean_gap`. `name` is for messages. Throws BadData where there are
+/// none to replace in block style ("  - id: varying_backlash").
+std::string with_gap_terms(const std::string& text, const std::string& name, const GapMap& map,
+                           double mean_gap);
+
+}  // namespace backlash

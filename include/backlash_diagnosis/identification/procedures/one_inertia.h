@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A machine that is one inertia with friction, from any record of motion (inverse dynamics):
+//
+//   inertia a + viscous v + coulomb sign(v) + offset = torque
+//
+// a, v from motor_position by central differences. Torque and all four columns go through the same zero-phase
+// low-pass, so that the filter takes nothing off the parameters (Gautier 1997; Janot, Gautier, Brunot 2019,
+// whose EMPS axis has M 95.1 kg, Fv 203.5 N s/m, Fc 20.4 N, offset -3.2 N). SI units, rotary or force and
+// length.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/record/record.h"
+#include "backlash_diagnosis/signal/measured.h"
+
+namespace backlash {
+
+struct OneInertiaOptions {
+  double cutoff = 0;  // Hz; 0: the bandwidth of the motion (bandwidth.h), at least 100 periods in the record
+  std::optional<double> delay;  // s, given; none: estimated within +-2 sampling intervals
+};
+
+struct OneInertia {
+  Measured inertia, viscous, coulomb, offset;  // kg m^2, N m s/rad, N m, N m (kg, N s/m, N, N)
+  Measured delay;     // s: the torque acts that much later than its stamp says, seen from the position; a
+                      // command that is held until the next sample has half an interval of it
+  double cutoff = 0;  // Hz
+  double relative_error = 0;                      // norm(residual) / norm(torque - its mean), both filtered
+  double floor = 0;                               // of that, by the white noise of torque and position alone
+  double used = 0;                                // share of the samples
+  std::vector<double> time, measured, predicted;  // filtered torque of the samples that are used
+  std::vector<std::string> warnings;
+};
+
+/// Left out: both ends (one period of the cutoff) and standstill, where friction takes any value between its
+/// bounds: speed below four standard deviations of its noise for longer than a quarter of the filter's memory
+/// 1 / (2 cutoff), widened by that memory. A passage through zero stays: its sign is known (from the speed in
+/// the widest band in which its noise is a thousandth of it, but at least four times the cutoff). The delay
+/// is an unknown like the others; where it is vague (standard error beyond one interval, or at the edge of
+/// the search), it is taken as 0, its error is NaN and a warning tells; standard errors by leaving out
+/// thirtieths of the record (jackknife), so they hold what friction does that the model does not. Throws
+/// CannotIdentify where motor_torque or motor_position is missing, the record is shorter than 64 samples or
+/// 40 periods of the cutoff, or one direction has less than 5 % of the samples; InvalidParameter for a cutoff
+/// beyond 0.4 of the sampling rate or a delay beyond two intervals.
+OneInertia identify_one_inertia(const Record& record, const OneInertiaOptions& options = {});
+
+/// Relative error with which the identified machine predicts another record, at its own cutoff and delay,
+/// over all samples of that record that identify_one_inertia would use. Throws as above, but needs no second
+/// direction.
+double relative_error(const OneInertia& machine, const Record& record);
+
+}  // namespace backlash

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the search for missing effects has found, in words and as JSON. Values are those of the load side of
+// the reduction; units are those of a linear axis where the rig is one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/effects/effect_search.h"
+
+namespace backlash {
+
+/// What was traced: paths as the user gave them.
+struct TraceInputs {
+  std::string rig;
+  std::vector<std::string> train;
+  std::string test;
+};
+
+/// "effect_found", "nothing_missing", "unexplained"
+std::string to_string(TraceVerdict verdict);
+
+/// The verdict in one or two sentences.
+std::string verdict_sentence(const Trace& trace);
+
+/// Tables for a terminal: errors before and after, effects, what is left, warnings.
+std::string trace_summary(const Trace& trace);
+
+/// The trace_residual JSON of the design: schema_version, verdict, channels, steps, unexplained; and beyond
+/// that message, inputs, cutoff, parameters of the machine, words and terms of each effect, warnings. What is
+/// not known is null.
+std::string trace_report_json(const Trace& trace, const TraceInputs& inputs);
+
+/// For plots: the test record as both models have it and what each step adds to it. As many samples as
+/// signals of this bandwidth need.
+std::string trace_series_json(const Trace& trace);
+
+/// The id, or of a learned map what it is a function of.
+std::string effect_name(const FoundEffect& effect);
+
+/// 0.0123 -> "1.23 %"
+std::string percent(double share);
+
+/// A value as people read it, with its standard error where that is known: "12.3 +- 0.4"; "15" for a fixed
+/// one.
+std::string with_error(const Measured& measured);
+
+}  // namespace backlash

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A whole rig file: the machine, its test run and its diagnosis. The one loader for it.
+#pragma once
+
+#include <string>
+
+#include "backlash_diagnosis/diagnosis/diagnose.h"
+#include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/rig_file/test_runs.h"
+#include "backlash_diagnosis/simulation/simulation.h"
+
+namespace backlash {
+
+struct RigFile {
+  Rig rig;
+  SimulationSettings simulation;
+  DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
+  std::vector<TestRun> test_runs;
+  std::string source;  // path, or "built-in sarkar_1997"
+  std::string text;    // as read
+  std::string digest;  // 64-bit FNV-1a of the text, hexadecimal
+};
+
+/// Throws MissingInput, BadData (file, line, key, value, limit), InvalidParameter.
+RigFile load_rig_file(const std::string& path);
+
+/// The same from text; `source` stands for the path in messages.
+RigFile rig_file_from_text(const std::string& text, const std::string& source);
+
+/// config/sarkar_1997.yaml as it was when the library was built: what nodes use without a rig file.
+RigFile default_rig_file();
+
+}  // namespace backlash

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Standard errors where neighbouring samples share their error: everything in blocks longer than that
+// sharing.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "backlash_diagnosis/signal/measured.h"
+
+namespace backlash {
+
+/// A number with three digits, for messages.
+std::string figure(double value);
+
+/// Means of consecutive blocks of `length` samples; the rest at the end is left out.
+std::vector<double> block_means(const std::vector<double>& values, std::size_t length);
+
+/// Mean of a correlated signal: standard error from the scatter of the means of ten to nineteen batches
+/// (fewer values: NaN). Honest where a batch is longer than the correlation.
+Measured batch_mean(const std::vector<double>& values);
+
+/// From where to where (one past the last) a signal is as steady as in its middle half: the last value within
+/// `most` (0 to 1/2) of the signal from its start, that lies more than four deviations (and `allowed_change`
+/// of the median) off the median, and all before it are left out, and so at the end. Deviation from the
+/// median absolute one.
+std::pair<std::size_t, std::size_t> steady_range(const std::vector<double>& values, double most,
+                                                 double allowed_change);
+
+/// How the least squares solution of A x = b changes where one block of rows after the other is left out: one
+/// column per block, about their mean. `residuals` b - A x at the solution; `block` the number of each row's
+/// block, 0 ... Throws CannotIdentify with fewer than four blocks, and where without one of them the unknowns
+/// cannot be told apart.
+Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
+                                  const std::vector<std::size_t>& block);
+
+/// Covariance from them (jackknife, Efron 1982): needs no independence of the rows inside a block.
+Eigen::MatrixXd jackknife_covariance(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
+                                     const std::vector<std::size_t>& block);
+
+/// The same for numbers of which the changes are known.
+double jackknife_error(const Eigen::VectorXd& changes);
+
+}  // namespace backlash

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Order statistics, one definition for the whole package. Values must not be NaN.
+#pragma once
+
+#include <vector>
+
+namespace backlash {
+
+/// The value below which `fraction` [0, 1] of the values lie, linear between neighbours: of n sorted values
+/// the one at place fraction * (n - 1), from 0 (Hyndman and Fan 1996, definition 7; the default of R and
+/// NumPy). NaN without values.
+double quantile(std::vector<double> values, double fraction);
+
+/// quantile(values, 0.5): the middle value, or the mean of the two middle ones.
+double median(std::vector<double> values);
+
+/// median(|value|)
+double median_magnitude(std::vector<double> values);
+
+/// quantile(values, 1 - tail) - quantile(values, tail): how far a signal travels, but for the rarest `tail`
+/// [0, 0.5) on either side.
+double quantile_range(std::vector<double> values, double tail);
+
+/// Largest minus smallest value; 0 without values.
+double peak_to_peak(const std::vector<double>& values);
+
+/// Standard deviation of a normal distribution in units of its median absolute deviation.
+constexpr double kNormalPerMedianDeviation = 1.482602218505602;
+
+/// The smallest change between two successive values, the resolution of a sensor; 0 where none changes.
+double smallest_step(const std::vector<double>& values);
+
+}  // namespace backlash

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Statistics that few wrong values cannot spoil.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace backlash {
+
+/// Location and scale of values of which a minority may be wrong.
+struct RobustScale {
+  double centre = 0;     ///< median
+  double deviation = 0;  ///< standard deviation about the median, residuals clipped at `clip`
+  double clip =
+      0;  ///< 3.5 times the median absolute deviation scaled to a normal standard deviation, plus floor
+  std::size_t outliers = 0;  ///< values farther than `clip` from the median
+};
+
+/// `floor` [unit of the values, >= 0] is the smallest difference that may count as one.
+RobustScale robust_scale(const std::vector<double>& values, double floor);
+
+/// 97.5 % quantile of Student's t with `degrees` >= 1 degrees of freedom: half width of a 95 % interval in
+/// standard errors. Tabulated to 4, beyond that the expansion of Fisher and Cornish (1960) to the third
+/// order, error < 0.3 %.
+double student_t_975(std::size_t degrees);
+
+}  // namespace backlash

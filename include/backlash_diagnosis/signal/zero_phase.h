@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Filters that do not delay: an evenly sampled signal of the past may be filtered forward and backward.
+#pragma once
+
+#include <vector>
+
+namespace backlash {
+
+/// Butterworth low-pass of order 4, forward and backward: gain 1 / (1 + (tan(pi f T) / tan(pi f_c T))^8), no
+/// phase shift, half of the amplitude at the cutoff f_c [Hz]. `interval` T [s]. The ends are continued by
+/// point reflection about the first and the last value over three time constants of the filter.
+/// Throws InvalidParameter for an interval <= 0 and a cutoff outside 0 < f_c < 0.5 / T.
+std::vector<double> low_pass(const std::vector<double>& values, double interval, double cutoff);
+
+/// Central difference [unit / s]; at the ends the parabola through the last three. Error h^2 / 6 times the
+/// third derivative, zero phase. Throws InvalidParameter for fewer than three values.
+std::vector<double> derivative(const std::vector<double>& values, double interval);
+
+/// The signal delayed by `samples` (also fractions, also < 0): y[k] = x(k - samples), cubic between samples
+/// (Catmull-Rom); beyond the ends the first or last value.
+std::vector<double> delayed(const std::vector<double>& values, double samples);
+
+}  // namespace backlash

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Builds a monitoring curve: simulates the rig over a grid of backlash values, with several sensor noise
+// seeds and sampling phases at each, and stores mean and scatter of the skewness.
+//
+// The motion is simulated once per backlash value, finer than the sampling; each seed then samples it at
+// another phase between two samples (a recorder does not know where between its samples the excitation
+// switches) and adds its own sensor noise. The same is done at several noise levels, so that a record can be
+// compared with the curve at the noise that it has.
+#pragma once
+
+#include "backlash_diagnosis/base/progress.h"
+#include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
+
+namespace backlash {
+
+struct CurveRequest {
+  int points = 41;             // >= 2
+  double max_backlash = 2e-4;  // m (angular mesh: rad), total free play, > 0
+  double sampling_rate = 0;    // Hz; 0: the rig file's
+  int periods = 10;            // per seed, after settling
+  int seeds = 8;
+  BestSoFar best_so_far;  // points that are there; may be empty
+};
+
+/// Sampling rate [Hz] of a recorder whose samples are `interval` [s] apart, to four significant digits: the
+/// rate it was set to, without the jitter of its stamps. Curves for records are built at this rate.
+double nominal_sampling_rate(double interval);
+
+/// Throws InvalidParameter (also where the rig declares no APD or an excitation without period),
+/// IntegrationError, Cancelled. Uses all processors; the result does not depend on their number.
+MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request,
+                            const Progress& progress = nullptr);
+
+/// What is to be said of a curve from a file that is used with a rig: nothing, or that it was made from
+/// another version of the rig file. Throws BadData naming `source` where it contradicts the geometry of the
+/// rig.
+std::string check_curve(const MonitoringCurve& curve, const RigFile& rig, const std::string& source);
+
+}  // namespace backlash

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "joint_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kFarthest = 30;      // times the start or a part of it: approached, never reached
+constexpr double kWideStep = 1e-2;    // of the differences that the errors are taken from
+constexpr double kBlock = 1;          // s: the slowest oscillation that a servo record shows
+constexpr double kNegligible = 2e-3;  // of a signal: no floor is lower, no model need be better
+constexpr double kSaturated = 3;      // where tanh no longer moves: 0.995 of the largest delay
+constexpr double kVague = 30;         // times the scale: what is believed of a parameter before any record
+constexpr double kDefaultGap = 1e-4;  // rad, scale of an encoder offset where the rig has no gap
+
+std::size_t stride(const PreparedServo& record) {
+  return std::max(1L, std::lround(0.4 / (record.cutoff * record.data().interval)));
+}
+
+double rms(const std::vector<double>& values, const std::vector<char>& counts) {
+  double square = 0, count = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    square += counts[k] ? values[k] * values[k] : 0;
+    count += counts[k];
+  }
+  return std::sqrt(square / std::max(1.0, count));
+}
+
+/// Standard deviation.
+double spread(std::vector<double> values, const std::vector<char>& counts) {
+  double sum = 0, count = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    sum += counts[k] ? values[k] : 0;
+    count += counts[k];
+  }
+  for (double& value : values) value -= sum / std::max(1.0, count);
+  return rms(values, counts);
+}
+
+Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, const Eigen::VectorXd& p) {
+  const Machine machine = unknowns.machine(p);
+  Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
+  const Eigen::Index own = rows.size();
+  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.beliefs.size()));
+  rows.segment(own, unknowns.size()) = unknowns.beliefs(p);
+  for (std::size_t i = 0; i < machine.beliefs.size(); ++i)
+    rows[own + unknowns.size() + Eigen::Index(i)] = machine.beliefs[i](machine.rig);
+  return rows;
+}
+
+/// A logarithm that approaches kFarthest either way.
+double limited(double logarithm) {
+  const double most = std::log(kFarthest);
+  return most * std::tanh(logarithm / most);
+}
+
+/// The covariance of neighbouring rows is itself an estimate from few blocks and now and then far too small.
+void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
+  const Eigen::VectorXd growth =
+      (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
+  covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
+}
+
+}  // namespace
+
+RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback) {
+  for (const ServoData& d : data) {
+    records_.emplace_back(d, cutoff, feedback);
+    const PreparedServo& record = records_.back();
+    spreads_.push_back({spread(low_pass(d.torque, d.interval, cutoff), record.counts), 0});
+    if (d.load.empty()) continue;
+    std::vector<double> deflection(d.size());
+    for (std::size_t k = 0; k < d.size(); ++k) deflection[k] = d.motor[k] - d.load[k];
+    spreads_.back().deflection = spread(low_pass(deflection, d.interval, cutoff), record.settled);
+  }
+  weights_.resize(data.size());
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    for (std::size_t k = 0; k < data[r].size(); k += stride(records_[r])) {
+      layout_.push_back({r, false, double(k) * data[r].interval});
+      layout_.push_back({r, true, double(k) * data[r].interval});
+    }
+  }
+}
+
+double RecordSet::row_interval() const {
+  return double(stride(records_[0])) * records_[0].data().interval;
+}
+
+void RecordSet::weigh(const Machine& machine) {
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    const PreparedServo& record = records_[i];
+    const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
+    const NoiseFloors floor =
+        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
+    weights_[i] = {std::max(floor.torque, rms(r.torque, record.counts)),
+                   std::max(floor.deflection, rms(r.deflection, record.settled))};
+  }
+}
+
+Leftover RecordSet::leftover(const Machine& machine) const {
+  Leftover sum;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    const PreparedServo& record = records_[i];
+    const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
+    const NoiseFloors floor =
+        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
+    const double torque = std::max(floor.torque, kNegligible * spreads_[i].torque);
+    const double torque_left = rms(r.torque, record.counts);
+    sum.torque += std::pow(torque_left / torque, 2);
+    if (spreads_[i].torque > 0) sum.torque_share += std::pow(torque_left / spreads_[i].torque, 2);
+    if (r.deflection.empty()) continue;
+    const double deflection = std::max(floor.deflection, kNegligible * spreads_[i].deflection);
+    const double deflection_left = rms(r.deflection, record.settled);
+    sum.deflection += std::pow(deflection_left / deflection, 2);
+    if (spreads_[i].deflection > 0)
+      sum.deflection_share += std::pow(deflection_left / spreads_[i].deflection, 2);
+  }
+  for (double* of : {&sum.torque, &sum.deflection, &sum.torque_share, &sum.deflection_share})
+    *of = std::sqrt(*of / double(records_.size()));
+  return sum;
+}
+
+Eigen::VectorXd RecordSet::rows(const Rig& rig, const std::vector<Calibration>& calibrations) const {
+  Eigen::VectorXd rows(layout_.size());
+  Eigen::Index next = 0;
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    const PreparedServo& record = records_[i];
+    const ServoResiduals r = record.residuals(rig, calibrations[i]);
+    for (std::size_t k = 0; k < record.data().size(); k += stride(record)) {
+      rows[next++] = record.counts[k] ? r.torque[k] / weights_[i].torque : 0;
+      rows[next++] =
+          record.settled[k] && !r.deflection.empty() ? r.deflection[k] / weights_[i].deflection : 0;
+    }
+  }
+  return rows;
+}
+
+Unknowns::Unknowns(const Machine& start)
+    : start_(start),
+      delays_(start.largest_delay > 0),
+      offsets_(!start.rig.mesh.rigid),
+      per_record_(std::size_t(delays_) + std::size_t(offsets_)) {}
+
+Eigen::VectorXd Unknowns::values() const {
+  Eigen::VectorXd p = Eigen::VectorXd::Zero(size());
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    if (!start_.parameters[i].positive) p[Eigen::Index(i)] = start_.parameters[i].get(start_.rig);
+  for (std::size_t r = 0; r < records(); ++r) {
+    const Calibration& c = start_.calibrations[r];
+    if (delays_)
+      p[first_of(r)] =
+          start_.largest_delay * std::atanh(std::clamp(c.torque_delay / start_.largest_delay, -0.99, 0.99));
+    if (offsets_) p[first_of(r) + delays_] = c.encoder_offset;
+  }
+  return p;
+}
+
+Eigen::VectorXd Unknowns::scale() const {
+  Eigen::VectorXd s = Eigen::VectorXd::Ones(size());
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    if (!start_.parameters[i].positive) s[Eigen::Index(i)] = start_.parameters[i].scale;
+  const double gap = start_.rig.mesh.backlash / start_.rig.mesh.lever();
+  for (std::size_t r = 0; r < records() && offsets_; ++r)
+    s[first_of(r) + delays_] = gap > 0 ? gap : kDefaultGap;
+  return s;
+}
+
+Rig Unknowns::rig(const Eigen::VectorXd& values) const {
+  Rig rig = start_.rig;
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i) {
+    const FitParameter& p = start_.parameters[i];
+    const double value = values[Eigen::Index(i)];
+    p.set(rig, p.positive ? p.get(start_.rig) * std::exp(limited(value)) : value);
+  }
+  return rig;
+}
+
+std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) const {
+  std::vector<Calibration> all = start_.calibrations;
+  for (std::size_t r = 0; r < records(); ++r) {
+    if (delays_) {
+      all[r].torque_delay = start_.largest_delay * std::tanh(values[first_of(r)] / start_.largest_delay);
+    }
+    if (offsets_) all[r].encoder_offset = values[first_of(r) + delays_];
+  }
+  return all;
+}
+
+Eigen::VectorXd Unknowns::beliefs(const Eigen::VectorXd& values) const {
+  Eigen::VectorXd sigma = kVague * scale();
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    if (start_.parameters[i].positive) sigma[Eigen::Index(i)] = std::log(kFarthest);
+  for (std::size_t r = 0; r < records() && delays_; ++r) sigma[first_of(r)] = start_.largest_delay;
+  return (values - this->values()).cwiseQuotient(sigma);
+}
+
+Machine Unknowns::machine(const Eigen::VectorXd& values) const {
+  Machine m = start_;
+  m.rig = rig(values);
+  m.calibrations = calibrations(values);
+  return m;
+}
+
+Measured Unknowns::parameter(const LeastSquaresFit& fit, std::size_t i) const {
+  Measured m = fit.parameter(Eigen::Index(i));
+  const FitParameter& p = start_.parameters[i];
+  if (!p.positive) return m;
+  const double slope = 1 - std::pow(limited(m.value) / std::log(kFarthest), 2);
+  m.value = p.get(start_.rig) * std::exp(limited(m.value));
+  m.standard_error *= m.value * slope;
+  return m;
+}
+
+std::map<std::string, Measured> Unknowns::parameters(const LeastSquaresFit& fit) const {
+  std::map<std::string, Measured> all;
+  for (std::size_t i = 0; i < start_.parameters.size(); ++i)
+    all[start_.parameters[i].name] = parameter(fit, i);
+  return all;
+}
+
+MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options) {
+  const Unknowns unknowns(start);
+  MachineFit out;
+  out.fit = fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
+                          unknowns.values(), unknowns.scale(), options);
+  out.machine = unknowns.machine(out.fit.values);
+  return out;
+}
+
+void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records) {
+  const Unknowns unknowns(start);
+  const Eigen::Index known = unknowns.size() + Eigen::Index(start.beliefs.size()),
+                     rows = fit.fit.residuals.size() - known;
+  const Eigen::Index wanted = 2 * std::lround(kBlock / records.row_interval());
+  const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
+  widen_jacobian(
+      fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
+      kWideStep * unknowns.scale(), true);
+  take_larger(fit.fit.covariance, block_covariance(fit.fit, block, known));
+}
+
+}  // namespace backlash

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The unknowns of a machine fitted to several records together (output_error.h says what counts).
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/fit/output_error.h"
+#include "backlash_diagnosis/signal/least_squares.h"
+#include "fit_parameter.h"
+#include "servo_prediction.h"
+
+namespace backlash {
+
+/// A rig, what is unknown of it, and what belongs to each record.
+struct Machine {
+  Rig rig;
+  std::vector<FitParameter> parameters;
+  std::vector<Calibration> calibrations;
+  /// What is known of the rig beside the records: one more row each, in standard deviations.
+  std::vector<std::function<double(const Rig&)>> beliefs = {};
+  double largest_delay = 3;  // samples; approached, never reached; 0: delays are not fitted
+};
+
+/// Standard deviation of either residual of one record [N m, rad].
+struct Weights {
+  double torque = 1, deflection = 1;
+};
+
+/// What is left of one channel of all records: root mean square in units of the noise floor, or of a
+/// negligible part of the signal where that is more.
+struct Leftover {
+  double torque = 0, deflection = 0;
+  double torque_share = 0, deflection_share = 0;  // of the signal's standard deviation instead
+};
+
+/// Records made ready at one bandwidth, with the weights of their channels. One row per channel and as many
+/// samples as a signal of this bandwidth has independent values: of each record torque and deflection in
+/// turn.
+class RecordSet {
+ public:
+  RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback);
+
+  /// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
+  void weigh(const Machine& machine);
+  Leftover leftover(const Machine& machine) const;
+
+  Eigen::VectorXd rows(const Rig& rig, const std::vector<Calibration>& calibrations) const;
+
+  struct Row {
+    std::size_t record;
+    bool deflection;
+    double time;  // s from the start of the record
+  };
+  const std::vector<Row>& layout() const { return layout_; }
+  const std::vector<PreparedServo>& records() const { return records_; }
+  /// s, between the samples of one channel that make rows
+  double row_interval() const;
+
+ private:
+  std::vector<PreparedServo> records_;
+  std::vector<Weights> weights_, spreads_;
+  std::vector<Row> layout_;
+};
+
+struct MachineFit {
+  Machine machine;
+  LeastSquaresFit fit;  // of the values of Unknowns(start)
+};
+
+/// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
+/// start), then delay and encoder offset of each record, as far as they are unknown.
+class Unknowns {
+ public:
+  explicit Unknowns(const Machine& start);
+  Eigen::Index size() const { return Eigen::Index(start_.parameters.size() + per_record_ * records()); }
+  Eigen::VectorXd values() const;
+  Eigen::VectorXd scale() const;
+  /// Throws InvalidParameter for what is refused by the rig.
+  Rig rig(const Eigen::VectorXd& values) const;
+  std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
+  /// One row per value: vaguely, it is not far from its start. So what the records do not tell stays there.
+  Eigen::VectorXd beliefs(const Eigen::VectorXd& values) const;
+  Machine machine(const Eigen::VectorXd& values) const;
+  std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const;
+  Measured parameter(const LeastSquaresFit& fit, std::size_t i) const;
+
+ private:
+  std::size_t records() const { return start_.calibrations.size(); }
+  Eigen::Index first_of(std::size_t record) const {
+    return Eigen::Index(start_.parameters.size() + per_record_ * record);
+  }
+  Machine start_;
+  bool delays_, offsets_;
+  std::size_t per_record_;
+};
+
+MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options);
+
+/// Covariance of the fitted values from wide steps and from whole stretches of the records, the larger.
+void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
+
+}  // namespace backlash

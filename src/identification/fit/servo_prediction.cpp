@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a rig says of a record: torque and deflection, and what is left of them.
+#include "servo_prediction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <list>
+#include <mutex>
+
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/model/presliding.h"
+#include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kEnds = 3;       // periods of the cutoff at either end, where the filter has not settled
+constexpr double kStarts = 12;    // time constants of the feedback, until the start of the load is forgotten
+constexpr double kSureSpeed = 5;  // standard deviations of the motor speed, from which it has a sign
+constexpr long kReach = 2;        // samples to either side that it uses
+
+// A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
+// torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
+// the next, by half and half.
+std::vector<double> over_second_difference(const std::vector<double>& x) {
+  std::vector<double> mean = x;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) mean[k] = (x[k - 1] + 10 * x[k] + x[k + 1]) / 12;
+  return mean;
+}
+
+std::vector<double> held_over_second_difference(const std::vector<double>& x) {
+  std::vector<double> mean = x;
+  for (std::size_t k = 1; k < x.size(); ++k) mean[k] = 0.5 * (x[k - 1] + x[k]);
+  return mean;
+}
+
+/// +1 or -1 where the motor slides that way over both intervals about the sample and all that its rate was
+/// taken from; 0 where it may stand or turn round, where dry friction takes any value.
+std::vector<int> sliding(const ServoData& data) {
+  const double slowest = kSureSpeed * data.rate_noise;
+  const long n = static_cast<long>(data.size());
+  std::vector<int> direction(n), sure(n);
+  for (long k = 0; k < n; ++k)
+    direction[k] = (data.motor_rate[k] > slowest) - (data.motor_rate[k] < -slowest);
+  for (long k = 0; k < n; ++k) {
+    sure[k] = direction[k];
+    for (long j = std::max(0L, k - kReach); j <= std::min(n - 1, k + kReach); ++j)
+      if (direction[j] != direction[k]) sure[k] = 0;
+  }
+  return sure;
+}
+
+std::vector<double> difference(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> out(a.size());
+  for (std::size_t k = 0; k < a.size(); ++k) out[k] = a[k] - b[k];
+  return out;
+}
+
+/// Over the samples that count.
+ChannelError relative(const std::vector<double>& measured, const std::vector<double>& predicted,
+                      const std::vector<char>& counts, double floor) {
+  double n = 0, sum = 0, square = 0, residual = 0;
+  for (std::size_t k = 0; k < measured.size(); ++k) {
+    if (!counts[k]) continue;
+    ++n;
+    sum += measured[k];
+    square += measured[k] * measured[k];
+    residual += std::pow(measured[k] - predicted[k], 2);
+  }
+  const double spread = std::sqrt(square - sum * sum / n);
+  return {std::sqrt(residual) / spread, floor * std::sqrt(n) / spread};
+}
+
+/// How a rig's load is driven by a record.
+struct Drive {
+  RecordedMotion motion;
+  double gain = 1;              // of the load encoder
+  std::vector<double> changed;  // column that is not as recorded
+
+  Drive(const ServoData& data, const Rig& rig, const Calibration& calibration) {
+    motion.interval = data.interval;
+    motion.motor = &data.motor;
+    motion.motor_rate = &data.motor_rate;
+    if (!rig.terms.empty()) motion.motor_torque = &data.torque;
+    if (load_moves_freely(rig)) {
+      gain = sensing(rig.terms).load_position_gain;
+      motion.load_rate = &data.load_rate;
+      motion.first_load = (data.first_load - calibration.encoder_offset) / gain;
+      motion.first_load_rate = data.first_load_rate / gain;
+      if (gain == 1) return;
+      changed = data.load_rate;
+      for (double& rate : changed) rate /= gain;
+      motion.load_rate = &changed;
+    } else if (calibration.encoder_offset != 0) {
+      changed = data.motor;
+      for (double& position : changed) position += calibration.encoder_offset;
+      motion.motor = &changed;
+    }
+  }
+  Drive(const Drive&) = delete;  // points into itself
+};
+
+struct SimulatedLoad {
+  Rig rig;
+  double gain, offset;
+  DrivenLoad motion;
+  std::vector<double> deflection;  // simulated load minus recorded, without offset, low-passed; see Drive
+};
+
+}  // namespace
+
+/// The last loads that were simulated, the last that was asked for first.
+class SimulatedLoads {
+ public:
+  std::shared_ptr<const SimulatedLoad> get(const PreparedServo& record, const Drive& drive, const Rig& rig,
+                                           const Calibration& calibration) {
+    if (auto known = find(rig, drive.gain, calibration.encoder_offset)) return known;
+    auto made = std::make_shared<SimulatedLoad>();
+    made->rig = rig;
+    made->gain = drive.gain;
+    made->offset = calibration.encoder_offset;
+    made->motion = simulate_driven_load(rig, drive.motion, record.feedback);
+    if (load_moves_freely(rig)) {
+      const ServoData& data = record.data();
+      std::vector<double> difference(data.size());
+      for (std::size_t k = 0; k < data.size(); ++k)
+        difference[k] = drive.gain * made->motion.load[k] - data.load[k];
+      made->deflection = low_pass(difference, data.interval, record.cutoff);
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    kept_.push_front(made);
+    if (kept_.size() > kKept) kept_.pop_back();
+    return made;
+  }
+
+ private:
+  static constexpr std::size_t kKept = 8;  // that a Jacobian's columns come upon the load of its centre again
+
+  std::shared_ptr<const SimulatedLoad> find(const Rig& rig, double gain, double offset) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (auto at = kept_.begin(); at != kept_.end(); ++at) {
+      if ((*at)->gain != gain || (*at)->offset != offset || !moves_same_load((*at)->rig, rig)) continue;
+      kept_.splice(kept_.begin(), kept_, at);
+      return kept_.front();
+    }
+    return nullptr;
+  }
+
+  std::mutex mutex_;
+  std::list<std::shared_ptr<const SimulatedLoad>> kept_;
+};
+
+PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, double load_feedback)
+    : cutoff(low_pass_cutoff),
+      feedback(load_feedback),
+      direction(sliding(servo)),
+      data_(&servo),
+      loads_(std::make_shared<SimulatedLoads>()) {
+  torque_of_moment_ = over_second_difference(servo.torque);
+  torque_held_ = held_over_second_difference(servo.torque);
+  const long n = static_cast<long>(servo.size()), ends = std::lround(kEnds / (cutoff * servo.interval));
+  const long begin = std::max(ends, std::lround(kStarts / (feedback * servo.interval)));
+  counts.assign(n, 0);
+  settled.assign(n, 0);
+  for (long k = begin; k < n - ends; ++k) {
+    settled[k] = 1;
+    counts[k] = direction[k] != 0;
+  }
+}
+
+std::vector<double> PreparedServo::acting_torque(const Rig& rig, const Calibration& calibration) const {
+  const double delay = calibration.torque_delay + sensing(rig.terms).torque_delay / data().interval;
+  return delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
+}
+
+ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calibration) const {
+  const Drive drive(data(), rig, calibration);
+  const auto load = loads_->get(*this, drive, rig, calibration);
+  const MotorTorques motor = motor_torques(rig, drive.motion, load->motion);
+  const double inertia = GearTrain(rig).motor_inertia();
+  ServoResiduals r;
+  r.load = {load, &load->motion};
+  r.torque = acting_torque(rig, calibration);
+  const std::vector<double> friction =
+      presliding_friction(data().motor, motor.friction, data().motor_rate, data().interval);
+  for (std::size_t k = 0; k < data().size(); ++k) {
+    if (direction[k] == 0)
+      r.torque[k] = 0;  // friction takes what balances
+    else
+      r.torque[k] -= inertia * data().motor_acceleration[k] - motor.mean[k] + friction[k];
+  }
+  r.torque = low_pass(r.torque, data().interval, cutoff);
+  r.deflection = load->deflection;
+  for (double& value : r.deflection) value += calibration.encoder_offset;
+  return r;
+}
+
+ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+                              const Calibration& calibration) {
+  const PreparedServo prepared(data, settings.cutoff, settings.feedback);
+  ServoResiduals r = prepared.residuals(rig, calibration);
+  ServoPrediction p;
+  p.counts = prepared.counts;
+  p.settled = prepared.settled;
+  const NoiseFloors floors = noise_floors(rig, data, r.load->load, settings.cutoff, settings.feedback);
+  p.torque_floor = floors.torque;
+  p.measured_torque = low_pass(prepared.acting_torque(rig, calibration), data.interval, settings.cutoff);
+  p.torque = difference(p.measured_torque, r.torque);
+  p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
+  if (!r.deflection.empty()) {
+    p.deflection_floor = floors.deflection;
+    p.measured_deflection = low_pass(difference(data.motor, data.load), data.interval, settings.cutoff);
+    p.deflection = difference(p.measured_deflection, r.deflection);
+    p.deflection_error = relative(p.measured_deflection, p.deflection, p.settled, p.deflection_floor);
+  }
+  p.load = *r.load;
+  return p;
+}
+
+}  // namespace backlash

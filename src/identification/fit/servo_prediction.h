@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A record made ready for many predictions by rigs that differ in their parameters.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "backlash_diagnosis/identification/fit/output_error.h"
+
+namespace backlash {
+
+/// Recorded minus predicted, low-passed. No deflection where the load has no motion of its own.
+struct ServoResiduals {
+  std::shared_ptr<const DrivenLoad> load;
+  std::vector<double> torque, deflection;  // N m, rad
+};
+
+class SimulatedLoads;
+
+struct PreparedServo {
+  /// `data` must outlive it.
+  PreparedServo(const ServoData& data, double cutoff, double feedback);
+
+  /// What a second difference of the motor position sees of the motor's torque [N m].
+  std::vector<double> acting_torque(const Rig& rig, const Calibration& calibration) const;
+  /// Safe to call from several threads. The last loads are kept: where a rig differs from one of them only in
+  /// what moves no load, nothing is simulated.
+  ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
+
+  const ServoData& data() const { return *data_; }
+  double cutoff, feedback;
+  std::vector<int> direction;  // +1, -1: the motor slides that way; 0: dry friction may take any value
+  std::vector<char> settled;   // away from the ends of the record
+  std::vector<char> counts;    // settled, and the motor slides
+
+ private:
+  const ServoData* data_;  // of the caller
+  std::vector<double> torque_of_moment_, torque_held_;
+  std::shared_ptr<SimulatedLoads> loads_;
+};
+
+}  // namespace backlash

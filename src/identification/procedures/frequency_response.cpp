@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/identification/procedures/frequency_response.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <unsupported/Eigen/FFT>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/identification/procedures/stepped_sine.h"
+#include "backlash_diagnosis/record/resampling.h"
+#include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+
+namespace backlash {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double kSteppedShare = 0.9;  // of the time in sine runs; less is no stepped sine
+constexpr double kHighest = 0.25;      // of the sampling rate
+constexpr double kOverlap = 1.0 / 6;   // correlation of Hann windows that overlap by half
+constexpr double kNeighbours =
+    1 + 2 * (4.0 / 9 + 1.0 / 36);       // of neighbouring lines of Hann windows, squared
+constexpr double kLongestSegment = 16;  // s, if not asked for
+constexpr std::size_t kShortestSegment = 64, kFewestSegments = 8;
+constexpr std::size_t kFirstLine = 3;  // below, what drifts leaks in
+constexpr double kExcited = 1e-5;      // of the largest power of a line
+constexpr std::size_t kLeakReach = 8;  // lines
+constexpr double kAlone = 1e-2;        // of a line's power, three lines beside it: it stands alone
+
+struct Signals {
+  std::vector<double> torque, speed;
+  double interval = 0;
+  bool from_position = false;
+};
+
+void require_finite(const std::vector<double>& values, Channel channel) {
+  for (const double v : values)
+    if (!std::isfinite(v)) throw CannotIdentify(channel_name(channel) + " has values that are not finite");
+}
+
+Signals collect(const Record& given, ResponseSide side) {
+  const bool motor = side == ResponseSide::motor;
+  const Channel velocity = motor ? Channel::motor_velocity : Channel::load_velocity,
+                position = motor ? Channel::motor_position : Channel::load_position;
+  if (!given.has(Channel::motor_torque)) throw CannotIdentify("the record has no motor_torque");
+  if (!given.has(velocity) && !given.has(position))
+    throw CannotIdentify("the record has neither " + channel_name(velocity) + " nor " +
+                         channel_name(position));
+  const Record record = evenly_sampled(given);
+  Signals s;
+  s.torque = record.column(Channel::motor_torque);
+  s.interval = (record.time.back() - record.time.front()) / double(record.size() - 1);
+  s.from_position = !record.has(velocity);
+  const Channel source = s.from_position ? position : velocity;
+  require_finite(s.torque, Channel::motor_torque);
+  require_finite(record.column(source), source);
+  const auto [least, most] = std::minmax_element(s.torque.begin(), s.torque.end());
+  if (*least == *most) throw CannotIdentify("the torque does not vary");
+  s.speed = s.from_position ? derivative(record.column(source), s.interval) : record.column(source);
+  return s;
+}
+
+double sinc(double x) {
+  return x == 0 ? 1 : std::sin(x) / x;
+}
+
+/// What sampling makes of the response of an inertia: a gain, and what images of the hold add.
+struct Sampling {
+  double gain = 1, images = 0;
+};
+
+Sampling sampling(const Signals& s, const ResponseSettings& settings, double frequency) {
+  const double x = M_PI * frequency * s.interval, hold = settings.held ? sinc(x) : 1;
+  const Sampling line{hold * (s.from_position ? sinc(2 * x) : 1), 0};
+  if (!settings.held || settings.side == ResponseSide::load) return line;
+  const double all = s.from_position ? std::pow(std::cos(x), 2) / sinc(x) : 1 / sinc(x);
+  return {line.gain, all - line.gain};
+}
+
+/// 1 / motor inertia from the upper half of the points: w |H| = (1 + d / f^2) / JM there.
+double inertance(const Signals& s, const ResponseSettings& settings, const FrequencyResponse& response) {
+  const auto& points = response.points;
+  const std::size_t first = points.size() / 2;
+  const auto rows = static_cast<Eigen::Index>(points.size() - first);
+  if (rows < 4) return 0;
+  Eigen::MatrixXd a(rows, 2);
+  Eigen::VectorXd b(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const ResponsePoint& p = points[first + static_cast<std::size_t>(i)];
+    const Sampling line = sampling(s, settings, p.frequency);
+    a.row(i) << 1, std::pow(points.back().frequency / p.frequency, 2);
+    b[i] = 2 * M_PI * p.frequency * std::abs(p.response) / (line.gain + line.images);
+  }
+  return fit_robust(a, b).values[0];
+}
+
+void correct_sampling(const Signals& s, const ResponseSettings& settings, FrequencyResponse& response) {
+  const bool images = settings.held && settings.side == ResponseSide::motor;
+  const double inverse_inertia = images ? inertance(s, settings, response) : 0;
+  for (ResponsePoint& point : response.points) {
+    const double w = 2 * M_PI * point.frequency;
+    const Sampling line = sampling(s, settings, point.frequency);
+    if (settings.held) point.response *= std::polar(1.0, 0.5 * w * s.interval);
+    point.response = (point.response - inverse_inertia * line.images / Complex(0, w)) / line.gain;
+  }
+}
+
+std::vector<ResponsePoint> stepped_points(const Signals& s, const SineRuns& sines) {
+  std::vector<ResponsePoint> points;
+  for (const SineRun& run : sines.runs) {
+    points.push_back(sine_response(s.torque, s.speed, run));
+    points.back().frequency /= s.interval;
+  }
+  return points;
+}
+
+/// Sums over segments of the spectra, line by line.
+struct Spectra {
+  std::vector<double> uu, yy;
+  std::vector<Complex> uy;
+  std::size_t segments = 0;
+};
+
+std::vector<Complex> windowed_spectrum(const std::vector<double>& x, std::size_t begin,
+                                       const std::vector<double>& window, Eigen::FFT<double>& fft) {
+  const auto first = x.begin() + static_cast<std::ptrdiff_t>(begin);
+  std::vector<double> part(first, first + static_cast<std::ptrdiff_t>(window.size()));
+  const double mean = std::accumulate(part.begin(), part.end(), 0.0) / double(part.size());
+  for (std::size_t i = 0; i < part.size(); ++i) part[i] = (part[i] - mean) * window[i];
+  std::vector<Complex> spectrum;
+  fft.fwd(spectrum, part);
+  return spectrum;
+}
+
+Spectra welch(const Signals& s, std::size_t segment) {
+  std::vector<double> window(segment);
+  for (std::size_t i = 0; i < segment; ++i)
+    window[i] = 0.5 - 0.5 * std::cos(2 * M_PI * double(i) / double(segment));
+  const std::size_t lines = segment / 2;
+  Spectra sum{std::vector<double>(lines, 0.0), std::vector<double>(lines, 0.0),
+              std::vector<Complex>(lines, 0.0), 0};
+  Eigen::FFT<double> fft;
+  for (std::size_t begin = 0; begin + segment <= s.torque.size(); begin += segment / 2, ++sum.segments) {
+    const auto u = windowed_spectrum(s.torque, begin, window, fft),
+               y = windowed_spectrum(s.speed, begin, window, fft);
+    for (std::size_t k = 0; k < lines; ++k) {
+      sum.uu[k] += std::norm(u[k]);
+      sum.yy[k] += std::norm(y[k]);
+      sum.uy[k] += std::conj(u[k]) * y[k];
+    }
+  }
+  return sum;
+}
+
+/// Highest of its neighbours, with nearly nothing three lines away.
+bool alone(const std::vector<double>& power, std::size_t k) {
+  return power[k] >= power[k - 1] && power[k] > power[k + 1] &&
+         std::max(power[k - 3], power[k + 3]) < kAlone * power[k];
+}
+
+/// Whether the line may be no more than what a Hann window leaks from a stronger one: d lines beside a sine
+/// 1 / (pi d (d^2 - 1)) of its amplitude at most; here twice that.
+bool leaked(const std::vector<double>& power, std::size_t k) {
+  for (std::size_t d = 2; d <= kLeakReach; ++d) {
+    const double share = std::pow(2 / (M_PI * double(d) * double(d * d - 1)), 2);
+    const double below = k >= d ? power[k - d] : 0, above = k + d < power.size() ? power[k + d] : 0;
+    if (power[k] < share * std::max(below, above)) return true;
+  }
+  return false;
+}
+
+/// Where between the lines a single sine under a Hann window lies.
+double interpolated(const std::vector<double>& power, std::size_t k) {
+  const bool above = power[k + 1] > power[k - 1];
+  const double ratio = std::sqrt((above ? power[k + 1] : power[k - 1]) / power[k]);
+  return double(k) + (above ? 1 : -1) * (2 * ratio - 1) / (ratio + 1);
+}
+
+std::size_t segment_length(const Signals& s, double wanted) {
+  const std::size_t samples = s.torque.size();
+  std::size_t segment = kShortestSegment;
+  if (wanted > 0) {
+    segment = 2 * static_cast<std::size_t>(std::lround(0.5 * wanted / s.interval));
+  } else {
+    while (2 * segment <= samples / 8 && 2.0 * double(segment) * s.interval <= kLongestSegment) segment *= 2;
+  }
+  if (segment < kShortestSegment || 2 * samples / segment < kFewestSegments + 1)
+    throw CannotIdentify(std::to_string(samples) + " samples do not hold " + std::to_string(kFewestSegments) +
+                         " half-overlapping segments of " + std::to_string(segment) + " (at least " +
+                         std::to_string(kShortestSegment) + ")");
+  return segment;
+}
+
+bool reverses(const std::vector<double>& speed) {
+  double sum = 0, squares = 0;
+  for (const double v : speed) sum += v, squares += v * v;
+  const double n = double(speed.size()), mean = sum / n;
+  return std::sqrt(2 * std::max(0.0, squares / n - mean * mean)) > std::fabs(mean);
+}
+
+FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) {
+  const std::size_t segment = segment_length(s, settings.segment);
+  const Spectra sum = welch(s, segment);
+  const double n = double(sum.segments) / (1 + 2 * kOverlap * kOverlap);
+  const double largest = *std::max_element(sum.uu.begin() + kFirstLine, sum.uu.end());
+  const bool both_signs = reverses(s.speed);
+  FrequencyResponse response;
+  std::size_t single = 0;  // line of the last sine that stands alone
+  for (std::size_t k = kFirstLine; k + 3 < sum.uu.size(); ++k) {
+    if (!(sum.uu[k] > kExcited * largest) || !(sum.yy[k] > 0) || leaked(sum.uu, k)) continue;
+    if (single > 0 && k <= single + 2) continue;
+    double line = double(k);
+    if (alone(sum.uu, k)) {
+      line = interpolated(sum.uu, k);
+      single = k;
+      while (!response.points.empty() &&
+             response.points.back().frequency * double(segment) * s.interval >= double(k) - 2.5)
+        response.points.pop_back();
+    }
+    ResponsePoint point;
+    point.frequency = line / (double(segment) * s.interval);
+    point.response = sum.uy[k] / sum.uu[k];
+    point.coherence = std::min(1.0, std::norm(sum.uy[k]) / (sum.uu[k] * sum.yy[k]));
+    point.standard_error = std::sqrt((1 - point.coherence) / (2 * n * point.coherence));
+    point.reverses = both_signs;
+    response.points.push_back(point);
+    if (single != k) response.variance_factor = kNeighbours;
+  }
+  return response;
+}
+
+void check(const ResponseSettings& settings) {
+  if (!(settings.segment >= 0) || !std::isfinite(settings.segment))
+    throw InvalidParameter("segment", settings.segment, "must be >= 0 s");
+  if (!(settings.least_coherence >= 0 && settings.least_coherence <= 1))
+    throw InvalidParameter("least_coherence", settings.least_coherence, "must be 0 to 1");
+}
+
+void sort_by_frequency(FrequencyResponse& response) {
+  std::sort(response.points.begin(), response.points.end(),
+            [](const ResponsePoint& a, const ResponsePoint& b) { return a.frequency < b.frequency; });
+}
+
+}  // namespace
+
+FrequencyResponse estimate_response(const Record& record, const ResponseSettings& settings) {
+  check(settings);
+  const Signals s = collect(record, settings.side);
+  FrequencyResponse response;
+  const SineRuns sines = settings.method == ResponseMethod::broadband ? SineRuns() : find_sine_runs(s.torque);
+  const bool stepped = settings.method == ResponseMethod::stepped_sine || sines.share >= kSteppedShare;
+  if (stepped && sines.runs.empty()) throw CannotIdentify("the torque holds no four even cycles of one sine");
+  if (stepped)
+    response.points = stepped_points(s, sines);
+  else
+    response = broadband(s, settings);
+  double best = 0;
+  for (const ResponsePoint& point : response.points) best = std::max(best, point.coherence);
+  const auto bad = [&](const ResponsePoint& p) {
+    return !(p.coherence >= settings.least_coherence) || p.frequency * s.interval > kHighest ||
+           !std::isfinite(p.standard_error);
+  };
+  auto& points = response.points;
+  points.erase(std::remove_if(points.begin(), points.end(), bad), points.end());
+  if (points.empty())
+    throw CannotIdentify("no frequency at which the speed follows the torque: highest coherence " +
+                         to_text(best) + ", needed is " + to_text(settings.least_coherence));
+  sort_by_frequency(response);
+  correct_sampling(s, settings, response);
+  return response;
+}
+
+FrequencyResponse estimate_response(const std::vector<Record>& records, const ResponseSettings& settings) {
+  FrequencyResponse all;
+  std::string reasons;
+  for (const Record& record : records) {
+    try {
+      const FrequencyResponse one = estimate_response(record, settings);
+      all.points.insert(all.points.end(), one.points.begin(), one.points.end());
+      all.variance_factor = std::max(all.variance_factor, one.variance_factor);
+    } catch (const CannotIdentify& reason) {
+      reasons += (reasons.empty() ? "" : "; ") + record.name + ": " + reason.what();
+    }
+  }
+  if (all.points.empty()) throw CannotIdentify(reasons.empty() ? "no record is given" : reasons);
+  sort_by_frequency(all);
+  return all;
+}
+
+}  // namespace backlash

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/identification/procedures/one_inertia.h"
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/record/resampling.h"
+#include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/blocks.h"
+#include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kLargestDelay = 2;   // sampling intervals
+constexpr double kVagueDelay = 1;     // sampling intervals of standard error
+constexpr double kLeastPeriods = 40;  // of the cutoff
+constexpr double kPeriods = 100;      // where the cutoff is chosen
+constexpr double kLeastShare = 0.05;  // of the samples in each direction
+constexpr double kStanding = 4;       // standard deviations of the speed's noise
+constexpr double kSignNoise = 1e-3;   // of the speed: how sharply its sign is taken
+constexpr double kSignBandwidth = 4;  // but not below four times the cutoff
+constexpr double kShortest = 0.25;    // of the memory: a standstill that matters
+constexpr std::size_t kBlocks = 30;
+constexpr double kMuchLeft = 0.1;  // relative error that is worth a warning
+
+/// What the equations need of a record.
+struct Signals {
+  double interval = 0, cutoff = 0, position_noise = 0;
+  std::vector<double> time, torque;  // torque filtered, delayed by nothing
+  Eigen::MatrixXd columns;           // a, v, sign(v), 1, filtered; all samples
+  std::vector<Eigen::Index> used;    // samples
+};
+
+std::vector<double> second_derivative(const std::vector<double>& x, double interval) {
+  const std::size_t n = x.size();
+  std::vector<double> a(n);
+  for (std::size_t k = 1; k + 1 < n; ++k) a[k] = (x[k + 1] - 2 * x[k] + x[k - 1]) / (interval * interval);
+  a[0] = a[1];
+  a[n - 1] = a[n - 2];
+  return a;
+}
+
+/// Samples in standstill, widened by the memory of the filter.
+std::vector<bool> standing(const std::vector<double>& speed, double threshold, double memory) {
+  const std::size_t n = speed.size(), widen = static_cast<std::size_t>(std::ceil(memory));
+  std::vector<bool> out(n, false);
+  for (std::size_t k = 0, end; k < n; k = end) {
+    for (end = k; end < n && std::fabs(speed[end]) <= threshold;) ++end;
+    if (double(end - k) > std::max(1.0, kShortest * memory))
+      std::fill(out.begin() + (k > widen ? k - widen : 0), out.begin() + std::min(n, end + widen), true);
+    if (end == k) ++end;
+  }
+  return out;
+}
+
+void require_channels(const Record& record) {
+  if (!record.has(Channel::motor_torque) || !record.has(Channel::motor_position))
+    throw CannotIdentify(record.name + ": a machine with one inertia needs motor_torque and motor_position");
+  if (record.size() < 64)
+    throw CannotIdentify(record.name + ": only " + std::to_string(record.size()) + " samples");
+}
+
+/// White noise of the position, differentiated up to a cutoff: the square of the gain 2 pi f integrated.
+double speed_noise(double position_noise, double cutoff, double interval) {
+  return position_noise * 2 * M_PI * cutoff * std::sqrt(2 * cutoff * interval / 3);
+}
+
+/// Cutoff [Hz] at which the noise of the speed is kSignNoise of the speed.
+double speed_bandwidth(double position_noise, const std::vector<double>& speed, double interval) {
+  const double size = Eigen::Map<const Eigen::VectorXd>(speed.data(), Eigen::Index(speed.size())).norm() /
+                      std::sqrt(double(speed.size()));
+  return std::pow(kSignNoise * size / speed_noise(position_noise, 1, interval), 2.0 / 3);
+}
+
+Signals prepare(const Record& record, double cutoff) {
+  Signals s;
+  const std::vector<double>& position = record.column(Channel::motor_position);
+  const std::size_t n = record.size();
+  const double t = s.interval = record.sampling_interval();
+  if (cutoff != 0 && !(cutoff > 0 && cutoff <= 0.4 / t))
+    throw InvalidParameter("cutoff", cutoff, "must be > 0 and at most 0.4 of the sampling rate");
+  s.cutoff = cutoff > 0 ? cutoff : std::max(motion_bandwidth(position, t), kPeriods / (double(n) * t));
+  if (double(n) * t * s.cutoff < kLeastPeriods)
+    throw CannotIdentify(record.name + ": " + figure(double(n) * t) + " s are too short for a motion of " +
+                         figure(s.cutoff) + " Hz");
+  s.position_noise = position_noise(position);
+  s.time = record.time;
+  s.torque = low_pass(record.column(Channel::motor_torque), t, s.cutoff);
+  const std::vector<double> speed = derivative(position, t);
+  const double sharp_cutoff = std::clamp(speed_bandwidth(s.position_noise, speed, t),
+                                         std::min(kSignBandwidth * s.cutoff, 0.4 / t), 0.4 / t);
+  const std::vector<double> sharp = low_pass(speed, t, sharp_cutoff);
+  std::vector<double> sign(n);
+  for (std::size_t k = 0; k < n; ++k) sign[k] = (sharp[k] > 0) - (sharp[k] < 0);
+  s.columns.resize(n, 4);
+  const std::vector<double> filtered[] = {low_pass(second_derivative(position, t), t, s.cutoff),
+                                          low_pass(speed, t, s.cutoff), low_pass(sign, t, s.cutoff)};
+  for (int i = 0; i < 3; ++i)
+    s.columns.col(i) = Eigen::Map<const Eigen::VectorXd>(filtered[i].data(), Eigen::Index(n));
+  s.columns.col(3).setOnes();
+  const double threshold = kStanding * speed_noise(s.position_noise, sharp_cutoff, t);
+  const auto masked = standing(sharp, threshold, 0.5 / (s.cutoff * t));
+  const auto end = static_cast<std::size_t>(std::ceil(1 / (s.cutoff * t)));
+  for (std::size_t k = end; k + end < n; ++k)
+    if (!masked[k]) s.used.push_back(Eigen::Index(k));
+  return s;
+}
+
+Eigen::VectorXd picked(const std::vector<double>& values, const std::vector<Eigen::Index>& rows) {
+  Eigen::VectorXd out(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) out[i] = values[rows[i]];
+  return out;
+}
+
+Eigen::MatrixXd picked(const Eigen::MatrixXd& columns, const std::vector<Eigen::Index>& rows) {
+  Eigen::MatrixXd out(rows.size(), columns.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) out.row(i) = columns.row(rows[i]);
+  return out;
+}
+
+void require_both_directions(const std::string& name, const Signals& s) {
+  double forward = 0, backward = 0;
+  for (const auto k : s.used) (s.columns(k, 1) > 0 ? forward : backward) += 1;
+  if (s.used.size() < 64 || std::min(forward, backward) < kLeastShare * double(s.time.size()))
+    throw CannotIdentify(name + ": moves forward in " + figure(100 * forward / double(s.time.size())) +
+                         " % and backward in " + figure(100 * backward / double(s.time.size())) +
+                         " % of the samples: Coulomb friction and offset cannot be told apart");
+}
+
+/// Delay [samples] with the smallest residual, golden section to a thousandth.
+double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
+  const Eigen::MatrixXd q = a.householderQr().householderQ() * Eigen::MatrixXd::Identity(a.rows(), a.cols());
+  const auto left = [&](double delay) {
+    const Eigen::VectorXd b = picked(delayed(s.torque, delay), s.used);
+    return (b - q * (q.transpose() * b)).squaredNorm();
+  };
+  const double ratio = 0.5 * (std::sqrt(5.0) - 1);
+  double low = -kLargestDelay, high = kLargestDelay;
+  double x = high - ratio * (high - low), y = low + ratio * (high - low), fx = left(x), fy = left(y);
+  while (high - low > 1e-3) {
+    if (fx < fy) {
+      high = y, y = x, fy = fx;
+      fx = left(x = high - ratio * (high - low));
+    } else {
+      low = x, x = y, fx = fy;
+      fy = left(y = low + ratio * (high - low));
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+/// The delay is one more column: what the torque would gain by one sample of it.
+Eigen::MatrixXd with_delay_column(const Signals& s, const Eigen::MatrixXd& a, double delay) {
+  Eigen::MatrixXd all(a.rows(), a.cols() + 1);
+  all << a, picked(derivative(delayed(s.torque, delay), 1), s.used);
+  return all;
+}
+
+std::vector<std::size_t> block_of_rows(const Signals& s) {
+  std::vector<std::size_t> block;
+  for (std::size_t i = 0; i < s.used.size(); ++i) block.push_back(i * kBlocks / s.used.size());
+  return block;
+}
+
+/// Parameters at one delay, errors of the parameters and, where it is one of them, of the delay [samples].
+struct Solution {
+  double delay = 0;
+  LeastSquaresFit fit;
+  Eigen::VectorXd error;
+};
+
+Solution solve(const Signals& s, const Eigen::MatrixXd& a, double delay, bool estimated) {
+  Solution out;
+  out.delay = delay;
+  out.fit = fit_linear(a, picked(delayed(s.torque, delay), s.used));
+  const Eigen::MatrixXd all = estimated ? with_delay_column(s, a, delay) : a;
+  out.error = jackknife_covariance(all, out.fit.residuals, block_of_rows(s)).diagonal().cwiseSqrt();
+  return out;
+}
+
+/// Relative error that noise alone would leave.
+double floor_of(const Record& record, const Signals& s, double inertia, double torque_size) {
+  const double left = noise_after_low_pass(s.interval, s.cutoff);
+  const double torque = white_noise(record.column(Channel::motor_torque)) * left;
+  const double acceleration = s.position_noise * std::pow(2 * M_PI * s.cutoff, 2) *
+                              std::sqrt(2 * s.cutoff * s.interval / 5);  // noise with f^2 up to the cutoff
+  return std::hypot(torque, inertia * acceleration) / torque_size;
+}
+
+double spread(const Eigen::VectorXd& values) {
+  return std::sqrt((values.array() - values.mean()).square().mean());
+}
+
+}  // namespace
+
+OneInertia identify_one_inertia(const Record& recorded, const OneInertiaOptions& options) {
+  require_channels(recorded);
+  const Record record = evenly_sampled(recorded);
+  const Signals s = prepare(record, options.cutoff);
+  require_both_directions(record.name, s);
+  if (options.delay && !(std::fabs(*options.delay) <= kLargestDelay * s.interval))
+    throw InvalidParameter("delay", *options.delay, "must be within two sampling intervals");
+  const Eigen::MatrixXd a = picked(s.columns, s.used);
+  OneInertia out;
+  Solution solution;
+  if (options.delay) {
+    solution = solve(s, a, *options.delay / s.interval, false);
+    out.delay = {*options.delay, 0};
+  } else {
+    solution = solve(s, a, best_delay(s, a), true);
+    out.delay = {solution.delay * s.interval, solution.error[4] * s.interval};
+    if (std::fabs(solution.delay) > kLargestDelay - 0.01 || solution.error[4] > kVagueDelay) {
+      out.warnings.push_back("the delay between torque and position cannot be told (" +
+                             figure(solution.delay) + " +- " + figure(solution.error[4]) +
+                             " samples, searched within two): taken as 0");
+      solution = solve(s, a, 0, false);
+      out.delay = {0, std::numeric_limits<double>::quiet_NaN()};
+    }
+  }
+  const LeastSquaresFit& fit = solution.fit;
+  Measured* const parameters[] = {&out.inertia, &out.viscous, &out.coulomb, &out.offset};
+  for (int i = 0; i < 4; ++i) *parameters[i] = {fit.values[i], solution.error[i]};
+  out.cutoff = s.cutoff;
+  out.used = double(s.used.size()) / double(s.time.size());
+  const Eigen::VectorXd predicted = a * fit.values, measured = predicted + fit.residuals;
+  out.relative_error = std::sqrt(fit.residuals.squaredNorm() / double(measured.size())) / spread(measured);
+  out.floor = floor_of(record, s, out.inertia.value, spread(measured));
+  for (const auto k : s.used) out.time.push_back(s.time[k]);
+  out.measured.assign(measured.begin(), measured.end());
+  out.predicted.assign(predicted.begin(), predicted.end());
+  if (out.relative_error > std::max(kMuchLeft, 3 * out.floor))
+    out.warnings.push_back("the model leaves " + figure(100 * out.relative_error) +
+                           " % of the torque, noise alone would leave " + figure(100 * out.floor) +
+                           " %: the machine has effects that one inertia with friction lacks");
+  return out;
+}
+
+double relative_error(const OneInertia& machine, const Record& recorded) {
+  require_channels(recorded);
+  const Record record = evenly_sampled(recorded);
+  const Signals s = prepare(record, machine.cutoff);
+  if (s.used.size() < 2) throw CannotIdentify(record.name + ": stands still");
+  const Eigen::VectorXd torque = picked(delayed(s.torque, machine.delay.value / s.interval), s.used);
+  const Eigen::Vector4d p(machine.inertia.value, machine.viscous.value, machine.coulomb.value,
+                          machine.offset.value);
+  const Eigen::VectorXd residual = torque - picked(s.columns, s.used) * p;
+  return std::sqrt(residual.squaredNorm() / double(residual.size())) / spread(torque);
+}
+
+}  // namespace backlash

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/report/diagnosis_report.h"
+
+#include <cmath>
+#include <iomanip>
+#include <ostream>
+#include <sstream>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/base/version.h"
+
+namespace backlash::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+/// Null where neither end is known; one null end is an open one.
+Json interval(double lower, double upper) {
+  if (!std::isfinite(lower) && !std::isfinite(upper)) return nullptr;
+  return Json::array({number(lower), number(upper)});
+}
+
+Json estimate_json(const Estimate& e) {
+  Json json;
+  json["method"] = e.method;
+  json["status"] = to_string(e.status);
+  json["backlash"] = number(e.backlash);
+  json["backlash_angle"] = number(e.backlash_angle);
+  json["interval"] = interval(e.lower, e.upper);
+  json["interval_angle"] = interval(e.angle_lower, e.angle_upper);
+  json["skewness"] = number(e.skewness);
+  json["message"] = e.message;
+  if (e.components) {
+    Json& parts = json["components"];
+    parts["gap"] = number(e.components->gap);
+    parts["compliance"] = number(e.components->compliance);
+    parts["coulomb"] = number(e.components->coulomb);
+    parts["at_torque"] = number(e.components->at_torque);
+  }
+  return json;
+}
+
+Json methods_json(const std::vector<Estimate>& estimates, const std::vector<int>& chosen) {
+  Json names = Json::array();
+  for (const int i : chosen) names.push_back(estimates[i].method);
+  return names;
+}
+
+Json coherence_json(const CoherenceDetection& d) {
+  Json json;
+  json["detector"] = "coherence";
+  json["status"] = to_string(d.status);
+  json["nonlinear"] = d.nonlinear ? Json(*d.nonlinear) : Json(nullptr);
+  json["loss"] = number(d.loss);
+  json["deviation"] = number(d.deviation);
+  json["index"] = number(d.index);
+  json["index_interval"] = interval(d.index_lower, d.index_upper);
+  json["band"] = interval(d.lower, d.upper);
+  json["message"] = d.message;
+  return json;
+}
+
+Json verdict_json(const Verdict& verdict, const std::vector<Estimate>& estimates) {
+  Json json;
+  json["grade"] = to_string(verdict.grade);
+  json["estimate"] = verdict.estimate < 0 ? Json(nullptr) : Json(verdict.estimate);
+  json["agreement"] = verdict.agreement;
+  json["members"] = methods_json(estimates, verdict.members);
+  json["dissenters"] = methods_json(estimates, verdict.dissenters);
+  json["backlash"] = number(verdict.backlash);
+  json["interval"] = interval(verdict.lower, verdict.upper);
+  json["backlash_angle"] = number(verdict.backlash_angle);
+  json["angle_interval"] = interval(verdict.angle_lower, verdict.angle_upper);
+  json["growth"] = number(verdict.growth);
+  json["growth_interval"] = interval(verdict.growth_lower, verdict.growth_upper);
+  json["message"] = verdict.message;
+  return json;
+}
+
+Json apd_json(const ApdResult& apd, const ApdSettings& settings) {
+  Json json;
+  json["signal"] = channel_name(settings.signal);
+  json["classes"] = settings.layout.classes;
+  json["lower"] = settings.layout.lower;
+  json["upper"] = settings.layout.upper;
+  json["percentages"] = apd.total.percentages();
+  json["samples"] = apd.total.samples();
+  json["below"] = apd.total.below();
+  json["above"] = apd.total.above();
+  json["periods"] = apd.periods.size();
+  json["incomplete"] = apd.incomplete;
+  json["settling_periods"] = settings.settling_periods;
+  json["period"] = apd.period > 0 ? Json(apd.period) : Json(nullptr);
+  json["skewness"] = number(apd.skewness);
+  json["kurtosis"] = number(apd.total.kurtosis());
+  json["noise"] = number(apd.noise);
+  Json& each = json["skewness_of_periods"] = Json::array();
+  for (const PeriodResult& period : apd.periods) each.push_back(number(period.apd.skewness()));
+  return json;
+}
+
+Json curve_json(const MonitoringCurve& curve, const std::string& source) {
+  const CurveConditions& c = curve.conditions;
+  Json json;
+  json["source"] = source;
+  json["rig"] = c.rig;
+  json["rig_digest"] = c.rig_digest;
+  json["version"] = c.version;
+  json["signal"] = c.signal;
+  json["excitation"] = c.excitation;
+  json["amplitude"] = c.amplitude;
+  json["frequency"] = c.frequency;
+  json["sampling_rate"] = c.sampling_rate;
+  json["periods"] = c.periods;
+  json["settling_periods"] = c.settling_periods;
+  json["seeds"] = c.seeds;
+  json["noise"] = c.noise;
+  json["angular"] = c.angular;
+  json["points"] = curve.points.size();
+  json["largest_backlash"] = curve.points.back().backlash;
+  return json;
+}
+
+std::string text_of(double value) {
+  std::ostringstream text;
+  text << std::setprecision(4) << value;
+  return std::isfinite(value) ? text.str() : "?";
+}
+
+std::string with_interval(double value, double lower, double upper, double unit) {
+  std::string text = text_of(value / unit);
+  if (std::isfinite(lower) || std::isfinite(upper))
+    text += " [" + text_of(lower / unit) + ", " + text_of(upper / unit) + "]";
+  return text;
+}
+
+void print_estimate(const Estimate& e, std::ostream& out) {
+  out << e.method << ": " << to_string(e.status) << '\n';
+  if (std::isfinite(e.backlash) || std::isfinite(e.lower))
+    out << "  backlash        " << with_interval(e.backlash, e.lower, e.upper, 1) << " m\n";
+  if (std::isfinite(e.backlash_angle) || std::isfinite(e.angle_lower))
+    out << "  backlash angle  " << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, 1)
+        << " rad = " << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, kDegree) << " deg\n";
+  if (std::isfinite(e.skewness)) out << "  skewness        " << text_of(e.skewness) << '\n';
+  if (e.components)
+    out << "  gap " << text_of(e.components->gap) << " rad = " << text_of(e.components->gap / kDegree)
+        << " deg, compliance " << text_of(e.components->compliance) << " rad/(N m), Coulomb friction "
+        << text_of(e.components->coulomb) << " N m, at torque " << text_of(e.components->at_torque)
+        << " N m\n";
+  if (!e.message.empty()) out << "  " << e.message << '\n';
+}
+
+}  // namespace
+
+Json to_json(const DiagnosisReport& report) {
+  Json json;
+  json["schema_version"] = 1;
+  json["record"] = report.record->name;
+  json["estimates"] = Json::array();
+  for (const Estimate& e : report.diagnosis.estimates) json["estimates"].push_back(estimate_json(e));
+  if (report.diagnosis.coherence)
+    json["detectors"] = Json::array({coherence_json(*report.diagnosis.coherence)});
+  json["verdict"] = verdict_json(report.diagnosis.verdict, report.diagnosis.estimates);
+  const bool has_apd = report.diagnosis.apd && report.apd_settings;
+  json["apd"] = has_apd ? apd_json(*report.diagnosis.apd, *report.apd_settings) : Json(nullptr);
+  json["warnings"] = report.warnings;
+  json["rig"] = report.rig.empty() ? Json(nullptr) : Json(report.rig);
+  json["curve"] = report.curve ? curve_json(*report.curve, report.curve_source) : Json(nullptr);
+  json["version"] = version();
+  return json;
+}
+
+void print_summary(const DiagnosisReport& report, std::ostream& out) {
+  const Record& record = *report.record;
+  const double interval = record.sampling_interval();
+  out << record.name << ": " << record.size() << " samples, "
+      << text_of(record.time.back() - record.time.front()) << " s";
+  if (interval > 0) out << ", " << text_of(1 / interval) << " Hz";
+  out << '\n';
+  for (const std::string& warning : report.warnings) out << "warning: " << warning << '\n';
+  for (const Estimate& e : report.diagnosis.estimates) print_estimate(e, out);
+  out << "verdict: " << report.diagnosis.verdict.message << '\n';
+}
+
+}  // namespace backlash::tools

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/report/diagnosis_series.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/model/axis_unit.h"
+
+namespace backlash::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kPeriods = 3;
+constexpr std::size_t kMostSamples = 20'000;  // of a plot
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json column(const std::vector<double>& values, std::size_t stride) {
+  Json json = Json::array();
+  for (std::size_t k = 0; k < values.size(); k += stride) json.push_back(number(values[k]));
+  return json;
+}
+
+/// Of the excitation; 0 where it does not repeat.
+double period_of(const DiagnosisReport& report) {
+  if (report.diagnosis.apd && report.diagnosis.apd->period > 0) return report.diagnosis.apd->period;
+  return excitation_period(*report.record, Channel::motor_torque);
+}
+
+Json record_json(const Record& record, double period, bool linear) {
+  const double end = record.time.back(), from = period > 0 ? end - kPeriods * period : record.time.front();
+  const Record part = record.slice(from, std::nextafter(end, end + 1));
+  const std::size_t stride = part.size() / kMostSamples + 1;
+  Json json = {{"period", period > 0 ? Json(period) : Json(nullptr)}, {"time", column(part.time, stride)}};
+  json["channels"] = Json::object();
+  for (const Channel channel : kChannels)
+    if (part.has(channel))
+      json["channels"][channel_name(channel)] = {{"unit", axis_unit(channel_unit(channel), linear)},
+                                                 {"values", column(part.column(channel), stride)}};
+  return json;
+}
+
+/// The curve at its declared noise, with the 95 % scatter of a single period.
+Json curve_json(const MonitoringCurve& curve) {
+  Json json = {{"angular", curve.conditions.angular}, {"backlash_to_angle", number(curve.backlash_to_angle)}};
+  for (const CurvePoint& point : curve.points) {
+    const SkewnessCell& cell = curve.nominal(point);
+    json["backlash"].push_back(point.backlash);
+    json["skewness"].push_back(number(cell.mean));
+    json["scatter"].push_back(number(curve.coverage_factor * MonitoringCurve::deviation(cell, 1)));
+  }
+  return json;
+}
+
+/// Null where there are none, or where they hold for the growth.
+Json limits_json(const DiagnosisReport& report) {
+  if (!report.limits || std::isfinite(report.diagnosis.verdict.growth)) return nullptr;
+  const Limits& limits = *report.limits;
+  return {{"angular", limits.angular},
+          {"watch", limits.watch},
+          {"service", limits.service},
+          {"stop", limits.stop}};
+}
+
+}  // namespace
+
+std::string diagnosis_series(const DiagnosisReport& report, const RigFile* rig) {
+  const bool linear = rig && rig->rig.linear;
+  const bool locked = rig ? rig->rig.link_locked : report.curve && report.curve->conditions.output_locked;
+  const Json json = {{"schema_version", 1},
+                     {"report", to_json(report)},
+                     {"linear", linear},
+                     {"locked", locked},
+                     {"rigid", rig && rig->rig.mesh.rigid},
+                     {"record", record_json(*report.record, period_of(report), linear)},
+                     {"curve", report.curve ? curve_json(*report.curve) : Json(nullptr)},
+                     {"limits", limits_json(report)}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace backlash::tools

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/report/identification_report.h"
+
+#include <cmath>
+#include <cstdio>
+#include <iomanip>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/base/version.h"
+
+namespace backlash::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostPoints = 3000;  // of a trace, which a plot shows
+constexpr double kZoom = 2;                // s, at full resolution
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json measured(const Measured& m) {
+  return {{"value", number(m.value)}, {"standard_error", number(m.standard_error)}};
+}
+
+Json line_json(const FrictionLine& line) {
+  return {{"coulomb", measured(line.coulomb)},
+          {"viscous", measured(line.viscous)},
+          {"speed", line.speed},
+          {"torque", line.torque},
+          {"residual", line.residual},
+          {"rms", line.rms},
+          {"quadratic_t", line.quadratic_t}};
+}
+
+Json split_json(const StiffnessSplit& s) {
+  return {{"motor_inertia", measured(s.motor_inertia)},
+          {"load_inertia", measured(s.load_inertia)},
+          {"reduced_inertia", measured(s.reduced_inertia)},
+          {"stiffness_anti_resonance", measured(s.stiffness_anti_resonance)},
+          {"stiffness_resonance", measured(s.stiffness_resonance)},
+          {"resonance", measured(s.resonance)},
+          {"anti_resonance", measured(s.anti_resonance)}};
+}
+
+Json response_json(const ResponseDetail& d) {
+  Json json = {{"held", d.held},
+               {"resonance", measured(d.resonances.resonance)},
+               {"anti_resonance", measured(d.resonances.anti_resonance)},
+               {"total_inertia", measured(d.plateaus.total)},
+               {"motor_inertia", measured(d.plateaus.motor)}};
+  for (const auto& [letter, split] : d.alternatives) json["alternatives"][letter] = split_json(split);
+  json["fit"] = {
+      {"motor_inertia", measured(d.fit.motor_inertia)},   {"load_inertia", measured(d.fit.load_inertia)},
+      {"stiffness", measured(d.fit.stiffness)},           {"damping", measured(d.fit.damping)},
+      {"damping_ratio", measured(d.fit.damping_ratio)},   {"resonance", measured(d.fit.resonance)},
+      {"anti_resonance", measured(d.fit.anti_resonance)}, {"delay", measured(d.fit.delay)}};
+  const TwoMass model = d.fit.model();
+  for (const ResponsePoint& p : d.response.points) {
+    const std::complex<double> fitted = model.motor_response(p.frequency);
+    json["points"].push_back({p.frequency, std::abs(p.response), std::arg(p.response), p.coherence,
+                              std::abs(fitted), std::arg(fitted)});
+  }
+  json["point_columns"] = {"frequency", "magnitude",        "phase",
+                           "coherence", "fitted_magnitude", "fitted_phase"};
+  return json;
+}
+
+Json decay_json(const DecayIdentification& d) {
+  Json json = {{"damping", measured(d.damping)},
+               {"damping_by_rate", measured(d.damping_by_rate)},
+               {"damping_ratio", measured(d.damping_ratio)},
+               {"peak_damping_ratio", measured(d.peak_damping_ratio)},
+               {"natural_frequency", measured(d.natural_frequency)},
+               {"engagements", d.ringings.size()}};
+  for (std::size_t i = 0; i < std::min<std::size_t>(4, d.ringings.size()); ++i) {
+    const Ringing& r = d.ringings[i];
+    json["ringings"].push_back({{"time", r.time}, {"measured", r.measured}, {"fitted", r.fitted}});
+  }
+  return json;
+}
+
+Json clearance_json(const Clearance& c) {
+  Json json = {{"gap", measured(c.gap)}, {"travel", measured(c.travel)}};
+  for (std::size_t i = 0; i < std::min<std::size_t>(4, c.passages.size()); ++i) {
+    const GapPassage& p = c.passages[i];
+    json["passages"].push_back({{"time", p.time},
+                                {"measured", p.measured},
+                                {"fitted", p.fitted},
+                                {"lower", p.lower},
+                                {"upper", p.upper}});
+  }
+  return json;
+}
+
+Json gap_map_json(const GapMap& map) {
+  Json json = {{"mean_gap", measured(map.mean_gap)},   {"mean_separation", measured(map.mean_separation)},
+               {"wind_up", measured(map.wind_up)},     {"varies", map.varies},
+               {"confidence", number(map.confidence)}, {"statement", map.statement}};
+  for (const Harmonic& h : map.harmonics)
+    json["harmonics"].push_back(
+        {{"order", h.order}, {"amplitude", measured(h.amplitude)}, {"phase", measured(h.phase)}});
+  for (const GapBin& bin : map.bins)
+    json["bins"].push_back(
+        {bin.position, bin.separation.value, number(bin.separation.standard_error), bin.centre.value});
+  json["bin_columns"] = {"position", "separation", "standard_error", "centre"};
+  return json;
+}
+
+/// Thinned over the whole record, and two seconds of its middle at full resolution.
+Json trace_json(const ChannelTrace& trace) {
+  const std::size_t n = trace.measured.size(), stride = n / kMostPoints + 1;
+  const auto part = [&](std::size_t from, std::size_t to, std::size_t step) {
+    Json json = {{"start", from * trace.interval}, {"interval", step * trace.interval}};
+    for (std::size_t k = from; k < to; k += step) {
+      const bool counts = trace.counts.empty() || trace.counts[k];  // else a gap in the plot
+      json["measured"].push_back(counts ? Json(trace.measured[k]) : Json(nullptr));
+      json["predicted"].push_back(counts ? Json(trace.predicted[k]) : Json(nullptr));
+    }
+    return json;
+  };
+  const std::size_t zoom = std::min(n, static_cast<std::size_t>(kZoom / trace.interval)),
+                    from = (n - zoom) / 2;
+  return {{"record", trace.record}, {"whole", part(0, n, stride)}, {"zoom", part(from, from + zoom, 1)}};
+}
+
+Json details_json(const Identification& found) {
+  Json json = Json::object();
+  for (const FrictionDetail& d : found.friction)
+    for (const FrictionLine& line : d.lines) json["friction_lines"][d.subject].push_back(line_json(line));
+  for (const InertiaDetail& d : found.inertia) {
+    json["line_inertia"][d.subject] = measured(d.combined);
+    for (const LineInertia& run : d.runs)
+      json["line_inertia"][d.subject]["runs"].push_back({{"frequency", run.frequency},
+                                                         {"torque", run.torque},
+                                                         {"speed", run.speed},
+                                                         {"inertia", measured(run.inertia)}});
+  }
+  if (found.speed_calibration)
+    json["sensor_calibration"]["speed"] = {{"scale", measured(found.speed_calibration->scale)},
+                                           {"offset", measured(found.speed_calibration->offset)}};
+  if (found.position_calibration)
+    json["sensor_calibration"]["position"] = {
+        {"scale", measured(found.position_calibration->scale)},
+        {"offset", measured(found.position_calibration->offset)},
+        {"play_and_wind_up", measured(found.position_calibration->play_and_wind_up)}};
+  for (const CalibrationTrace& trace : found.calibration_traces)
+    json["sensor_calibration"]["traces"].push_back(
+        {{"record", trace.record}, {"motor", trace.motor}, {"difference", trace.difference}});
+  if (found.response) json["frequency_response"] = response_json(*found.response);
+  if (found.decay) json["decay"] = decay_json(*found.decay);
+  if (found.clearance) json["clearance"] = clearance_json(*found.clearance);
+  if (found.gap_map) json["gap_map"] = gap_map_json(*found.gap_map);
+  for (const ChannelTrace& trace : found.torque) json["torque"].push_back(trace_json(trace));
+  for (const ChannelTrace& trace : found.deflection) json["deflection"].push_back(trace_json(trace));
+  return json;
+}
+
+}  // namespace
+
+Json to_json(const Identification& found) {
+  Json json = {{"schema_version", 1},          {"version", version()},       {"procedures", Json::array()},
+               {"parameters", Json::object()}, {"channels", Json::object()}, {"warnings", found.warnings}};
+  for (const ProcedureReport& p : found.procedures)
+    json["procedures"].push_back(
+        {{"name", p.name}, {"used", !p.records.empty()}, {"records", p.records}, {"message", p.message}});
+  for (const auto& [name, m] : found.parameters)
+    json["parameters"][name] = {{"value", number(m.value)},
+                                {"unit", found.units.at(name)},
+                                {"standard_error", number(m.standard_error)}};
+  for (const auto& [name, channel] : found.channels)
+    json["channels"][name] = {{"train", number(channel.error)}, {"floor", number(channel.floor)}};
+  if (found.delay)
+    json["torque_delay"] = {{"value", number(found.delay->value)},
+                            {"unit", "s"},
+                            {"standard_error", number(found.delay->standard_error)}};
+  for (const Finding& f : found.findings) {
+    Json entry = {{"procedure", f.procedure}, {"combination", Json::object()}};
+    for (const auto& [name, factor] : f.combination) entry["combination"][name] = factor;
+    entry.update(measured(f.measured));
+    json["findings"].push_back(std::move(entry));
+  }
+  json["details"] = details_json(found);
+  return json;
+}
+
+void print_summary(const Identification& found, std::ostream& out) {
+  out << "procedures\n";
+  for (const ProcedureReport& p : found.procedures)
+    out << "  " << std::left << std::setw(20) << p.name << (p.records.empty() ? "not used: " : "")
+        << p.message << '\n';
+  out << "\nparameters (load side of the reduction)\n";
+  for (const auto& [name, m] : found.parameters) {
+    char line[128];
+    std::snprintf(line, sizeof line, "  %-26s %12.6g  +- %-9.2g %s\n", name.c_str(), m.value,
+                  m.standard_error, found.units.at(name).c_str());
+    out << line;
+  }
+  out << "\nrelative error of the fitted model (what noise alone would leave)\n";
+  for (const auto& [name, channel] : found.channels) {
+    char line[128];
+    std::snprintf(line, sizeof line, "  %-26s %.3g %% (%.3g %%)\n", name.c_str(), 100 * channel.error,
+                  100 * channel.floor);
+    out << line;
+  }
+  for (const std::string& warning : found.warnings) out << "warning: " << warning << '\n';
+}
+
+}  // namespace backlash::tools

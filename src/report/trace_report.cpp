@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/report/trace_report.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/model/axis_unit.h"
+
+namespace backlash {
+namespace {
+
+/// "a, b and c"
+std::string listed(const std::vector<std::string>& parts) {
+  std::string text;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == parts.size() ? " and " : ", ") + parts[i];
+  return text;
+}
+
+std::string row(const char* format, const std::string& a, const std::string& b, const std::string& c,
+                const std::string& d) {
+  char line[256];
+  std::snprintf(line, sizeof line, format, a.c_str(), b.c_str(), c.c_str(), d.c_str());
+  return line;
+}
+
+std::string effect_text(const FoundEffect& e, bool linear) {
+  std::string text = "  " + e.id;
+  for (const auto& [name, word] : e.words) text += " (" + name + ": " + word + ")";
+  text += ", " + e.channel + " error " + percent(e.test_error_before) + " -> " + percent(e.test_error_after) +
+          "\n";
+  for (const EffectParameter& p : e.parameters)
+    text += row("    %-24s %s %s%s\n", p.name, with_error(p.measured), axis_unit(p.unit, linear), "");
+  const Evidence& v = e.evidence;
+  text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
+          percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
+          " of " + std::to_string(v.blocks) + " better), " + percent(v.gain_forward) + " on the last part\n";
+  if (!e.nearest.empty()) text += "    nearest named effects: " + joined(e.nearest) + "\n";
+  if (!e.equivalent_to.empty()) text += "    would explain the same: " + joined(e.equivalent_to) + "\n";
+  return text;
+}
+
+}  // namespace
+
+std::string effect_name(const FoundEffect& e) {
+  const auto coordinate = e.words.find("coordinate");
+  if (e.id != "learned_map" || coordinate == e.words.end()) return e.id;
+  return "a function of " + coordinate->second + " that is not one of the named effects";
+}
+
+std::string percent(double share) {
+  if (!std::isfinite(share)) return "unknown";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g %%", 100 * share);
+  return text;
+}
+
+std::string with_error(const Measured& m) {
+  char text[64];
+  if (!(m.standard_error > 0) || !std::isfinite(m.standard_error)) {
+    std::snprintf(text, sizeof text, "%.6g", m.value);
+    return text;
+  }
+  // As many digits as the error leaves, which has two.
+  const double size = std::max(std::fabs(m.value), m.standard_error);
+  const int digits = 2 + int(std::floor(std::log10(size)) - std::floor(std::log10(m.standard_error)));
+  std::snprintf(text, sizeof text, "%.*g +- %.2g", std::min(digits, 9), m.value, m.standard_error);
+  return text;
+}
+
+std::string to_string(TraceVerdict verdict) {
+  switch (verdict) {
+    case TraceVerdict::effect_found:
+      return "effect_found";
+    case TraceVerdict::nothing_missing:
+      return "nothing_missing";
+    case TraceVerdict::unexplained:
+      break;
+  }
+  return "unexplained";
+}
+
+std::string verdict_sentence(const Trace& trace) {
+  std::vector<std::string> effects, errors;
+  for (const FoundEffect& e : trace.steps) effects.push_back(effect_name(e));
+  for (const auto& [name, c] : trace.channels)
+    errors.push_back(name +
+                     (effects.empty() ? " " + percent(c.after)
+                                      : " from " + percent(c.before) + " to " + percent(c.after)) +
+                     " (noise alone: " + percent(c.floor) + ")");
+  std::string text;
+  if (!effects.empty())
+    text = "The declared model lacks " + listed(effects) + ". With " + (effects.size() == 1 ? "it" : "them") +
+           " the error on the test record falls: " + listed(errors) + ".";
+  if (trace.verdict == TraceVerdict::nothing_missing)
+    text = "Nothing is missing: the declared model, fitted, has these errors on the test record: " +
+           listed(errors) + ".";
+  if (trace.verdict == TraceVerdict::unexplained || trace.unexplained) {
+    text += effects.empty() ? "Something is missing" : " Something more is missing";
+    text += " that no effect explains";
+    if (trace.unexplained) text += ", in " + trace.unexplained->channel + ": " + trace.unexplained->signature;
+    text += effects.empty() ? ". Errors on the test record: " + listed(errors) + "." : ".";
+  }
+  return text;
+}
+
+std::string trace_summary(const Trace& trace) {
+  const bool linear = trace.augmented.linear;
+  std::string text = verdict_sentence(trace) + "\n\nrelative error on the test record, low-passed at " +
+                     to_text(std::round(trace.cutoff * 1000) / 1000) + " Hz\n";
+  const char* columns = "  %-12s %10s %10s %14s\n";
+  text += row(columns, "channel", "before", "after", "noise alone");
+  for (const auto& [name, c] : trace.channels)
+    text += row(columns, name, percent(c.before), percent(c.after), percent(c.floor));
+  if (!trace.independence.empty())
+    text += "\nshare of lags at which the residual still follows an input (0.01 by chance)\n" +
+            row("  %-12s %-18s %10s %10s\n", "channel", "input", "before", "after");
+  for (const Independence& i : trace.independence)
+    text += row("  %-12s %-18s %10s %10s\n", i.channel, i.input, percent(i.before), percent(i.after));
+  if (!trace.steps.empty()) text += "\neffects that were added\n";
+  for (const FoundEffect& e : trace.steps) text += effect_text(e, linear);
+  if (trace.unexplained)
+    text += "\nunexplained\n  " + trace.unexplained->channel + ": " + trace.unexplained->signature + "\n";
+  text += "\nmachine (load side of the reduction)\n";
+  const char* machine = "  %-24s %-24s %-24s %s\n";
+  text += row(machine, "parameter", "without effects", "with effects", "unit");
+  for (const auto& [name, value] : trace.parameters) {
+    const auto before = trace.base_parameters.find(name);
+    text += row(machine, name, before == trace.base_parameters.end() ? "-" : with_error(before->second),
+                with_error(value), axis_unit(trace.units.at(name), linear));
+  }
+  for (const std::string& note : trace.notes) text += "note: " + note + "\n";
+  for (const std::string& warning : trace.warnings) text += "warning: " + warning + "\n";
+  return text;
+}
+
+}  // namespace backlash

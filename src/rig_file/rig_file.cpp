@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/rig_file/rig_file.h"
+
+#include <cmath>
+#include <memory>
+
+#include "backlash_diagnosis/base/digest.h"
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/yaml_tree.h"
+#include "default_rig.h"
+
+namespace backlash {
+namespace {
+
+/// What the estimators need to know of the rig.
+void fill_from_rig(const Rig& rig, DiagnosisSettings& settings) {
+  const auto train = std::make_shared<GearTrain>(rig);  // refuses what cannot move
+  if (rig.mesh.rigid) return;                           // nothing that could have play
+  const auto deflection = [train](double torque) { return train->elastic_deflection(torque); };
+  const double base_radius = rig.mesh.angular() ? kNaN : 1 / rig.backlash_angle(1);
+  if (settings.lost_motion) {
+    settings.lost_motion->elastic_deflection = deflection;
+    settings.lost_motion->base_radius = base_radius;
+  }
+  const Coupling& coupling = rig.input_coupling;
+  const double motor = rig.motor.inertia + 0.5 * coupling.inertia;
+  const double pinion = rig.pinion.inertia + 0.5 * coupling.inertia;
+  PositionDifferenceSettings& difference = settings.position_difference.emplace();
+  difference.elastic_deflection = deflection;
+  if (settings.stiffness_uncertainty > 0) difference.elastic_uncertainty = 2 * settings.stiffness_uncertainty;
+  difference.motor_inertia = coupling.rigid ? motor + pinion : motor;
+  MomentumTransferSettings& momentum = settings.momentum_transfer.emplace();
+  momentum.motor_inertia = difference.motor_inertia;
+  momentum.motor_damping = rig.motor.viscous_damping;
+  difference.output_locked = momentum.output_locked = rig.link_locked;
+  momentum.flank_deflection = deflection;
+  if (!coupling.rigid) {
+    const double stiffness = coupling.stiffness;
+    momentum.pinion_inertia = pinion;
+    momentum.coupling_stiffness = stiffness;
+    momentum.flank_deflection = [train, stiffness](double torque) {
+      return train->elastic_deflection(torque) - torque / stiffness;
+    };
+  }
+  difference.load_ratio = momentum.load_ratio = rig.motor_axis_ratio();
+  difference.base_radius = momentum.base_radius = base_radius;
+}
+
+}  // namespace
+
+RigFile rig_file_from_text(const std::string& text, const std::string& source) {
+  const YamlReader yaml = YamlReader::from_text(text, source);
+  RigFile file;
+  file.source = source;
+  file.text = text;
+  file.digest = digest_of(text);
+  yaml.integer("schema_version", 1, 1);
+  file.rig = read_rig(yaml);
+  file.simulation = read_simulation_settings(yaml);
+  check_excitation(yaml.map("excitation"), file.simulation.excitation, file.rig);
+  file.test_runs = read_test_runs(yaml, file.rig);
+  file.diagnosis = read_diagnosis_settings(yaml.map("diagnosis"));
+  yaml.finish();
+  if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())
+    yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");
+  if (file.simulation.sensors.of(Channel::motor_current).declared && std::isnan(file.rig.torque_constant))
+    yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
+  fill_from_rig(file.rig, file.diagnosis);
+  return file;
+}
+
+RigFile load_rig_file(const std::string& path) {
+  return rig_file_from_text(read_start(path, kLargestYaml + 1), path);  // one more than the parser takes
+}
+
+RigFile default_rig_file() {
+  return rig_file_from_text(kDefaultRig, "built-in sarkar_1997");
+}
+
+}  // namespace backlash

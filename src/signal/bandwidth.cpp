@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/signal/bandwidth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numeric>
+#include <unsupported/Eigen/FFT>
+
+#include "backlash_diagnosis/signal/blocks.h"
+#include "backlash_diagnosis/signal/measured.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kShare = 0.99;
+constexpr double kNoiseFrom = 0.35;         // cycles per sample: the upper three tenths
+constexpr double kPositionNoiseFrom = 0.1;  // cycles per sample
+constexpr double kBand = 0.05;
+constexpr double kMeanPerMedian = 1 / M_LN2;  // of a periodogram of noise: exponential distribution
+constexpr double kHighest = 0.4;              // cycles per sample
+constexpr double kRounding = 1e-12;           // of a number in a file
+constexpr double kFewSteps = 10, kOffStep = 0.05, kLeastSteps = 10;  // of a resolution
+
+/// Second differences; of white noise of variance 1 they have the gain 16 sin^4(pi f).
+std::vector<double> second_difference(const std::vector<double>& x) {
+  std::vector<double> d(x.size() - 2);
+  for (std::size_t k = 0; k < d.size(); ++k) d[k] = x[k + 2] - 2 * x[k + 1] + x[k];
+  return d;
+}
+
+double gain(double f) {
+  return 16 * std::pow(std::sin(M_PI * f), 4);
+}
+
+/// Variance per line of the second differences, at (i + 1) / (2 lines) cycles per sample: periodogram with
+/// Hann window scaled so that white noise of variance 1 has the mean 1.
+std::vector<double> periodogram(const std::vector<double>& values) {
+  if (values.size() < 64) throw InvalidParameter("samples", double(values.size()), "must be at least 64");
+  const std::vector<double> d = second_difference(values);
+  std::size_t size = 1;
+  while (size < d.size()) size *= 2;
+  std::vector<double> windowed(size, 0.0);
+  double squares = 0;
+  for (std::size_t k = 0; k < d.size(); ++k) {
+    const double w = 0.5 - 0.5 * std::cos(2 * M_PI * (double(k) + 0.5) / double(d.size()));
+    windowed[k] = w * d[k];
+    squares += w * w;
+  }
+  std::vector<std::complex<double>> lines;
+  Eigen::FFT<double> fft;
+  fft.fwd(lines, windowed);
+  std::vector<double> power(size / 2);
+  for (std::size_t i = 0; i < power.size(); ++i) power[i] = std::norm(lines[i + 1]) / squares;
+  return power;
+}
+
+double frequency(std::size_t i, const std::vector<double>& power) {
+  return 0.5 * double(i + 1) / double(power.size());
+}
+
+/// Variance of white noise with the density between two frequencies, from the periodogram of second
+/// differences.
+double white_variance(const std::vector<double>& power, double from, double to) {
+  std::vector<double> density;
+  for (std::size_t i = 0; i < power.size(); ++i)
+    if (const double f = frequency(i, power); f >= from && f < to) density.push_back(power[i] / gain(f));
+  if (density.empty()) return 0;
+  const auto middle = density.begin() + density.size() / 2;
+  std::nth_element(density.begin(), middle, density.end());
+  return kMeanPerMedian * *middle;
+}
+
+/// From third differences, the largest tenth left out: what moves smoothly, and the few samples where a
+/// signal jumps, cancel. A jump is white, so its spectrum does not tell it from noise.
+double variance_between_jumps(const std::vector<double>& x) {
+  constexpr double kNormalShare = 0.6231;  // of the variance of normal values without the largest tenth
+  std::vector<double> square;
+  for (std::size_t k = 3; k < x.size(); ++k)
+    square.push_back(std::pow(x[k] - 3 * x[k - 1] + 3 * x[k - 2] - x[k - 3], 2));
+  const auto kept = square.begin() + square.size() * 9 / 10;
+  std::nth_element(square.begin(), kept, square.end());
+  return std::accumulate(square.begin(), kept, 0.0) / (double(kept - square.begin()) * kNormalShare * 20);
+}
+
+/// The largest density in the bands above a tenth of the sampling rate.
+double position_variance(const std::vector<double>& power) {
+  double largest = 0;
+  for (double from = kPositionNoiseFrom; from < 0.49; from += kBand)
+    largest = std::max(largest, white_variance(power, from, from + kBand));
+  return largest;
+}
+
+}  // namespace
+
+double white_noise(const std::vector<double>& values) {
+  const double spectral = white_variance(periodogram(values), kNoiseFrom, 1);
+  return std::sqrt(std::min(spectral, variance_between_jumps(values)));
+}
+
+double position_noise(const std::vector<double>& position) {
+  return std::sqrt(position_variance(periodogram(position)));
+}
+
+double resolution(const std::vector<double>& position) {
+  const auto size = [&](std::size_t k) { return std::fabs(position[k] - position[k - 1]); };
+  double step = INFINITY;
+  for (std::size_t k = 1; k < position.size(); ++k)
+    if (size(k) > kRounding * std::fabs(position[k])) step = std::min(step, size(k));
+  double travel = 0, steps = 0, odd = 0, all = 0;
+  for (std::size_t k = 1; k < position.size(); ++k) {
+    if (size(k) > kFewSteps * step || size(k) < 0.5 * step) continue;
+    const double whole = std::round(size(k) / step);
+    odd += std::fabs(size(k) - whole * step) > kOffStep * step;
+    all += 1;
+    travel += size(k);
+    steps += whole;
+  }
+  return all >= kLeastSteps && odd < 0.01 * all ? travel / steps : 0;
+}
+
+double motion_bandwidth(const std::vector<double>& position, double interval) {
+  if (!(interval > 0)) throw InvalidParameter("interval", interval, "must be > 0 s");
+  const std::vector<double> power = periodogram(position);
+  const double white = position_variance(power);
+  const std::size_t n = power.size();
+  std::vector<double> sum(n + 1, 0.0), noise(n + 1, 0.0);  // up to line i
+  for (std::size_t i = 0; i < n; ++i) {
+    sum[i + 1] = sum[i] + power[i];
+    noise[i + 1] = noise[i] + white * gain(frequency(i, power));
+  }
+  // Up to where, over the next tenth of an octave or eight lines, noise is half of the power.
+  std::size_t end = 0;
+  while (end < n) {
+    const std::size_t next = std::min(n, end + std::max<std::size_t>(8, end / 10));
+    if (sum[next] - sum[end] < 2 * (noise[next] - noise[end])) break;
+    end = next;
+  }
+  if (end == 0) throw CannotIdentify("no motion stands out of the noise of the position");
+  const double all = sum[end] - noise[end];
+  std::size_t i = 0;
+  while (i < end && sum[i] - noise[i] < kShare * all) ++i;
+  return std::min(kHighest, 0.5 * double(i) / double(n)) / interval;
+}
+
+double noise_after_low_pass(double interval, double cutoff) {
+  const auto half = static_cast<std::size_t>(std::ceil(4 / (cutoff * interval)));
+  std::vector<double> impulse(2 * half + 1, 0.0);
+  impulse[half] = 1;
+  const std::vector<double> response = low_pass(impulse, interval, cutoff);
+  return std::sqrt(std::inner_product(response.begin(), response.end(), response.begin(), 0.0));
+}
+
+}  // namespace backlash

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/signal/least_squares.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/interruption.h"
+#include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kWorstCondition = 1e10;
+constexpr double kHuber = 1.345;  // standard deviations; 95 % efficient on normal residuals
+constexpr int kRobustIterations = 50;
+
+void require_rows(const Eigen::MatrixXd& a) {
+  if (a.rows() <= a.cols())
+    throw CannotIdentify(std::to_string(a.cols()) + " unknowns from only " + std::to_string(a.rows()) +
+                         " equations");
+}
+
+/// Solves with rows multiplied by `root`; covariance for residuals of variance 1.
+LeastSquaresFit solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& root) {
+  const Eigen::MatrixXd weighted = root.asDiagonal() * a;
+  const Eigen::VectorXd size = weighted.colwise().norm();
+  if (!(size.minCoeff() > 0) || !size.allFinite())
+    throw CannotIdentify("an unknown has no effect on the equations");
+  const Eigen::VectorXd unit = size.cwiseInverse();
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(weighted * unit.asDiagonal());
+  const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
+  if (!(diagonal.minCoeff() > diagonal.maxCoeff() / kWorstCondition))
+    throw CannotIdentify("the equations cannot tell the unknowns apart");
+  LeastSquaresFit fit;
+  fit.values = unit.asDiagonal() * qr.solve(root.asDiagonal() * b);
+  fit.residuals = b - a * fit.values;
+  const Eigen::MatrixXd normal = weighted.transpose() * weighted;
+  const Eigen::MatrixXd scaled = unit.asDiagonal() * normal * unit.asDiagonal();
+  fit.covariance = unit.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(a.cols(), a.cols())) *
+                   unit.asDiagonal();
+  return fit;
+}
+
+}  // namespace
+
+Measured LeastSquaresFit::parameter(Eigen::Index i) const {
+  return {values[i], std::sqrt(covariance(i, i))};
+}
+
+LeastSquaresFit fit_linear(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
+  require_rows(a);
+  LeastSquaresFit fit = solve(a, b, Eigen::VectorXd::Ones(a.rows()));
+  const double variance = fit.residuals.squaredNorm() / double(a.rows() - a.cols());
+  fit.covariance *= variance;
+  fit.deviation = std::sqrt(variance);
+  return fit;
+}
+
+LeastSquaresFit fit_robust(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
+  require_rows(a);
+  const double smallest = 1e-12 * b.norm();
+  Eigen::VectorXd root = Eigen::VectorXd::Ones(a.rows());
+  LeastSquaresFit fit = solve(a, b, root);
+  double scale = 0;
+  for (int i = 0; i < kRobustIterations; ++i) {
+    const Eigen::VectorXd before = fit.values;
+    scale = std::max(
+        smallest, kNormalPerMedianDeviation * median_magnitude({fit.residuals.begin(), fit.residuals.end()}));
+    if (scale == 0) break;
+    for (Eigen::Index k = 0; k < root.size(); ++k)
+      root[k] = std::sqrt(std::min(1.0, kHuber * scale / std::max(smallest, std::fabs(fit.residuals[k]))));
+    fit = solve(a, b, root);
+    if ((fit.values - before).norm() <= 1e-10 * fit.values.norm()) break;
+  }
+  // Variance of the M-estimate: mean square of the clipped residuals over the square of their share inside.
+  double sum = 0, inside = 0;
+  for (const double r : fit.residuals) {
+    sum += std::pow(std::min(std::fabs(r), kHuber * scale), 2);
+    inside += std::fabs(r) <= kHuber * scale;
+  }
+  const double rows = double(a.rows()), share = std::max(inside / rows, 0.1);
+  const double variance = sum / (rows - a.cols()) / (share * share);
+  const Eigen::MatrixXd all = solve(a, b, Eigen::VectorXd::Ones(a.rows())).covariance;
+  fit.covariance = all * variance;
+  fit.deviation = scale;
+  return fit;
+}
+
+namespace {
+
+constexpr double kLeastDamping = 1e-12, kMostDamping = 1e12;
+
+bool usable(const Eigen::VectorXd& r) {
+  return r.size() > 0 && r.allFinite();
+}
+
+/// Residuals, or an empty vector where the parameters are refused.
+Eigen::VectorXd try_residuals(const ResidualFunction& f, const Eigen::VectorXd& p) {
+  stop_if_interrupted();
+  try {
+    Eigen::VectorXd r = f(p);
+    return usable(r) ? r : Eigen::VectorXd();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+void for_each_column(Eigen::Index n, bool parallel, const std::function<void(int)>& column) {
+  if (parallel)
+    for_each_in_parallel(int(n), column);
+  else
+    for (int i = 0; i < n; ++i) column(i);
+}
+
+void require_effect(const Eigen::MatrixXd& j, Eigen::Index i) {
+  if (!(j.col(i).norm() > 0))
+    throw CannotIdentify("parameter " + std::to_string(i) + " has no effect on the record");
+}
+
+/// Columns in units of `scale`; a step that is refused is tried the other way.
+Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, const Eigen::VectorXd& r,
+                         const Eigen::VectorXd& scale, const NonlinearOptions& options) {
+  Eigen::MatrixXd j(r.size(), p.size());
+  for_each_column(p.size(), options.parallel, [&](int i) {
+    Eigen::VectorXd moved;
+    double h = options.step;
+    for (const double sign : {1.0, -1.0}) {
+      Eigen::VectorXd q = p;
+      h = sign * options.step;
+      q[i] += h * scale[i];
+      moved = try_residuals(f, q);
+      if (moved.size() == r.size()) break;
+    }
+    if (moved.size() != r.size())
+      throw CannotIdentify("the model cannot be evaluated beside parameter " + std::to_string(i));
+    j.col(i) = (moved - r) / h;
+    require_effect(j, i);
+  });
+  return j;
+}
+
+double variance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
+  return r.squaredNorm() / std::max<double>(1, double(j.rows() - j.cols()));
+}
+
+/// Of independent rows, with the residuals' own variance.
+Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
+  const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
+  const Eigen::MatrixXd scaled = j * unit.asDiagonal();
+  const Eigen::MatrixXd inverse =
+      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
+  return variance(j, r) * (unit.asDiagonal() * inverse * unit.asDiagonal());
+}
+
+}  // namespace
+
+LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::VectorXd& start,
+                              const Eigen::VectorXd& scale, const NonlinearOptions& options) {
+  Eigen::VectorXd p = start, r = residuals(p);
+  if (!usable(r)) throw CannotIdentify("the model cannot be evaluated at the start values");
+  double damping = 1e-3;
+  bool done = false;
+  Eigen::MatrixXd j = jacobian(residuals, p, r, scale, options);
+  for (int i = 0; i < options.iterations && !done; ++i) {
+    const Eigen::MatrixXd normal = j.transpose() * j;
+    const Eigen::VectorXd gradient = j.transpose() * r;
+    for (bool better = false; !better && !done;) {
+      Eigen::MatrixXd damped = normal;
+      damped.diagonal() *= 1 + damping;
+      const Eigen::VectorXd step = -damped.ldlt().solve(gradient);
+      const Eigen::VectorXd q = p + scale.cwiseProduct(step);
+      const Eigen::VectorXd moved = try_residuals(residuals, q);
+      better = moved.size() == r.size() && moved.squaredNorm() < r.squaredNorm();
+      if (better) {
+        const double gain = 1 - moved.squaredNorm() / r.squaredNorm();
+        done = gain < options.tolerance || step.norm() < options.tolerance;
+        p = q;
+        r = moved;
+        damping = std::max(kLeastDamping, damping / 10);
+      } else {
+        damping *= 10;
+        done = damping > kMostDamping || step.norm() < options.tolerance;
+      }
+    }
+    if (!done || i == 0) j = jacobian(residuals, p, r, scale, options);
+  }
+  LeastSquaresFit fit;
+  fit.values = p;
+  fit.residuals = r;
+  fit.jacobian = j * scale.cwiseInverse().asDiagonal();
+  fit.covariance = covariance(fit.jacobian, r);
+  fit.deviation = std::sqrt(variance(fit.jacobian, r));
+  return fit;
+}
+
+void widen_jacobian(LeastSquaresFit& fit, const ResidualFunction& residuals, const Eigen::VectorXd& steps,
+                    bool parallel) {
+  for_each_column(fit.values.size(), parallel, [&](int i) {
+    Eigen::VectorXd above = fit.values, below = fit.values;
+    above[i] += steps[i];
+    below[i] -= steps[i];
+    fit.jacobian.col(i) = (residuals(above) - residuals(below)) / (2 * steps[i]);
+    require_effect(fit.jacobian, i);
+  });
+  fit.covariance = covariance(fit.jacobian, fit.residuals);
+}
+
+Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block, Eigen::Index known) {
+  const Eigen::MatrixXd& j = fit.jacobian;
+  const Eigen::Index n = j.cols(), end = j.rows() - known;
+  const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
+  const Eigen::MatrixXd scaled = j * unit.asDiagonal(), one = Eigen::MatrixXd::Identity(n, n);
+  const Eigen::MatrixXd inverse = (scaled.transpose() * scaled).ldlt().solve(one);
+  Eigen::MatrixXd outer = Eigen::MatrixXd::Zero(n, n);
+  double blocks = 0;
+  for (Eigen::Index row = 0; row < end; row += block, ++blocks) {
+    const Eigen::Index rows = std::min(block, end - row);
+    const auto part = scaled.middleRows(row, rows);
+    const Eigen::VectorXd gradient = part.transpose() * fit.residuals.segment(row, rows);
+    // As it would be had the block not drawn the fit to itself.
+    const Eigen::VectorXd free = (one - part.transpose() * part * inverse).partialPivLu().solve(gradient);
+    outer += free * free.transpose();
+  }
+  if (blocks <= double(n))
+    throw CannotIdentify(std::to_string(long(blocks)) +
+                         " stretches of the record cannot tell the errors of " + std::to_string(n) +
+                         " parameters");
+  outer += scaled.bottomRows(known).transpose() * scaled.bottomRows(known);
+  return unit.asDiagonal() * (inverse * outer * inverse) * unit.asDiagonal();
+}
+
+}  // namespace backlash

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Simulated records of known backlash, as a recorder gives them that was switched on at some moment, with
+// noise.
+#pragma once
+
+#include <cstdint>
+#include <random>
+
+#include "backlash_diagnosis/rig_file/rig_file.h"
+
+namespace backlash {
+
+/// A record before it is simulated.
+struct Draw {
+  double backlash, noise, start;  // m, of the signal's rms, s
+  int periods;                    // after settling
+  std::uint64_t seed;             // of the noise
+};
+
+/// Uniform in [0, 1). Independent of std::uniform_*_distribution, whose results depend on the library.
+double uniform(std::mt19937_64& random);
+
+/// The machine that a rig file describes (machine_of, by d.seed) with the backlash of a draw: exact motion
+/// for `duration` [s], several times finer than the sampling, so that a recorder can begin between two
+/// samples.
+Record simulate_fine(RigFile file, const Draw& d, double duration);
+
+/// What the rig's sensors give of a fine record from d.start on: settling and d.periods, with noise on the
+/// signal of the APD and on motor_torque, saturated where the signal's sensor is.
+Record recorded(const Record& fine, const RigFile& file, const Draw& d);
+
+/// Both.
+Record simulate_draw(const RigFile& file, const Draw& d);
+
+}  // namespace backlash

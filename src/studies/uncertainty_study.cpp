@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/studies/uncertainty_study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "drawn_record.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kMisses = 2;  // widths of an interval beyond which a miss was confident
+
+Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
+  std::seed_seq sequence{static_cast<std::uint32_t>(request.seed),
+                         static_cast<std::uint32_t>(request.seed >> 32), static_cast<std::uint32_t>(index)};
+  std::mt19937_64 random(sequence);
+  Draw d{};
+  d.backlash = request.max_backlash * uniform(random);
+  d.noise =
+      request.noise[static_cast<std::size_t>(uniform(random) * static_cast<double>(request.noise.size()))];
+  d.start = period * uniform(random);
+  d.periods = request.fewest_periods +
+              static_cast<int>(uniform(random) * (request.most_periods - request.fewest_periods + 1));
+  d.seed = random();
+  return d;
+}
+
+using Change = std::function<void(RigFile&)>;
+
+Record signal_alone(const Record& record, Channel signal) {
+  Record alone;
+  alone.name = record.name;
+  alone.time = record.time;
+  alone.column(signal) = record.column(signal);
+  return alone;
+}
+
+/// The verdict as one more estimate; where its members contradict each other nobody should rely on it.
+Estimate combined(const Verdict& verdict) {
+  Estimate estimate;
+  estimate.method = "combined";
+  estimate.backlash = verdict.backlash;
+  estimate.lower = verdict.lower;
+  estimate.upper = verdict.upper;
+  estimate.message = verdict.message;
+  const bool sound = verdict.grade != Grade::cannot_tell && std::isfinite(verdict.backlash);
+  estimate.status = sound ? Status::ok : Status::ambiguous;
+  return estimate;
+}
+
+std::vector<Estimate> estimates_of(const Record& record, const RigFile& file, const MonitoringCurve& curve) {
+  const Diagnosis diagnosis = diagnose(record, file.diagnosis, &curve);
+  std::vector<Estimate> all = diagnosis.estimates;
+  all.push_back(combined(diagnosis.verdict));
+  return all;
+}
+
+void check(const RigFile& file, const StudyRequest& request) {
+  if (!file.diagnosis.apd) throw InvalidParameter("diagnosis.apd", "absent", "the study needs its signal");
+  if (!(file.diagnosis.apd->period > 0))
+    throw InvalidParameter("diagnosis.apd.period", "absent", "the study counts in periods");
+  if (request.records < 1) throw InvalidParameter("records", request.records, "must be >= 1");
+  if (!(request.max_backlash > 0 && std::isfinite(request.max_backlash)))
+    throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
+  if (request.fewest_periods < 1 || request.most_periods < request.fewest_periods)
+    throw InvalidParameter("periods", request.fewest_periods, "must be >= 1 and not above the most");
+  if (request.noise.empty()) throw InvalidParameter("noise", "none", "needs at least one level");
+  for (const double level : request.noise)
+    if (!(level >= 0 && std::isfinite(level))) throw InvalidParameter("noise", level, "must be >= 0");
+}
+
+RigFile at_rate(RigFile file, double rate) {
+  if (rate > 0) file.simulation.sensors.sampling_rate = rate;
+  return file;
+}
+
+double width(const Estimate& e) {
+  return e.upper - e.lower;
+}
+
+bool holds(const Estimate& e, double truth) {
+  return truth >= e.lower && truth <= e.upper;
+}
+
+bool confident_miss(const Estimate& e, double truth) {
+  return std::fabs(e.backlash - truth) > kMisses * width(e);
+}
+
+struct Variant {
+  std::string name;
+  Change change;
+  double shortest = 0;  // of max_backlash: the smallest backlash drawn
+  double duration = 0;  // periods after settling; 0: as drawn
+};
+
+std::vector<Variant> variants_of(const RigFile& file) {
+  const auto amplitude = [](double factor) {
+    return [factor](RigFile& f) { f.simulation.excitation.amplitude *= factor; };
+  };
+  const auto frequency = [](double factor) {
+    return [factor](RigFile& f) { f.simulation.excitation.frequency *= factor; };
+  };
+  const auto sampling = [](double factor) {
+    return [factor](RigFile& f) { f.simulation.sensors.sampling_rate *= factor; };
+  };
+  const double torque = file.simulation.excitation.amplitude;
+  const auto limit = [torque](double factor) {
+    return [torque, factor](RigFile& f) {
+      f.simulation.sensors.of(f.diagnosis.apd->signal).limit = factor * torque;
+    };
+  };
+  const auto free_output = [](double inertia) {
+    return [inertia](RigFile& f) {
+      f.rig.link_locked = false;
+      f.rig.link.inertia = inertia;
+    };
+  };
+  return {{"amplitude -20 %", amplitude(0.8)},
+          {"amplitude +20 %", amplitude(1.2)},
+          {"frequency -20 %", frequency(0.8)},
+          {"frequency +25 %", frequency(1.25)},
+          {"sampling halved", sampling(0.5)},
+          {"sampling doubled", sampling(2)},
+          {"saturated at 0.8", limit(0.8)},
+          {"saturated at 1.2", limit(1.2)},
+          {"output free", free_output(1e-3)},
+          {"output free and light", free_output(5e-5)},
+          {"constant torque", [](RigFile& f) { f.simulation.excitation.type = "constant"; }},
+          {"too short", [](RigFile&) {}, 0, -1.2},
+          {"above the range", [](RigFile&) {}, 1.1}};
+}
+
+Record simulate_variant(const RigFile& file, const Variant& variant, const Draw& d, int settling) {
+  RigFile machine = file;
+  variant.change(machine);
+  Record record = simulate_draw(machine, d);
+  if (variant.duration != 0)
+    record = record.slice(0, (settling + variant.duration) * file.diagnosis.apd->period);
+  return record;
+}
+
+}  // namespace
+
+std::vector<StudyTrial> run_study(const RigFile& rig_file, const MonitoringCurve& curve,
+                                  const StudyRequest& request, const Progress& progress) {
+  check(rig_file, request);
+  const RigFile file = at_rate(rig_file, request.sampling_rate);
+  const ApdSettings& apd = *file.diagnosis.apd;
+  std::vector<StudyTrial> trials(2 * static_cast<std::size_t>(request.records));
+  Ticker ticker(progress, request.records, "simulating and diagnosing records");
+  for_each_in_parallel(request.records, ticker, [&](int i) {
+    const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(i));
+    const Record record = simulate_draw(file, d);
+    trials[2 * i] = {"", d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
+    trials[2 * i + 1] = {"",        d.backlash, d.noise,
+                         d.periods, false,      estimates_of(signal_alone(record, apd.signal), file, curve)};
+    ticker.tick();
+  });
+  return trials;
+}
+
+std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, bool position,
+                                      double max_half_gap, double noise) {
+  std::vector<StudyRow> rows;
+  const std::size_t methods = trials.empty() ? 0 : trials.front().estimates.size();
+  for (std::size_t m = 0; m < methods; ++m) {
+    StudyRow row;
+    std::vector<double> errors, widths;
+    int held = 0;
+    for (const StudyTrial& trial : trials) {
+      if (trial.position != position || trial.backlash > 2 * max_half_gap) continue;
+      if (!std::isnan(noise) && trial.noise != noise) continue;
+      const Estimate& e = trial.estimates[m];
+      row.method = e.method;
+      ++row.trials;
+      if (e.status != Status::ok) continue;
+      errors.push_back(std::fabs(e.backlash - trial.backlash));
+      widths.push_back(width(e));
+      held += holds(e, trial.backlash);
+      row.confident_misses += confident_miss(e, trial.backlash);
+    }
+    row.told = static_cast<int>(errors.size());
+    if (row.trials > 0) row.cannot_tell = 1 - static_cast<double>(row.told) / row.trials;
+    if (row.told > 0) {
+      row.coverage = static_cast<double>(held) / row.told;
+      row.p95_error = quantile(errors, 0.95);
+      row.median_error = median(std::move(errors));
+      row.median_width = median(std::move(widths));
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<StudyTrial> run_variants(const RigFile& rig_file, const MonitoringCurve& curve,
+                                     const StudyRequest& request, int records, const Progress& progress) {
+  check(rig_file, request);
+  const RigFile file = at_rate(rig_file, request.sampling_rate);
+  const ApdSettings& apd = *file.diagnosis.apd;
+  const std::vector<Variant> variants = variants_of(file);
+  const int count = records * static_cast<int>(variants.size());
+  std::vector<StudyTrial> trials(2 * static_cast<std::size_t>(count));
+  Ticker ticker(progress, count, "records under other conditions");
+  for_each_in_parallel(count, ticker, [&](int i) {
+    const Variant& variant = variants[i / records];
+    Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records + i));
+    d.backlash += variant.shortest * request.max_backlash;
+    const Record record = simulate_variant(file, variant, d, apd.settling_periods);
+    trials[2 * i] = {variant.name, d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
+    trials[2 * i + 1] = {variant.name, d.backlash,
+                         d.noise,      d.periods,
+                         false,        estimates_of(signal_alone(record, apd.signal), file, curve)};
+    ticker.tick();
+  });
+  return trials;
+}
+
+std::vector<VariantRow> summarise_variants(const std::vector<StudyTrial>& trials) {
+  std::vector<VariantRow> rows;
+  const auto row_of = [&rows](const StudyTrial& trial, const std::string& method) -> VariantRow& {
+    for (VariantRow& row : rows)
+      if (row.variant == trial.variant && row.method == method && row.position == trial.position) return row;
+    rows.push_back({trial.variant, method, trial.position});
+    return rows.back();
+  };
+  for (const StudyTrial& trial : trials)
+    for (const Estimate& e : trial.estimates) {
+      VariantRow& row = row_of(trial, e.method);
+      const double below = e.lower - trial.backlash, above = trial.backlash - e.upper;
+      const bool near = std::max(below, above) <= width(e);
+      ++(e.status != Status::ok ? row.recognised : near ? row.right : row.wrong);
+    }
+  return rows;
+}
+
+}  // namespace backlash

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "backlash_diagnosis/identification/procedures/gap_terms.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
+#include "support/data.h"
+
+namespace backlash {
+namespace {
+
+const std::string kVarying = test::package_file("config/yumrukcal_2013_varying.yaml");
+constexpr double kStiffness = 460e3;  // N m/rad, of that rig
+
+/// Mean separation 6e-4, of it 0.5e-4 wind-up; orders 2 and 5.
+GapMap hand_made_map() {
+  GapMap map;
+  map.mean_separation = {6e-4, 1e-6};
+  map.wind_up = {0.5e-4, 1e-6};
+  map.mean_gap = {5.5e-4, 1e-6};
+  map.forward_speed = 0.2;
+  map.reverse_speed = -0.1;
+  map.harmonics = {{2, {4e-5, 1e-7}, {0.3, 1e-3}, 0}, {5, {1e-5, 1e-7}, {-1.2, 1e-3}, 0}};
+  return map;
+}
+
+double gap_of(double mean, double q) {
+  return mean + 4e-5 * std::sin(2 * q + 0.3) + 1e-5 * std::sin(5 * q - 1.2);
+}
+
+/// Distance between the flanks where the load is at q, from two penetrations and the stiffness alone.
+double gap_in_train(const Rig& rig, double q) {
+  const GearTrain train(rig);
+  const double far = 1e-3;  // rad, deep in contact on either side
+  double open = 0;
+  for (const double side : {1.0, -1.0}) {
+    const double state[] = {q + side * far, q, 0, 0};
+    open += far - std::fabs(train.end_forces(0, state, 0).mesh_torque) / kStiffness;
+  }
+  return open;
+}
+
+TEST(GapTerms, TheGapOfTheModelIsThatOfTheMap) {
+  const Rig varying = load_rig_file(kVarying).rig;
+  ASSERT_TRUE(gap_varies(varying));
+  for (const auto& [use, mean] : {std::pair{GapUse::corrected, 5.5e-4}, std::pair{GapUse::directly, 6e-4},
+                                  std::pair{GapUse::variation, 5.358e-4}}) {
+    const Rig rig = with_gap_map(varying, hand_made_map(), use);
+    EXPECT_EQ(rig.terms.size(), 2u);
+    for (const double q : {0.0, 0.7, 2.0, 3.3, 5.9, 8.1})
+      EXPECT_NEAR(gap_in_train(rig, q), gap_of(mean, q), 1e-12) << q;  // rounding of 1 rad / 1e-3 rad
+  }
+}
+
+TEST(GapTerms, AMapThatDoesNotVaryGivesAConstantGap) {
+  GapMap map = hand_made_map();
+  map.harmonics.clear();
+  const Rig rig = with_gap_map(load_rig_file(kVarying).rig, map);
+  EXPECT_FALSE(gap_varies(rig));
+  EXPECT_NEAR(gap_in_train(rig, 1), 5.5e-4, 1e-12);
+}
+
+TEST(GapTerms, WindUpFromTheRigByHand) {
+  const GapMap map = with_wind_up(hand_made_map(), load_rig_file(kVarying).rig);
+  const double torque = 16.8 + 7.6 * 0.2 + 13.3 + 11.5 * 0.1;  // N m, load's friction both ways [5.2]
+  EXPECT_NEAR(map.wind_up.value, torque / kStiffness, 1e-12);
+  EXPECT_NEAR(map.mean_gap.value, 6e-4 - torque / kStiffness, 1e-12);
+}
+
+TEST(GapTerms, RigFileGetsTheEntriesAndKeepsTheRest) {
+  const std::string text = load_rig_file(kVarying).text;
+  const std::string changed = with_gap_terms(text, kVarying, hand_made_map(), 5.358e-4);
+  const RigFile file = rig_file_from_text(changed, kVarying);
+  EXPECT_EQ(file.rig.terms.size(), 2u);
+  // The text has five decimals of the relative amplitude, four of the phase: 5e-6 of 5.4e-4 and 5e-5 of 4e-5.
+  for (const double q : {0.0, 0.7, 2.0, 3.3, 5.9})
+    EXPECT_NEAR(gap_in_train(file.rig, q), gap_of(5.358e-4, q), 1e-8) << q;
+  for (const char* part : {"# As a look-up table", "\nexcitation:", "15 % at most.\nterms:\n  - id: "})
+    EXPECT_NE(changed.find(part), std::string::npos) << part;
+  EXPECT_THROW(with_gap_terms("terms: []\n", "x.yaml", hand_made_map(), 5e-4), BadData);
+}
+
+TEST(GapTerms, RefusesAGapThatIsNone) {
+  GapMap map = hand_made_map();
+  map.mean_gap.value = -1e-6;
+  EXPECT_THROW(with_gap_map(load_rig_file(kVarying).rig, map), InvalidParameter);
+  EXPECT_THROW(gap_terms_yaml(map, 0), InvalidParameter);
+  EXPECT_THROW(make_term("varying_backlash", {{"amplitude", 0.1}, {"order", -1}, {"phase", 0}}),
+               InvalidParameter);
+  EXPECT_THROW(make_term("no such", {}), InvalidParameter);
+}
+
+}  // namespace
+}  // namespace backlash

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/procedures/one_inertia.h"
+#include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/signal/bandwidth.h"
+#include "support/data.h"
+
+namespace backlash {
+namespace {
+
+// An axis like the EMPS under a position controller whose command is held for one interval; integrated here
+// with a fixed small step, friction exact at rest.
+struct Axis {
+  double mass = 95, viscous = 200, coulomb = 20, offset = -3;  // kg, N s/m, N, N
+  double rate = 1000, duration = 20;                           // Hz, s
+  double delay = 0;                                            // s, of the command beyond the hold
+  double position_noise = 3e-8, force_noise = 0.1;             // m, N
+  double disturbance = 0;                                      // N, unknown force with 30 ms memory
+  double dwell = 0;                                            // s of standing still at each end
+};
+
+/// Three sines whose frequencies have no common period; every 3 s it rests for `dwell`.
+double reference(const Axis& axis, double t) {
+  const double leg = 3 + axis.dwell, whole = std::floor(t / leg);
+  const double u = 2 * M_PI * (3 * whole + std::min(3.0, t - whole * leg));
+  return 0.1 * std::sin(0.31 * u) + 0.03 * std::sin(0.83 * u) + 0.008 * std::sin(2.3 * u);
+}
+
+struct Body {
+  double x = 0, v = 0;
+
+  void step(const Axis& axis, double force, double h) {
+    const double free = force - axis.offset - axis.viscous * v;
+    if (v == 0 && std::fabs(free) <= axis.coulomb) return;
+    const double sign = v != 0 ? (v > 0 ? 1 : -1) : (free > 0 ? 1 : -1);
+    const double next = v + h * (free - sign * axis.coulomb) / axis.mass;
+    const bool stops = v != 0 && next * v < 0;
+    x += 0.5 * h * (v + (stops ? 0 : next));
+    v = stops ? 0 : next;
+  }
+};
+
+Record simulate(const Axis& axis, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  Record record;
+  record.name = "axis";
+  Body body;
+  constexpr int kSteps = 50;
+  const double interval = 1 / axis.rate, h = interval / kSteps;
+  const double keep = std::exp(-interval / 0.03);
+  double command = 0, previous = 0, coloured = 0;
+  for (int k = 0; k < int(axis.duration * axis.rate); ++k) {
+    const double t = k * interval, ahead = 1e-4;
+    const double wanted = (reference(axis, t + ahead) - reference(axis, std::max(0.0, t - ahead))) /
+                          (t < ahead ? t + ahead : 2 * ahead);
+    previous = command;
+    command = 95 * (1600 * (reference(axis, t) - body.x) + 80 * (wanted - body.v));
+    coloured = keep * coloured + std::sqrt(1 - keep * keep) * axis.disturbance * normal(random);
+    record.time.push_back(t);
+    record.column(Channel::motor_torque).push_back(command + axis.force_noise * normal(random));
+    record.column(Channel::motor_position).push_back(body.x + axis.position_noise * normal(random));
+    for (int i = 0; i < kSteps; ++i) body.step(axis, (i * h < axis.delay ? previous : command) + coloured, h);
+  }
+  return record;
+}
+
+void expect_near(const Measured& m, double truth, double relative, const char* name) {
+  EXPECT_NEAR(m.value, truth, relative * std::fabs(truth)) << name;
+  // 5 standard errors; the second term is the discretisation of this test's integration at the reversals.
+  EXPECT_NEAR(m.value, truth, 5 * m.standard_error + 1e-3 * std::fabs(truth)) << name;
+}
+
+TEST(OneInertia, ClosedCircle) {
+  const OneInertia m = identify_one_inertia(simulate({}));
+  expect_near(m.inertia, 95, 2e-3, "inertia");
+  expect_near(m.viscous, 200, 1e-2, "viscous");
+  expect_near(m.coulomb, 20, 1e-2, "coulomb");
+  expect_near(m.offset, -3, 1e-2, "offset");
+  EXPECT_NEAR(m.delay.value, 0.5e-3, 0.05e-3);  // the hold: half an interval
+  EXPECT_LT(m.delay.standard_error, 0.05e-3);
+  EXPECT_LT(m.relative_error, 0.01);
+  EXPECT_TRUE(m.warnings.empty());
+  EXPECT_EQ(m.time.size(), m.predicted.size());
+  EXPECT_EQ(m.time.size(), m.measured.size());
+}
+
+TEST(OneInertia, DelayOfTheForceIsFoundAndDoesNotSpoilTheParameters) {
+  Axis axis;
+  axis.delay = 0.6e-3;
+  const OneInertia m = identify_one_inertia(simulate(axis));
+  EXPECT_NEAR(m.delay.value, 1.1e-3, 0.05e-3);
+  expect_near(m.viscous, 200, 1e-2, "viscous");
+  expect_near(m.coulomb, 20, 1e-2, "coulomb");
+  OneInertiaOptions undelayed;
+  undelayed.delay = 0;
+  // What it would cost to leave it: the force belongs to a speed that is a (1.1 ms) higher.
+  EXPECT_GT(std::fabs(identify_one_inertia(simulate(axis), undelayed).viscous.value - 200), 2.5);
+}
+
+TEST(OneInertia, StandstillIsLeftOut) {
+  Axis axis;
+  axis.dwell = 0.5;
+  const OneInertia m = identify_one_inertia(simulate(axis));
+  EXPECT_LT(m.used, 0.9);  // it rests 14 % of the time, less what the controller takes to stop
+  EXPECT_GT(identify_one_inertia(simulate({})).used, 0.95);
+  expect_near(m.coulomb, 20, 1e-2, "coulomb");
+  expect_near(m.offset, -3, 1e-2, "offset");
+}
+
+TEST(OneInertia, StandardErrorsAreHonestForCorrelatedForces) {
+  double squares[3] = {}, stated[3] = {};
+  constexpr int kSeeds = 40;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    Axis axis;
+    axis.rate = 250;
+    axis.duration = 16;
+    axis.disturbance = 2;
+    OneInertiaOptions options;
+    options.cutoff = 10;
+    const OneInertia m = identify_one_inertia(simulate(axis, seed), options);
+    const Measured measured[] = {m.inertia, m.coulomb, m.offset};
+    const double truth[] = {95, 20, -3};
+    for (int i = 0; i < 3; ++i) {
+      squares[i] += std::pow(measured[i].value - truth[i], 2);
+      stated[i] += std::pow(measured[i].standard_error, 2);
+    }
+  }
+  // Variance from 40 seeds: sqrt(2 / 40) = 22 %, two and a half of it; leaving out thirtieths overstates a
+  // little.
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(squares[i] / stated[i], 0.95, 0.6) << i;
+}
+
+TEST(OneInertia, JitterOfTheStampsAt100Hz) {
+  Axis axis;
+  axis.duration = 40;
+  const Record even = simulate(axis);
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> shift(-2, 2);
+  Record record;
+  record.name = "jitter";
+  for (int k = 5; k + 10 < int(even.size()); k += 10) {
+    const int j = k + shift(random);
+    record.time.push_back(even.time[j]);
+    for (const Channel c : {Channel::motor_torque, Channel::motor_position})
+      record.column(c).push_back(even.column(c)[j]);
+  }
+  const OneInertia m = identify_one_inertia(record);
+  // Linear interpolation of samples 10 ms apart loses (w T)^2 / 12 of a motion of w = 8 rad/s: 5e-4 per
+  // column.
+  EXPECT_NEAR(m.inertia.value, 95, 1);
+  EXPECT_NEAR(m.viscous.value, 200, 6);
+  EXPECT_NEAR(m.coulomb.value, 20, 0.6);
+}
+
+TEST(OneInertia, WhatTheModelLacksIsSaid) {
+  Record record = simulate({});
+  const auto& x = record.column(Channel::motor_position);
+  for (std::size_t k = 0; k < x.size(); ++k)
+    record.column(Channel::motor_torque)[k] += 80 * std::sin(25 * x[k]);
+  const OneInertia m = identify_one_inertia(record);
+  EXPECT_GT(m.relative_error, 0.2);
+  ASSERT_FALSE(m.warnings.empty());
+  EXPECT_NE(m.warnings.back().find("lacks"), std::string::npos);
+}
+
+TEST(OneInertia, RefusesWhatTheRecordCannotSay) {
+  Record record = simulate({});
+  EXPECT_THROW(identify_one_inertia(record.slice(0, 0.4)), CannotIdentify);   // one way
+  EXPECT_THROW(identify_one_inertia(record.slice(0, 0.05)), CannotIdentify);  // 50 samples
+  OneInertiaOptions options;
+  options.cutoff = 450;
+  EXPECT_THROW(identify_one_inertia(record, options), InvalidParameter);
+  options.cutoff = 0;
+  options.delay = 3e-3;
+  EXPECT_THROW(identify_one_inertia(record, options), InvalidParameter);
+  std::fill(record.column(Channel::motor_position).begin(), record.column(Channel::motor_position).end(),
+            0.1);
+  EXPECT_THROW(identify_one_inertia(record), CannotIdentify);
+  record.column(Channel::motor_torque).clear();
+  EXPECT_THROW(identify_one_inertia(record), CannotIdentify);
+}
+
+TEST(OneInertia, EmpsAsPublished) {
+  const auto train = test::find_data("measured/emps_train.csv");
+  const auto validation = test::find_data("measured/emps_validation.csv");
+  if (!train || !validation) GTEST_SKIP() << "measured/emps_*.csv absent";
+  const OneInertia m = identify_one_inertia(read_csv(*train));
+  // Janot, Gautier, Brunot (2019), as stated with the data; 1 % is the requirement.
+  EXPECT_NEAR(m.inertia.value, 95.1, 0.01 * 95.1);
+  EXPECT_NEAR(m.viscous.value, 203.5, 0.01 * 203.5);
+  EXPECT_NEAR(m.coulomb.value, 20.4, 0.01 * 20.4);
+  EXPECT_NEAR(m.offset.value, -3.2, 0.01 * 3.2);
+  // A least-squares prototype had 0.0365 and 0.0435 (of the norm with mean); 5 % for another cutoff.
+  EXPECT_LT(m.relative_error, 0.0365 * 1.05);
+  EXPECT_LT(relative_error(m, read_csv(*validation)), 0.0435 * 1.05);
+  EXPECT_LT(m.floor, 0.1 * m.relative_error);
+  EXPECT_GT(m.delay.value, 0);
+  EXPECT_LT(m.delay.value, 1e-3);
+}
+
+TEST(OneInertia, TheTwoEmpsRecordsAgreeWithinTheirErrors) {
+  const auto train = test::find_data("measured/emps_train.csv");
+  const auto validation = test::find_data("measured/emps_validation.csv");
+  if (!train || !validation) GTEST_SKIP() << "measured/emps_*.csv absent";
+  const OneInertia a = identify_one_inertia(read_csv(*train)),
+                   b = identify_one_inertia(read_csv(*validation));
+  const auto agree = [](const Measured& x, const Measured& y, const char* name) {
+    EXPECT_LT(std::fabs(x.value - y.value), 4 * std::hypot(x.standard_error, y.standard_error)) << name;
+  };
+  agree(a.inertia, b.inertia, "inertia");
+  agree(a.viscous, b.viscous, "viscous");
+  agree(a.coulomb, b.coulomb, "coulomb");
+  agree(a.offset, b.offset, "offset");
+}
+
+TEST(OneInertia, Ur5NeedsMoreThanFriction) {
+  const auto path = test::find_data("measured/ur5_joint3.csv");
+  if (!path) GTEST_SKIP() << "measured/ur5_joint3.csv absent";
+  const OneInertia m = identify_one_inertia(read_csv(*path));
+  EXPECT_GT(m.relative_error, 0.3);  // gravity is not in this model: the prototype had 0.70 of the norm
+  EXPECT_LT(m.floor, 0.05);
+  EXPECT_TRUE(std::isnan(m.delay.standard_error));
+  EXPECT_EQ(m.warnings.size(), 2u);  // the delay, and that something is missing
+}
+
+TEST(Bandwidth, WhiteNoiseUnderAMotion) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<double> x;
+  for (int k = 0; k < 8192; ++k) x.push_back(0.2 * std::sin(2e-3 * k) + 1e-3 * k + 1e-5 * normal(random));
+  // The median of 1200 lines: 1 / sqrt(1200) * 1 / (2 ln 2) * ... about 4 % of the power, 2 % of the
+  // deviation.
+  EXPECT_NEAR(white_noise(x), 1e-5, 6e-7);
+  EXPECT_NEAR(position_noise(x), 1e-5, 2e-6);  // the largest of eight bands of some 400 lines
+}
+
+TEST(Bandwidth, OfTwoSines) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<double> x;
+  // Accelerations of amplitude 1 at 3 Hz and 0.5 at 7 Hz, 0.02 (less than 1 % of the power) at 40 Hz.
+  for (int k = 0; k < 16384; ++k) {
+    const double t = 1e-3 * k;
+    const auto part = [&](double a, double f) {
+      return a * std::sin(2 * M_PI * f * t) / std::pow(2 * M_PI * f, 2);
+    };
+    x.push_back(part(1, 3) + part(0.5, 7) + part(0.02, 40) + 1e-8 * normal(random));
+  }
+  EXPECT_NEAR(motion_bandwidth(x, 1e-3), 7, 0.2);  // lines are 0.06 Hz apart, the window is three wide
+  std::vector<double> noise;
+  for (int k = 0; k < 4096; ++k) noise.push_back(normal(random));
+  EXPECT_THROW(motion_bandwidth(noise, 1e-3), CannotIdentify);
+  EXPECT_THROW(motion_bandwidth({1, 2, 3}, 1e-3), InvalidParameter);
+  EXPECT_THROW(motion_bandwidth(noise, 0), InvalidParameter);
+}
+
+TEST(Bandwidth, NoiseAfterTheFilter) {
+  // Integral of 1 / (1 + x^8)^2 from 0 to infinity: (1 - 1 / 8) (pi / 8) / sin(pi / 8) = 0.8979.
+  const double density = 0.875 * (M_PI / 8) / std::sin(M_PI / 8);
+  EXPECT_NEAR(noise_after_low_pass(1e-3, 10), std::sqrt(2 * 10e-3 * density), 1e-4);
+}
+
+}  // namespace
+}  // namespace backlash

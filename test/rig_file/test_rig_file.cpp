@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
+#include "support/data.h"
+
+namespace backlash {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A file that lives as long as this.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& text)
+      : path_((fs::temp_directory_path() / ("rig_file_" + std::to_string(::getpid()) + ".yaml")).string()) {
+    std::ofstream(path_, std::ios::binary) << text;
+  }
+  ~TemporaryFile() { fs::remove(path_); }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+RigFile load(const std::string& text) {
+  return load_rig_file(TemporaryFile(text).path());
+}
+
+std::string content_of(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+const char* const kTwoInertias =
+    "schema_version: 1\n"
+    "name: two_inertias\n"
+    "joint: elbow\n"
+    "gear_train:\n"
+    "  reduction_ratio: 4\n"
+    "  motor: {inertia: 1.0e-3}\n"
+    "  input_coupling: rigid\n"
+    "  mesh: {base_radius: 0.02, backlash: 1.0e-4, contact: {law: linear, stiffness: 1.0e7, damping: 10}}\n"
+    "  output_coupling: rigid\n"
+    "  link: {inertia: 0.01}\n"
+    "excitation: {type: sine, amplitude: 1, frequency: 2}\n"
+    "sensors: {sampling_rate: 500, seed: 3}\n"
+    "diagnosis:\n"
+    "  lost_motion: {torque: 0.5, elastic_deflection: subtracted}\n"
+    "  limits: {backlash: {watch: 1, service: 2, stop: 3}}\n";
+
+TEST(RigFile, EveryRigOfThePackageLoads) {
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(test::package_file("config"))) {
+    if (entry.path().extension() != ".yaml") continue;
+    if (entry.path().stem().string().find("_search") != std::string::npos) continue;  // of search_parameters
+    const std::string path = entry.path().string();
+    if (!YamlReader::from_file(path).has("gear_train")) continue;  // not a rig
+    SCOPED_TRACE(path);
+    RigFile file;
+    ASSERT_NO_THROW(file = load_rig_file(path));
+    ++count;
+    EXPECT_EQ(file.source, path);
+    EXPECT_EQ(file.text, content_of(path));
+    EXPECT_EQ(file.rig.name, entry.path().stem().string());
+    EXPECT_NO_THROW(Simulation(file.rig, file.simulation).step());
+  }
+  EXPECT_GE(count, 1);
+}
+
+TEST(RigFile, TheDefaultIsTheFileOfThePackage) {
+  const RigFile built_in = default_rig_file(),
+                file = load_rig_file(test::package_file("config/sarkar_1997.yaml"));
+  EXPECT_EQ(built_in.text, file.text);
+  EXPECT_EQ(built_in.digest, file.digest);
+  EXPECT_NE(built_in.source, file.source);
+  EXPECT_EQ(built_in.rig.name, "sarkar_1997");
+}
+
+TEST(RigFile, TheSarkarRigAsPublished) {
+  const RigFile file = default_rig_file();
+  EXPECT_EQ(file.rig.motor.inertia, 2.24e-5);
+  EXPECT_EQ(file.rig.input_coupling.stiffness, 28.71);
+  EXPECT_TRUE(file.rig.link_locked);
+  EXPECT_EQ(file.simulation.excitation.type, "square");
+  EXPECT_EQ(file.simulation.excitation.amplitude, 0.05);
+  EXPECT_EQ(file.simulation.excitation.frequency, 10);
+  EXPECT_EQ(file.simulation.sensors.sampling_rate, 1000);
+  ASSERT_TRUE(file.diagnosis.apd && file.diagnosis.lost_motion && file.diagnosis.limits);
+  EXPECT_EQ(file.diagnosis.apd->period, 0.1);
+  EXPECT_TRUE(file.diagnosis.apd->layout == (ApdLayout{60, -0.4, 0.4}));
+  EXPECT_TRUE(file.diagnosis.lost_motion->subtract_elastic_deflection);
+}
+
+// One flank loaded: both springs in series with the contact F = K d^1.5.
+TEST(RigFile, LostMotionKnowsTheElasticDeflectionAndTheBaseRadius) {
+  const RigFile file = default_rig_file();
+  const LostMotionSettings& lost_motion = *file.diagnosis.lost_motion;
+  EXPECT_DOUBLE_EQ(lost_motion.base_radius, 0.014917);
+  const double torque = 0.05, radius = 0.014917;
+  const double expected =
+      torque / 28.71 + torque / 6310 + std::pow(torque / radius / 2.28e8, 1 / 1.5) / radius;
+  ASSERT_TRUE(lost_motion.elastic_deflection);
+  EXPECT_NEAR(lost_motion.elastic_deflection(torque), expected, 1e-12);
+}
+
+TEST(RigFile, MotorSideAxisScalesBaseRadiusAndDeflection) {
+  const RigFile load_side = load(kTwoInertias);
+  const RigFile motor_side =
+      load(replaced(kTwoInertias, "reduction_ratio: 4\n", "reduction_ratio: 4\n  motor_side: true\n"));
+  EXPECT_DOUBLE_EQ(load_side.diagnosis.lost_motion->base_radius, 0.02);
+  EXPECT_DOUBLE_EQ(motor_side.diagnosis.lost_motion->base_radius, 0.02 / 4);
+  // Linear contact at lever r: T / (K r^2); on the motor side torque and angle are scaled by the ratio.
+  EXPECT_NEAR(load_side.diagnosis.lost_motion->elastic_deflection(0.5), 0.5 / (1e7 * 0.02 * 0.02), 1e-15);
+  EXPECT_NEAR(motor_side.diagnosis.lost_motion->elastic_deflection(0.5), 4 * 4 * 0.5 / (1e7 * 0.02 * 0.02),
+              1e-15);
+}
+
+TEST(RigFile, DigestIsFnv1aOfTheText) {
+  const RigFile file = load(kTwoInertias);
+  EXPECT_EQ(file.digest, "9424e96f1cccdcb8");  // computed by a separate program
+  EXPECT_NE(load(std::string(kTwoInertias) + "# a remark\n").digest, file.digest);
+}
+
+TEST(RigFile, MissingAndUnreadableFiles) {
+  EXPECT_THROW(load_rig_file("/nonexistent/rig.yaml"), MissingInput);
+  EXPECT_THROW(load_rig_file(fs::temp_directory_path().string()), MissingInput);
+  EXPECT_THROW(load(""), BadData);
+  EXPECT_THROW(load("[1, 2]"), BadData);
+  EXPECT_THROW(load("name: \x01"), BadData);
+}
+
+TEST(RigFile, AFileWithoutEndIsRefused) {
+  EXPECT_THROW(load_rig_file("/dev/zero"), BadData);
+}
+
+TEST(RigFile, MalformedFilesAreRefusedWithFileAndKey) {
+  struct Case {
+    const char *from, *to, *key;
+  };
+  const std::vector<Case> cases = {
+      {"schema_version: 1", "schema_version: 2", "schema_version"},
+      {"schema_version: 1\n", "", "schema_version"},
+      {"joint: elbow\n", "joint: elbow\ncolour: red\n", "colour"},
+      {"reduction_ratio: 4", "reduction_ratio: 4\n  teeth: 40", "gear_train.teeth"},
+      {"name: two_inertias\n", "", "name"},
+      {"inertia: 1.0e-3", "inertia: -1.0e-3", "gear_train.motor.inertia"},
+      {"inertia: 1.0e-3", "inertia: heavy", "gear_train.motor.inertia"},
+      {"backlash: 1.0e-4,", "backlash: 1.0e-4, half_gap: 1.0e-4,", "gear_train.mesh.half_gap"},
+      {"law: linear", "law: cubic", "gear_train.mesh.contact.law"},
+      {"type: sine", "type: saw", "excitation.type"},
+      {"sampling_rate: 500", "sampling_rate: 0", "sensors.sampling_rate"},
+      {"seed: 3", "seed: 3, motor_current: {noise: 0}", "torque_constant"},
+      {"seed: 3", "seed: -3", "sensors.seed"},
+      {"lost_motion: {torque: 0.5,", "lost_motion: {torque: -0.5,", "diagnosis.lost_motion.torque"},
+      {"watch: 1, service: 2", "watch: 3, service: 2", "diagnosis.limits.backlash.service"},
+      {"diagnosis:\n", "diagnosi:\n", "diagnosis"},
+      {"diagnosis:\n", "diagnosis:\n  alarm: 3\n", "diagnosis.alarm"},
+      // A mesh without base radius knows no lengths, so its limits must be angles.
+      {"base_radius: 0.02, backlash: 1.0e-4", "backlash_angle: 1.0e-4", "diagnosis.limits"},
+  };
+  for (const Case& c : cases) try {
+      load(replaced(kTwoInertias, c.from, c.to));
+      ADD_FAILURE() << c.to << " was accepted";
+    } catch (const BadData& error) {
+      EXPECT_NE(std::string(error.what()).find(c.key), std::string::npos) << c.to << ": " << error.what();
+      EXPECT_NE(std::string(error.what()).find("rig_file_"), std::string::npos) << error.what();
+    }
+}
+
+TEST(RigFile, AnAngularMeshHasNoBaseRadius) {
+  std::string text = replaced(kTwoInertias, "base_radius: 0.02, backlash: 1.0e-4", "backlash_angle: 1.0e-4");
+  const RigFile file = load(replaced(text, "{backlash: {watch", "{backlash_angle: {watch"));
+  EXPECT_TRUE(file.rig.mesh.angular());
+  EXPECT_TRUE(std::isnan(file.diagnosis.lost_motion->base_radius));
+  EXPECT_TRUE(file.diagnosis.limits->angular);
+}
+
+}  // namespace
+}  // namespace backlash

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "backlash_diagnosis/signal/least_squares.h"
+
+namespace backlash {
+namespace {
+
+/// A line y = 2 - 3 x at x = 0 .. n - 1, with normal noise.
+struct Line {
+  Eigen::MatrixXd a;
+  Eigen::VectorXd b;
+};
+
+Line line(int n, double noise, unsigned seed) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  Line l{Eigen::MatrixXd(n, 2), Eigen::VectorXd(n)};
+  for (int i = 0; i < n; ++i) {
+    l.a.row(i) << 1, i;
+    l.b[i] = 2 - 3 * i + noise * normal(generator);
+  }
+  return l;
+}
+
+TEST(LeastSquares, LineThroughFourPointsByHand) {
+  // x = 0..3, y = 1, 2, 2, 4: slope 0.9, intercept 0.9, squares 0.7, variance 0.35; s.e. sqrt(0.35/5),
+  // sqrt(0.35 * 14/20).
+  Eigen::MatrixXd a(4, 2);
+  a << 1, 0, 1, 1, 1, 2, 1, 3;
+  const LeastSquaresFit fit = fit_linear(a, Eigen::Vector4d(1, 2, 2, 4));
+  EXPECT_NEAR(fit.parameter(0).value, 0.9, 1e-12);
+  EXPECT_NEAR(fit.parameter(1).value, 0.9, 1e-12);
+  EXPECT_NEAR(fit.parameter(0).standard_error, std::sqrt(0.35 * 0.7), 1e-12);
+  EXPECT_NEAR(fit.parameter(1).standard_error, std::sqrt(0.07), 1e-12);
+  EXPECT_NEAR(fit.residuals.squaredNorm(), 0.7, 1e-12);
+}
+
+TEST(LeastSquares, RobustFitIgnoresAFifthOfWildRows) {
+  Line l = line(50, 0.1, 1);
+  for (int i = 0; i < 50; i += 5) l.b[i] += 1000;
+  const LeastSquaresFit robust = fit_robust(l.a, l.b);
+  // Slope 0.1 / sqrt(50^3 / 12) = 0.001 without outliers; Huber's weights bias it by some of those.
+  EXPECT_NEAR(robust.values[1], -3, 0.01);
+  EXPECT_GT(std::fabs(fit_linear(l.a, l.b).values[0] - 2), 50);
+}
+
+TEST(LeastSquares, StandardErrorsMatchTheScatter) {
+  double sum = 0, stated = 0;
+  constexpr int kSeeds = 400;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Line l = line(30, 0.5, seed);
+    const Measured slope = fit_robust(l.a, l.b).parameter(1);
+    sum += std::pow(slope.value + 3, 2);
+    stated += std::pow(slope.standard_error, 2);
+  }
+  // A variance from 400 values is known to sqrt(2/400) = 7 %; three of them, and 10 % for Huber's small
+  // sample.
+  EXPECT_NEAR(sum / stated, 1, 0.31);
+}
+
+TEST(LeastSquares, RefusesWhatCannotBeTold) {
+  Eigen::MatrixXd twice(5, 2);
+  twice << 1, 2, 2, 4, 3, 6, 4, 8, 5, 10;
+  EXPECT_THROW(fit_linear(twice, Eigen::VectorXd::Ones(5)), CannotIdentify);
+  EXPECT_THROW(fit_linear(Eigen::MatrixXd::Ones(2, 2), Eigen::Vector2d(1, 1)), CannotIdentify);
+  EXPECT_THROW(fit_linear(Eigen::MatrixXd::Zero(5, 1), Eigen::VectorXd::Ones(5)), CannotIdentify);
+}
+
+/// Residuals of y = exp(-k t) + c at hundred times.
+ResidualFunction decay(const Eigen::VectorXd& data) {
+  return [data](const Eigen::VectorXd& p) {
+    if (p[0] < 0) throw InvalidParameter("k", p[0], "must be >= 0");
+    Eigen::VectorXd r(data.size());
+    for (Eigen::Index i = 0; i < r.size(); ++i) r[i] = data[i] - std::exp(-p[0] * 0.05 * i) - p[1];
+    return r;
+  };
+}
+
+TEST(LeastSquares, NonlinearFitFindsTheExactParameters) {
+  Eigen::VectorXd data(100);
+  for (int i = 0; i < 100; ++i) data[i] = std::exp(-1.7 * 0.05 * i) + 0.3;
+  const LeastSquaresFit fit = fit_nonlinear(decay(data), Eigen::Vector2d(0.2, 0), Eigen::Vector2d(1, 1));
+  EXPECT_NEAR(fit.values[0], 1.7, 1e-6);
+  EXPECT_NEAR(fit.values[1], 0.3, 1e-6);
+}
+
+TEST(LeastSquares, BlockCovarianceKnowsThatNeighboursAgree) {
+  // Noise that stays for 20 rows: white formulas state an error sqrt(20) too small.
+  double sum = 0, white = 0, blocks = 0;
+  constexpr int kSeeds = 200, kRows = 2000, kStay = 20;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal;
+    Eigen::VectorXd y(kRows);
+    for (int i = 0; i < kRows; i += kStay) y.segment(i, kStay).setConstant(normal(generator));
+    const LeastSquaresFit fit =
+        fit_nonlinear([&](const Eigen::VectorXd& p) { return Eigen::VectorXd(y.array() - p[0]); },
+                      Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1));
+    sum += fit.values[0] * fit.values[0];
+    white += fit.covariance(0, 0);
+    blocks += block_covariance(fit, 2 * kStay)(0, 0);
+  }
+  EXPECT_NEAR(sum / white, kStay, 0.3 * kStay);  // three standard errors of a variance from 200 values
+  EXPECT_NEAR(sum / blocks, 1, 0.3);
+}
+
+}  // namespace
+}  // namespace backlash

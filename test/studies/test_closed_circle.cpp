@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The printed configurations of Yumrukcal (2013), their test runs simulated with the sensors of the rig
+// files, and each procedure's findings against the parameters that were simulated.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "backlash_diagnosis/rig_file/rig_file.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "identification/procedures/procedures.h"
+
+namespace backlash {
+namespace {
+
+constexpr int kSeed = 5;
+
+std::string config(const std::string& name) {
+  return std::string(BACKLASH_DIAGNOSIS_SOURCE_DIR) + "/config/" + name;
+}
+
+/// Only as long as the procedure needs; 0: as the file says.
+double shortened(const std::string& run) {
+  if (run == "external_excitation" || run == "square_wave") return 10;
+  if (run == "inertia_sine" || run == "motor_inertia_sine") return 12;
+  return 0;
+}
+
+/// Findings of all procedures but the last, from records alone and a rig file that is wrong by 20 to 40 %.
+IdentificationCase found(const std::string& rig_file) {
+  const RigFile file = load_rig_file(config(rig_file));
+  std::vector<Record> records;
+  for (const TestRun& run : file.test_runs) {
+    if (run.name == "sine_sweep") continue;  // it reverses; the one with bias is preferred
+    RigFile applied = file;
+    apply_test_run(run, applied);
+    applied.simulation.sensors.seed = kSeed;
+    const double duration = shortened(run.name) > 0 ? shortened(run.name) : run.duration;
+    records.push_back(simulate_record(applied.rig, applied.simulation, duration));
+    records.back().name = run.name;
+  }
+  Rig wrong = file.rig;
+  int i = 0;
+  for (const RigParameter& p : servo_parameters()) {
+    const double factors[] = {1.3, 0.75, 0.8, 1.4};
+    if (p.name != "start_in_gap" && p.name != "mesh_alpha") p.set(wrong, p.get(wrong) * factors[i++ % 4]);
+  }
+  IdentificationCase c = identification_case(wrong, records);
+  for (const Procedure& procedure : servo_procedures()) {
+    if (procedure.run == run_output_error) continue;
+    const ProcedureReport report = procedure.run(c);
+    EXPECT_FALSE(report.records.empty()) << procedure.name;
+    update_from_findings(c);
+  }
+  return c;
+}
+
+/// Goals of the closed circle, relative to the true value of what is found.
+double goal(const std::string& name) {
+  if (name.find("damping") != std::string::npos) return 0.10;
+  const bool friction_or_gap = name.find("coulomb") != std::string::npos ||
+                               name.find("viscous") != std::string::npos || name == "backlash_angle";
+  return friction_or_gap ? 0.03 : 0.02;
+}
+
+class ClosedCircle : public testing::TestWithParam<const char*> {};
+
+TEST_P(ClosedCircle, EveryProcedureFindsWhatWasSimulated) {
+  const IdentificationCase c = found(GetParam());
+  const Rig truth = load_side(load_rig_file(config(GetParam())).rig);
+  std::set<std::string> procedures;
+  for (const Finding& f : c.result.findings) {
+    procedures.insert(f.procedure);
+    double expected = 0;
+    std::string name;
+    for (const auto& [parameter, factor] : f.combination) {
+      expected += factor * servo_parameter(parameter).get(truth);
+      name += " " + parameter;
+    }
+    const double most = goal(f.combination.begin()->first) * expected;
+    // Of 17 findings one lies beyond three standard errors once in 20 runs; beyond 3.5 once in 120.
+    EXPECT_NEAR(f.measured.value, expected, 3.5 * f.measured.standard_error) << f.procedure << name;
+    EXPECT_NEAR(f.measured.value, expected, most) << f.procedure << name;
+    EXPECT_LT(f.measured.standard_error, most / 2) << f.procedure << name;  // useful: the goal is two of them
+  }
+  EXPECT_EQ(procedures.size(), 6u);  // all but the calibration, which has no parameter, and the joint fit
+  for (const auto& [name, m] : c.result.parameters) {
+    const double expected = servo_parameter(name).get(truth);
+    EXPECT_NEAR(m.value, expected, 3.5 * m.standard_error) << name;
+    // Differences of the directions are small against what they are differences of.
+    if (name.find("asymmetry") == std::string::npos) {
+      EXPECT_NEAR(m.value, expected, goal(name) * expected) << name;
+    }
+  }
+  ASSERT_TRUE(c.result.gap_map);
+  EXPECT_FALSE(c.result.gap_map->varies);
+  for (const std::string& warning : c.result.warnings) ADD_FAILURE() << "nothing is wrong, but: " << warning;
+}
+
+INSTANTIATE_TEST_SUITE_P(Yumrukcal2013, ClosedCircle,
+                         testing::Values("yumrukcal_2013.yaml", "yumrukcal_2013_config1.yaml"),
+                         [](const auto& info) {
+                           return std::string("Configuration") + (info.index ? "1" : "2");
+                         });
+
+}  // namespace
+}  // namespace backlash
