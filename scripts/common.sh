@@ -13,6 +13,9 @@ unset PYTHONPATH PYTHONHOME
 # Debian's ROS lives in /usr and needs no entry here; other workspaces of the caller must not leak in.
 unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH
 
+# ccache, where it is installed, finds again what another clone has compiled: paths count from the workspace.
+export CCACHE_BASEDIR=${REPO} CCACHE_NOHASHDIR=1
+
 # fail MESSAGE: ends the script.
 fail() {
   echo "$(basename "$0"): $1" >&2

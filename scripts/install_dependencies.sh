@@ -6,14 +6,14 @@ set -euo pipefail
 
 # One line per purpose.
 packages=(
-  build-essential cmake                                           # compiler and build
+  build-essential ccache cmake                                    # compiler and build
   catkin catkin-lint ros-core-dev                                 # ROS 1: build system, roscpp, rosbag, messages
   libactionlib-dev libdiagnostic-updater-dev                      # ROS 1 libraries outside the core
   libdynamic-reconfigure-config-init-mutex-dev python3-dynamic-reconfigure
   libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node; the plugins are in -dev
   rosbash python3-rostest librostest-dev                          # rosrun, rostest
   python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
-  libboost-program-options-dev libeigen3-dev libyaml-cpp-dev nlohmann-json3-dev
+  libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
   libgtest-dev
   python3-matplotlib python3-numpy python3-yaml                   # plots
