@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/studies/curve_builder.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <mutex>
 #include <numeric>
-#include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -163,10 +164,8 @@ class PointsDone {
     const std::lock_guard<std::mutex> lock(mutex_);
     lowest_ = std::min(lowest_, point.cells.front().mean);
     highest_ = std::max(highest_, point.cells.front().mean);
-    std::ostringstream text;
-    text.precision(3);
-    text << ++done_ << " of " << request_.points << " points, skewness " << lowest_ << " to " << highest_;
-    request_.best_so_far(text.str());
+    request_.best_so_far(fmt::format("{} of {} points, skewness {:.3g} to {:.3g}", ++done_, request_.points,
+                                     lowest_, highest_));
   }
 
  private:

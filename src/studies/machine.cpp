@@ -2,16 +2,16 @@
 #include "machine.h"
 
 #include <algorithm>
-#include <random>
+
+#include "backlash_diagnosis/base/random.h"
 
 namespace backlash {
 
 Rig machine_of(const RigFile& file, std::uint64_t seed) {
   Rig rig = file.rig;
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
+  Random random(seed);
   for (Coupling* coupling : {&rig.input_coupling, &rig.output_coupling})
-    coupling->stiffness *= 1 + file.diagnosis.stiffness_uncertainty * std::clamp(normal(random), -3.0, 3.0);
+    coupling->stiffness *= 1 + file.diagnosis.stiffness_uncertainty * std::clamp(random.normal(), -3.0, 3.0);
   return rig;
 }
 
