@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <sstream>
 #include <vector>
 
@@ -84,15 +85,12 @@ Rig with_gap_map(Rig rig, const GapMap& map, GapUse use) {
 std::string gap_terms_yaml(const GapMap& map, double mean) {
   check_mean(mean);
   std::string text;
-  for (const Harmonic& h : map.harmonics) {
-    char entry[320];
-    std::snprintf(entry, sizeof entry,
-                  "  - id: %s\n    amplitude: %-13.5f # -, +- %.1g\n    order: %-17d # 1/rad\n"
-                  "    phase: %-17.4f # rad, +- %.1g\n",
-                  kTerm.c_str(), h.amplitude.value / mean, h.amplitude.standard_error / mean, h.order,
-                  h.phase.value, h.phase.standard_error);
-    text += entry;
-  }
+  for (const Harmonic& h : map.harmonics)
+    text += fmt::format(
+        "  - id: {}\n    amplitude: {:<13.5f} # -, +- {:.1g}\n    order: {:<17} # 1/rad\n"
+        "    phase: {:<17.4f} # rad, +- {:.1g}\n",
+        kTerm, h.amplitude.value / mean, h.amplitude.standard_error / mean, h.order, h.phase.value,
+        h.phase.standard_error);
   return text;
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The last step of an identification: everything together, on the raw records.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -119,11 +121,9 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   }
   c.result.channels["torque"] = total(fit.torque, torque);
   c.result.channels["deflection"] = total(fit.deflection, deflection);
-  char text[128];
-  std::snprintf(text, sizeof text, "torque error %.2g %% (noise alone %.2g %%), deflection %.2g %% (%.2g %%)",
-                100 * c.result.channels["torque"].error, 100 * c.result.channels["torque"].floor,
-                100 * c.result.channels["deflection"].error, 100 * c.result.channels["deflection"].floor);
-  report.message = text;
+  const ChannelError &t = c.result.channels["torque"], &d = c.result.channels["deflection"];
+  report.message = fmt::format("torque error {:.2g} % (noise alone {:.2g} %), deflection {:.2g} % ({:.2g} %)",
+                               100 * t.error, 100 * t.floor, 100 * d.error, 100 * d.floor);
   return report;
 }
 
