@@ -71,7 +71,7 @@ bool takes_noise_away(const std::vector<Accepted>& effects, const Leftover& left
 }  // namespace
 
 bool is_friction(const std::string& parameter) {
-  return parameter.find("viscous") != std::string::npos || parameter.find("coulomb") != std::string::npos;
+  return servo_parameter(parameter).is_friction();
 }
 
 Search::Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff,
@@ -141,13 +141,8 @@ std::vector<std::string> Search::parameter_names() const {
   const Rig& rig = declared_.rig;
   std::vector<std::string> names;
   for (const RigParameter& p : servo_parameters()) {
-    const bool of_mesh = p.name.find("mesh") == 0 || p.name == "backlash_angle";
-    if (p.name == "start_in_gap" || (of_mesh && rig.mesh.rigid)) continue;
-    if (p.name.find("load") == 0 && !load_moves_freely(rig)) continue;
-    if (of_mesh && p.name != "backlash_angle") {
-      const std::string key = p.name.substr(5);
-      if (!rig.mesh.contact_spec.values.has(key)) continue;
-    }
+    if (p.kind == ParameterKind::start_in_gap || !p.known_to(rig)) continue;
+    if (p.part == RigPart::link && !load_moves_freely(rig)) continue;
     if (p.get(rig) != 0) names.push_back(p.name);
   }
   return names;

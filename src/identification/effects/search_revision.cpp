@@ -15,12 +15,13 @@ namespace {
 
 constexpr double kClearlyLess = 0.9;  // of a residual: worth another set of effects
 constexpr double kAsGood = 1.02;      // of a residual: then fewer parameters are better
-const char* const kAsymmetry = "_asymmetry";
 
-double asymmetry_of(const std::string& friction, const Rig& rig) {
-  for (const RigParameter& p : servo_parameters())
-    if (p.name == friction + kAsymmetry) return p.get(rig);
-  return 0;
+/// Friction below 0, of one direction or of both: it would drive the body.
+bool friction_drives(const FitParameter& p, const Rig& rig) {
+  const RigParameter& friction = servo_parameter(p.name);
+  if (!friction.is_friction() || friction.is_asymmetry()) return false;
+  const RigParameter* asymmetry = asymmetry_of(friction);
+  return p.get(rig) < (asymmetry ? std::fabs(asymmetry->get(rig)) : 0);
 }
 
 }  // namespace
@@ -89,7 +90,7 @@ void Search::put_on(const Rig& teeth) {
   declared_.rig = teeth;
   for (const RigParameter& p : servo_parameters()) {
     // Without the effects that it lacks the machine may have wanted less friction than none.
-    if (is_friction(p.name) && p.get(teeth) <= 0) p.set(declared_.rig, p.get(declared));
+    if (p.is_friction() && p.get(teeth) <= 0) p.set(declared_.rig, p.get(declared));
   }
   declare_parameters();
 }
@@ -182,16 +183,13 @@ void Search::drop_stand_ins() {
 void Search::hold_friction() {
   for (bool negative = true; negative;) {
     const Machine& now = stage_->fit.machine;
-    auto at =
-        std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
-          return is_friction(p.name) && p.name.find(kAsymmetry) == std::string::npos &&
-                 p.get(now.rig) < std::fabs(asymmetry_of(p.name, now.rig));
-        });
+    auto at = std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
+                           [&](const FitParameter& p) { return friction_drives(p, now.rig); });
     negative = at != declared_.parameters.end();
     if (!negative) return;
     const auto asymmetry =
         std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
-                     [&](const FitParameter& p) { return p.name == at->name + kAsymmetry; });
+                     [&](const FitParameter& p) { return servo_parameter(p.name).mean == at->name; });
     if (asymmetry != declared_.parameters.end()) at = asymmetry;
     held_.push_back(at->name);
     at->set(stage_->fit.machine.rig, 0);
