@@ -48,9 +48,10 @@ void Search::drop_superfluous() {
 /// show.
 bool Search::try_other_teeth() {
   std::vector<Accepted> others = effects_;
-  others.erase(std::remove_if(others.begin(), others.end(),
-                              [](const Accepted& effect) { return effect.candidate.id == kHardening; }),
-               others.end());
+  others.erase(
+      std::remove_if(others.begin(), others.end(),
+                     [](const Accepted& effect) { return stands_in_for_contact_law(effect.candidate.id); }),
+      others.end());
   const auto teeth =
       with_hertzian_teeth(base_->fit.machine.rig, range_.torque);  // hardening has its own stiffness
   const bool news = others.size() < effects_.size() && teeth_tried_with_ != effects_.size();
@@ -102,7 +103,7 @@ bool Search::dropped(std::size_t effect) {
   const Stage stage = *stage_;
   drop(effect);
   const bool learned = std::any_of(effects.begin(), effects.end(),
-                                   [](const Accepted& e) { return e.candidate.id == kLearned; });
+                                   [](const Accepted& e) { return is_learned(e.candidate.id); });
   if (!learned || size(stage_->leftover) * (1 - settings_.least_gain_unclear) < size(stage.leftover))
     return true;
   effects_ = effects;
