@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "machine.h"
+#include "drawn_machine.h"
 
 namespace backlash {
 namespace {
@@ -48,7 +48,7 @@ double uniform(std::mt19937_64& random) {
 }
 
 Record simulate_fine(RigFile file, const Draw& d, double duration) {
-  Rig rig = machine_of(file, d.seed);
+  Rig rig = draw_machine(file, d.seed);
   rig.mesh.backlash = d.backlash;
   SensorsSettings& sensors = file.simulation.sensors;
   sensors.sampling_rate *= kPhases;

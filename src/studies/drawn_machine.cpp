@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "machine.h"
+#include "drawn_machine.h"
 
 #include <algorithm>
 #include <random>
 
 namespace backlash {
 
-Rig machine_of(const RigFile& file, std::uint64_t seed) {
+Rig draw_machine(const RigFile& file, std::uint64_t seed) {
   Rig rig = file.rig;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
