@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/diagnosis/healthy_machine.h"
+#include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/ros/messages.h"
 #include "backlash_diagnosis/ros/parameters.h"
 
