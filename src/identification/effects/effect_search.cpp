@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "independence.h"
+#include "learned.h"
 #include "search.h"
 #include "signature.h"
 
@@ -114,25 +115,20 @@ Numbers numbers(const Stage& stage, std::size_t declared) {
   return out;
 }
 
-const char* map_unit(const std::string& acts_on) {
-  if (acts_on == "motor" || acts_on == "load") return "N m";
-  return acts_on.find("stiffness") != std::string::npos ? "-" : "rad";
-}
-
 /// Of a learned map: where its coordinate reaches and how large it gets.
 void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
-  for (const char* word : {"acts_on", "coordinate"}) effect.words[word] = term.values.choice(word);
-  effect.curve_x = term.values.list("points");
-  effect.curve_y = term.values.list("values");
-  const std::string& x = effect.words["coordinate"];
-  const bool angle = x.find("position") != std::string::npos, speed = x.find("velocity") != std::string::npos;
-  const char* unit = angle ? "rad" : speed ? "rad/s" : x == "time" ? "s" : "N m";
+  const TermMap& map = *term_type(term.id).map;
+  const MapKind& kind = kind_of(term.values);
+  effect.words = {{map.acts_on, kind.acts_on}, {map.coordinate, kind.coordinate}};
+  effect.curve_x = term.values.list(map.points);
+  effect.curve_y = term.values.list(map.values);
+  const std::string &x = kind.coordinate, &unit = kind.coordinate_unit;
   const auto largest = std::max_element(effect.curve_y.begin(), effect.curve_y.end(),
                                         [](double a, double b) { return std::fabs(a) < std::fabs(b); });
   const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
   effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
                        {x + "_to", unit, {effect.curve_x.back(), 0}},
-                       {"largest", map_unit(effect.words["acts_on"]), at_largest}};
+                       {"largest", kind.unit, at_largest}};
   fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
 }
 
@@ -140,7 +136,7 @@ void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& 
 void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted,
               FoundEffect& effect) {
   const TermType& type = term_type(term.id);
-  if (!type.search) return describe_map(term, fitted, effect);
+  if (type.map) return describe_map(term, fitted, effect);
   const TermSearch& search = *type.search;
   std::map<std::string, Measured> found;
   const auto take = [&](const std::string& name) {
@@ -198,12 +194,12 @@ std::vector<FoundEffect> found_effects(const Search& search, std::vector<Measure
 
 /// Every friction builds up over some path; it is called missing only where that shows.
 void note_shape_of_friction(const Search& search, Trace& trace) {
-  const auto is_shape = [](const FoundEffect& e) { return e.id == "presliding"; };
+  const auto is_shape = [](const FoundEffect& e) { return term_type(e.id).shapes_friction; };
   const auto at = std::find_if(trace.steps.begin(), trace.steps.end(), is_shape);
   if (at == trace.steps.end()) return;
   const double share = search.share(at->id);
   if (share >= kShapeOfFriction) return;
-  std::string note = "friction builds up after each reversal (presliding";
+  std::string note = "friction builds up after each reversal (" + at->id;
   for (const EffectParameter& p : at->parameters) {
     char text[96];
     std::snprintf(text, sizeof text, ", %s %.3g +- %.2g %s", p.name.c_str(), p.measured.value,

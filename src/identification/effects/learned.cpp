@@ -14,39 +14,10 @@ namespace backlash {
 namespace {
 
 constexpr int kPoints = 40;
-constexpr double kTail = 0.002;      // of the samples, beyond the outer points
-constexpr double kProbe = 0.05;      // of a strength that would show clearly
-constexpr double kShowing = 0.05;    // of the torque: such a strength
-constexpr double kGapShowing = 0.1;  // of the deflection
-constexpr double kStiffnessShowing = 0.1;
-constexpr double kSoftest = -0.9;  // share that a flank's stiffness may start with
+constexpr double kTail = 0.002;  // of the samples, beyond the outer points
+constexpr double kProbe = 0.05;  // of a strength that would show clearly
 constexpr int kBlocks = 12;
 constexpr double kRidge = 1e-6;  // of the mean squared sensitivity: decides what nothing else does
-
-struct MapKind {
-  const char *acts_on, *coordinate;
-  bool needs_load;
-};
-
-// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque
-// itself would explain everything, and so would time where the torque is commanded in ramps.
-constexpr MapKind kKinds[] = {
-    {"motor", "motor_position", false},
-    {"motor", "motor_velocity", false},
-    {"motor", "motor_torque", true},
-    {"motor", "mesh_torque", true},
-    {"motor", "time", true},
-    {"load", "load_position", true},
-    {"load", "load_velocity", true},
-    {"load", "mesh_torque", true},
-    {"load", "time", true},
-    {"gap", "load_position", true},
-    {"gap", "mesh_torque", true},
-    {"forward_flank", "load_position", true},
-    {"backward_flank", "load_position", true},
-    {"forward_stiffness", "load_position", true},
-    {"backward_stiffness", "load_position", true},
-};
 
 std::vector<double> coordinate(const std::string& name, const RecordSet& records, const Machine& machine) {
   std::vector<double> all;
@@ -80,22 +51,14 @@ std::vector<double> points_over(std::vector<double> values) {
   return points;
 }
 
-bool is_stiffness(const std::string& acts_on) {
-  return acts_on.find("stiffness") != std::string::npos;
-}
-
-double clear_strength(const std::string& acts_on, const MotionRange& range) {
-  if (acts_on == "motor" || acts_on == "load") return kShowing * range.torque;
-  return is_stiffness(acts_on) ? kStiffnessShowing : kGapShowing * range.deflection;
-}
-
 ParameterValues map_values(const MapKind& kind, const std::vector<double>& points,
                            std::vector<double> values) {
+  const TermMap& map = *map_term().map;
   ParameterValues p;
-  p.set_choice("acts_on", kind.acts_on);
-  p.set_choice("coordinate", kind.coordinate);
-  p.set_list("points", points);
-  p.set_list("values", std::move(values));
+  p.set_choice(map.acts_on, kind.acts_on);
+  p.set_choice(map.coordinate, kind.coordinate);
+  p.set_list(map.points, points);
+  p.set_list(map.values, std::move(values));
   return p;
 }
 
@@ -108,7 +71,7 @@ Eigen::MatrixXd columns(const MapKind& kind, const std::vector<double>& points, 
     std::vector<double> values(kPoints, 0.0);
     values[i] = step;
     Rig rig = fit.machine.rig;
-    rig.terms.push_back(make_term("learned_map", map_values(kind, points, values)));
+    rig.terms.push_back(make_term(map_term().id, map_values(kind, points, values)));
     try {
       all.col(i) = remainder.without(records.rows(rig, fit.machine.calibrations) - now) / step;
     } catch (const Cancelled&) {
@@ -179,7 +142,7 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
     if (!(square < least)) continue;
     least = square;
     Eigen::VectorXd v = (all + belief).ldlt().solve(gradient);
-    if (is_stiffness(kind.acts_on)) v = v.cwiseMax(kSoftest);
+    v = v.cwiseMax(kind.least);
     best.values = map_values(kind, points, {v.begin(), v.end()});
     best.smoothness = weight;
     best.gain = 1 - std::sqrt(std::max(0.0, square)) / left.norm();
@@ -189,16 +152,29 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
 
 }  // namespace
 
+const TermType& map_term() {
+  static const TermType& type = term_type_that([](const TermType& t) { return t.map.has_value(); });
+  return type;
+}
+
+const MapKind& kind_of(const ParameterValues& values) {
+  const TermMap& map = *map_term().map;
+  for (const MapKind& kind : map.kinds)
+    if (kind.acts_on == values.choice(map.acts_on) && kind.coordinate == values.choice(map.coordinate))
+      return kind;
+  throw InvalidParameter(map.coordinate, values.choice(map.coordinate), "is not one that is learned");
+}
+
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
                                          const MotionRange& range) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
   const Remainder remainder(fit, now.size());
   std::vector<LearnedCandidate> all;
-  for (const MapKind& kind : kKinds) {
+  for (const MapKind& kind : map_term().map->kinds) {
     if (kind.needs_load && !load_moves_freely(fit.machine.rig)) continue;
     const std::vector<double> points = points_over(coordinate(kind.coordinate, records, fit.machine));
     if (points.empty()) continue;
-    const double step = kProbe * clear_strength(kind.acts_on, range);
+    const double step = kProbe * kind.typical(range);
     const LearnedCandidate one = learn(
         kind, points, columns(kind, points, step, fit, records, remainder, now), remainder.left(), records);
     if (one.gain > 0) all.push_back(one);
@@ -210,17 +186,18 @@ std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet&
 
 Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range) {
   const std::size_t place = machine.rig.terms.size();
-  machine.rig.terms.push_back(make_term("learned_map", candidate.values));
-  const double scale = clear_strength(candidate.values.choice("acts_on"), range);
+  machine.rig.terms.push_back(make_term(map_term().id, candidate.values));
+  const TermMap& map = *map_term().map;
+  const double scale = kind_of(candidate.values).typical(range);
   for (std::size_t i = 0; i < kPoints; ++i)
-    machine.parameters.push_back(list_parameter(place, "values", i, scale));
+    machine.parameters.push_back(list_parameter(place, map.values, i, scale));
   const double root = std::sqrt(candidate.smoothness), ridge = std::sqrt(kRidge * candidate.smoothness);
   for (std::size_t i = 0; i < kPoints; ++i) {
     machine.beliefs.push_back(
-        [=](const Rig& rig) { return ridge * rig.terms[place]->values.list("values")[i]; });
+        [=, &map](const Rig& rig) { return ridge * rig.terms[place]->values.list(map.values)[i]; });
     if (i + 2 < kPoints)
-      machine.beliefs.push_back([=](const Rig& rig) {
-        const std::vector<double>& v = rig.terms[place]->values.list("values");
+      machine.beliefs.push_back([=, &map](const Rig& rig) {
+        const std::vector<double>& v = rig.terms[place]->values.list(map.values);
         return root * (v[i] - 2 * v[i + 1] + v[i + 2]);
       });
   }

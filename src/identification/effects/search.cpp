@@ -63,15 +63,27 @@ std::vector<std::vector<double>> places(const Candidate& candidate) {
 bool takes_noise_away(const std::vector<Accepted>& effects, const Leftover& left) {
   return left.torque < kLessThanNoise &&
          std::any_of(effects.begin(), effects.end(), [](const Accepted& effect) {
-           return effect.candidate.id == kLearned &&
-                  effect.candidate.terms.front().choice("coordinate") == "motor_torque";
+           return is_learned(effect.candidate.id) &&
+                  kind_of(effect.candidate.terms.front()).coordinate == channel_name(Channel::motor_torque);
          });
 }
 
 }  // namespace
 
+bool is_learned(const std::string& id) {
+  return term_type(id).map.has_value();
+}
+
+bool is_delay(const std::string& id) {
+  return term_type(id).calibrates == Calibrates::torque_delay;
+}
+
+bool stands_in_for_contact_law(const std::string& id) {
+  return term_type(id).stands_in_for_contact_law;
+}
+
 bool is_friction(const std::string& parameter) {
-  return parameter.find("viscous") != std::string::npos || parameter.find("coulomb") != std::string::npos;
+  return servo_parameter(parameter).is_friction();
 }
 
 Search::Search(const Rig& declared, const std::vector<ServoData>& train, double cutoff,
@@ -141,13 +153,8 @@ std::vector<std::string> Search::parameter_names() const {
   const Rig& rig = declared_.rig;
   std::vector<std::string> names;
   for (const RigParameter& p : servo_parameters()) {
-    const bool of_mesh = p.name.find("mesh") == 0 || p.name == "backlash_angle";
-    if (p.name == "start_in_gap" || (of_mesh && rig.mesh.rigid)) continue;
-    if (p.name.find("load") == 0 && !load_moves_freely(rig)) continue;
-    if (of_mesh && p.name != "backlash_angle") {
-      const std::string key = p.name.substr(5);
-      if (!rig.mesh.contact_spec.values.has(key)) continue;
-    }
+    if (p.kind == ParameterKind::start_in_gap || !p.known_to(rig)) continue;
+    if (p.part == RigPart::link && !load_moves_freely(rig)) continue;
     if (p.get(rig) != 0) names.push_back(p.name);
   }
   return names;
@@ -178,7 +185,7 @@ double Search::share(const std::string& id) const {
 }
 
 Machine Search::extended(Machine machine, const Candidate& candidate) const {
-  if (candidate.id != kLearned) return with_candidate(std::move(machine), candidate, range_);
+  if (!is_learned(candidate.id)) return with_candidate(std::move(machine), candidate, range_);
   return with_map(std::move(machine), {candidate.terms.front(), candidate.smoothness, 0}, range_);
 }
 
@@ -229,7 +236,7 @@ std::optional<Search::Trial> Search::tried(const Candidate& candidate, double wa
   Trial trial{candidate, {}, {}, 0};
   const auto fit = attempted([&] {
     trial.start = extended(stage_->fit.machine, candidate);
-    if (candidate.id == "delay") take_over_calibration(trial.start, data_.front().interval);
+    if (is_delay(candidate.id)) take_over_calibration(trial.start, data_.front().interval);
     const bool map = !trial.start.beliefs.empty();
     const MachineFit rough = fit_machine(trial.start, stage_->records, fit_options(kRoughTolerance, map));
     if (rough.fit.residuals.norm() > kHopeless * wanted) throw CannotIdentify("far from what was wanted");
@@ -337,7 +344,7 @@ bool Search::adopt(std::vector<Accepted> effects) {
   std::optional<Stage> fitted = attempted([&] {
     Machine machine = with_effects(effects);
     const bool delay = std::any_of(effects.begin(), effects.end(),
-                                   [](const Accepted& effect) { return effect.candidate.id == "delay"; });
+                                   [](const Accepted& effect) { return is_delay(effect.candidate.id); });
     if (delay)
       without_calibration(machine);
     else
@@ -400,7 +407,7 @@ bool Search::add_map() {
   const HeldOut now = held_out(stage_->fit, stage_->start, stage_->records);
   for (std::size_t i = 0; i < std::min(kMapTrials, maps.size()); ++i) {
     if (maps[i].gain < kLeastPredicted * settings_.least_gain_unclear) break;
-    const auto trial = tried({kLearned, {maps[i].values}, maps[i].gain, maps[i].smoothness});
+    const auto trial = tried({map_term().id, {maps[i].values}, maps[i].gain, maps[i].smoothness});
     if (!trial) continue;
     const Gain gain = compare(now, held_out(trial->fit, trial->start, stage_->records));
     if (gain.evidence.gain_held_out < settings_.least_gain_unclear || !convinces(gain, trial->fit.machine))
@@ -440,7 +447,7 @@ void Search::add_learned() {
 
 void Search::add_effects() {
   while (effects_.size() < settings_.most_effects && add_one())
-    if (effects_.back().candidate.id == kHardening) try_other_teeth();
+    if (stands_in_for_contact_law(effects_.back().candidate.id)) try_other_teeth();
 }
 
 }  // namespace backlash

@@ -29,8 +29,10 @@ constexpr double kNearFloor = 2;       // times the floor: what is left is mostl
 constexpr double kClearlyRight = 1.3;  // times the floor: no other order, no other set needs to be tried
 constexpr double kHalf = 0.5;          // of a residual: an effect that explains less may stand in for another
 
-const char* const kLearned = "learned_map";
-const char* const kHardening = "mesh_hardening";
+/// What the term of this id is for the search (model/term.h).
+bool is_learned(const std::string& id);
+bool is_delay(const std::string& id);
+bool stands_in_for_contact_law(const std::string& id);
 
 bool is_friction(const std::string& parameter);
 

@@ -15,12 +15,13 @@ namespace {
 
 constexpr double kClearlyLess = 0.9;  // of a residual: worth another set of effects
 constexpr double kAsGood = 1.02;      // of a residual: then fewer parameters are better
-const char* const kAsymmetry = "_asymmetry";
 
-double asymmetry_of(const std::string& friction, const Rig& rig) {
-  for (const RigParameter& p : servo_parameters())
-    if (p.name == friction + kAsymmetry) return p.get(rig);
-  return 0;
+/// Friction below 0, of one direction or of both: it would drive the body.
+bool friction_drives(const FitParameter& p, const Rig& rig) {
+  const RigParameter& friction = servo_parameter(p.name);
+  if (!friction.is_friction() || friction.is_asymmetry()) return false;
+  const RigParameter* asymmetry = asymmetry_of(friction);
+  return p.get(rig) < (asymmetry ? std::fabs(asymmetry->get(rig)) : 0);
 }
 
 }  // namespace
@@ -47,9 +48,10 @@ void Search::drop_superfluous() {
 /// show.
 bool Search::try_other_teeth() {
   std::vector<Accepted> others = effects_;
-  others.erase(std::remove_if(others.begin(), others.end(),
-                              [](const Accepted& effect) { return effect.candidate.id == kHardening; }),
-               others.end());
+  others.erase(
+      std::remove_if(others.begin(), others.end(),
+                     [](const Accepted& effect) { return stands_in_for_contact_law(effect.candidate.id); }),
+      others.end());
   const auto teeth =
       with_hertzian_teeth(base_->fit.machine.rig, range_.torque);  // hardening has its own stiffness
   const bool news = others.size() < effects_.size() && teeth_tried_with_ != effects_.size();
@@ -89,7 +91,7 @@ void Search::put_on(const Rig& teeth) {
   declared_.rig = teeth;
   for (const RigParameter& p : servo_parameters()) {
     // Without the effects that it lacks the machine may have wanted less friction than none.
-    if (is_friction(p.name) && p.get(teeth) <= 0) p.set(declared_.rig, p.get(declared));
+    if (p.is_friction() && p.get(teeth) <= 0) p.set(declared_.rig, p.get(declared));
   }
   declare_parameters();
 }
@@ -101,7 +103,7 @@ bool Search::dropped(std::size_t effect) {
   const Stage stage = *stage_;
   drop(effect);
   const bool learned = std::any_of(effects.begin(), effects.end(),
-                                   [](const Accepted& e) { return e.candidate.id == kLearned; });
+                                   [](const Accepted& e) { return is_learned(e.candidate.id); });
   if (!learned || size(stage_->leftover) * (1 - settings_.least_gain_unclear) < size(stage.leftover))
     return true;
   effects_ = effects;
@@ -182,16 +184,13 @@ void Search::drop_stand_ins() {
 void Search::hold_friction() {
   for (bool negative = true; negative;) {
     const Machine& now = stage_->fit.machine;
-    auto at =
-        std::find_if(declared_.parameters.begin(), declared_.parameters.end(), [&](const FitParameter& p) {
-          return is_friction(p.name) && p.name.find(kAsymmetry) == std::string::npos &&
-                 p.get(now.rig) < std::fabs(asymmetry_of(p.name, now.rig));
-        });
+    auto at = std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
+                           [&](const FitParameter& p) { return friction_drives(p, now.rig); });
     negative = at != declared_.parameters.end();
     if (!negative) return;
     const auto asymmetry =
         std::find_if(declared_.parameters.begin(), declared_.parameters.end(),
-                     [&](const FitParameter& p) { return p.name == at->name + kAsymmetry; });
+                     [&](const FitParameter& p) { return servo_parameter(p.name).mean == at->name; });
     if (asymmetry != declared_.parameters.end()) at = asymmetry;
     held_.push_back(at->name);
     at->set(stage_->fit.machine.rig, 0);

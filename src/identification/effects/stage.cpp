@@ -70,9 +70,10 @@ void take_over_calibration(Machine& machine, double interval) {
   double mean = 0;
   for (const Calibration& c : machine.calibrations)
     mean += c.torque_delay / double(machine.calibrations.size());
-  ParameterValues values = machine.rig.terms.back()->values;
-  values["delay"] += mean * interval;
-  machine.rig.terms.back() = make_term("delay", values);
+  std::shared_ptr<const Term>& term = machine.rig.terms.back();
+  ParameterValues values = term->values;
+  values[term_type(term->id).search->strength] += mean * interval;
+  term = make_term(term->id, values);
   without_calibration(machine);
 }
 

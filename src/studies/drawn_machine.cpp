@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "machine.h"
+#include "drawn_machine.h"
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 
 namespace backlash {
 
-Rig machine_of(const RigFile& file, std::uint64_t seed) {
+Rig draw_machine(const RigFile& file, std::uint64_t seed) {
   Rig rig = file.rig;
   Random random(seed);
   for (Coupling* coupling : {&rig.input_coupling, &rig.output_coupling})
