@@ -38,12 +38,12 @@ ResponseDetail respond(const Record& record) {
       best = std::move(d);
     }
   }
-  const std::pair<const char*, Kept> kinds[] = {
-      {"a", Kept::total_inertia}, {"b", Kept::motor_inertia}, {"c", Kept::both_inertias}};
-  for (const auto& [letter, kept] : kinds) {
+  const std::pair<const char*, KnownInertia> kinds[] = {
+      {"a", KnownInertia::total_inertia}, {"b", KnownInertia::motor_inertia}, {"c", KnownInertia::both_inertias}};
+  for (const auto& [letter, known] : kinds) {
     try {
       best.alternatives[letter] =
-          split_stiffness(kept, best.resonances, best.plateaus.total, best.plateaus.motor);
+          split_stiffness(known, best.resonances, best.plateaus.total, best.plateaus.motor);
     } catch (
         const CannotIdentify&) {  // frequencies and inertias that contradict each other: the fit tells more
     }

@@ -92,7 +92,7 @@ TwoMass TwoMassFit::model() const {
 TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse& load) {
   const Resonances seen = find_resonances(motor);
   const InertiaPlateaus inertias = find_inertias(motor, seen);
-  const StiffnessSplit start = split_stiffness(Kept::total_inertia, seen, inertias.total, {});
+  const StiffnessSplit start = split_stiffness(KnownInertia::total_inertia, seen, inertias.total, {});
   const double k = start.stiffness_anti_resonance.value, total = inertias.total.value;
   const double critical = 2 * std::sqrt(k * start.reduced_inertia.value);
   const double viscous = 2 * M_PI * motor.points.front().frequency * total;
