@@ -3,7 +3,6 @@
 
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
-#include "friction_parameters.h"
 #include "steps.h"
 
 namespace backlash {
@@ -11,10 +10,8 @@ namespace {
 
 /// All that the rig declares, of the bodies and the mesh that it has.
 bool can_be_fitted(const RigParameter& p, const Rig& rig) {
-  const bool of_mesh = p.name.find("mesh") == 0 || p.name == "backlash_angle";
-  if (p.name == "start_in_gap" || (of_mesh && rig.mesh.rigid)) return false;
-  if (p.name.find("load") == 0 && !load_moves_freely(rig)) return false;
-  if (of_mesh && p.name != "backlash_angle" && !rig.mesh.contact_spec.values.has(p.name.substr(5))) return false;
+  if (p.kind == ParameterKind::start_in_gap || !p.known_to(rig)) return false;
+  if (p.part == RigPart::link && !load_moves_freely(rig)) return false;
   return p.get(rig) != 0;
 }
 
@@ -38,7 +35,7 @@ std::vector<FitParameter> declared_parameters(const Rig& rig) {
     FitParameter p = machine_parameter(declared.name, rig);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back. With a
     // locked link damping is hardly told and stays where it is.
-    if (p.positive && is_friction(p.name) && !rig.link_locked) {
+    if (p.positive && declared.is_friction() && !rig.link_locked) {
       p.positive = false;
       p.scale = p.get(rig);
     }

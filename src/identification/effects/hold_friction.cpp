@@ -2,22 +2,29 @@
 #include <algorithm>
 #include <cmath>
 
-#include "friction_parameters.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "steps.h"
 
 namespace backlash {
 namespace {
 
-/// The first friction that is below 0 in one direction or both: it, or the difference of the directions if it has one.
+/// Friction below 0, of one direction or of both: it would drive the body.
+bool drives(const FitParameter& p, const Rig& rig) {
+  const RigParameter& friction = servo_parameter(p.name);
+  if (!friction.is_friction() || friction.is_asymmetry()) return false;
+  const RigParameter* asymmetry = asymmetry_of(friction);
+  return p.get(rig) < (asymmetry ? std::fabs(asymmetry->get(rig)) : 0);
+}
+
+/// The first friction that drives, or the difference of its directions where that is fitted.
 std::optional<FitParameter> negative_friction(const Hypothesis& h) {
   const std::vector<FitParameter>& all = h.declared->parameters;
   const Rig& rig = h.fitted->fit.machine.rig;
-  const auto negative = std::find_if(all.begin(), all.end(), [&](const FitParameter& p) {
-    return is_friction(p.name) && !is_asymmetry(p.name) && p.get(rig) < std::fabs(asymmetry(p.name, rig));
-  });
+  const auto negative =
+      std::find_if(all.begin(), all.end(), [&](const FitParameter& p) { return drives(p, rig); });
   if (negative == all.end()) return std::nullopt;
   const auto difference = std::find_if(all.begin(), all.end(), [&](const FitParameter& p) {
-    return p.name == asymmetry_of(negative->name);
+    return servo_parameter(p.name).mean == negative->name;
   });
   return difference != all.end() ? *difference : *negative;
 }

@@ -4,7 +4,6 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "contact_shape.h"
 #include "effect_ids.h"
-#include "friction_parameters.h"
 #include "steps.h"
 
 namespace backlash {
@@ -16,7 +15,7 @@ Machine declared_with(const Rig& teeth, const Machine& declared) {
   machine.rig = teeth;
   for (const RigParameter& p : servo_parameters()) {
     // Without the effects that it lacks the machine may have wanted less friction than none.
-    if (is_friction(p.name) && p.get(teeth) <= 0) p.set(machine.rig, p.get(declared.rig));
+    if (p.is_friction() && p.get(teeth) <= 0) p.set(machine.rig, p.get(declared.rig));
   }
   machine.parameters = declared_parameters(machine.rig);
   return machine;

@@ -124,11 +124,7 @@ void check_traced_rig_text(const RigFile& declared) {
   trace.augmented = load_side(declared.rig);
   trace.augmented.terms.push_back(make_term("delay", {{"delay", 0}}));
   for (const RigParameter& p : servo_parameters()) {
-    const bool of_mesh = p.name.find("mesh") == 0 || p.name == "backlash_angle" || p.name == "start_in_gap";
-    if (of_mesh && declared.rig.mesh.rigid) continue;
-    const bool of_contact = p.name.find("mesh_") == 0;
-    if (of_contact && !declared.rig.mesh.contact_spec.values.has(p.name.substr(5))) continue;
-    if (p.get(declared.rig) == 0) continue;
+    if (!p.known_to(declared.rig) || p.get(declared.rig) == 0) continue;
     trace.parameters[p.name] = {p.get(trace.augmented), 0};
     trace.units[p.name] = p.unit;
   }
