@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/signal/noise.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <optional>
+
+#include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash {
 namespace {
@@ -59,9 +60,7 @@ double white_share(const std::vector<double>& values, const std::vector<Stretch>
     }
   const double mean = covariance.trace() / order;
   if (!(mean > 0)) return 1;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, order, order>> solver(covariance,
-                                                                                  Eigen::EigenvaluesOnly);
-  return std::max(0.0, solver.eigenvalues()[0]) / mean;
+  return std::max(0.0, symmetric_eigenvalues(covariance)[0]) / mean;
 }
 
 /// From period to period; nothing with fewer than two periods.
@@ -83,21 +82,19 @@ std::optional<NoiseRange> between_periods(const std::vector<double>& signal, dou
   return NoiseRange{repeats ? std::sqrt(variance) : 0, std::sqrt(variance)};
 }
 
-/// What a projection leaves of a stretch is orthogonal to all cubics.
-Eigen::Matrix<double, kStretch, kStretch> cubic_residual() {
-  Eigen::Matrix<double, kStretch, kCubic> powers;
+/// Orthonormal cubics over a stretch.
+Eigen::MatrixXd cubics() {
+  Eigen::MatrixXd powers(kStretch, kCubic);
   for (int i = 0; i < kStretch; ++i)
     for (int k = 0; k < kCubic; ++k) powers(i, k) = std::pow((i - 4.5) / 4.5, k);
-  const Eigen::HouseholderQR<Eigen::Matrix<double, kStretch, kCubic>> qr(powers);
-  const Eigen::Matrix<double, kStretch, kCubic> basis =
-      qr.householderQ() * Eigen::Matrix<double, kStretch, kCubic>::Identity();
-  return Eigen::Matrix<double, kStretch, kStretch>::Identity() - basis * basis.transpose();
+  return orthonormal_basis(powers);
 }
 
 /// Within a period; NaN without a stretch.
 double within_period(const std::vector<double>& signal) {
-  static const Eigen::Matrix<double, kStretch, kStretch> residual = cubic_residual();
-  auto stretches = stretches_of(signal, [](const Samples& x) { return (residual * x).squaredNorm(); });
+  static const Eigen::Matrix<double, kStretch, kCubic> cubic = cubics();
+  auto stretches = stretches_of(
+      signal, [](const Samples& x) { return (x - cubic * (cubic.transpose() * x)).squaredNorm(); });
   if (stretches.empty()) return NoiseRange().upper;
   return std::sqrt(stretches[sort_calm(stretches)].sum / kQuantile6);
 }
