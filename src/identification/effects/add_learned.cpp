@@ -13,13 +13,13 @@ namespace {
 
 std::vector<std::string> nearest_effects(const Hypothesis& h, const SearchContext& context) {
   std::vector<std::string> ids;
-  for (const Candidate& c :
-       screen(h.fitted->fit, h.fitted->records, context.range, context.settings.screen))
+  for (const Candidate& c : screen(h.fitted->fit, h.fitted->records, context.range, context.settings.screen))
     if (ids.size() < context.settings.maps.nearest) ids.push_back(c.id);
   return ids;
 }
 
-/// With the effects alone that explain more than half of their residual. Friction of one channel always is such a rest.
+/// With the effects alone that explain more than half of their residual. Friction of one channel always is
+/// such a rest.
 Hypothesis without_stand_ins(const Hypothesis& named, const SearchContext& context) {
   Hypothesis h = named;
   if (!load_moves_freely(h.declared->rig)) return h;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "candidates.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "orthogonal_part.h"
 
@@ -79,11 +79,9 @@ struct Explained {
   double gain = 0;
 };
 
-Explained explain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& left, double same) {
+Explained explain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& left) {
   Explained e;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
-  qr.setThreshold(same);
-  e.factors = qr.solve(-left);
+  e.factors = solve_least_squares(columns, -left).x;
   e.gain = 1 - (left + columns * e.factors).norm() / left.norm();
   return e;
 }
@@ -103,18 +101,18 @@ bool set_strength(const Probed& p, const double* factors, ParameterValues& value
   return false;
 }
 
-Candidate single(const Probed& p, const Eigen::VectorXd& left, double same) {
+Candidate single(const Probed& p, const Eigen::VectorXd& left) {
   Candidate c{p.type->id, {{}}, 0, 0};
-  const Explained e = explain(p.columns, left, same);
+  const Explained e = explain(p.columns, left);
   if (set_strength(p, e.factors.data(), c.terms[0])) c.gain = e.gain;
   return c;
 }
 
-Candidate pair(const Probed& a, const Probed& b, const Eigen::VectorXd& left, double same) {
+Candidate pair(const Probed& a, const Probed& b, const Eigen::VectorXd& left) {
   Candidate c{a.type->id, {{}, {}}, 0, 0};
   Eigen::MatrixXd both(a.columns.rows(), a.columns.cols() + b.columns.cols());
   both << a.columns, b.columns;
-  const Explained e = explain(both, left, same);
+  const Explained e = explain(both, left);
   if (set_strength(a, e.factors.data(), c.terms[0]) &&
       set_strength(b, e.factors.data() + a.columns.cols(), c.terms[1]))
     c.gain = e.gain;
@@ -182,11 +180,10 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, c
   });
   std::map<std::string, Candidate> best;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    keep_better(best, all[i].group, single(all[i], left, settings.same));
+    keep_better(best, all[i].group, single(all[i], left));
     if (!all[i].type->search->pairs) continue;
     for (std::size_t j = 0; j < i; ++j)
-      if (all[j].group == all[i].group)
-        keep_better(best, all[i].group + " pair", pair(all[j], all[i], left, settings.same));
+      if (all[j].group == all[i].group) keep_better(best, all[i].group + " pair", pair(all[j], all[i], left));
   }
   std::vector<Candidate> sorted;
   for (const auto& [group, candidate] : best)

@@ -6,8 +6,8 @@
 
 namespace backlash {
 
-// Friction of a machine with one channel is never quite what a term says, and its residual never at the floor; there
-// what was found stands, and what remains is told beside it.
+// Friction of a machine with one channel is never quite what a term says, and its residual never at the
+// floor; there what was found stands, and what remains is told beside it.
 Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context) {
   const double half = context.settings.revision.half;
   const Misfit& left = misfit(h);
@@ -20,8 +20,9 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context) {
   none.effects.clear();
   none.fitted = h.base;
   for (const Effect& effect : h.effects)
-    none = with_rejected(std::move(none), effect.candidate.id,
-                         "what is left stays far above the noise: it may stand in for an effect that has no name");
+    none = with_rejected(
+        std::move(none), effect.candidate.id,
+        "what is left stays far above the noise: it may stand in for an effect that has no name");
   return none;
 }
 

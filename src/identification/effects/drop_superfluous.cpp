@@ -7,7 +7,8 @@
 namespace backlash {
 namespace {
 
-/// Whether the others, fitted with the same weights, leave so much more that the effect convinces beside them.
+/// Whether the others, fitted with the same weights, leave so much more that the effect convinces beside
+/// them.
 bool needed(const Hypothesis& h, std::size_t effect, const SearchContext& context) {
   const SearchSettings& settings = context.settings;
   const RecordSet& records = h.fitted->records;
@@ -15,7 +16,8 @@ bool needed(const Hypothesis& h, std::size_t effect, const SearchContext& contex
   fewer.erase(fewer.begin() + long(effect));
   Machine start = start_with(h, fewer, context);
   const auto fit = attempted([&] {
-    start = fit_machine(start, records, fit_options(settings.fit, settings.fit.rough_tolerance, false)).machine;
+    start =
+        fit_machine(start, records, fit_options(settings.fit, settings.fit.rough_tolerance, false)).machine;
     return fit_machine(start, records, fit_options(settings.fit, settings.fit.tolerance, false));
   });
   if (!fit) return true;

@@ -4,9 +4,9 @@
 
 namespace backlash {
 
-constexpr const char* kLearnedMap = "learned_map";      // fitted by learned.h, not sought as a term
-constexpr const char* kHardening = "mesh_hardening";    // may be teeth of another law
-constexpr const char* kDelay = "delay";                 // calibration is part of it
-constexpr const char* kPresliding = "presliding";       // every friction has some
+constexpr const char* kLearnedMap = "learned_map";    // fitted by learned.h, not sought as a term
+constexpr const char* kHardening = "mesh_hardening";  // may be teeth of another law
+constexpr const char* kDelay = "delay";               // calibration is part of it
+constexpr const char* kPresliding = "presliding";     // every friction has some
 
 }  // namespace backlash

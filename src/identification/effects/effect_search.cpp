@@ -100,11 +100,11 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   describe_errors(result, on_test, records, settings.fit, trace);
   if (found.other_teeth)
     trace.notes.push_back(
-        "the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; so they are in "
+        "the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; so "
+        "they are in "
         "the model, but nothing is called missing for it");
   note_shape_of_friction(found, settings.shape_of_friction, trace);
-  trace.unexplained =
-      signature(found.fitted->fit.machine, found.fitted->records, settings.unexplained);
+  trace.unexplained = signature(found.fitted->fit.machine, found.fitted->records, settings.unexplained);
   if (!trace.steps.empty())
     trace.verdict = TraceVerdict::effect_found;
   else if (trace.unexplained)

@@ -15,8 +15,8 @@ bool can_be_fitted(const RigParameter& p, const Rig& rig) {
   return p.get(rig) != 0;
 }
 
-/// With a locked link the middle of the gap and of both wind-ups is in the middle of the travel, and both flanks must
-/// have touched.
+/// With a locked link the middle of the gap and of both wind-ups is in the middle of the travel, and both
+/// flanks must have touched.
 void start_in_travel(Machine& machine, const std::vector<ServoData>& data) {
   double& gap = machine.rig.mesh.backlash;
   for (std::size_t i = 0; i < data.size(); ++i) {
@@ -33,8 +33,8 @@ std::vector<FitParameter> declared_parameters(const Rig& rig) {
   for (const RigParameter& declared : servo_parameters()) {
     if (!can_be_fitted(declared, rig)) continue;
     FitParameter p = machine_parameter(declared.name, rig);
-    // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back. With a
-    // locked link damping is hardly told and stays where it is.
+    // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
+    // With a locked link damping is hardly told and stays where it is.
     if (p.positive && declared.is_friction() && !rig.link_locked) {
       p.positive = false;
       p.scale = p.get(rig);

@@ -121,8 +121,9 @@ std::vector<std::string> harm_warnings(const std::vector<FoundEffect>& steps) {
   std::vector<std::string> warnings;
   for (const FoundEffect& e : steps)
     if (e.test_error_after > kWorse * e.test_error_before)
-      warnings.push_back(fmt::format("{} makes the test record worse ({} {:.3g} -> {:.3g} %): not to be believed",
-                                     e.id, e.channel, 100 * e.test_error_before, 100 * e.test_error_after));
+      warnings.push_back(
+          fmt::format("{} makes the test record worse ({} {:.3g} -> {:.3g} %): not to be believed", e.id,
+                      e.channel, 100 * e.test_error_before, 100 * e.test_error_after));
   return warnings;
 }
 

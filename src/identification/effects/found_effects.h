@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The effects of a hypothesis as a report says them: parameters with standard errors, evidence, errors on the unseen
-// record.
+// The effects of a hypothesis as a report says them: parameters with standard errors, evidence, errors on the
+// unseen record.
 #pragma once
 
 #include <map>
@@ -11,7 +11,8 @@
 
 namespace backlash {
 
-/// Fitted values with standard errors: of the machine by name, of the effects in the order of their fitted parameters.
+/// Fitted values with standard errors: of the machine by name, of the effects in the order of their fitted
+/// parameters.
 struct FittedValues {
   std::map<std::string, Measured> machine;
   std::vector<Measured> effects;

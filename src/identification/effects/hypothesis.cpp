@@ -89,7 +89,8 @@ Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, cons
   return machine;
 }
 
-std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects, const SearchContext& context) {
+std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
+                                   const SearchContext& context) {
   auto fit = attempted(
       [&] { return fit_with_effects(start_with(h, effects, context), has(effects, kDelay), context); });
   if (!fit || takes_noise_away(effects, fit->misfit, context.settings.maps)) return std::nullopt;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the search compares: a machine with some effects, fitted, with the evidence for each effect and the reasons why
-// others are not in it. A value: steps of the search take one and give another, cheap to copy.
+// What the search compares: a machine with some effects, fitted, with the evidence for each effect and the
+// reasons why others are not in it. A value: steps of the search take one and give another, cheap to copy.
 #pragma once
 
 #include <functional>
@@ -28,12 +28,12 @@ struct Effect {
 };
 
 struct Hypothesis {
-  std::shared_ptr<const Machine> declared;     // the machine without effects, where its fits start
-  std::shared_ptr<const FittedMachine> base;   // that, fitted
+  std::shared_ptr<const Machine> declared;      // the machine without effects, where its fits start
+  std::shared_ptr<const FittedMachine> base;    // that, fitted
   std::shared_ptr<const FittedMachine> fitted;  // with the effects; base if there are none
   std::vector<Effect> effects;
-  bool other_teeth = false;       // not those that the rig file declares
-  std::vector<std::string> held;  // friction of the machine that is held at 0
+  bool other_teeth = false;              // not those that the rig file declares
+  std::vector<std::string> held;         // friction of the machine that is held at 0
   std::vector<RejectedEffect> rejected;  // the latest last
 };
 
@@ -62,9 +62,10 @@ Machine extended(Machine machine, const Candidate& candidate, const SearchContex
 /// The machine with these effects alone, at the values that it has now: a start for a fit.
 Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, const SearchContext& context);
 
-/// The same machine with these effects instead, fitted at weights of its own. Nothing where that fails, or where a map
-/// over the torque takes the noise away with it.
-std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects, const SearchContext& context);
+/// The same machine with these effects instead, fitted at weights of its own. Nothing where that fails, or
+/// where a map over the torque takes the noise away with it.
+std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
+                                   const SearchContext& context);
 
 /// The result of a fit, or nothing where the model cannot be fitted or followed.
 template <typename Fit>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "learned.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "effect_ids.h"
 #include "orthogonal_part.h"
@@ -120,7 +120,8 @@ struct Blocks {
   std::vector<double> square;
 };
 
-Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const RecordSet& records, int blocks) {
+Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const RecordSet& records,
+                 int blocks) {
   Blocks b;
   b.normal.assign(blocks, Eigen::MatrixXd::Zero(c.cols(), c.cols()));
   b.gradient.assign(blocks, Eigen::VectorXd::Zero(c.cols()));
@@ -140,7 +141,7 @@ Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const Re
 Eigen::MatrixXd roughness() {
   Eigen::MatrixXd d = Eigen::MatrixXd::Zero(kPoints - 2, kPoints);
   for (int i = 0; i + 2 < kPoints; ++i) d(i, i) = 1, d(i, i + 1) = -2, d(i, i + 2) = 1;
-  return d.transpose() * d;
+  return gram(d);
 }
 
 /// Squared norm of what is left in blocks that the map did not see.
@@ -148,7 +149,7 @@ double held_out_square(const Blocks& b, const Eigen::MatrixXd& all, const Eigen:
                        const Eigen::MatrixXd& prior) {
   double sum = 0;
   for (std::size_t k = 0; k < b.normal.size(); ++k) {
-    const Eigen::VectorXd v = (all - b.normal[k] + prior).ldlt().solve(gradient - b.gradient[k]);
+    const Eigen::VectorXd v = solve_symmetric(all - b.normal[k] + prior, gradient - b.gradient[k]);
     sum += b.square[k] - 2 * v.dot(b.gradient[k]) + v.dot(b.normal[k] * v);
   }
   return sum;
@@ -172,7 +173,7 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
     const double square = held_out_square(blocks, all, gradient, prior);
     if (!(square < least)) continue;
     least = square;
-    Eigen::VectorXd v = (all + prior).ldlt().solve(gradient);
+    Eigen::VectorXd v = solve_symmetric(all + prior, gradient);
     if (is_stiffness(kind.acts_on)) v = v.cwiseMax(settings.softest);
     best.values = map_values(kind, points, {v.begin(), v.end()});
     best.smoothness = weight;
@@ -190,11 +191,13 @@ std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet&
   std::vector<LearnedCandidate> all;
   for (const MapKind& kind : kKinds) {
     if (kind.needs_load && !load_moves_freely(fit.machine.rig)) continue;
-    const std::vector<double> points = points_over(coordinate(kind.coordinate, records, fit.machine), settings.tail);
+    const std::vector<double> points =
+        points_over(coordinate(kind.coordinate, records, fit.machine), settings.tail);
     if (points.empty()) continue;
     const double step = settings.probe * clear_strength(kind.acts_on, range, settings);
-    const LearnedCandidate one = learn(
-        kind, points, columns(kind, points, step, fit, records, orthogonal, now), orthogonal.residuals(), records, settings);
+    const LearnedCandidate one =
+        learn(kind, points, columns(kind, points, step, fit, records, orthogonal, now),
+              orthogonal.residuals(), records, settings);
     if (one.gain > 0) all.push_back(one);
   }
   std::stable_sort(all.begin(), all.end(),
@@ -210,7 +213,8 @@ Machine with_map(Machine machine, const LearnedCandidate& candidate, const Motio
   const double scale = clear_strength(candidate.values.choice("acts_on"), range, settings);
   for (std::size_t i = 0; i < kPoints; ++i)
     machine.parameters.push_back(list_parameter(place, "values", i, scale));
-  const double root = std::sqrt(candidate.smoothness), ridge = std::sqrt(settings.ridge * candidate.smoothness);
+  const double root = std::sqrt(candidate.smoothness),
+               ridge = std::sqrt(settings.ridge * candidate.smoothness);
   for (std::size_t i = 0; i < kPoints; ++i) {
     machine.priors.push_back(
         [=](const Rig& rig) { return ridge * rig.terms[place]->values.list("values")[i]; });

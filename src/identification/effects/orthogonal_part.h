@@ -3,13 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 
 #include "../fit/joint_fit.h"
 
 namespace backlash {
 
-/// Projects rows onto what is orthogonal to the sensitivities of a fit: the first `rows` rows, those of the records.
+/// Projects rows onto what is orthogonal to the sensitivities of a fit: the first `rows` rows, those of the
+/// records.
 class OrthogonalPart {
  public:
   OrthogonalPart(const MachineFit& fit, Eigen::Index rows);
@@ -19,8 +19,7 @@ class OrthogonalPart {
   const Eigen::VectorXd& residuals() const { return residuals_; }
 
  private:
-  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
-  Eigen::Index columns_;
+  Eigen::MatrixXd basis_;  // orthonormal, of the sensitivities
   Eigen::VectorXd residuals_;
 };
 

@@ -11,12 +11,12 @@ Hypothesis reconsider(const Hypothesis& before, const SearchContext& context) {
     if (clearly_right(misfit(h), context)) return h;
     const std::string id = h.effects[i].candidate.id;
     context.tell("reconsidering " + id);
-    const Hypothesis other =
-        drop_superfluous(add_effects(without_effect(h, i, context), context), context);
+    const Hypothesis other = drop_superfluous(add_effects(without_effect(h, i, context), context), context);
     if (size(other) < context.settings.revision.clearly_less * size(h)) {
-      h = with_rejected(other, id,
-                        fmt::format("stood in for others: without it {:.3g} times the floor is left, with it {:.3g}",
-                                    size(other), size(h)));
+      h = with_rejected(
+          other, id,
+          fmt::format("stood in for others: without it {:.3g} times the floor is left, with it {:.3g}",
+                      size(other), size(h)));
       i = 0;
     } else {
       ++i;

@@ -12,11 +12,14 @@
 namespace backlash {
 namespace {
 
-/// What is told on the way: a share that never falls back when effects are taken out again, and the best so far.
+/// What is told on the way: a share that never falls back when effects are taken out again, and the best so
+/// far.
 class Told {
  public:
   Told(const SearchSettings& settings, const Progress& progress)
-      : most_(double(settings.asked.most_effects)), best_so_far_(settings.asked.best_so_far), progress_(progress) {}
+      : most_(double(settings.asked.most_effects)),
+        best_so_far_(settings.asked.best_so_far),
+        progress_(progress) {}
 
   void phase(const std::string& phase) {
     phase_ = phase;
@@ -47,7 +50,8 @@ SearchResult search_effects(const Rig& declared, const std::vector<ServoData>& d
                             const SearchSettings& settings, const Progress& progress) {
   Told told(settings, progress);
   const Interruption interruption([&] { return told.goes_on(); });  // fits of minutes end when asked to
-  const SearchContext context{data, motion_range(data), settings, [&](const std::string& p) { told.phase(p); },
+  const SearchContext context{data, motion_range(data), settings,
+                              [&](const std::string& p) { told.phase(p); },
                               [&](const Hypothesis& h) { told.hypothesis(h); }};
   SearchResult result{fit_declared(declared, context), {}};
   Hypothesis h = add_effects_or_teeth(result.declared, context);

@@ -12,8 +12,8 @@ struct SearchResult {
   Hypothesis found;
 };
 
-/// The same for the same records and settings. `settings.fit` has its bands. `data` must outlive the result. Throws
-/// CannotIdentify, Cancelled.
+/// The same for the same records and settings. `settings.fit` has its bands. `data` must outlive the result.
+/// Throws CannotIdentify, Cancelled.
 SearchResult search_effects(const Rig& declared, const std::vector<ServoData>& data,
                             const SearchSettings& settings, const Progress& progress);
 

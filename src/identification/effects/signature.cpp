@@ -12,11 +12,13 @@
 namespace backlash {
 namespace {
 
-constexpr int kBins = 24, kFolds = 12;  // choice: classes of a coordinate; parts of each record, for cross-validation
-constexpr int kLargestOrder = 80;       // choice: of the motor position, load side
-constexpr double kWorthNaming = 0.05;   // choice: of the variance
-constexpr double kWorthSaying = 0.01;   // choice: of the signal: what is smaller lies within what any model neglects
-constexpr std::size_t kMostNames = 3;   // choice
+constexpr int kBins = 24,
+              kFolds = 12;  // choice: classes of a coordinate; parts of each record, for cross-validation
+constexpr int kLargestOrder = 80;      // choice: of the motor position, load side
+constexpr double kWorthNaming = 0.05;  // choice: of the variance
+constexpr double kWorthSaying =
+    0.01;  // choice: of the signal: what is smaller lies within what any model neglects
+constexpr std::size_t kMostNames = 3;  // choice
 
 /// Residual of one channel and what it may follow, samples that count, of all records.
 struct Samples {
@@ -117,8 +119,8 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
   }
   u.signature += "; follows";
   for (std::size_t i = 0; i < kMostNames && shares[i].first >= kWorthNaming; ++i)
-    u.signature +=
-        fmt::format("{} {} ({:.0f} % of its variance)", i ? "," : "", shares[i].second, 100 * shares[i].first);
+    u.signature += fmt::format("{} {} ({:.0f} % of its variance)", i ? "," : "", shares[i].second,
+                               100 * shares[i].first);
   return u;
 }
 

@@ -55,20 +55,22 @@ void require_same_rate(const std::vector<ServoData>& train, const ServoData& tes
                            std::to_string(test.interval) + " s cannot be compared");
 }
 
-std::vector<std::string> range_warnings(const std::vector<ServoData>& train, const ServoData& test, bool linear) {
+std::vector<std::string> range_warnings(const std::vector<ServoData>& train, const ServoData& test,
+                                        bool linear) {
   const MotionRange known = motion_range(train), asked = motion_range({test});
   const double slack = kBeyond * (known.to - known.from);
   std::vector<std::string> warnings;
   if (asked.from < known.from - slack || asked.to > known.to + slack)
-    warnings.push_back(
-        fmt::format("the test record moves from {:.3g} to {:.3g} {}, the training records from {:.3g} to {:.3g}",
-                    asked.from, asked.to, axis_unit("rad", linear), known.from, known.to));
-  if (asked.speed > kFaster * known.speed || asked.torque > kFaster * known.torque)
     warnings.push_back(fmt::format(
-        "the test record is faster or stronger than the training records: speed {:.3g} against {:.3g} {}, {} {:.3g} "
-        "against {:.3g} {} (standard deviations)",
-        asked.speed, known.speed, axis_unit("rad/s", linear), linear ? "force" : "torque", asked.torque,
-        known.torque, axis_unit("N m", linear)));
+        "the test record moves from {:.3g} to {:.3g} {}, the training records from {:.3g} to {:.3g}",
+        asked.from, asked.to, axis_unit("rad", linear), known.from, known.to));
+  if (asked.speed > kFaster * known.speed || asked.torque > kFaster * known.torque)
+    warnings.push_back(
+        fmt::format("the test record is faster or stronger than the training records: speed {:.3g} against "
+                    "{:.3g} {}, {} {:.3g} "
+                    "against {:.3g} {} (standard deviations)",
+                    asked.speed, known.speed, axis_unit("rad/s", linear), linear ? "force" : "torque",
+                    asked.torque, known.torque, axis_unit("N m", linear)));
   return warnings;
 }
 

@@ -27,8 +27,8 @@ std::vector<std::vector<double>> places(const Candidate& candidate) {
 
 /// The same with its t-th term's shape some places farther in the grid; nothing where that ends or where two
 /// terms become one.
-std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, const TermShape& shape, long step,
-                                   const MotionRange& range) {
+std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, const TermShape& shape,
+                                   long step, const MotionRange& range) {
   const std::vector<double> grid = shape.values(range);
   const long at =
       std::find(grid.begin(), grid.end(), candidate.terms[t].at(shape.name)) - grid.begin() + step;
@@ -40,7 +40,8 @@ std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, co
   return other;
 }
 
-std::vector<Candidate> neighbours(const Candidate& candidate, const TermShape& shape, const MotionRange& range) {
+std::vector<Candidate> neighbours(const Candidate& candidate, const TermShape& shape,
+                                  const MotionRange& range) {
   std::vector<Candidate> all;
   for (std::size_t t = 0; t < candidate.terms.size(); ++t)
     for (const long step : {-2L, -1L, 1L, 2L})
@@ -79,17 +80,19 @@ std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, cons
   return trial;
 }
 
-Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates, const SearchContext& context) {
+Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
+                  const SearchContext& context) {
   const TrialSettings& settings = context.settings.trials;
   Trials all;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate& c = candidates[i];
-    const double worth = std::max(settings.worth_trying * candidates.front().gain,
-                                  settings.least_predicted * least_gain_in_noise(h.fitted->records, context.settings));
+    const double worth =
+        std::max(settings.worth_trying * candidates.front().gain,
+                 settings.least_predicted * least_gain_in_noise(h.fitted->records, context.settings));
     if (i >= settings.most || c.gain < worth) {
-      all.rejected.push_back({c.id, fmt::format("not fitted: predicted to lessen the residual by {:.2g} %, {}",
-                                                100 * c.gain,
-                                                i >= settings.most ? "others by more" : "too little")});
+      all.rejected.push_back(
+          {c.id, fmt::format("not fitted: predicted to lessen the residual by {:.2g} %, {}", 100 * c.gain,
+                             i >= settings.most ? "others by more" : "too little")});
       continue;
     }
     context.tell(fmt::format("trying {} (predicted gain {:.3g})", c.id, c.gain));

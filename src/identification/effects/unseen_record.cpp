@@ -9,8 +9,9 @@
 namespace backlash {
 namespace {
 
-constexpr int kLags = 25;             // choice: to either side, of the test for independence
-constexpr double kIndependent = 0.4;  // theory: of a period of the cutoff, between independent values of a residual
+constexpr int kLags = 25;  // choice: to either side, of the test for independence
+constexpr double kIndependent =
+    0.4;  // theory: of a period of the cutoff, between independent values of a residual
 
 }  // namespace
 

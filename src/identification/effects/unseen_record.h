@@ -8,8 +8,8 @@
 
 namespace backlash {
 
-/// What a machine says of a record that it was not fitted to, with the record's own calibration. `settings` have their
-/// bands.
+/// What a machine says of a record that it was not fitted to, with the record's own calibration. `settings`
+/// have their bands.
 ServoPrediction predicted(Machine machine, const ServoData& record, const FitSettings& settings);
 
 /// The machine before any effect, then with each effect and those before it.

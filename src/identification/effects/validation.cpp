@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "validation.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kRidge = 1e-10;  // theory: of a squared sensitivity: what only the left-out rows tell stays where it is
+constexpr double kRidge =
+    1e-10;  // theory: of a squared sensitivity: what only the left-out rows tell stays where it is
 
 double duration(const PreparedServo& record) {
   return double(record.data().size()) * record.data().interval;
@@ -28,9 +30,10 @@ Eigen::VectorXd without(const LeastSquaresFit& fit, const Eigen::MatrixXd& norma
                         const std::vector<Eigen::Index>& rows) {
   const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
   const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd rest = unit.asDiagonal() * (normal - j.transpose() * j) * unit.asDiagonal();
+  Eigen::MatrixXd rest = unit.asDiagonal() * (normal - gram(j)) * unit.asDiagonal();
   rest.diagonal().array() += kRidge;
-  return unit.asDiagonal() * rest.ldlt().solve(unit.asDiagonal() * (j.transpose() * fit.residuals(rows)));
+  const Eigen::VectorXd gradient = j.transpose() * fit.residuals(rows);
+  return unit.asDiagonal() * solve_symmetric(rest, unit.asDiagonal() * gradient);
 }
 
 void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& r,
@@ -67,7 +70,7 @@ Squares all_but_worst(const std::vector<double>& before, const std::vector<doubl
 HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records,
                  const AcceptanceSettings& settings) {
   const LeastSquaresFit& f = fit.fit;
-  const Eigen::MatrixXd normal = f.jacobian.transpose() * f.jacobian;
+  const Eigen::MatrixXd normal = gram(f.jacobian);
   HeldOut out;
   const auto everything = rows_where(records, [](const RecordSet::Row&) { return true; });
   add_squares(records, everything, f.residuals(everything), out.torque_train, out.deflection_train);

@@ -9,7 +9,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kHold = 0.5;     // samples, theory: mean delay of a torque that is held from its sample to the next
+constexpr double kHold =
+    0.5;  // samples, theory: mean delay of a torque that is held from its sample to the next
 constexpr double kBetween = 0.25;  // samples, theory: half way between held and of the moment
 
 }  // namespace

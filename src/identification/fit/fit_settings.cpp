@@ -12,18 +12,20 @@ namespace backlash {
 namespace {
 
 // In units of the mesh resonance. Simulation: found on a servo with a resonance of 44 Hz.
-constexpr double kCutoff = 1.35;      // the oscillation after a touch is seen
+constexpr double kCutoff = 1.35;       // the oscillation after a touch is seen
 constexpr double kRoughCutoff = 0.34;  // it is not, the deflection under load is
-constexpr double kFeedback = 0.18;     // of its angular frequency: it stays as it is, chaos in the gap does not
+constexpr double kFeedback = 0.18;  // of its angular frequency: it stays as it is, chaos in the gap does not
 
-constexpr double kHighestCutoff = 0.2;  // theory: of the sampling rate, up to which differences are derivatives
-constexpr double kPeriods = 100;        // choice: in the record: friction has more to say than a slow motion
+constexpr double kHighestCutoff =
+    0.2;                          // theory: of the sampling rate, up to which differences are derivatives
+constexpr double kPeriods = 100;  // choice: in the record: friction has more to say than a slow motion
 
 /// Hz; of the fastest record.
 double motion_cutoff(const std::vector<ServoData>& data) {
   double widest = 0;
   for (const ServoData& d : data)
-    widest = std::max({widest, motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
+    widest =
+        std::max({widest, motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
   return widest;
 }
 
@@ -35,7 +37,8 @@ FitSettings with_bands(FitSettings settings, const Rig& rig, const std::vector<S
   for (const ServoData& d : data) torque = std::max(torque, usual_torque(d.torque));
   const double resonance = mesh_resonance(rig, torque);
   const bool free = load_moves_freely(rig) && resonance > 0;
-  if (settings.cutoff == 0) settings.cutoff = std::min(free ? kCutoff * resonance : motion_cutoff(data), highest);
+  if (settings.cutoff == 0)
+    settings.cutoff = std::min(free ? kCutoff * resonance : motion_cutoff(data), highest);
   if (settings.rough_cutoff == 0)
     settings.rough_cutoff = resonance > 0 ? kRoughCutoff * resonance : settings.cutoff;
   settings.rough_cutoff = std::min(settings.rough_cutoff, settings.cutoff);

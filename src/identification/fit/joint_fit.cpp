@@ -11,13 +11,14 @@
 namespace backlash {
 namespace {
 
-constexpr double kFarthest = 30;       // choice: times the start or a part of it: approached, never reached
-constexpr double kWideStep = 1e-2;     // simulation: relative, of the differences that the errors are taken from
-constexpr double kNegligible = 2e-3;   // choice: of a signal: no floor is lower, no model need be better
-constexpr double kVague = 30;          // choice: times the scale: standard deviation of the prior of a parameter
-constexpr double kDefaultGap = 1e-4;   // rad, choice: scale of an encoder offset where the rig has no gap
-constexpr double kOversampling = 1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
-constexpr long kFewestBlocks = 4;       // choice: per unknown, for a covariance from blocks
+constexpr double kFarthest = 30;    // choice: times the start or a part of it: approached, never reached
+constexpr double kWideStep = 1e-2;  // simulation: relative, of the differences that the errors are taken from
+constexpr double kNegligible = 2e-3;  // choice: of a signal: no floor is lower, no model need be better
+constexpr double kVague = 30;  // choice: times the scale: standard deviation of the prior of a parameter
+constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
+constexpr double kOversampling =
+    1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
+constexpr long kFewestBlocks = 4;  // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));

@@ -29,8 +29,8 @@ struct Weights {
   double torque = 1, deflection = 1;
 };
 
-/// What a machine leaves of the channels of all records: root mean square in units of the noise floor, or of a
-/// negligible part of the signal where that is more.
+/// What a machine leaves of the channels of all records: root mean square in units of the noise floor, or of
+/// a negligible part of the signal where that is more.
 struct Misfit {
   double torque = 0, deflection = 0;
   double torque_share = 0, deflection_share = 0;  // of the signal's standard deviation instead
@@ -102,8 +102,9 @@ class Unknowns {
 
 MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options);
 
-/// Covariance of the fitted values from wide steps and from blocks of the records as long as the time between two
-/// reversals of the motor, the larger: until the next reversal what friction and play leave keeps its sign.
+/// Covariance of the fitted values from wide steps and from blocks of the records as long as the time between
+/// two reversals of the motor, the larger: until the next reversal what friction and play leave keeps its
+/// sign.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
 }  // namespace backlash

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The fit of a machine to records: from several starts in a narrow band, then from the best of them in the whole band.
+// The fit of a machine to records: from several starts in a narrow band, then from the best of them in the
+// whole band.
 #pragma once
 
 #include <functional>
@@ -24,23 +25,23 @@ using BeforeFit = std::function<void()>;
 /// As the settings say, with another tolerance; `with_map`: of a machine with a learned map.
 NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map);
 
-/// One fit with weights of its own, those of `start` in this band [Hz]. `settings` have their bands. `data` must outlive
-/// what is returned. Throws CannotIdentify.
+/// One fit with weights of its own, those of `start` in this band [Hz]. `settings` have their bands. `data`
+/// must outlive what is returned. Throws CannotIdentify.
 FittedMachine fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
                           const FitSettings& settings);
 
-/// The same machine from another start: each parameter > 0 times exp(spread u), u in [-1, 1) from a generator of random
-/// numbers with this seed.
+/// The same machine from another start: each parameter > 0 times exp(spread u), u in [-1, 1) from a generator
+/// of random numbers with this seed.
 Machine other_start(Machine machine, double spread, std::uint64_t seed);
 
-/// The best of several starts in the narrow band. Where `start` leaves more than noise others are tried until one ends
-/// within `same_minimum` of the best before it: that is taken for the lowest minimum. Throws CannotIdentify where no
-/// start can be fitted.
+/// The best of several starts in the narrow band. Where `start` leaves more than noise others are tried until
+/// one ends within `same_minimum` of the best before it: that is taken for the lowest minimum. Throws
+/// CannotIdentify where no start can be fitted.
 FittedMachine fit_from_starts(const std::vector<ServoData>& data, const Machine& start,
                               const FitSettings& settings, const BeforeFit& before_fit = nullptr);
 
-/// The whole fit: from several starts, then in the whole band, where each record's torque is found to be held or of the
-/// moment, with weights renewed from fit to fit. Throws CannotIdentify.
+/// The whole fit: from several starts, then in the whole band, where each record's torque is found to be held
+/// or of the moment, with weights renewed from fit to fit. Throws CannotIdentify.
 FittedMachine fit_to_records(const std::vector<ServoData>& data, const Machine& start,
                              const FitSettings& settings, const BeforeFit& before_fit = nullptr);
 

@@ -19,12 +19,14 @@ namespace {
 
 constexpr std::size_t kStart = 10;        // samples, choice: of the line that the load's start is taken from
 constexpr std::size_t kLeastToTell = 64;  // samples, theory: for the noise of a position (bandwidth.h)
-constexpr double kRateNoise = 0.95;    // theory: of a five-point difference of white noise of deviation 1, per sample
-constexpr double kClear = 0.02;        // choice: of the speed: noise that does not hide its direction
-constexpr double kSureSpeed = 5;       // choice: standard deviations of the speed's noise, from which it has a sign
-constexpr double kWidestBand = 0.2;    // theory: of the sampling rate, up to which differences are derivatives
-constexpr double kNarrower = 0.9;      // choice: from one band that is tried to the next
-constexpr double kLeastPeriods = 10;   // choice: of the band, in the record: below, nothing is smoothed
+constexpr double kRateNoise =
+    0.95;  // theory: of a five-point difference of white noise of deviation 1, per sample
+constexpr double kClear = 0.02;  // choice: of the speed: noise that does not hide its direction
+constexpr double kSureSpeed =
+    5;  // choice: standard deviations of the speed's noise, from which it has a sign
+constexpr double kWidestBand = 0.2;   // theory: of the sampling rate, up to which differences are derivatives
+constexpr double kNarrower = 0.9;     // choice: from one band that is tried to the next
+constexpr double kLeastPeriods = 10;  // choice: of the band, in the record: below, nothing is smoothed
 constexpr double kLoadRateBand = 2.7;  // simulation: in units of the mesh resonance
 
 std::vector<double> scaled(const Record& record, Channel channel, double factor) {
@@ -142,7 +144,8 @@ ServoData servo_data(const Record& raw, const Rig& rig) {
   if (!record.has(Channel::load_position)) return data;
   data.load = scaled(record, Channel::load_position, 1);
   const double highest = kWidestBand / data.interval;
-  const double resonance = load_moves_freely(rig) ? mesh_resonance(load_side(rig), usual_torque(data.torque)) : 0;
+  const double resonance =
+      load_moves_freely(rig) ? mesh_resonance(load_side(rig), usual_torque(data.torque)) : 0;
   data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
   data.load_rate = low_pass(fast_derivative(data.load, data.interval), data.interval, data.load_rate_cutoff);
   std::tie(data.first_load, data.first_load_rate) = start_of(data.load);

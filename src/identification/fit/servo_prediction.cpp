@@ -16,8 +16,9 @@
 namespace backlash {
 namespace {
 
-constexpr double kEnds = 3;       // theory: periods of the cutoff at either end, where the filter has not settled
-constexpr double kStarts = 12;    // theory: time constants of the feedback: of the load's start exp(-12) is left
+constexpr double kEnds = 3;  // theory: periods of the cutoff at either end, where the filter has not settled
+constexpr double kStarts =
+    12;  // theory: time constants of the feedback: of the load's start exp(-12) is left
 constexpr double kSureSpeed = 5;  // choice: standard deviations of the motor speed, from which it has a sign
 constexpr long kReach = 2;        // theory: samples to either side that the five-point difference uses
 

@@ -19,8 +19,9 @@ constexpr double kTellingCutoff = 5;     // Hz, choice: of the deflection, far b
 constexpr double kHighestCutoff = 0.2;   // choice: of the sampling rate
 constexpr double kMostSeconds = 60;      // s, choice (time): of all records
 constexpr std::size_t kMostRecords = 3;  // choice (time)
-constexpr double kTellingShare = 0.3;    // choice: of the most telling record, from which another is worth its time
-constexpr double kFewestSeconds = 2;     // s, choice: of a record
+constexpr double kTellingShare =
+    0.3;  // choice: of the most telling record, from which another is worth its time
+constexpr double kFewestSeconds = 2;  // s, choice: of a record
 
 struct Stretch {
   const CaseRecord* record;

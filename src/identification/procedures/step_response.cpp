@@ -38,8 +38,9 @@ ResponseDetail respond(const Record& record) {
       best = std::move(d);
     }
   }
-  const std::pair<const char*, KnownInertia> kinds[] = {
-      {"a", KnownInertia::total_inertia}, {"b", KnownInertia::motor_inertia}, {"c", KnownInertia::both_inertias}};
+  const std::pair<const char*, KnownInertia> kinds[] = {{"a", KnownInertia::total_inertia},
+                                                        {"b", KnownInertia::motor_inertia},
+                                                        {"c", KnownInertia::both_inertias}};
   for (const auto& [letter, known] : kinds) {
     try {
       best.alternatives[letter] =

@@ -108,7 +108,8 @@ TEST(TwoMass, ResponseIsEquations232And235) {
 TEST(TwoMass, SplitPropagatesErrors) {
   const Resonances measured{{37.75, 0.2}, {10.5, 0.05}};
   const Measured total{114.6, 1.0}, motor{6.3, 0.2};
-  for (const KnownInertia known : {KnownInertia::total_inertia, KnownInertia::motor_inertia, KnownInertia::both_inertias}) {
+  for (const KnownInertia known :
+       {KnownInertia::total_inertia, KnownInertia::motor_inertia, KnownInertia::both_inertias}) {
     const StiffnessSplit stated = split_stiffness(known, measured, total, motor);
     std::mt19937_64 random(4);
     std::normal_distribution<double> normal;
@@ -132,8 +133,10 @@ TEST(TwoMass, SplitPropagatesErrors) {
 
 TEST(TwoMass, SplitRefusesWhatCannotBe) {
   const Measured total{50, 1}, motor{6, 1};
-  EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(10), sure(12)}, total, motor), CannotIdentify);
-  EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(12), sure(10)}, motor, total), CannotIdentify);
+  EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(10), sure(12)}, total, motor),
+               CannotIdentify);
+  EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(12), sure(10)}, motor, total),
+               CannotIdentify);
   EXPECT_THROW(split_stiffness(KnownInertia::total_inertia, {sure(12), sure(10)}, {}, motor), CannotIdentify);
   EXPECT_NO_THROW(split_stiffness(KnownInertia::motor_inertia, {sure(12), sure(10)}, {}, motor));
 }

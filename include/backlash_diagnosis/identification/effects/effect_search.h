@@ -25,7 +25,7 @@
 namespace backlash {
 
 struct TraceSettings {
-  double cutoff = 0;  // Hz, low-pass of all residuals; 0: that of the machine (fit_settings.h)
+  double cutoff = 0;                // Hz, low-pass of all residuals; 0: that of the machine (fit_settings.h)
   double least_gain = 0.03;         // of a residual that an effect brings near its floor
   double least_gain_unclear = 0.1;  // of one that stays far above its floor, as on real machines
   std::size_t most_effects = 6;

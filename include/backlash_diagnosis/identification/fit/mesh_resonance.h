@@ -8,8 +8,9 @@
 
 namespace backlash {
 
-/// Hz: sqrt(k (1 / J_M + 1 / J_L)) / 2 pi, of a locked link sqrt(k / J_M) / 2 pi, with the stiffness k of closed teeth
-/// at rest under `torque` [N m] > 0 (of a linear law the same under any). 0 for a rigid mesh. `rig` is of the load side.
+/// Hz: sqrt(k (1 / J_M + 1 / J_L)) / 2 pi, of a locked link sqrt(k / J_M) / 2 pi, with the stiffness k of
+/// closed teeth at rest under `torque` [N m] > 0 (of a linear law the same under any). 0 for a rigid mesh.
+/// `rig` is of the load side.
 double mesh_resonance(const Rig& rig, double torque);
 
 /// N m: root mean square, the usual torque that a mesh is under.

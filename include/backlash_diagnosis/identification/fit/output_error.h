@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// All parameters of a servo with two inertias and two encoders together, from the raw record, by the multi-start fit.
+// All parameters of a servo with two inertias and two encoders together, from the raw record, by the
+// multi-start fit.
 //
 // The load is simulated driven by the recorded motor position (simulation/driven_load.h). Two residuals
 // count, each divided by its noise floor, which the record itself tells:
@@ -68,8 +69,8 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSe
 ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const FitSettings& settings,
                                    Calibration& calibration);
 
-/// Starts from the values in `rig`; bands that the settings do not have are those of `rig`. Throws CannotIdentify,
-/// InvalidParameter.
+/// Starts from the values in `rig`; bands that the settings do not have are those of `rig`. Throws
+/// CannotIdentify, InvalidParameter.
 OutputError fit_output_error(const Rig& rig, const std::vector<ServoData>& records,
                              const OutputErrorSettings& settings);
 

@@ -34,9 +34,9 @@ double time_between_reversals(const ServoData& data);
 /// its root mean square the motor position is low-passed, in the widest band in which it is not. With two
 /// inertias the position stays as it is: there it drives a load.
 ///
-/// The recorded speed of the load draws a simulated one (driven_load.h); what its low-pass takes away counts there like a
-/// friction. So its cutoff is 2.7 times the mesh resonance (mesh_resonance.h), or 0.2 of the sampling rate if that is
-/// less.
+/// The recorded speed of the load draws a simulated one (driven_load.h); what its low-pass takes away counts
+/// there like a friction. So its cutoff is 2.7 times the mesh resonance (mesh_resonance.h), or 0.2 of the
+/// sampling rate if that is less.
 ///
 /// Needs motor_torque and motor_position; load_position where the record has it. Throws CannotIdentify
 /// without them, BadData for gaps or values that are not finite (naming channel and time).
