@@ -51,7 +51,7 @@ Hypothesis fit_declared(const Rig& declared, const SearchContext& context) {
   if (declared.link_locked) start_in_travel(machine, context.data);
   machine.parameters = declared_parameters(machine.rig);
   Hypothesis h;
-  h.base = std::make_shared<const FittedMachine>(fit_to_records(
+  h.base = std::make_shared<const BandFit>(fit_to_records(
       context.data, machine, context.settings.fit, [&] { context.tell("fit of the declared machine"); }));
   h.declared = std::make_shared<const Machine>(std::move(machine));
   h.fitted = h.base;

@@ -70,7 +70,7 @@ std::vector<std::string> ids_of(const Effect& effect) {
 
 }  // namespace
 
-FittedValues fitted_values(const FittedMachine& fitted, std::size_t declared) {
+FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
   MachineFit fit = fitted.fit;
   judge_errors(fit, fitted.start, fitted.records);
   const Unknowns unknowns(fitted.start);

@@ -18,7 +18,7 @@ struct FittedValues {
   std::vector<Measured> effects;
 };
 /// `declared`: how many of the first parameters are the machine's.
-FittedValues fitted_values(const FittedMachine& fitted, std::size_t declared);
+FittedValues fitted_values(const BandFit& fitted, std::size_t declared);
 
 /// One step per effect; a second term of the same kind belongs to the step of the first. `on_test`: as
 /// predicted_by_all() gives it.

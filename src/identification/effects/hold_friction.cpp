@@ -32,9 +32,9 @@ std::optional<FitParameter> negative_friction(const Hypothesis& h) {
 /// A hypothesis to start a fit from, with this parameter 0 and no longer fitted.
 Hypothesis with_held(const Hypothesis& h, const FitParameter& parameter) {
   Hypothesis held = h;
-  FittedMachine fitted = *h.fitted;
+  BandFit fitted = *h.fitted;
   parameter.set(fitted.fit.machine.rig, 0);
-  held.fitted = std::make_shared<const FittedMachine>(std::move(fitted));
+  held.fitted = std::make_shared<const BandFit>(std::move(fitted));
   Machine declared = *h.declared;
   declared.parameters.erase(std::remove_if(declared.parameters.begin(), declared.parameters.end(),
                                            [&](const FitParameter& p) { return p.name == parameter.name; }),
@@ -53,8 +53,8 @@ Hypothesis hold_friction(const Hypothesis& before, const SearchContext& context)
     const Hypothesis held = with_held(h, *negative);
     if (h.effects.empty()) {
       h = held;
-      h.fitted = std::make_shared<const FittedMachine>(fit_in_band(
-          context.data, start_with(held, {}, context), settings.cutoff, settings.tolerance, settings));
+      h.fitted = std::make_shared<const BandFit>(fit_in_band(context.data, start_with(held, {}, context),
+                                                             settings.cutoff, settings.tolerance, settings));
       continue;
     }
     auto with = refitted(held, held.effects, context);

@@ -23,7 +23,7 @@ bool takes_noise_away(const std::vector<Effect>& effects, const Misfit& misfit, 
          });
 }
 
-FittedMachine fit_with_effects(Machine machine, bool delay, const SearchContext& context) {
+BandFit fit_with_effects(Machine machine, bool delay, const SearchContext& context) {
   const FitSettings& settings = context.settings.fit;
   if (delay)
     without_calibration(machine);
@@ -95,7 +95,7 @@ std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effe
       [&] { return fit_with_effects(start_with(h, effects, context), has(effects, kDelay), context); });
   if (!fit || takes_noise_away(effects, fit->misfit, context.settings.maps)) return std::nullopt;
   Hypothesis other = h;
-  other.fitted = std::make_shared<const FittedMachine>(std::move(*fit));
+  other.fitted = std::make_shared<const BandFit>(std::move(*fit));
   const Machine& machine = other.fitted->fit.machine;
   std::size_t place = h.declared->rig.terms.size();
   for (Effect& effect : effects)

@@ -28,9 +28,9 @@ struct Effect {
 };
 
 struct Hypothesis {
-  std::shared_ptr<const Machine> declared;      // the machine without effects, where its fits start
-  std::shared_ptr<const FittedMachine> base;    // that, fitted
-  std::shared_ptr<const FittedMachine> fitted;  // with the effects; base if there are none
+  std::shared_ptr<const Machine> declared;  // the machine without effects, where its fits start
+  std::shared_ptr<const BandFit> base;      // that, fitted
+  std::shared_ptr<const BandFit> fitted;    // with the effects; base if there are none
   std::vector<Effect> effects;
   bool other_teeth = false;              // not those that the rig file declares
   std::vector<std::string> held;         // friction of the machine that is held at 0

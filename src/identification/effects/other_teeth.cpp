@@ -22,11 +22,11 @@ Machine declared_with(const Rig& teeth, const Machine& declared) {
 }
 
 /// The machine as it is fitted now, with other teeth.
-std::shared_ptr<const FittedMachine> with_teeth(FittedMachine fitted, const Mesh& teeth) {
+std::shared_ptr<const BandFit> with_teeth(BandFit fitted, const Mesh& teeth) {
   Mesh& mesh = fitted.fit.machine.rig.mesh;
   mesh.contact_spec = teeth.contact_spec;
   mesh.contact = teeth.contact;
-  return std::make_shared<const FittedMachine>(std::move(fitted));
+  return std::make_shared<const BandFit>(std::move(fitted));
 }
 
 std::vector<Effect> without_hardening(std::vector<Effect> effects) {
@@ -44,7 +44,7 @@ Hypothesis fitted_with(const Rig& teeth, const std::vector<Effect>& effects, con
   std::optional<Hypothesis> with_effects;
   if (!effects.empty()) with_effects = refitted(start, effects, context);
   Hypothesis other = with_effects ? *with_effects : start;
-  other.base = std::make_shared<const FittedMachine>(fit_to_records(
+  other.base = std::make_shared<const BandFit>(fit_to_records(
       context.data, *other.declared, context.settings.fit, [&] { context.tell("trying other teeth"); }));
   other.other_teeth = true;
   if (!with_effects) {

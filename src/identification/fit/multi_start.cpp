@@ -19,8 +19,8 @@ NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool
   return options;
 }
 
-FittedMachine fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
-                          const FitSettings& settings) {
+BandFit fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
+                    const FitSettings& settings) {
   RecordSet records(data, cutoff, settings.feedback);
   records.weigh(start);
   MachineFit fit = fit_machine(start, records, fit_options(settings, tolerance, start.has_map));
@@ -37,15 +37,15 @@ Machine other_start(Machine machine, double spread, std::uint64_t seed) {
   return machine;
 }
 
-FittedMachine fit_from_starts(const std::vector<ServoData>& data, const Machine& start,
-                              const FitSettings& settings, const BeforeFit& before_fit) {
+BandFit fit_from_starts(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
+                        const BeforeFit& before_fit) {
   const int others = start.parameters.empty() ? 0 : settings.other_starts;
-  std::optional<FittedMachine> best;
+  std::optional<BandFit> best;
   for (int i = 0; i <= others; ++i) {
     if (before_fit) before_fit();
     const Machine from = i == 0 ? start : other_start(start, settings.start_spread, settings.seed + i);
     try {
-      FittedMachine one = fit_in_band(data, from, settings.rough_cutoff, settings.rough_tolerance, settings);
+      BandFit one = fit_in_band(data, from, settings.rough_cutoff, settings.rough_tolerance, settings);
       const double least = best ? size(best->misfit) : INFINITY, left = size(one.misfit);
       if (left < least) best = std::move(one);
       if (left < settings.at_floor || std::fabs(left / least - 1) < settings.same_minimum) break;
@@ -56,8 +56,8 @@ FittedMachine fit_from_starts(const std::vector<ServoData>& data, const Machine&
   return std::move(*best);
 }
 
-FittedMachine fit_to_records(const std::vector<ServoData>& data, const Machine& start,
-                             const FitSettings& settings, const BeforeFit& before_fit) {
+BandFit fit_to_records(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
+                       const BeforeFit& before_fit) {
   const auto fit = [&](const Machine& from, double tolerance) {
     if (before_fit) before_fit();
     return fit_in_band(data, from, settings.cutoff, tolerance, settings);

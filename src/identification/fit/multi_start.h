@@ -12,7 +12,7 @@
 namespace backlash {
 
 /// A machine fitted in one band, and what belongs to it.
-struct FittedMachine {
+struct BandFit {
   MachineFit fit;
   Machine start;  // what fit.fit.values belong to
   RecordSet records;
@@ -27,8 +27,8 @@ NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool
 
 /// One fit with weights of its own, those of `start` in this band [Hz]. `settings` have their bands. `data`
 /// must outlive what is returned. Throws CannotIdentify.
-FittedMachine fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
-                          const FitSettings& settings);
+BandFit fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
+                    const FitSettings& settings);
 
 /// The same machine from another start: each parameter > 0 times exp(spread u), u in [-1, 1) from a generator
 /// of random numbers with this seed.
@@ -37,12 +37,12 @@ Machine other_start(Machine machine, double spread, std::uint64_t seed);
 /// The best of several starts in the narrow band. Where `start` leaves more than noise others are tried until
 /// one ends within `same_minimum` of the best before it: that is taken for the lowest minimum. Throws
 /// CannotIdentify where no start can be fitted.
-FittedMachine fit_from_starts(const std::vector<ServoData>& data, const Machine& start,
-                              const FitSettings& settings, const BeforeFit& before_fit = nullptr);
+BandFit fit_from_starts(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
+                        const BeforeFit& before_fit = nullptr);
 
 /// The whole fit: from several starts, then in the whole band, where each record's torque is found to be held
 /// or of the moment, with weights renewed from fit to fit. Throws CannotIdentify.
-FittedMachine fit_to_records(const std::vector<ServoData>& data, const Machine& start,
-                             const FitSettings& settings, const BeforeFit& before_fit = nullptr);
+BandFit fit_to_records(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
+                       const BeforeFit& before_fit = nullptr);
 
 }  // namespace backlash

@@ -31,7 +31,7 @@ Machine machine_of(const Rig& rig, std::size_t records, const OutputErrorSetting
 OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& asked) {
   const FitSettings settings = with_bands(asked.fit, start, records);
-  FittedMachine fitted = fit_to_records(records, machine_of(start, records.size(), asked), settings);
+  BandFit fitted = fit_to_records(records, machine_of(start, records.size(), asked), settings);
   judge_errors(fitted.fit, fitted.start, fitted.records);
   const Machine& machine = fitted.fit.machine;
   OutputError result;
