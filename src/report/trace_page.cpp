@@ -40,7 +40,7 @@ std::string bars(const std::string& name, const TraceChannel& c) {
 
 std::string effect_row(const FoundEffect& e, bool linear) {
   std::string name = html_tag("b", html_text(e.id)), parameters;
-  if (e.id == "learned_map") name += "<br>" + html_text(effect_name(e)) + "; shape as plotted";
+  if (term_type(e.id).map) name += "<br>" + html_text(effect_name(e)) + "; shape as plotted";
   for (const auto& [key, word] : e.words) name += "<br>" + html_text(key + ": " + word);
   for (const EffectParameter& p : e.parameters)
     parameters += html_text(p.name) + " = " +

@@ -44,8 +44,10 @@ std::string effect_text(const FoundEffect& e, bool linear) {
 }  // namespace
 
 std::string effect_name(const FoundEffect& e) {
-  const auto coordinate = e.words.find("coordinate");
-  if (e.id != "learned_map" || coordinate == e.words.end()) return e.id;
+  const TermType& type = term_type(e.id);
+  if (!type.map) return e.id;
+  const auto coordinate = e.words.find(type.map->coordinate);
+  if (coordinate == e.words.end()) return e.id;
   return "a function of " + coordinate->second + " that is not one of the named effects";
 }
 

@@ -137,8 +137,32 @@ struct TermSearch {
   std::string phase;     // of an effect strength * sin(... + phase), tried in sine and cosine; empty: none
   double (*typical)(const MotionRange&) = nullptr;  // a strength that would show clearly, > 0
   std::vector<TermShape> shapes;
-  bool pairs = false;  // also two of it with different values of its one shape
+  bool pairs = false;               // also two of it with different values of its one shape
+  bool needs_turning_link = false;  // tells nothing of a locked link
 };
+
+/// One kind of look-up table that is learned from records: what its values are added to, and over what.
+struct MapKind {
+  std::string acts_on, coordinate;  // choices of TermMap::acts_on and TermMap::coordinate
+  std::string coordinate_unit, unit;
+  bool needs_load;                        // only of a load that moves freely
+  double (*typical)(const MotionRange&);  // a value that would show clearly, > 0
+  double least;                           // value that a fit may start with; -infinity: any
+};
+
+/// A term whose law is no formula but a look-up table from the data: it says that there is an effect, not
+/// which.
+struct TermMap {
+  std::string acts_on, coordinate, points, values;  // its parameters
+  std::vector<MapKind> kinds;                       // that are learned
+};
+
+/// What of a record's calibration a term describes as well: where such a term is in the model, its strength
+/// takes over what the calibration has found, and the calibration rests.
+enum class Calibrates { nothing, torque_delay };
+
+/// How a term says that the backlash depends on the position of the load.
+enum class GapVariation { none, harmonic, table };
 
 /// What the registry knows of a term: its id in the rig file, its parameters, how it is made.
 struct TermType {
@@ -146,10 +170,20 @@ struct TermType {
   std::vector<ParameterSpec> parameters;
   std::unique_ptr<Term> (*create)(const ParameterValues&);
   std::optional<TermSearch> search = std::nullopt;  // none: it is never sought
+  std::optional<TermMap> map = std::nullopt;
+  Calibrates calibrates = Calibrates::nothing;
+  GapVariation gap_variation = GapVariation::none;
+  // How friction builds up after a reversal. Every machine's does: it is called missing only where it shows.
+  bool shapes_friction = false;
+  // Beside the declared contact law it does what another law would do alone.
+  bool stands_in_for_contact_law = false;
 };
 
 /// By id; throws InvalidParameter for one that is not in the registry.
 const TermType& term_type(const std::string& id);
+
+/// The first one that `can`; throws InvalidParameter where none can.
+const TermType& term_type_that(bool (*can)(const TermType&));
 
 /// All terms. There is no second list of effects anywhere.
 const std::vector<TermType>& term_types();

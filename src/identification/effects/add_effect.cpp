@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "acceptance.h"
-#include "effect_ids.h"
+#include "effect_roles.h"
 #include "steps.h"
 #include "trial.h"
 
@@ -80,7 +80,7 @@ Hypothesis add_effects_or_teeth(const Hypothesis& before, const SearchContext& c
     const std::size_t count = h.effects.size();
     if (count < context.settings.asked.most_effects) h = add_effect(h, context);
     const bool more = h.effects.size() > count;
-    const bool hardening = more && h.effects.back().candidate.id == kHardening;
+    const bool hardening = more && stands_in_for_contact_law(h.effects.back().candidate.id);
     if ((hardening || !more) && tried_with != h.effects.size()) {
       tried_with = h.effects.size();
       if (auto other = with_other_teeth(h, context)) {

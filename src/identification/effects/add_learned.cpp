@@ -3,7 +3,7 @@
 
 #include "acceptance.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
-#include "effect_ids.h"
+#include "effect_roles.h"
 #include "learned.h"
 #include "steps.h"
 #include "trial.h"
@@ -42,7 +42,7 @@ Hypothesis add_map(const Hypothesis& before, const SearchContext& context) {
   Hypothesis h = before;
   for (std::size_t i = 0; i < std::min(settings.maps.trials, maps.size()); ++i) {
     if (maps[i].gain < settings.trials.least_predicted * least) break;
-    const auto trial = tried(h, {kLearnedMap, {maps[i].values}, maps[i].gain, maps[i].smoothness}, context);
+    const auto trial = tried(h, {map_term().id, {maps[i].values}, maps[i].gain, maps[i].smoothness}, context);
     if (!trial) continue;
     const Gain gain = compare(now, held_out(trial->fit, trial->start, records, settings.acceptance));
     std::string reason = objection(gain, trial->fit.machine, records, settings);
@@ -54,7 +54,7 @@ Hypothesis add_map(const Hypothesis& before, const SearchContext& context) {
       if (auto with = refitted(h, std::move(effects), context)) return *with;
       reason = "takes the noise away with the torque, or the machine cannot be fitted with it";
     }
-    h = with_rejected(std::move(h), kLearnedMap, reason);
+    h = with_rejected(std::move(h), map_term().id, reason);
   }
   return h;
 }
@@ -77,7 +77,7 @@ Hypothesis add_learned(const Hypothesis& named, const SearchContext& context) {
   if (helped && size(h) < (1 - settings.asked.least_gain_unclear) * size(named)) return h;
   Hypothesis rest = named;
   rest.rejected = h.rejected;
-  return helped ? with_rejected(rest, kLearnedMap, "leaves hardly less than the named effects do") : rest;
+  return helped ? with_rejected(rest, map_term().id, "leaves hardly less than the named effects do") : rest;
 }
 
 }  // namespace backlash

@@ -130,7 +130,7 @@ std::vector<Probed> all_probes(const Rig& rig, const MotionRange& range, double 
   const bool load = load_moves_freely(rig);
   for (const TermType& type : term_types()) {
     if (!type.search) continue;
-    if (rig.link_locked && type.id == "varying_reduction_ratio") continue;  // nothing turns that has a ratio
+    if (rig.link_locked && type.search->needs_turning_link) continue;
     const double strength = share * type.search->typical(range);
     for (const ParameterValues& shape : combinations(type, range, load)) {
       std::string group = type.id;

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/axis_unit.h"
-#include "effect_ids.h"
+#include "effect_roles.h"
 #include "found_effects.h"
 #include "search.h"
 #include "signature.h"
@@ -20,11 +20,11 @@ namespace {
 /// Every friction builds up over some path; it is called missing only where that shows.
 void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
   const auto at = std::find_if(trace.steps.begin(), trace.steps.end(),
-                               [](const FoundEffect& e) { return e.id == kPresliding; });
+                               [](const FoundEffect& e) { return shapes_friction(e.id); });
   if (at == trace.steps.end()) return;
   const double share = share_of_signal(h, at->id);
   if (share >= least) return;
-  std::string note = "friction builds up after each reversal (presliding";
+  std::string note = "friction builds up after each reversal (" + at->id;
   for (const EffectParameter& p : at->parameters)
     note += fmt::format(", {} {:.3g} +- {:.2g} {}", p.name, p.measured.value, p.measured.standard_error,
                         axis_unit(p.unit, trace.augmented.linear));

@@ -6,30 +6,27 @@
 #include <algorithm>
 #include <cmath>
 
+#include "learned.h"
+
 namespace backlash {
 namespace {
 
 constexpr double kWorse = 1.05;  // choice: times the error on the test record: an effect that does harm
 
-const char* map_unit(const std::string& acts_on) {
-  if (acts_on == "motor" || acts_on == "load") return "N m";
-  return acts_on.find("stiffness") != std::string::npos ? "-" : "rad";
-}
-
 /// Of a learned map: where its coordinate reaches and how large it gets.
 void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
-  for (const char* word : {"acts_on", "coordinate"}) effect.words[word] = term.values.choice(word);
-  effect.curve_x = term.values.list("points");
-  effect.curve_y = term.values.list("values");
-  const std::string& x = effect.words["coordinate"];
-  const bool angle = x.find("position") != std::string::npos, speed = x.find("velocity") != std::string::npos;
-  const char* unit = angle ? "rad" : speed ? "rad/s" : x == "time" ? "s" : "N m";
+  const TermMap& map = *term_type(term.id).map;
+  const MapKind& kind = kind_of(term.values);
+  effect.words = {{map.acts_on, kind.acts_on}, {map.coordinate, kind.coordinate}};
+  effect.curve_x = term.values.list(map.points);
+  effect.curve_y = term.values.list(map.values);
+  const std::string &x = kind.coordinate, &unit = kind.coordinate_unit;
   const auto largest = std::max_element(effect.curve_y.begin(), effect.curve_y.end(),
                                         [](double a, double b) { return std::fabs(a) < std::fabs(b); });
   const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
   effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
                        {x + "_to", unit, {effect.curve_x.back(), 0}},
-                       {"largest", map_unit(effect.words["acts_on"]), at_largest}};
+                       {"largest", kind.unit, at_largest}};
   fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
 }
 
@@ -37,7 +34,7 @@ void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& 
 void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted,
               FoundEffect& effect) {
   const TermType& type = term_type(term.id);
-  if (!type.search) return describe_map(term, fitted, effect);
+  if (type.map) return describe_map(term, fitted, effect);
   const TermSearch& search = *type.search;
   std::map<std::string, Measured> found;
   const auto take = [&](const std::string& name) {

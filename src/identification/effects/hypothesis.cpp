@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "../fit/calibration.h"
-#include "effect_ids.h"
+#include "effect_roles.h"
 #include "learned.h"
 
 namespace backlash {
@@ -14,12 +14,16 @@ bool has(const std::vector<Effect>& effects, const std::string& id) {
   return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return e.candidate.id == id; });
 }
 
+bool has(const std::vector<Effect>& effects, bool (*is)(const std::string& id)) {
+  return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return is(e.candidate.id); });
+}
+
 /// A map over the recorded torque may take it away, and all inertia with it: no residual, less than noise.
 bool takes_noise_away(const std::vector<Effect>& effects, const Misfit& misfit, const MapSettings& settings) {
   return misfit.torque < settings.less_than_noise &&
          std::any_of(effects.begin(), effects.end(), [](const Effect& e) {
-           return e.candidate.id == kLearnedMap &&
-                  e.candidate.terms.front().choice("coordinate") == "motor_torque";
+           return is_learned(e.candidate.id) &&
+                  kind_of(e.candidate.terms.front()).coordinate == channel_name(Channel::motor_torque);
          });
 }
 
@@ -53,7 +57,7 @@ bool clearly_right(const Misfit& misfit, const SearchContext& context) {
 }
 
 bool has_learned_map(const std::vector<Effect>& effects) {
-  return has(effects, kLearnedMap);
+  return has(effects, is_learned);
 }
 
 Hypothesis with_rejected(Hypothesis h, const std::string& effect, const std::string& reason) {
@@ -73,7 +77,7 @@ std::vector<RejectedEffect> rejected_effects(const Hypothesis& h) {
 }
 
 Machine extended(Machine machine, const Candidate& candidate, const SearchContext& context) {
-  if (candidate.id != kLearnedMap) return with_candidate(std::move(machine), candidate, context.range);
+  if (!is_learned(candidate.id)) return with_candidate(std::move(machine), candidate, context.range);
   return with_map(std::move(machine), {candidate.terms.front(), candidate.smoothness, 0}, context.range,
                   context.settings.maps);
 }
@@ -92,7 +96,7 @@ Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, cons
 std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
                                    const SearchContext& context) {
   auto fit = attempted(
-      [&] { return fit_with_effects(start_with(h, effects, context), has(effects, kDelay), context); });
+      [&] { return fit_with_effects(start_with(h, effects, context), has(effects, is_delay), context); });
   if (!fit || takes_noise_away(effects, fit->misfit, context.settings.maps)) return std::nullopt;
   Hypothesis other = h;
   other.fitted = std::make_shared<const BandFit>(std::move(*fit));

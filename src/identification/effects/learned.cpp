@@ -8,38 +8,12 @@
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
-#include "effect_ids.h"
 #include "orthogonal_part.h"
 
 namespace backlash {
 namespace {
 
 constexpr int kPoints = 40;  // choice: of a map; its smoothness is found by cross-validation
-
-struct MapKind {
-  const char *acts_on, *coordinate;
-  bool needs_load;
-};
-
-// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque
-// itself would explain everything, and so would time where the torque is commanded in ramps.
-constexpr MapKind kKinds[] = {
-    {"motor", "motor_position", false},
-    {"motor", "motor_velocity", false},
-    {"motor", "motor_torque", true},
-    {"motor", "mesh_torque", true},
-    {"motor", "time", true},
-    {"load", "load_position", true},
-    {"load", "load_velocity", true},
-    {"load", "mesh_torque", true},
-    {"load", "time", true},
-    {"gap", "load_position", true},
-    {"gap", "mesh_torque", true},
-    {"forward_flank", "load_position", true},
-    {"backward_flank", "load_position", true},
-    {"forward_stiffness", "load_position", true},
-    {"backward_stiffness", "load_position", true},
-};
 
 std::vector<double> coordinate(const std::string& name, const RecordSet& records, const Machine& machine) {
   std::vector<double> all;
@@ -73,22 +47,14 @@ std::vector<double> points_over(std::vector<double> values, double tail) {
   return points;
 }
 
-bool is_stiffness(const std::string& acts_on) {
-  return acts_on.find("stiffness") != std::string::npos;
-}
-
-double clear_strength(const std::string& acts_on, const MotionRange& range, const MapSettings& settings) {
-  if (acts_on == "motor" || acts_on == "load") return settings.torque * range.torque;
-  return is_stiffness(acts_on) ? settings.stiffness : settings.gap * range.deflection;
-}
-
 ParameterValues map_values(const MapKind& kind, const std::vector<double>& points,
                            std::vector<double> values) {
+  const TermMap& map = *map_term().map;
   ParameterValues p;
-  p.set_choice("acts_on", kind.acts_on);
-  p.set_choice("coordinate", kind.coordinate);
-  p.set_list("points", points);
-  p.set_list("values", std::move(values));
+  p.set_choice(map.acts_on, kind.acts_on);
+  p.set_choice(map.coordinate, kind.coordinate);
+  p.set_list(map.points, points);
+  p.set_list(map.values, std::move(values));
   return p;
 }
 
@@ -101,7 +67,7 @@ Eigen::MatrixXd columns(const MapKind& kind, const std::vector<double>& points, 
     std::vector<double> values(kPoints, 0.0);
     values[i] = step;
     Rig rig = fit.machine.rig;
-    rig.terms.push_back(make_term(kLearnedMap, map_values(kind, points, values)));
+    rig.terms.push_back(make_term(map_term().id, map_values(kind, points, values)));
     try {
       all.col(i) = orthogonal.of(records.rows(rig, fit.machine.calibrations) - now) / step;
     } catch (const Cancelled&) {
@@ -174,7 +140,7 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
     if (!(square < least)) continue;
     least = square;
     Eigen::VectorXd v = solve_symmetric(all + prior, gradient);
-    if (is_stiffness(kind.acts_on)) v = v.cwiseMax(settings.softest);
+    v = v.cwiseMax(kind.least);
     best.values = map_values(kind, points, {v.begin(), v.end()});
     best.smoothness = weight;
     best.gain = 1 - std::sqrt(std::max(0.0, square)) / left.norm();
@@ -184,17 +150,30 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
 
 }  // namespace
 
+const TermType& map_term() {
+  static const TermType& type = term_type_that([](const TermType& t) { return t.map.has_value(); });
+  return type;
+}
+
+const MapKind& kind_of(const ParameterValues& values) {
+  const TermMap& map = *map_term().map;
+  for (const MapKind& kind : map.kinds)
+    if (kind.acts_on == values.choice(map.acts_on) && kind.coordinate == values.choice(map.coordinate))
+      return kind;
+  throw InvalidParameter(map.coordinate, values.choice(map.coordinate), "is not one that is learned");
+}
+
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
                                          const MotionRange& range, const MapSettings& settings) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
   const OrthogonalPart orthogonal(fit, now.size());
   std::vector<LearnedCandidate> all;
-  for (const MapKind& kind : kKinds) {
+  for (const MapKind& kind : map_term().map->kinds) {
     if (kind.needs_load && !load_moves_freely(fit.machine.rig)) continue;
     const std::vector<double> points =
         points_over(coordinate(kind.coordinate, records, fit.machine), settings.tail);
     if (points.empty()) continue;
-    const double step = settings.probe * clear_strength(kind.acts_on, range, settings);
+    const double step = settings.probe * kind.typical(range);
     const LearnedCandidate one =
         learn(kind, points, columns(kind, points, step, fit, records, orthogonal, now),
               orthogonal.residuals(), records, settings);
@@ -209,18 +188,19 @@ Machine with_map(Machine machine, const LearnedCandidate& candidate, const Motio
                  const MapSettings& settings) {
   const std::size_t place = machine.rig.terms.size();
   machine.has_map = true;
-  machine.rig.terms.push_back(make_term(kLearnedMap, candidate.values));
-  const double scale = clear_strength(candidate.values.choice("acts_on"), range, settings);
+  machine.rig.terms.push_back(make_term(map_term().id, candidate.values));
+  const TermMap& map = *map_term().map;
+  const double scale = kind_of(candidate.values).typical(range);
   for (std::size_t i = 0; i < kPoints; ++i)
-    machine.parameters.push_back(list_parameter(place, "values", i, scale));
+    machine.parameters.push_back(list_parameter(place, map.values, i, scale));
   const double root = std::sqrt(candidate.smoothness),
                ridge = std::sqrt(settings.ridge * candidate.smoothness);
   for (std::size_t i = 0; i < kPoints; ++i) {
     machine.priors.push_back(
-        [=](const Rig& rig) { return ridge * rig.terms[place]->values.list("values")[i]; });
+        [=, &map](const Rig& rig) { return ridge * rig.terms[place]->values.list(map.values)[i]; });
     if (i + 2 < kPoints)
-      machine.priors.push_back([=](const Rig& rig) {
-        const std::vector<double>& v = rig.terms[place]->values.list("values");
+      machine.priors.push_back([=, &map](const Rig& rig) {
+        const std::vector<double>& v = rig.terms[place]->values.list(map.values);
         return root * (v[i] - 2 * v[i + 1] + v[i + 2]);
       });
   }

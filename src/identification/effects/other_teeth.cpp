@@ -3,7 +3,7 @@
 
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "contact_shape.h"
-#include "effect_ids.h"
+#include "effect_roles.h"
 #include "steps.h"
 
 namespace backlash {
@@ -29,10 +29,11 @@ std::shared_ptr<const BandFit> with_teeth(BandFit fitted, const Mesh& teeth) {
   return std::make_shared<const BandFit>(std::move(fitted));
 }
 
-std::vector<Effect> without_hardening(std::vector<Effect> effects) {
-  effects.erase(std::remove_if(effects.begin(), effects.end(),
-                               [](const Effect& effect) { return effect.candidate.id == kHardening; }),
-                effects.end());
+std::vector<Effect> without_stand_ins_for_teeth(std::vector<Effect> effects) {
+  effects.erase(
+      std::remove_if(effects.begin(), effects.end(),
+                     [](const Effect& effect) { return stands_in_for_contact_law(effect.candidate.id); }),
+      effects.end());
   return effects;
 }
 
@@ -58,7 +59,7 @@ Hypothesis fitted_with(const Rig& teeth, const std::vector<Effect>& effects, con
 }  // namespace
 
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context) {
-  const std::vector<Effect> others = without_hardening(h.effects);
+  const std::vector<Effect> others = without_stand_ins_for_teeth(h.effects);
   if (others.size() == h.effects.size() || clearly_right(misfit(h), context)) return std::nullopt;
   // Of the machine without hardening, which has a stiffness of its own.
   const auto teeth = with_hertzian_teeth(h.base->fit.machine.rig, context.range.torque);
@@ -66,7 +67,12 @@ std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchCont
   context.tell("trying other teeth");
   const auto other = attempted([&] { return fitted_with(*teeth, others, h, context); });
   if (!other || size(*other) >= context.settings.revision.clearly_less * size(h)) return std::nullopt;
-  return with_rejected(*other, kHardening, "teeth of another law (Hertzian) explain it better");
+  Hypothesis result = *other;
+  for (const Effect& effect : h.effects)
+    if (stands_in_for_contact_law(effect.candidate.id))
+      result = with_rejected(std::move(result), effect.candidate.id,
+                             "teeth of another law (Hertzian) explain it better");
+  return result;
 }
 
 }  // namespace backlash

@@ -61,10 +61,6 @@ struct MapSettings {
   std::size_t nearest = 3;       // choice: named effects that are told beside a map
   double less_than_noise = 0.8;  // theory: times the floor: a residual cannot be that small
   double probe = 0.05;           // theory: of a strength that shows clearly, as ScreenSettings::probe
-  double torque = 0.05;          // choice: of the torque, a strength that shows clearly
-  double gap = 0.1;              // choice: of the deflection, the same of flanks and gap
-  double stiffness = 0.1;        // choice: of 1, the same of a relative stiffness
-  double softest = -0.9;         // choice: relative stiffness that a flank may start with
   double tail = 0.002;           // choice: of the samples, beyond the outer points
   double ridge = 1e-6;           // theory: of the mean squared sensitivity: decides what nothing else does
   int blocks = 12;               // choice: of each record, for cross-validation

@@ -8,7 +8,7 @@
 
 #include "../fit/calibration.h"
 #include "acceptance.h"
-#include "effect_ids.h"
+#include "effect_roles.h"
 
 namespace backlash {
 namespace {
@@ -62,7 +62,7 @@ std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, cons
   Trial trial{candidate, {}, {}, 0};
   const auto fit = attempted([&] {
     trial.start = extended(h.fitted->fit.machine, candidate, context);
-    if (candidate.id == kDelay) move_delay_to_term(trial.start, context.data.front().interval);
+    if (is_delay(candidate.id)) move_delay_to_term(trial.start, context.data.front().interval);
     const bool map = trial.start.has_map;
     const MachineFit rough =
         fit_machine(trial.start, records, fit_options(settings.fit, settings.fit.rough_tolerance, map));

@@ -48,9 +48,10 @@ void move_delay_to_term(Machine& machine, double interval) {
   double mean = 0;
   for (const Calibration& c : machine.calibrations)
     mean += c.torque_delay / double(machine.calibrations.size());
-  ParameterValues values = machine.rig.terms.back()->values;
-  values["delay"] += mean * interval;
-  machine.rig.terms.back() = make_term(machine.rig.terms.back()->id, values);
+  std::shared_ptr<const Term>& term = machine.rig.terms.back();
+  ParameterValues values = term->values;
+  values[term_type(term->id).search->strength] += mean * interval;
+  term = make_term(term->id, values);
   without_calibration(machine);
 }
 

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

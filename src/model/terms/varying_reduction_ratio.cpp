@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -42,7 +42,7 @@ TermType varying_reduction_ratio_term() {
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<VaryingReductionRatio>(p.at("change"));
           },
-          TermSearch{"change", "", clear_change, {}}};
+          TermSearch{"change", "", clear_change, {}, false, true}};
 }
 
 }  // namespace backlash

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Strengths and shapes that several terms give the search for missing effects to try.
+// Values of strengths and shapes that the search for missing effects tries, of several terms.
 #pragma once
 
 #include <vector>
