@@ -10,9 +10,9 @@
 namespace backlash {
 namespace {
 
-constexpr double kResponseModel = 0.002;  // a mesh that is not quite linear
+constexpr double kResponseModel = 0.002;  // simulation: a mesh that is not quite linear
 constexpr double kLeastCoherence =
-    0.1;  // dropping faint points would leave the anti-resonance those that noise lifts
+    0.1;  // simulation: dropping faint points would leave the anti-resonance those that noise lifts
 
 std::size_t reversing(const FrequencyResponse& response) {
   return std::count_if(response.points.begin(), response.points.end(),

@@ -12,10 +12,10 @@
 namespace backlash {
 namespace {
 
-constexpr double kLeastError = 1e-3;   // relative: what sampling and transients leave
-constexpr double kOutlier = 5;         // deviations
-constexpr std::size_t kPool = 2;       // neighbours on either side whose errors are pooled
-constexpr double kStartDamping = 0.1;  // damping ratio
+constexpr double kLeastError = 1e-3;   // choice: relative: what sampling and transients leave
+constexpr double kOutlier = 5;         // choice: deviations
+constexpr std::size_t kPool = 2;       // choice: neighbours on either side whose errors are pooled
+constexpr double kStartDamping = 0.1;  // choice: damping ratio
 
 struct Point {
   double frequency = 0, error = 0;
