@@ -11,10 +11,11 @@
 namespace backlash {
 namespace {
 
-// In units of the mesh resonance. Simulation: found on a servo with a resonance of 44 Hz.
-constexpr double kCutoff = 1.35;       // the oscillation after a touch is seen
-constexpr double kRoughCutoff = 0.34;  // it is not, the deflection under load is
-constexpr double kFeedback = 0.18;  // of its angular frequency: it stays as it is, chaos in the gap does not
+// In units of the mesh resonance; simulation.
+constexpr double kCutoff = 60 / kTriedResonance;       // the oscillation after a touch is seen
+constexpr double kRoughCutoff = 15 / kTriedResonance;  // it is not, the deflection under load is
+constexpr double kFeedback =
+    50 / kTriedResonance;  // 1/s per Hz: the oscillation stays, chaos in the gap does not
 
 constexpr double kHighestCutoff =
     0.2;                          // theory: of the sampling rate, up to which differences are derivatives
@@ -42,7 +43,7 @@ FitSettings with_bands(FitSettings settings, const Rig& rig, const std::vector<S
   if (settings.rough_cutoff == 0)
     settings.rough_cutoff = resonance > 0 ? kRoughCutoff * resonance : settings.cutoff;
   settings.rough_cutoff = std::min(settings.rough_cutoff, settings.cutoff);
-  if (settings.feedback == 0) settings.feedback = kFeedback * 2 * M_PI * resonance;
+  if (settings.feedback == 0) settings.feedback = kFeedback * resonance;
   return settings;
 }
 

@@ -27,7 +27,7 @@ constexpr double kSureSpeed =
 constexpr double kWidestBand = 0.2;   // theory: of the sampling rate, up to which differences are derivatives
 constexpr double kNarrower = 0.9;     // choice: from one band that is tried to the next
 constexpr double kLeastPeriods = 10;  // choice: of the band, in the record: below, nothing is smoothed
-constexpr double kLoadRateBand = 2.7;  // simulation: in units of the mesh resonance
+constexpr double kLoadRateBand = 120 / kTriedResonance;  // simulation: in units of the mesh resonance
 
 std::vector<double> scaled(const Record& record, Channel channel, double factor) {
   std::vector<double> values = record.column(channel);

@@ -36,7 +36,7 @@ struct FitSettings {
 
 /// The settings with the bands that this machine and its records need, where they are 0. With f the frequency
 /// of the mesh resonance (mesh_resonance.h), and no more than 0.2 of the sampling rate:
-///   cutoff 1.35 f, rough cutoff 0.34 f, feedback 0.18 (2 pi f).
+///   cutoff 1.36 f, rough cutoff 0.34 f, feedback 0.18 (2 pi f).
 /// Without a load that moves freely: cutoff is the bandwidth of the motion, and at least 100 periods of it
 /// are in the record. Throws CannotIdentify for records in which nothing moves.
 FitSettings with_bands(FitSettings settings, const Rig& rig, const std::vector<ServoData>& data);

@@ -13,6 +13,10 @@ namespace backlash {
 /// `rig` is of the load side.
 double mesh_resonance(const Rig& rig, double torque);
 
+/// Hz: that of config/two_inertia_servo.yaml, on whose records the bands of fits were tried (simulation).
+/// Bands of other machines are as far from their own resonance.
+constexpr double kTriedResonance = 44.2425;
+
 /// N m: root mean square, the usual torque that a mesh is under.
 double usual_torque(const std::vector<double>& torque);
 
