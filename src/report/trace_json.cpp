@@ -104,6 +104,7 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
                {"cutoff", {{"value", number(trace.cutoff)}, {"unit", "Hz"}}},
                {"channels", Json::object()},
                {"steps", Json::array()},
+               {"rejected", Json::array()},
                {"unexplained", nullptr}};
   for (const auto& [name, c] : trace.channels)
     json["channels"][name] = {{"before", number(c.before)},
@@ -112,6 +113,8 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
                               {"train_before", number(c.train_before)},
                               {"train_after", number(c.train_after)}};
   for (const FoundEffect& e : trace.steps) json["steps"].push_back(step_json(e, trace));
+  for (const RejectedEffect& r : trace.rejected)
+    json["rejected"].push_back({{"effect", r.id}, {"reason", r.reason}});
   if (trace.unexplained)
     json["unexplained"] = {{"channel", trace.unexplained->channel},
                            {"signature", trace.unexplained->signature}};

@@ -4,6 +4,7 @@
 
 #include "../fit/joint_fit.h"
 #include "backlash_diagnosis/model/term.h"
+#include "search_settings.h"
 
 namespace backlash {
 
@@ -23,9 +24,10 @@ const MapKind& kind_of(const ParameterValues& values);
 /// A map over every coordinate, best first: values by least squares on what the machine's own parameters
 /// leave, as smooth as cross-validation over blocks of the records says.
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
-                                         const MotionRange& range);
+                                         const MotionRange& range, const MapSettings& settings);
 
 /// The machine with this map, whose values are fitted as well, held as smooth as they are.
-Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range);
+Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range,
+                 const MapSettings& settings);
 
 }  // namespace backlash
