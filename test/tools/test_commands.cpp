@@ -242,6 +242,24 @@ TEST_F(Commands, CsvToBagToCsvIsTheSameFile) {
   EXPECT_EQ(read("a.csv"), read("d.csv"));
 }
 
+// For programs that start a command: lines instead of a summary, and the same curve.
+TEST_F(Commands, FeedbackIsAnObjectALine) {
+  done("build_curve rig.yaml --points 3 --seeds 1 --periods 1 --out a.yaml");
+  std::istringstream lines(
+      done("build_curve rig.yaml --points 3 --seeds 1 --periods 1 --out b.yaml --feedback").out);
+  EXPECT_EQ(read("a.yaml"), read("b.yaml"));
+  double last = 0;
+  std::string line, best;
+  while (std::getline(lines, line)) {
+    const Json json = Json::parse(line);
+    EXPECT_GE(json["fraction"], last);
+    last = json["fraction"];
+    best = json["best"];
+    EXPECT_FALSE(json["phase"].get<std::string>().empty());
+  }
+  expect_contains(best, "3 of 3 points");
+}
+
 TEST_F(Commands, CurveOfABagIsTheCurveOfTheCsv) {
   write("noisy.yaml", rig_variant(true, false));
   done("simulate noisy.yaml --duration 1 --backlash 6e-5 --out a.csv");
