@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/curve_job.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "backlash_diagnosis/base/scratch_folder.h"
@@ -23,10 +25,10 @@ MonitoringCurve build_curve_as_job(const RigFile& rig, const CurveRequest& reque
   const auto add = [&job](const char* option, const std::string& value) {
     job.words.insert(job.words.end(), {option, value});
   };
-  add("--points", std::to_string(request.points));
+  add("--points", fmt::to_string(request.points));
   add("--max-backlash", to_text(request.max_backlash));
-  add("--periods", std::to_string(request.periods));
-  add("--seeds", std::to_string(request.seeds));
+  add("--periods", fmt::to_string(request.periods));
+  add("--seeds", fmt::to_string(request.seeds));
   if (request.sampling_rate > 0) add("--sample-rate", to_text(request.sampling_rate));
   job.memory = memory;
   job.progress = progress;

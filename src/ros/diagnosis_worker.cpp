@@ -72,7 +72,7 @@ void DiagnosisWorker::run() {
     try {
       work_(task);
     } catch (const std::exception& error) {
-      ROS_ERROR_THROTTLE(1, "a diagnosis failed: %s", error.what());
+      ROS_ERROR("a diagnosis failed: %s", error.what());
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <sstream>
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "support/data.h"
