@@ -1,7 +1,8 @@
 #!/bin/bash
 # Checks how the files are written: the licence in the first lines of each, the layout by .clang-format, names and habits
-# by .clang-tidy, that every public header compiles alone, that rooms include only what they may know.
-# Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms]... [--all|--since COMMIT]
+# by .clang-tidy, that every public header compiles alone, that rooms include only what they may know, that
+# pages lead to each other.
+# Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|pages]... [--all|--since COMMIT]
 #   tidy and headers look at the files that differ from the main branch (on it: from the commit before), --all at all.
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
@@ -67,23 +68,27 @@ rooms() {
   python3 scripts/check_rooms.py CMakeLists.txt include/"${PACKAGE}" src
 }
 
+pages() {
+  python3 scripts/check_pages.py
+}
+
 parts=()
 all=0
 since=
 while (($#)); do
   case $1 in
-    licence | format | tidy | headers | rooms) parts+=("$1") ;;
+    licence | format | tidy | headers | rooms | pages) parts+=("$1") ;;
     --all) all=1 ;;
     --since) since=${2:?} && shift ;;
     *)
-      sed -n '2,5s/^# //p' "$0"
+      sed -n '2,6s/^# //p' "$0"
       [[ $1 == -h || $1 == --help ]] && exit 0
       exit 64
       ;;
   esac
   shift
 done
-((${#parts[@]})) || parts=(licence format tidy headers rooms)
+((${#parts[@]})) || parts=(licence format tidy headers rooms pages)
 
 cd "${REPO}"
 failed=0

@@ -43,7 +43,7 @@ run_tests rostest 1  # they measure rates
 
 echo "Checking style, documentation, installation and faults"
 check catkin_lint catkin_lint --strict "${REPO}"
-for part in licence format tidy headers rooms; do
+for part in licence format tidy headers rooms pages; do
   check "${part}" bash "${REPO}/scripts/check_style.sh" "${part}"
 done
 check api_doc bash "${REPO}/scripts/api_doc.sh" "${WS}/doc"
