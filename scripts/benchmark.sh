@@ -17,8 +17,7 @@ fi
 out=$(realpath -m "${1:-${REPO}/build/benchmark.json}")
 older=${2:+$(realpath "$2")}
 
-install_dependencies
-bash "${REPO}/scripts/install_dependencies.sh" libbenchmark-dev libboost-dev python3-scipy
+install_dependencies run libbenchmark-dev python3-scipy
 echo "Building in ${WS}"
 build
 build "${PACKAGE}_test_machine"

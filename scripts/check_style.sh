@@ -1,6 +1,9 @@
 #!/bin/bash
-# Checks how the files are written: the licence in the first lines of each, the layout by .clang-format, the names by
-# .clang-tidy (for which it builds the messages if need be). Usage: bash scripts/check_style.sh [licence|format|naming]...
+# Checks how the files are written: the licence in the first lines of each, the layout by .clang-format, names and habits
+# by .clang-tidy, that every public header compiles alone, that rooms include only what they may know, that
+# pages lead to each other.
+# Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|pages]... [--all|--since COMMIT]
+#   tidy and headers look at the files that differ from the main branch (on it: from the commit before), --all at all.
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -28,21 +31,64 @@ format() {
   files '*.cpp' '*.h' | tr '\n' '\0' | xargs -0 -n 40 -P "$(nproc)" clang-format --dry-run -Werror
 }
 
-naming() {
-  build "${PACKAGE}_generate_messages_cpp" &&
-    python3 scripts/check_naming.py "${WS}/build/compile_commands.json" "${WS}/src/${PACKAGE}"
+# From which commit on changes count.
+changed_since() {
+  [[ -z ${since} ]] || { echo "${since}" && return; }
+  local base
+  for base in origin/main main; do
+    base=$(git merge-base HEAD "${base}" 2>/dev/null) && [[ ${base} != $(git rev-parse HEAD) ]] && echo "${base}" && return
+  done
+  git rev-parse -q --verify HEAD~1 || git rev-parse HEAD
 }
 
-parts=("$@")
-((${#parts[@]})) || parts=(licence format naming)
-for part in "${parts[@]}"; do
-  case ${part} in licence | format | naming) ;; *)
-    sed -n '2,3s/^# //p' "$0"
-    [[ ${part} == -h || ${part} == --help ]] && exit 0
-    exit 64
-    ;;
+tidy() {
+  local which=()
+  ((all)) || which=(--changed-since "$(changed_since)")
+  build "${PACKAGE}_generate_messages_cpp" "${PACKAGE}_gencfg" &&
+    python3 scripts/check_tidy.py "${WS}/build/compile_commands.json" "${WS}/src/${PACKAGE}" "${which[@]}"
+}
+
+# The headers of ROS are left out: they need those of the messages.
+headers() {
+  local names
+  if ((all)); then
+    names=$(find include -name '*.h')
+  else
+    names=$(git diff --name-only --diff-filter=d "$(changed_since)" -- include; git ls-files -o --exclude-standard include)
+  fi
+  local name failed=0
+  for name in $(grep -v '/ros/' <<<"${names}"); do
+    g++ -std=c++17 -fsyntax-only -Wall -Wextra -Iinclude -isystem /usr/include/eigen3 -x c++ - <<<"#include \"${name#include/}\"" ||
+      failed=1
+  done
+  return "${failed}"
+}
+
+rooms() {
+  python3 scripts/check_rooms.py CMakeLists.txt include/"${PACKAGE}" src
+}
+
+pages() {
+  python3 scripts/check_pages.py
+}
+
+parts=()
+all=0
+since=
+while (($#)); do
+  case $1 in
+    licence | format | tidy | headers | rooms | pages) parts+=("$1") ;;
+    --all) all=1 ;;
+    --since) since=${2:?} && shift ;;
+    *)
+      sed -n '2,6s/^# //p' "$0"
+      [[ $1 == -h || $1 == --help ]] && exit 0
+      exit 64
+      ;;
   esac
+  shift
 done
+((${#parts[@]})) || parts=(licence format tidy headers rooms pages)
 
 cd "${REPO}"
 failed=0

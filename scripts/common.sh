@@ -33,8 +33,9 @@ quietly() {
   return 1
 }
 
+# install_dependencies [run|test] [PACKAGE...]
 install_dependencies() {
-  bash "${REPO}/scripts/install_dependencies.sh"
+  bash "${REPO}/scripts/install_dependencies.sh" "$@"
 }
 
 # Creates the workspace ${WS} with this repository as its only package. The package is a folder of links, one per
@@ -58,14 +59,37 @@ make_workspace() {
   fi
 }
 
-# build [TARGET...]: catkin_make in the workspace, quiet unless it fails.
+# Of what make prints, how far it is: one line that is written again and again on a terminal, else a line per fifth.
+show_progress() {
+  local line percent shown=0
+  while IFS= read -r line; do
+    [[ ${line} =~ ^\[\ *([0-9]+)%\] ]] || continue
+    percent=${BASH_REMATCH[1]}
+    if [[ -t 2 ]]; then
+      printf '\r%3d %% built' "${percent}" >&2
+    elif ((percent >= shown + 20)); then
+      shown=$((percent - percent % 20))
+      printf '%3d %% built\n' "${shown}" >&2
+    fi
+  done
+  [[ ! -t 2 ]] || printf '\r\033[K' >&2
+}
+
+# build [TARGET|VARIABLE...]: catkin_make in the workspace, with the output in a log that is shown if it fails.
 build() {
   make_workspace
+  mkdir -p "${WS}/log"
+  local log=${WS}/log/build${1:+_${1//\//_}}.log
   (
     flock 9  # demo.sh and test.sh may run at the same time
-    quietly "build${1:+_$1}" catkin_make --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 "-j$(nproc)" \
-      "$@" 9>&-
-  ) 9>"${WS}/lock"
+    catkin_make --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 "-j$(nproc)" "$@" 2>&1 </dev/null 9>&- |
+      tee "${log}" | show_progress
+    ((PIPESTATUS[0] == 0))
+  ) 9>"${WS}/lock" && return 0
+  grep -nE 'error|Error|undefined reference' "${log}" | head -n 20 >&2
+  tail -n 20 "${log}" >&2
+  echo "$(basename "$0"): the build failed, all of it in ${log}" >&2
+  return 1
 }
 
 # Makes rosrun, roslaunch and rostest find the package, and keeps everything on this machine.

@@ -13,16 +13,17 @@ fi
 half_gap=${1:-4.0e-5}
 sampling_rate=5000  # Hz
 
-install_dependencies
+install_dependencies run
 echo "Building in ${WS} (minutes the first time, seconds later)"
-build || fail "the build failed"
+demo_programs=(simulator diagnoser build_curve convert_record diagnose_record)
+build "${PACKAGE}_generate_messages_py" "${demo_programs[@]/#/${PACKAGE}_}" || exit 1
 use_workspace
 
 out=${WS}/demo
 mkdir -p "${out}"
 rig=${REPO}/config/sarkar_1997.yaml
 curve=${out}/curve.yaml
-if [[ ! -e ${curve} || ${rig} -nt ${curve} || ${WS}/devel/lib/libbacklash_diagnosis.so -nt ${curve} ]]; then
+if [[ ! -e ${curve} || ${rig} -nt ${curve} || ${WS}/devel/lib/libbacklash_diagnosis_studies.so -nt ${curve} ]]; then
   echo "Building the monitoring curve: 41 backlash values x 8 runs x 10 periods"
   rosrun "${PACKAGE}" build_curve "${rig}" --sample-rate "${sampling_rate}" --out "${curve}"
 fi

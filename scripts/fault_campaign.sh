@@ -9,7 +9,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 if [[ ${1:-} == -h || ${1:-} == --help ]]; then
   exec /usr/bin/python3 "${REPO}/test/faults/campaign.py" --help
 fi
-install_dependencies
+install_dependencies run
 build
 use_workspace
 exec env PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 "${REPO}/test/faults/campaign.py" "$@"

@@ -13,7 +13,7 @@ if [[ ! ${seconds} =~ ^[1-9][0-9]*$ ]]; then
   exit 64
 fi
 
-bash "${REPO}/scripts/install_dependencies.sh" clang libclang-rt-14-dev
+install_dependencies run clang libclang-rt-14-dev
 mkdir -p "${WS}"
 touch "${WS}/CATKIN_IGNORE"  # for a search that starts above the workspace
 WS=$(cd "${WS}" && pwd -P)

@@ -1,26 +1,38 @@
 #!/bin/bash
-# Installs what the package needs from Debian 12 and is not there yet; without anything missing it only looks.
-# Debian packages ROS 1 itself, so no foreign archive is needed. Run as root or with sudo. Arguments: further packages.
+# Installs what the package needs from Debian 12 and is not there yet; without anything missing it only looks. Debian
+# packages ROS 1 itself, so no foreign archive is needed. Run as root or with sudo.
+# Usage: bash scripts/install_dependencies.sh [run|test] [PACKAGE...]
+#   run   builds and runs the package and the demo; test (default): also what the tests call (browser, clang, doxygen)
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 
 # One line per purpose.
-packages=(
+run=(
   build-essential ccache cmake                                    # compiler and build
-  catkin catkin-lint ros-core-dev                                 # ROS 1: build system, roscpp, rosbag, messages
+  catkin ros-core-dev                                             # ROS 1: build system, roscpp, rosbag, messages
   libactionlib-dev libdiagnostic-updater-dev                      # ROS 1 libraries outside the core
   libdynamic-reconfigure-config-init-mutex-dev python3-dynamic-reconfigure
-  libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node; the plugins are in -dev
-  rosbash python3-rostest librostest-dev                          # rosrun, rostest
+  rosbash python3-rostest librostest-dev libgtest-dev             # rosrun; the package's CMake file asks for rostest
   python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
-  libgtest-dev
   python3-matplotlib python3-numpy python3-yaml                   # plots
+)
+tests=(
+  catkin-lint
+  libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
   chromium chromium-driver python3-selenium                       # tests that look at the pages in a browser
   clang-format clang-tidy doxygen                                 # what scripts/check_style.sh and api_doc.sh call
 )
-packages+=("$@")
+case ${1:-} in
+  run) packages=("${run[@]}" "${@:2}") ;;
+  test) packages=("${run[@]}" "${tests[@]}" "${@:2}") ;;
+  -h | --help)
+    sed -n '2,5s/^# //p' "$0"
+    exit 0
+    ;;
+  *) packages=("${run[@]}" "${tests[@]}" "$@") ;;
+esac
 
 missing=()
 installed=" $(dpkg-query --show --showformat '${Package}=${db:Status-Status} ' "${packages[@]}" 2>/dev/null || true)"

@@ -14,7 +14,7 @@ out=${1:-${REPO}/build/yumrukcal_2013}
 mkdir -p "${out}" || fail "cannot create ${out}"
 out=$(cd "${out}" && pwd -P)
 
-install_dependencies
+install_dependencies run
 echo "Building in ${WS}"
 build
 use_workspace

@@ -14,7 +14,7 @@ case ${kind} in
   *) sed -n '2,4s/^# //p' "$0" && exit 64 ;;
 esac
 
-install_dependencies
+install_dependencies run
 WS=${WS}_${kind}
 make_workspace
 echo "Building in ${WS}"

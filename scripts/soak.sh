@@ -6,7 +6,7 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-install_dependencies
+install_dependencies run
 build
 use_workspace
 exec env PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 "${REPO}/test/soak/soak.py" "$@"

@@ -17,10 +17,9 @@ broken() {  # the last line holds for whoever reads only that
   exit 1
 }
 
-install_dependencies || broken "installation of the dependencies"
+install_dependencies test || broken "installation of the dependencies"
 echo "Building in ${WS}"
-build || broken "build"
-build tests || broken "build of the tests"
+build all tests || broken "build"
 
 use_workspace
 # rostest starts a master of its own on a free port; this one is never contacted.
@@ -30,16 +29,21 @@ rm -rf "${results}" "${ROS_HOME}"
 mkdir -p "${results}" "${ROS_HOME}"
 outside=()  # results that no file of the test runners holds
 
-echo "Running the tests; their output goes to ${WS}/log/run_tests.log"
-# One at a time: rostests measure rates. The exit code says nothing about the tests, only about the run.
-quietly run_tests catkin_make --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 -j1 run_tests ||
-  outside+=(--failed "run_tests: the run broke off")
 # check NAME COMMAND...: a test outside the test runners.
 check() {
   if quietly "$@"; then outside+=(--passed "$1"); else outside+=(--failed "$1: see above"); fi
 }
+# run_tests KIND JOBS: the gtests or the rostests. The exit code says nothing about the tests, only about the run.
+run_tests() {
+  echo "Running the $1s; their output goes to ${WS}/log/run_$1s.log"
+  quietly "run_$1s" make -C "${WS}/build" "-j$2" "run_tests_${PACKAGE}_$1" || outside+=(--failed "run_$1s: the run broke off")
+}
+run_tests gtest "$(nproc)"
+run_tests rostest 1  # they measure rates
+
+echo "Checking style, documentation, installation and faults"
 check catkin_lint catkin_lint --strict "${REPO}"
-for part in licence format naming; do
+for part in licence format tidy headers rooms pages; do
   check "${part}" bash "${REPO}/scripts/check_style.sh" "${part}"
 done
 check api_doc bash "${REPO}/scripts/api_doc.sh" "${WS}/doc"
@@ -47,7 +51,6 @@ check install_space bash "${REPO}/scripts/check_install.sh"
 
 # One seed, one of each class; the long runs are told in doc/reliability.md.
 check fault_campaign bash "${REPO}/scripts/fault_campaign.sh" --seed 1 --count 1 all
-check fuzz bash "${REPO}/scripts/fuzz.sh" 20
 grep '^NOT TRIED' "${WS}/log/fault_campaign.log" || true
 
 /usr/bin/python3 "${REPO}/scripts/summarise_tests.py" "${results}" "${outside[@]}"

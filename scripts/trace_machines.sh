@@ -17,7 +17,7 @@ fi
 out=${1:-${REPO}/build/machines}
 shift $(($# > 0))
 
-install_dependencies
+install_dependencies run
 echo "Building in ${WS}"
 build
 build "${PACKAGE}_test_machine"

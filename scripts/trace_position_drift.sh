@@ -15,7 +15,7 @@ out=${1:-${REPO}/build/position_drift}
 mkdir -p "${out}" || fail "cannot create ${out}"
 out=$(cd "${out}" && pwd -P)
 
-install_dependencies
+install_dependencies run
 echo "Building in ${WS}"
 build
 bin=${WS}/devel/lib/${PACKAGE}

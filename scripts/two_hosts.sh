@@ -7,7 +7,7 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-bash "${REPO}/scripts/install_dependencies.sh" iproute2
+install_dependencies run iproute2
 build
 use_workspace
 exec env PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 "${REPO}/test/soak/two_hosts.py" "$@"

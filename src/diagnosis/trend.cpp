@@ -6,8 +6,8 @@
 
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
+#include "backlash_diagnosis/signal/sen_slope.h"
 #include "error_memory.h"
-#include "signal/sen_slope.h"
 #include "trend_message.h"
 
 namespace backlash {

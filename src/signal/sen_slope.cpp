@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sen_slope.h"
+#include "backlash_diagnosis/signal/sen_slope.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,58 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks that every room includes only headers of rooms that it may know, and private headers of no other room.
+
+What a room may know is what CMakeLists.txt says: room(NAME KNOWS ROOM...), and all that those know.
+"""
+import os
+import re
+import sys
+
+ROOM = re.compile(r"^room\((\w+)((?: KNOWS(?: [a-z_]+)+)?)", re.MULTILINE)
+INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
+
+
+def known_rooms(cmake_file):
+    """Room -> rooms that it may include, itself among them."""
+    known = {}
+    for name, knows in ROOM.findall(open(cmake_file).read()):
+        known[name] = {name}
+        for other in knows.split()[1:]:
+            known[name] |= known[other]
+    known["nodes"] = known["tools"] = set(known) | {"nodes", "tools"}
+    return known
+
+
+def room_of_include(name, path, include, src):
+    """The room of what a file includes, and whether it is private to that room; None for what is generated."""
+    if name.startswith("backlash_diagnosis/"):
+        parts = name.split("/")
+        return (parts[1], False) if len(parts) > 2 else None
+    for folder in (os.path.dirname(path), src):
+        found = os.path.normpath(os.path.join(folder, name))
+        if os.path.exists(found):
+            return os.path.relpath(found, src).split(os.sep)[0], True
+    return None
+
+
+def main(cmake_file, include, src):
+    known = known_rooms(cmake_file)
+    problems = []
+    for root in (include, src):
+        for folder, _, names in os.walk(root):
+            for path in (os.path.join(folder, name) for name in names if name.endswith((".h", ".cpp"))):
+                room = os.path.relpath(path, root).split(os.sep)[0]
+                for name in INCLUDE.findall(open(path).read()):
+                    target = room_of_include(name, path, include, src)
+                    if target is None:
+                        continue
+                    if target[0] not in known[room]:
+                        problems.append("%s: %s must not know %s (%s)" % (path, room, target[0], name))
+                    elif target[1] and target[0] != room:
+                        problems.append("%s: %s is private to %s" % (path, name, target[0]))
+    print("\n".join(problems) or "%d rooms know what they may" % len(known))
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
