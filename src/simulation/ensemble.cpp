@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "lanes.h"
@@ -140,14 +139,8 @@ AttemptFunction attempt_of() {
 }
 #endif
 
-template <int... Numbers>
-AttemptFunction attempt_of(int number, std::integer_sequence<int, Numbers...>) {
-  static const AttemptFunction all[] = {attempt_of<Numbers>()...};
-  return all[number];
-}
-
 AttemptFunction attempt_of(const TrainLayout& layout) {
-  return attempt_of(layout.number(), std::make_integer_sequence<int, TrainLayout::kLayouts>());
+  return with_constant_number(layout, [](auto number) { return attempt_of<decltype(number)::value>(); });
 }
 
 }  // namespace
