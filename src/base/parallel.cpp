@@ -14,7 +14,7 @@ namespace backlash {
 void Ticker::tick() {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++done_;
-  if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, phase_)) stop_ = true;
+  if (!stop_ && progress_ && !progress_(double(done_) / double(total_), phase_)) stop_ = true;
   if (stop_) throw Cancelled();
 }
 

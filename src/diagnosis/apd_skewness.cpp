@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kNoiseExcess = 1.2;  // noise estimate over the largest on the curve that may be by chance
 constexpr double kOftenNoise = 1.65;  // standard deviations of noise that a twentieth of the time exceeds
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool differs(double value, double reference, double tolerance) {
   return !(std::fabs(value - reference) <= tolerance * std::fabs(reference));
@@ -30,7 +29,8 @@ std::string mismatch(const char* what, double value, double reference, const cha
 std::string excitation_mismatch(const Record& record, const CurveConditions& made, double noise) {
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   if (torque.empty()) return {};
-  if (peak_to_peak(torque) <= 0.05 * made.amplitude) return "motor_torque is constant: there is no excitation";
+  if (peak_to_peak(torque) <= 0.05 * made.amplitude)
+    return "motor_torque is constant: there is no excitation";
   // A level that a tenth of the time is exceeded stands for the amplitude: a few spikes or noise do not
   // change it.
   if (differs(signal_level(torque), made.excitation_level, 0.05))
@@ -91,56 +91,29 @@ double excitation_period(const Record& record, Channel signal) {
   return detect_period(record.time, record.column(source)).value_or(0);
 }
 
-double run_period(const Record& record, const ApdSettings& settings) {
-  if (settings.period > 0) return settings.period;
-  std::size_t end = 0;  // of the run so far
-  for (double length = kFirstPeriodSearch;; length *= 2) {
-    while (end < record.size() && record.time[end] - record.time[0] < length) ++end;
-    if (end >= record.size()) return excitation_period(record, settings.signal);
-    const Record run = record.slice(record.time[0], std::nextafter(record.time[end], kInfinity));
-    if (const double period = excitation_period(run, settings.signal); period > 0) return period;
-  }
-}
-
-std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings, long last) {
-  const double period = run_period(record, settings);
-  if (!(period > 0)) return std::nullopt;
-  const auto grid = window_grid(record.time, period);
-  if (!grid) return std::nullopt;
-  const long end = grid->completed(record.time.back());
-  const long begin = std::max<long>(settings.settling_periods, last > 0 ? end - last : 0);
-  if (begin >= end) return std::nullopt;
-  return record.slice(grid->start(begin), grid->start(end));
-}
-
-ApdResult analyse_apd(const Record& record, const ApdSettings& settings) {
+ApdResult analyse_apd(const PeriodWindow& window, const ApdSettings& settings) {
+  const Record& record = window.record;
   ApdResult result;
   result.total = AmplitudeDistribution(settings.layout);
-  result.period = settings.period > 0 ? settings.period : excitation_period(record, settings.signal);
+  result.period = window.period;
   if (!record.has(settings.signal) || !(result.period > 0)) return result;
-  const std::vector<double>& signal = record.column(settings.signal);
-  PeriodAnalyser analyser(result.period, settings.layout);
   double sum = 0;
-  for (std::size_t i = 0; i <= record.size(); ++i) {
-    const PeriodResult* period =
-        i < record.size() ? analyser.add(record.time[i], signal[i]) : analyser.finish();
-    if (!period || period->index < settings.settling_periods) continue;
-    if (!period->complete || std::isnan(period->apd.skewness())) {
+  for (const PeriodResult& period : window.periods) {
+    const double skewness = period.apd.skewness();
+    if (!period.complete || std::isnan(skewness)) {
       ++result.incomplete;
       continue;
     }
-    result.periods.push_back(*period);
-    result.total.merge(period->apd);
-    sum += period->apd.skewness();
+    result.periods.push_back(period);
+    result.total.merge(period.apd);
+    sum += skewness;
   }
-  if (!result.periods.empty()) result.skewness = sum / result.periods.size();
+  if (!result.periods.empty()) result.skewness = sum / static_cast<double>(result.periods.size());
   const double interval = record.sampling_interval();
   if (interval > 0) {
-    const double start = record.time.front() + settings.settling_periods * result.period;
-    const Record settled = record.slice(start - 0.5 * interval, record.time.back() + interval);
     const double samples_per_period = result.period / interval;
-    result.noise_range = estimate_noise(settled.column(settings.signal), samples_per_period);
-    if (settled.size() >= 2 * samples_per_period) result.noise = result.noise_range.upper;
+    result.noise_range = estimate_noise(record.column(settings.signal), samples_per_period);
+    if (static_cast<double>(record.size()) >= 2 * samples_per_period) result.noise = result.noise_range.upper;
   }
   return result;
 }
@@ -223,9 +196,7 @@ std::optional<Estimate> refusal(const Record& record, const ApdResult& apd, cons
   if (!record.has(settings.signal))
     return refuse(Status::insufficient_data, "the record has no " + channel_name(settings.signal));
   if (!curve) return refuse(Status::insufficient_data, "no monitoring curve");
-  std::string lacking = "no complete excitation period";
-  if (settings.settling_periods > 0)
-    lacking += " after " + std::to_string(settings.settling_periods) + " settling period(s)";
+  const std::string lacking = "no complete excitation period";
   const double expected = curve->conditions.frequency > 0 ? 1 / curve->conditions.frequency : apd.period;
   if (record.size() < kLeadingSamples || record.time.back() - record.time.front() < 0.9 * expected)
     return refuse(Status::insufficient_data, lacking + ": the record is too short");

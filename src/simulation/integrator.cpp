@@ -226,7 +226,7 @@ Integrator::Impl::~Impl() {
 }
 
 void Integrator::Impl::fail(const std::string& what) const {
-  double reached = time;  // where the solver is now; of no interest whether it can tell
+  double reached = time;  // where the solver is now; an error here leaves the time before
   if (memory) multistep ? CVodeGetCurrentTime(memory, &reached) : ERKStepGetCurrentTime(memory, &reached);
   throw IntegrationError(fmt::format("{}: {} at t = {:.12g} s", settings.method, what, reached));
 }

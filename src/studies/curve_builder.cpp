@@ -13,9 +13,9 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
+#include "drawn_machine.h"
 #include "family_builder.h"
 #include "fine_run.h"
-#include "machine.h"
 
 namespace backlash {
 namespace {
@@ -132,7 +132,7 @@ std::vector<Rig> machines_of(const CurvePlan& plan) {
   for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
   for (int i = 0; i + 1 < count; ++i)
     machines.push_back(
-        with_backlash(machine_of(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
+        with_backlash(draw_machine(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
   for (int i = 0; i < count_beyond(plan); ++i)
     machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
   return machines;

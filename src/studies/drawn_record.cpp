@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/random.h"
-#include "machine.h"
+#include "drawn_machine.h"
 
 namespace backlash {
 namespace {
@@ -45,7 +45,7 @@ double duration_of(const RigFile& file, const Draw& d) {
 }  // namespace
 
 Record simulate_fine(RigFile file, const Draw& d, double duration) {
-  Rig rig = machine_of(file, d.seed);
+  Rig rig = draw_machine(file, d.seed);
   rig.mesh.backlash = d.backlash;
   SensorsSettings& sensors = file.simulation.sensors;
   sensors.sampling_rate *= kPhases;

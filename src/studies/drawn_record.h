@@ -16,7 +16,7 @@ struct Draw {
   std::uint64_t seed;             // of the noise
 };
 
-/// The machine that a rig file describes (machine_of, by d.seed) with the backlash of a draw: exact motion
+/// The machine that a rig file describes (draw_machine, by d.seed) with the backlash of a draw: exact motion
 /// for `duration` [s], several times finer than the sampling, so that a recorder can begin between two
 /// samples.
 Record simulate_fine(RigFile file, const Draw& d, double duration);

@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/feedback.h"
 #include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
@@ -41,6 +42,7 @@ Command command() {
       {"seeds", "N",
        "runs per backlash value, each with its own noise and sampling phase" + fallback(defaults.seeds)},
       {"plot", "CURVE.png", "also draw the curve with its scatter"},
+      feedback_option(),
   };
   c.examples = {"build_curve config/sarkar_1997.yaml --out curve.yaml --plot curve.png"};
   c.exit_codes = "  0   done (a stretch where skewness rises is flagged in the curve and told)\n";
@@ -79,7 +81,7 @@ void tell(const MonitoringCurve& curve, const std::string& out) {
 
 int build(const Arguments& arguments) {
   const std::string rig = arguments.positional(0), out = arguments.text("out"), plot = arguments.text("plot");
-  const CurveRequest request = read_request(arguments);
+  CurveRequest request = read_request(arguments);
   const RigFile file = load_rig_file(rig);
   check_output(out, {rig});
   if (!plot.empty()) {
@@ -88,12 +90,16 @@ int build(const Arguments& arguments) {
     check_output(plot, {rig});
   }
   MonitoringCurve curve;
-  {
+  if (arguments.has("feedback")) {
+    FeedbackLines lines;
+    request.best_so_far = lines.best_so_far();
+    curve = of_file(rig, [&] { return build_curve(file, request, lines.progress()); });
+  } else {
     ProgressBar bar;
     curve = of_file(rig, [&] { return build_curve(file, request, bar.progress()); });
   }
   write_text(out, curve.to_yaml());
-  tell(curve, out);
+  if (!arguments.has("feedback")) tell(curve, out);
   if (!plot.empty()) {
     std::cout.flush();
     plot_curve(out, plot);

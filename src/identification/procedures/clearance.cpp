@@ -16,16 +16,16 @@
 namespace backlash {
 namespace {
 
-constexpr double kCutoff = 40;       // Hz, of the travel in which passages are sought
-constexpr double kFineCutoff = 120;  // Hz, of the penetration
-constexpr double kMisfit = 0.02;     // of the travel, deviation of a passage that fits
-constexpr double kOutlier = 3;       // of the median deviation
-constexpr int kPushes[] = {2, 3};    // degrees of the push over J
-constexpr double kSlow = 0.2;        // of the fastest: below it friction changes
-constexpr double kSensitive = 0.05;  // of the gap, between the two pushes: worth a warning
-constexpr double kUncertain = 0.25;  // of the gap: beyond it is not told
-constexpr double kFlanks = 1.3;      // by which flanks must better the fit
-constexpr int kLeastSamples = 20;
+constexpr double kCutoff = 3.85;      // simulation: times the frequency of the load on a flank
+constexpr double kFineCutoff = 11.5;  // simulation: the same
+constexpr double kMisfit = 0.02;      // choice: of the travel, deviation of a passage that fits
+constexpr double kOutlier = 3;        // choice: of the median deviation
+constexpr int kPushes[] = {2, 3};     // choice: degrees of the push over J
+constexpr double kSlow = 0.2;         // choice: of the fastest: below it friction changes
+constexpr double kSensitive = 0.05;   // choice: of the gap, between the two pushes: worth a warning
+constexpr double kUncertain = 0.25;   // choice: of the gap: beyond it is not told
+constexpr double kFlanks = 1.3;       // simulation: by which flanks must better the fit
+constexpr int kLeastSamples = 20;     // choice: of a passage
 
 using Values = std::vector<double>;
 
@@ -39,7 +39,7 @@ struct Run {
   double interval = 0;
 };
 
-Run prepare(const Record& given) {
+Run prepare(const Record& given, const ClearanceSettings& settings) {
   if (!given.has(Channel::motor_position) || !given.has(Channel::load_position))
     throw CannotIdentify("the clearance needs the positions of motor and load");
   const Record record = evenly_sampled(given);
@@ -49,8 +49,8 @@ Run prepare(const Record& given) {
   run.interval = record.sampling_interval();
   const Values& load = record.column(Channel::load_position);
   for (std::size_t i = 0; i < load.size(); ++i) run.relative.push_back(load[i] - run.motor[i]);
-  run.smooth = low_pass(run.relative, run.interval, std::min(kCutoff, 0.2 / run.interval));
-  run.fine = low_pass(run.relative, run.interval, std::min(kFineCutoff, 0.4 / run.interval));
+  run.smooth = low_pass(run.relative, run.interval, std::min(settings.cutoff, 0.2 / run.interval));
+  run.fine = low_pass(run.relative, run.interval, std::min(settings.fine_cutoff, 0.4 / run.interval));
   return run;
 }
 
@@ -215,9 +215,19 @@ Measured gap_of(const Passages& p) {
 
 }  // namespace
 
+ClearanceSettings clearance_settings(double stiffness, double load_inertia) {
+  ClearanceSettings settings;
+  settings.stiffness = stiffness;
+  settings.load_inertia = load_inertia;
+  const double contact = std::sqrt(stiffness / load_inertia) / (2 * M_PI);  // Hz
+  settings.cutoff = kCutoff * contact;
+  settings.fine_cutoff = kFineCutoff * contact;
+  return settings;
+}
+
 Clearance identify_clearance(const Record& record, const ClearanceSettings& settings) {
   const double held = held_frequency(settings);
-  const Run run = prepare(record);
+  const Run run = prepare(record, settings);
   std::vector<Stretch> stretches = find_passages(run, settings.contact_time);
   require_brake(run, stretches, settings.most_motor_travel);
   Clearance c;

@@ -13,9 +13,9 @@
 namespace backlash {
 namespace {
 
-constexpr std::size_t kLeastBlocks = 4;
-constexpr double kSettled = 1e-4;      // of the speed
-constexpr double kMostSettling = 0.5;  // of a stretch
+constexpr std::size_t kLeastBlocks = 4;  // theory: for a standard error
+constexpr double kSettled = 1e-4;        // choice: of the speed
+constexpr double kMostSettling = 0.5;    // choice: of a stretch
 
 void require(const ConstantSpeedOptions& options) {
   if (!(options.block > 0)) throw InvalidParameter("block", options.block, "must be > 0 s");

@@ -15,12 +15,13 @@
 namespace backlash {
 namespace {
 
-constexpr double kSearched = 12;       // periods after a step in which ringing may begin
-constexpr double kShape = 0.01;        // of the amplitude: misfit that contact with friction and drift leaves
-constexpr double kNoiseMargin = 1.2;   // of the residuals' deviation over the noise
-constexpr double kLeastAmplitude = 5;  // deviations
-constexpr int kHeld = 2;               // eighths of a period
-constexpr double kSteady = 0.1;        // of the torque's travel: it is constant within this
+constexpr double kSearched = 12;  // choice: periods after a step in which ringing may begin
+constexpr double kShape =
+    0.01;  // simulation: of the amplitude: misfit that contact with friction and drift leaves
+constexpr double kNoiseMargin = 1.2;   // choice: of the residuals' deviation over the noise
+constexpr double kLeastAmplitude = 5;  // choice: deviations
+constexpr int kHeld = 2;               // choice: eighths of a period
+constexpr double kSteady = 0.1;        // choice: of the torque's travel: it is constant within this
 
 using Values = std::vector<double>;
 

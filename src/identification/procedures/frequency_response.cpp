@@ -18,14 +18,14 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kSteppedShare = 0.9;   // of the time in sine runs; less is no stepped sine
-constexpr double kHighest = 0.25;       // of the sampling rate
-constexpr double kLongestSegment = 16;  // s, if not asked for
+constexpr double kSteppedShare = 0.9;   // choice: of the time in sine runs; less is no stepped sine
+constexpr double kHighest = 0.25;       // choice: of the sampling rate
+constexpr double kLongestSegment = 16;  // s, choice: if not asked for
 constexpr std::size_t kShortestSegment = 64, kFewestSegments = 8;
-constexpr std::size_t kFirstLine = 3;  // below, what drifts leaks in
-constexpr double kExcited = 1e-5;      // of the largest power of a line
-constexpr std::size_t kLeakReach = 8;  // lines
-constexpr double kAlone = 1e-2;        // of a line's power, three lines beside it: it stands alone
+constexpr std::size_t kFirstLine = 3;  // theory: below, what drifts leaks in
+constexpr double kExcited = 1e-5;      // choice: of the largest power of a line
+constexpr std::size_t kLeakReach = 8;  // theory: lines
+constexpr double kAlone = 1e-2;        // choice: of a line's power, three lines beside it: it stands alone
 
 struct Signals {
   std::vector<double> torque, speed;

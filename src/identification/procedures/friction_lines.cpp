@@ -16,9 +16,9 @@
 namespace backlash {
 namespace {
 
-constexpr double kSameSpeed = 0.01;  // relative: speeds closer than this count as one
-constexpr double kSurprise = 0.01;   // chance of so much curvature on a straight line, that is worth telling,
-                                     // or of a row so far off among all
+constexpr double kSameSpeed = 0.01;  // choice: relative: speeds closer than this count as one
+constexpr double kSurprise = 0.01;   // choice: chance of so much curvature on a straight line, that is worth
+                                    // telling, or of a row so far off among all
 
 struct Rows {
   Eigen::VectorXd speed, torque, error;

@@ -20,16 +20,17 @@ namespace backlash {
 namespace {
 
 constexpr double kTurn = 2 * M_PI;
-constexpr double kSteady = 0.05;     // of the median speed
-constexpr double kSettled = 5e-3;    // of the median speed: the filter's own at the ends of a run
-constexpr double kMostStart = 0.25;  // of a run, for starting and for stopping
-constexpr double kSpeedCutoff = 5;   // Hz, of the speed that is judged
-constexpr double kBackwards = 0.01;  // share of samples that may go the other way: starting and stopping
-constexpr int kLeastSamples = 5;     // per bin and direction
-constexpr double kRelevant = 1e-3;   // of the mean: smaller harmonics may be the steps of the sensors
-constexpr double kLopsided = 0.1;    // of the bin's width
-constexpr int kLeastBins = 8;
-constexpr int kCentreOrders = 6;  // of the centre line beside the scale
+constexpr double kSteady = 0.05;     // choice: of the median speed
+constexpr double kSettled = 5e-3;    // choice: of the median speed: the filter's own at the ends of a run
+constexpr double kMostStart = 0.25;  // choice: of a run, for starting and for stopping
+constexpr double kSpeedCutoff = 5;   // Hz, choice: of the speed that is judged
+constexpr double kBackwards =
+    0.01;                         // choice: share of samples that may go the other way: starting and stopping
+constexpr int kLeastSamples = 5;  // choice: per bin and direction
+constexpr double kRelevant = 1e-3;  // choice: of the mean: smaller harmonics may be the steps of the sensors
+constexpr double kLopsided = 0.1;   // choice: of the bin's width
+constexpr int kLeastBins = 8;       // theory: three unknowns per harmonic
+constexpr int kCentreOrders = 6;    // choice: of the centre line beside the scale
 
 using Values = std::vector<double>;
 

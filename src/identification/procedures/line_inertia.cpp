@@ -19,11 +19,11 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr std::size_t kLeastCycles = 4;
-constexpr double kLeastShare = 0.5;      // of the speed's variance that the sine must explain
-constexpr double kSettled = 1e-3;        // of the amplitude, of a cycle from those of the second half
-constexpr double kScatter = 4;           // deviations of those, the same
-constexpr std::size_t kMostGroups = 20;  // of cycles, for the error
+constexpr std::size_t kLeastCycles = 4;  // choice
+constexpr double kLeastShare = 0.5;      // choice: of the speed's variance that the sine must explain
+constexpr double kSettled = 1e-3;        // choice: of the amplitude, of a cycle from those of the second half
+constexpr double kScatter = 4;           // choice: deviations of those, the same
+constexpr std::size_t kMostGroups = 20;  // choice: of cycles, for the error
 constexpr int kCycleBits = 22;           // choice: of the number of cycles, relative 5e-7
 
 /// x = Re(amplitude exp(i w k)) + polynomial, k in samples.

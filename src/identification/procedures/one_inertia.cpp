@@ -19,18 +19,18 @@
 namespace backlash {
 namespace {
 
-constexpr double kLargestDelay = 2;   // sampling intervals
+constexpr double kLargestDelay = 2;   // choice: sampling intervals
 constexpr int kDelayBits = 12;        // choice: the search ends within 0.001 of an interval
-constexpr double kVagueDelay = 1;     // sampling intervals of standard error
-constexpr double kLeastPeriods = 40;  // of the cutoff
-constexpr double kPeriods = 100;      // where the cutoff is chosen
-constexpr double kLeastShare = 0.05;  // of the samples in each direction
-constexpr double kStanding = 4;       // standard deviations of the speed's noise
-constexpr double kSignNoise = 1e-3;   // of the speed: how sharply its sign is taken
-constexpr double kSignBandwidth = 4;  // but not below four times the cutoff
-constexpr double kShortest = 0.25;    // of the memory: a standstill that matters
-constexpr std::size_t kBlocks = 30;
-constexpr double kMuchLeft = 0.1;  // relative error that is worth a warning
+constexpr double kVagueDelay = 1;     // choice: sampling intervals of standard error
+constexpr double kLeastPeriods = 40;  // choice: of the cutoff
+constexpr double kPeriods = 100;      // choice: where the cutoff is chosen
+constexpr double kLeastShare = 0.05;  // choice: of the samples in each direction
+constexpr double kStanding = 4;       // choice: standard deviations of the speed's noise
+constexpr double kSignNoise = 1e-3;   // choice: of the speed: how sharply its sign is taken
+constexpr double kSignBandwidth = 4;  // choice: but not below four times the cutoff
+constexpr double kShortest = 0.25;    // choice: of the memory: a standstill that matters
+constexpr std::size_t kBlocks = 30;   // choice: left out one at a time, for the errors
+constexpr double kMuchLeft = 0.1;     // choice: relative error that is worth a warning
 
 /// What the equations need of a record.
 struct Signals {

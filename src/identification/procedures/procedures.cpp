@@ -66,7 +66,7 @@ void update_from_findings(IdentificationCase& c) {
   c.result.rig = c.declared;
   for (const auto& [name, m] : c.result.parameters) {
     const RigParameter& parameter = servo_parameter(name);
-    if (!parameter.positive || m.value > 0) parameter.set(c.result.rig, m.value);
+    if (!parameter.positive() || m.value > 0) parameter.set(c.result.rig, m.value);
   }
 }
 

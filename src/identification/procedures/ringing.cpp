@@ -9,8 +9,8 @@
 namespace backlash {
 namespace {
 
-constexpr int kLinear = 4;  // c0, c1, p, q
-constexpr double kMostDamping = 0.9;
+constexpr int kLinear = 4;            // c0, c1, p, q
+constexpr double kMostDamping = 0.9;  // theory: damping ratio; above, nothing rings
 
 /// The damped sine as a problem in (rate, frequency) alone.
 class DampedSine {

@@ -15,9 +15,9 @@
 namespace backlash {
 namespace {
 
-constexpr double kMoving = 0.1;       // of the largest speed: slower does not count as moving one way
-constexpr double kLeastSpread = 0.1;  // of the largest speed
-constexpr std::size_t kParts = 10;    // blocks of rows of one run that are left out one at a time
+constexpr double kMoving = 0.1;       // choice: of the largest speed: slower does not count as moving one way
+constexpr double kLeastSpread = 0.1;  // choice: of the largest speed
+constexpr std::size_t kParts = 10;    // choice: blocks of rows of one run that are left out one at a time
 
 /// Means of two channels while the motor turns one way.
 struct OneWayRun {

@@ -14,18 +14,18 @@ namespace backlash {
 namespace {
 
 constexpr std::size_t kFewestCycles = 4, kMostCycles = 200;
-constexpr std::size_t kFewestForNoise = 64;  // samples that tell the noise
+constexpr std::size_t kFewestForNoise = 64;  // theory: samples that tell the noise
 constexpr double kBetween =
     2.5;  // cycles between two runs that count as inside: the step from one to the other
-constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // cycles
-constexpr double kJitter = 5;                              // deviations of a passage
-constexpr std::size_t kJitterReach = 10;                   // passages on either side that tell the deviation
-constexpr double kSameHeight = 0.2;                        // of the amplitude
-constexpr double kNoSine = 0.1;                            // of the torque's power
-constexpr double kTurn = 0.1;                              // of the torque's range; a smaller turn is noise
-constexpr double kNoiseTurn = 8;                           // standard deviations; the same for known noise
-constexpr double kMostTurn = 0.5;                          // of the range, lest the sine itself be noise
-constexpr double kFewestSamples = 8;  // a cycle or a group of them is fitted with, three unknowns
+constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // choice: cycles
+constexpr double kJitter = 5;                              // choice: deviations of a passage
+constexpr std::size_t kJitterReach = 10;  // choice: passages on either side that tell the deviation
+constexpr double kSameHeight = 0.2;       // choice: of the amplitude
+constexpr double kNoSine = 0.1;           // choice: of the torque's power
+constexpr double kTurn = 0.1;             // choice: of the torque's range; a smaller turn is noise
+constexpr double kNoiseTurn = 8;          // choice: standard deviations; the same for known noise
+constexpr double kMostTurn = 0.5;         // choice: of the range, lest the sine itself be noise
+constexpr double kFewestSamples = 8;      // theory: a cycle or a group of them is fitted with, three unknowns
 
 /// A rising passage of the mean between a minimum and the next maximum.
 struct Passage {

@@ -15,10 +15,10 @@ namespace {
 
 using Points = std::vector<ResponsePoint>;
 
-constexpr double kWindow = 2;                 // of |H|^2, around an extremum
-constexpr std::size_t kBeside = 3;            // points on either side of an extremum
-constexpr double kLeastError = 1e-3;          // relative, of any point
-constexpr double kBelow = 0.5, kAbove = 1.5;  // of F_AR and F_R: bands of the plateaus
+constexpr double kWindow = 2;                 // choice: of |H|^2, around an extremum
+constexpr std::size_t kBeside = 3;            // choice: points on either side of an extremum
+constexpr double kLeastError = 1e-3;          // choice: relative, of any point
+constexpr double kBelow = 0.5, kAbove = 1.5;  // theory: of F_AR and F_R: bands of the plateaus
 
 /// Median of a value over five neighbours: a single bad point makes no extremum.
 std::vector<double> smoothed(const Points& points, const std::function<double(const ResponsePoint&)>& value) {

@@ -13,10 +13,10 @@
 namespace backlash {
 namespace {
 
-constexpr double kLeastError = 1e-3;   // relative: what sampling and transients leave
-constexpr double kOutlier = 5;         // deviations
-constexpr std::size_t kPool = 2;       // neighbours on either side whose errors are pooled
-constexpr double kStartDamping = 0.1;  // damping ratio
+constexpr double kLeastError = 1e-3;   // choice: relative: what sampling and transients leave
+constexpr double kOutlier = 5;         // choice: deviations
+constexpr std::size_t kPool = 2;       // choice: neighbours on either side whose errors are pooled
+constexpr double kStartDamping = 0.1;  // choice: damping ratio
 
 struct Point {
   double frequency = 0, error = 0;
@@ -91,7 +91,7 @@ TwoMass TwoMassFit::model() const {
 TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse& load) {
   const Resonances seen = find_resonances(motor);
   const InertiaPlateaus inertias = find_inertias(motor, seen);
-  const StiffnessSplit start = split_stiffness(Kept::total_inertia, seen, inertias.total, {});
+  const StiffnessSplit start = split_stiffness(KnownInertia::total_inertia, seen, inertias.total, {});
   const double k = start.stiffness_anti_resonance.value, total = inertias.total.value;
   const double critical = 2 * std::sqrt(k * start.reduced_inertia.value);
   const double viscous = 2 * M_PI * motor.points.front().frequency * total;

@@ -53,7 +53,7 @@ class Square : public Excitation {
   double torque(double, long segment) const override {
     return bias_ + (segment % 2 == 0 ? amplitude_ : -amplitude_);
   }
-  double segment_end(long segment) const override { return (segment + 1) / (2 * frequency_); }
+  double segment_end(long segment) const override { return double(segment + 1) / (2 * frequency_); }
   double period() const override { return 1 / frequency_; }
 
  private:
@@ -103,10 +103,10 @@ class Chirp : public Excitation {
         shortest_(1 / std::max(start, end)),
         bias_(bias) {}
   double torque(double t, long segment) const override {
-    const double s = t - segment * duration_;
+    const double s = t - double(segment) * duration_;
     return bias_ + amplitude_ * std::sin(2 * M_PI * (start_ + 0.5 * rate_ * s) * s);
   }
-  double segment_end(long segment) const override { return (segment + 1) * duration_; }
+  double segment_end(long segment) const override { return double(segment + 1) * duration_; }
   double shortest_period(long) const override { return shortest_; }
   double period() const override { return duration_; }
 
