@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "json.h"
 
-#include <cmath>
+#include "backlash_diagnosis/report/json_number.h"
 
 namespace backlash {
 
 Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
+  return json_number(value);
 }
 
 Json measured(const Measured& m) {
