@@ -5,12 +5,17 @@
 
 namespace backlash {
 
-Json number(double value) {
+Json json_number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
 
+Json json_interval(double lower, double upper) {
+  if (!std::isfinite(lower) && !std::isfinite(upper)) return nullptr;
+  return Json::array({json_number(lower), json_number(upper)});
+}
+
 Json measured(const Measured& m) {
-  return {{"value", number(m.value)}, {"standard_error", number(m.standard_error)}};
+  return {{"value", json_number(m.value)}, {"standard_error", json_number(m.standard_error)}};
 }
 
 std::string dumped(const Json& json, int indent) {
