@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
@@ -15,7 +16,6 @@ namespace {
 
 constexpr double kNoiseExcess = 1.2;  // noise estimate over the largest on the curve that may be by chance
 constexpr double kOftenNoise = 1.65;  // standard deviations of noise that a twentieth of the time exceeds
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double range_of(const std::vector<double>& x) {
   if (x.empty()) return 0;
@@ -28,10 +28,7 @@ bool differs(double value, double reference, double tolerance) {
 }
 
 std::string mismatch(const char* what, double value, double reference, const char* unit) {
-  std::ostringstream text;
-  text.precision(4);
-  text << what << " is " << value << ' ' << unit << ", the curve was made at " << reference << ' ' << unit;
-  return text.str();
+  return fmt::format("{0} is {1:.4g} {3}, the curve was made at {2:.4g} {3}", what, value, reference, unit);
 }
 
 /// `noise`: standard deviation of that of motor_torque.
@@ -57,19 +54,15 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
 
 std::string motion_mismatch(const Record& record, const MonitoringCurve& curve) {
   if (!curve.conditions.output_locked) return {};
-  std::ostringstream text;
-  text.precision(4);
   const double load = range_of(record.column(Channel::load_position));
   const double travel = travel_of(record.column(Channel::motor_position));
-  if (load > 0.05 * curve.conditions.motor_travel) {
-    text << "the output moves by " << load << " rad, the rig says it is locked";
-    return text.str();
-  }
-  if (travel > 1.05 * curve.conditions.motor_travel) {
-    text << "the motor travels " << travel << " rad, more than any backlash on the curve allows ("
-         << curve.conditions.motor_travel << " rad): output free, or backlash above the curve";
-    return text.str();
-  }
+  if (load > 0.05 * curve.conditions.motor_travel)
+    return fmt::format("the output moves by {:.4g} rad, the rig says it is locked", load);
+  if (travel > 1.05 * curve.conditions.motor_travel)
+    return fmt::format(
+        "the motor travels {:.4g} rad, more than any backlash on the curve allows ({:.4g} rad): output free, "
+        "or backlash above the curve",
+        travel, curve.conditions.motor_travel);
   return {};
 }
 
@@ -103,56 +96,29 @@ double excitation_period(const Record& record, Channel signal) {
   return detect_period(record.time, record.column(source)).value_or(0);
 }
 
-double run_period(const Record& record, const ApdSettings& settings) {
-  if (settings.period > 0) return settings.period;
-  std::size_t end = 0;  // of the run so far
-  for (double length = kFirstPeriodSearch;; length *= 2) {
-    while (end < record.size() && record.time[end] - record.time[0] < length) ++end;
-    if (end >= record.size()) return excitation_period(record, settings.signal);
-    const Record run = record.slice(record.time[0], std::nextafter(record.time[end], kInfinity));
-    if (const double period = excitation_period(run, settings.signal); period > 0) return period;
-  }
-}
-
-std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings, long last) {
-  const double period = run_period(record, settings);
-  if (!(period > 0)) return std::nullopt;
-  const auto grid = window_grid(record.time, period);
-  if (!grid) return std::nullopt;
-  const long end = grid->completed(record.time.back());
-  const long begin = std::max<long>(settings.settling_periods, last > 0 ? end - last : 0);
-  if (begin >= end) return std::nullopt;
-  return record.slice(grid->start(begin), grid->start(end));
-}
-
-ApdResult analyse_apd(const Record& record, const ApdSettings& settings) {
+ApdResult analyse_apd(const PeriodWindow& window, const ApdSettings& settings) {
+  const Record& record = window.record;
   ApdResult result;
   result.total = AmplitudeDistribution(settings.layout);
-  result.period = settings.period > 0 ? settings.period : excitation_period(record, settings.signal);
+  result.period = window.period;
   if (!record.has(settings.signal) || !(result.period > 0)) return result;
-  const std::vector<double>& signal = record.column(settings.signal);
-  PeriodAnalyser analyser(result.period, settings.layout);
   double sum = 0;
-  for (std::size_t i = 0; i <= record.size(); ++i) {
-    const PeriodResult* period =
-        i < record.size() ? analyser.add(record.time[i], signal[i]) : analyser.finish();
-    if (!period || period->index < settings.settling_periods) continue;
-    if (!period->complete || std::isnan(period->apd.skewness())) {
+  for (const PeriodResult& period : window.periods) {
+    const double skewness = period.apd.skewness();
+    if (!period.complete || std::isnan(skewness)) {
       ++result.incomplete;
       continue;
     }
-    result.periods.push_back(*period);
-    result.total.merge(period->apd);
-    sum += period->apd.skewness();
+    result.periods.push_back(period);
+    result.total.merge(period.apd);
+    sum += skewness;
   }
-  if (!result.periods.empty()) result.skewness = sum / result.periods.size();
+  if (!result.periods.empty()) result.skewness = sum / static_cast<double>(result.periods.size());
   const double interval = record.sampling_interval();
   if (interval > 0) {
-    const double start = record.time.front() + settings.settling_periods * result.period;
-    const Record settled = record.slice(start - 0.5 * interval, record.time.back() + interval);
     const double samples_per_period = result.period / interval;
-    result.noise_range = estimate_noise(settled.column(settings.signal), samples_per_period);
-    if (settled.size() >= 2 * samples_per_period) result.noise = result.noise_range.upper;
+    result.noise_range = estimate_noise(record.column(settings.signal), samples_per_period);
+    if (static_cast<double>(record.size()) >= 2 * samples_per_period) result.noise = result.noise_range.upper;
   }
   return result;
 }
@@ -171,12 +137,9 @@ std::string frequency_mismatch(const Record& record, const ApdResult& apd, const
 
 std::string noise_mismatch(const ApdResult& apd, const ApdSettings& settings, const MonitoringCurve& curve) {
   if (!(apd.noise > kNoiseExcess * curve.noise_levels.back())) return {};
-  std::ostringstream text;
-  text.precision(4);
-  text << "sensor noise is " << apd.noise << ' ' << channel_unit(settings.signal)
-       << " (standard deviation), the curve covers noise up to " << curve.noise_levels.back() << ' '
-       << channel_unit(settings.signal);
-  return text.str();
+  return fmt::format(
+      "sensor noise is {0:.4g} {2} (standard deviation), the curve covers noise up to {1:.4g} {2}", apd.noise,
+      curve.noise_levels.back(), channel_unit(settings.signal));
 }
 
 /// Whether the record is of the kind that the curve is for.
@@ -238,9 +201,7 @@ std::optional<Estimate> refusal(const Record& record, const ApdResult& apd, cons
   if (!record.has(settings.signal))
     return refuse(Status::insufficient_data, "the record has no " + channel_name(settings.signal));
   if (!curve) return refuse(Status::insufficient_data, "no monitoring curve");
-  std::string lacking = "no complete excitation period";
-  if (settings.settling_periods > 0)
-    lacking += " after " + std::to_string(settings.settling_periods) + " settling period(s)";
+  const std::string lacking = "no complete excitation period";
   const double expected = curve->conditions.frequency > 0 ? 1 / curve->conditions.frequency : apd.period;
   if (record.size() < kLeadingSamples || record.time.back() - record.time.front() < 0.9 * expected)
     return refuse(Status::insufficient_data, lacking + ": the record is too short");
@@ -279,13 +240,12 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
   if (match.refused || !curve->family) return match;
   match.family = match_family(*curve, std::move(samples), match.noise);
   if (match.family->alien()) {
-    std::ostringstream text;
-    text.precision(3);
-    text << "the distribution is " << match.family->misfit << " (rms) from the nearest of "
-         << curve->conditions.rig << ", simulated records were within " << match.family->usual_misfit
-         << ": the machine does something that the rig does not contain";
-    match.mismatch = Mismatch{Mismatch::Concern::curve, text.str()};
-    match.refused = refuse(Status::out_of_domain, text.str());
+    const std::string reason = fmt::format(
+        "the distribution is {:.3g} (rms) from the nearest of {}, simulated records were within {:.3g}: the "
+        "machine does something that the rig does not contain",
+        match.family->misfit, curve->conditions.rig, match.family->usual_misfit);
+    match.mismatch = Mismatch{Mismatch::Concern::curve, reason};
+    match.refused = refuse(Status::out_of_domain, reason);
   }
   return match;
 }

@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/apd_shape.h"
+#include "backlash_diagnosis/diagnosis/sample_stream.h"
 
 namespace backlash {
 namespace {
@@ -84,11 +85,6 @@ DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
   return settings;
 }
 
-DiagnosisSettings without_settling(DiagnosisSettings settings) {
-  if (settings.apd) settings.apd->settling_periods = 0;
-  return settings;
-}
-
 const std::vector<DiagnosisMethod>& diagnosis_method_table() {
   static const std::vector<DiagnosisMethod> methods = {
       {"apd_skewness", "the signal of diagnosis.apd and a monitoring curve", true,
@@ -121,21 +117,20 @@ bool needs_curve(const std::string& method) {
 
 Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
                    const std::optional<Baseline>& baseline, const std::string& method) {
-  const DiagnosisSettings settled = without_settling(settings);
-  if (!settings.apd || !(run_period(record, *settings.apd) > 0))
-    return diagnose_settled(record, settled, curve, baseline, method);
-  return diagnose_settled(whole_periods(record, *settings.apd).value_or(Record()), settled, curve, baseline,
-                          method);
+  const PeriodWindow window =
+      settings.apd ? cut_periods(record, settings.apd) : PeriodWindow{record, 0, 0, {}};
+  return diagnose(window, settings, curve, baseline, method);
 }
 
-Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings,
-                           const MonitoringCurve* curve, const std::optional<Baseline>& baseline,
-                           const std::string& method) {
+Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings,
+                   const MonitoringCurve* curve, const std::optional<Baseline>& baseline,
+                   const std::string& method) {
+  const Record& record = window.record;
   const auto& methods = diagnosis_methods();
   if (!method.empty() && std::find(methods.begin(), methods.end(), method) == methods.end())
     throw InvalidParameter("method", method, "must be one of " + joined(methods));
   Diagnosis diagnosis;
-  if (settings.apd) diagnosis.apd = analyse_apd(record, *settings.apd);
+  if (settings.apd) diagnosis.apd = analyse_apd(window, *settings.apd);
   CurveMatch match;
   if (settings.apd) match = match_curve(record, *diagnosis.apd, *settings.apd, curve);
   diagnosis.mismatch = match.mismatch;

@@ -3,15 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says
-
-constexpr std::size_t kRecent = 1000;  // samples from which the present rate is told
+constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says; a choice: two tell noise, one is open
+constexpr std::size_t kRecent = 1000;  // samples from which the present rate is told; a choice
+constexpr double kForever = std::numeric_limits<double>::infinity();  // s
 
 double get(const ChannelValues& values, Channel channel) {
   return values[static_cast<std::size_t>(channel)];
@@ -39,6 +40,7 @@ void SampleStream::restart() {
   record_ = Record();
   channels_.clear();
   analyser_.reset();
+  result_count_ = 0;
   grid_.reset();
   dropped_.reset();
   period_ = settings_.apd ? settings_.apd->period : 0;
@@ -46,7 +48,7 @@ void SampleStream::restart() {
 }
 
 double SampleStream::jump_limit() const {
-  return std::max(1.0, 3 * period_);
+  return settings_.of_record ? kForever : std::max(1.0, 3 * period_);
 }
 
 /// Without it there is nothing to diagnose.
@@ -58,7 +60,7 @@ Channel SampleStream::needed() const {
 /// new run.
 SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
   if (!channels_.empty() && present(values) == present_) return Fit::take;
-  if (channels_.empty() && !std::isfinite(get(values, needed()))) {
+  if (channels_.empty() && !settings_.of_record && !std::isfinite(get(values, needed()))) {
     counters_.last_problem = channel_name(needed()) + " is absent or not a number";
     return Fit::drop;
   }
@@ -133,7 +135,7 @@ const PeriodResult* SampleStream::add(double time, const ChannelValues& values) 
   if (!grid_)
     finished = start_windows();
   else if (analyser_)
-    finished = analyser_->add(time, get(values, settings_.apd->signal));
+    finished = analyse(time, get(values, settings_.apd->signal));
   trim();
   return finished && finished->index >= settings_.apd->settling_periods ? finished : nullptr;
 }
@@ -142,7 +144,19 @@ const PeriodResult* SampleStream::add(double time, const ChannelValues& values) 
 void SampleStream::find_period() {
   if (record_.time.back() - start_ < next_search_) return;
   next_search_ += next_search_ < settings_.keep ? next_search_ : 0.25 * settings_.keep;
-  period_ = excitation_period(record_, settings_.apd ? settings_.apd->signal : Channel::motor_torque);
+  period_ = excitation_period(record_, needed());
+}
+
+/// Keeps what the analyser has finished.
+const PeriodResult* SampleStream::analyse(double time, double value) {
+  const PeriodResult* finished = analyser_->add(time, value);
+  if (!finished) return nullptr;
+  if (result_count_ == results_.size())
+    results_.push_back(*finished);
+  else
+    results_[result_count_] = *finished;  // what was forgotten leaves its place in the heap
+  ++result_count_;
+  return finished;
 }
 
 const PeriodResult* SampleStream::start_windows() {
@@ -150,10 +164,10 @@ const PeriodResult* SampleStream::start_windows() {
   grid_ = window_grid(record_.time, period_);
   dropped_.reset();  // windows count from the first sample kept
   const PeriodResult* finished = nullptr;
-  if (!grid_ || !settings_.apd) return finished;
+  if (!grid_ || !settings_.apd || !record_.has(settings_.apd->signal)) return finished;
   analyser_.emplace(period_, settings_.apd->layout);
   const auto& signal = record_.column(settings_.apd->signal);
-  for (std::size_t i = 0; i < record_.size(); ++i) finished = analyser_->add(record_.time[i], signal[i]);
+  for (std::size_t i = 0; i < record_.size(); ++i) finished = analyse(record_.time[i], signal[i]);
   return finished;
 }
 
@@ -164,6 +178,16 @@ void SampleStream::trim() {
   const auto first = std::lower_bound(record_.time.begin(), record_.time.end(), last - keep);
   dropped_ = *(first - 1);
   record_.forget(static_cast<std::size_t>(first - record_.time.begin()));
+  forget_results();
+}
+
+void SampleStream::forget_results() {
+  const long begin = windows().begin;
+  const auto end = results_.begin() + static_cast<std::ptrdiff_t>(result_count_);
+  const auto first = std::find_if(results_.begin(), end,
+                                  [begin](const PeriodResult& result) { return result.index >= begin; });
+  result_count_ -= static_cast<std::size_t>(first - results_.begin());
+  std::rotate(results_.begin(), first, results_.end());
 }
 
 double SampleStream::sampling_interval() const {
@@ -183,16 +207,61 @@ long SampleStream::periods() const {
   return windows().end - windows().begin;
 }
 
-Record SampleStream::latest(long count) const {
-  if (!settings_.apd && (count == 0 || !grid_)) return record_;  // nothing that needs whole periods
-  if (!grid_) {
-    if (!(run_period(record_, *settings_.apd) > 0)) return record_;
-    return whole_periods(record_, *settings_.apd, count)
-        .value_or(Record());  // found sooner than at the next search
-  }
+/// Those of the windows [begin, end). The last window may count as whole while the analyser still waits for a
+/// sample that jitter could bring.
+std::vector<PeriodResult> SampleStream::results(const Windows& cut) const {
+  std::vector<PeriodResult> chosen;
+  for (std::size_t i = 0; i < result_count_; ++i)
+    if (const long index = results_[i].index; index >= cut.begin && index < cut.end)
+      chosen.push_back(results_[i]);
+  if (!analyser_ || (result_count_ > 0 && results_[result_count_ - 1].index >= cut.end - 1)) return chosen;
+  PeriodAnalyser ended = *analyser_;
+  const PeriodResult* last = ended.finish();
+  if (last && last->index >= cut.begin && last->index < cut.end) chosen.push_back(*last);
+  return chosen;
+}
+
+PeriodWindow SampleStream::latest(long count) const {
+  if (!settings_.apd && (count == 0 || !grid_)) return {record_, period_, periods(), {}};
+  if (!grid_) return searched_now(count);
   Windows cut = windows();
   if (count > 0) cut.begin = std::max(cut.begin, cut.end - count);
-  return record_.slice(grid_->start(cut.begin), grid_->start(cut.end));
+  return {record_.slice(grid_->start(cut.begin), grid_->start(cut.end)), period_, cut.end - cut.begin,
+          results(cut)};
+}
+
+/// A period may show before the next search is due.
+PeriodWindow SampleStream::searched_now(long count) const {
+  StreamSettings settings = settings_;
+  settings.of_record = true;
+  settings.keep = kForever;
+  settings.apd->period = period_ > 0 ? period_ : excitation_period(record_, settings.apd->signal);
+  if (!(settings.apd->period > 0)) return {record_, 0, 0, {}};
+  SampleStream again(settings);
+  again.add(record_);
+  return again.grid_ ? again.latest(count) : PeriodWindow{Record(), settings.apd->period, 0, {}};
+}
+
+void SampleStream::add(const Record& record) {
+  ChannelValues values;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    for (const Channel channel : kChannels)
+      values[static_cast<std::size_t>(channel)] = record.has(channel) ? record.column(channel)[i] : kNaN;
+    add(record.time[i], values);
+  }
+}
+
+PeriodWindow cut_periods(const Record& record, const std::optional<ApdSettings>& apd, long last) {
+  StreamSettings settings;
+  settings.apd = apd;
+  settings.keep = kForever;
+  settings.of_record = true;
+  SampleStream stream(settings);
+  stream.add(record);
+  PeriodWindow window = stream.latest(last);
+  window.record.name = record.name;
+  window.record.warnings = record.warnings;
+  return window;
 }
 
 }  // namespace backlash

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/bag_record.h"
 
+#include <fmt/format.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <std_msgs/String.h>
@@ -37,9 +38,7 @@ bool is_type(const rosbag::ConnectionInfo& c) {
 }
 
 std::string stamp_text(const ros::Time& stamp) {
-  std::string nanoseconds = std::to_string(stamp.nsec);
-  return std::to_string(stamp.sec) + "." +
-         std::string(9 - std::min<std::size_t>(9, nanoseconds.size()), '0') + nanoseconds;
+  return fmt::format("{}.{:09}", stamp.sec, stamp.nsec);
 }
 
 /// "joint_states" stands for "/joint_states" and "/robot/joint_states".
@@ -128,7 +127,7 @@ class JointRun {
 
  private:
   [[noreturn]] void fail_at(std::size_t index, const std::string& reason) const {
-    throw BadData(path_ + ": " + printable(topic_) + " message " + std::to_string(index), reason);
+    throw BadData(fmt::format("{}: {} message {}", path_, printable(topic_), index), reason);
   }
 
   bool accept_stamp(const ros::Time& stamp, std::size_t index) {
@@ -168,7 +167,7 @@ class JointRun {
       if (!column.empty() && std::isnan(column.front())) column.clear();
       if (!column.empty()) present.push_back(channel_name(channel));
     }
-    if (!record_.tells())
+    if (!record_.can_show_backlash())
       throw BadData(path_, "joint '" + printable(joint_) + "' on " + printable(topic_) +
                                " has no torque, position, current or acceleration; it has: " +
                                (present.empty() ? "nothing" : joined(present)));
@@ -261,7 +260,7 @@ class Reader {
       raw.bytes.clear();  // an empty message asks for nothing
       instance.write(raw);
       if (!lengths_fit(raw.bytes))
-        throw BadData(path_ + ": " + printable(instance.getTopic()) + " message " + std::to_string(index),
+        throw BadData(fmt::format("{}: {} message {}", path_, printable(instance.getTopic()), index),
                       "damaged: its arrays do not fit into it");
       ros::serialization::IStream in(raw.bytes.data(), static_cast<std::uint32_t>(raw.bytes.size()));
       ros::serialization::deserialize(in, message);

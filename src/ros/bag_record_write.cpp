@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The writing half of bag_record.h.
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <rosbag/bag.h>
 #include <std_msgs/String.h>
 #include <sys/stat.h>
@@ -36,7 +37,7 @@ class TemporaryFile {
       const auto real = std::filesystem::canonical(path, ignored);  // a symbolic link stays
       if (!ignored) target_ = real.string();
     }
-    name_ = target_ + ".tmp-" + std::to_string(::getpid());
+    name_ = fmt::format("{}.tmp-{}", target_, ::getpid());
     const int descriptor = ::open(name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor < 0) fail(std::strerror(errno));
     ::close(descriptor);
@@ -71,16 +72,16 @@ class TemporaryFile {
 void check_writable(const Record& record) {
   const auto fail = [&record](const std::string& reason) { throw BadData(record.name, reason); };
   if (record.time.empty()) fail("a record without samples cannot be written");
-  if (!record.tells()) fail("a record needs a torque, position, current or acceleration to be written");
+  if (!record.can_show_backlash())
+    fail("a record needs a torque, position, current or acceleration to be written");
   for (const Channel channel : kChannels) {
     const std::vector<double>& column = record.column(channel);
     if (column.empty()) continue;
     if (column.size() != record.size())
-      fail(channel_name(channel) + " has " + std::to_string(column.size()) + " values, time has " +
-           std::to_string(record.size()));
+      fail(fmt::format("{} has {} values, time has {}", channel_name(channel), column.size(), record.size()));
     for (std::size_t i = 0; i < column.size(); ++i)
       if (!std::isfinite(column[i]))
-        fail(channel_name(channel) + " in sample " + std::to_string(i) + " is not a finite number");
+        fail(fmt::format("{} in sample {} is not a finite number", channel_name(channel), i));
   }
 }
 
@@ -90,8 +91,8 @@ std::vector<ros::Time> stamps_of(const Record& record, const ros::Time& origin) 
   stamps.reserve(record.size());
   for (std::size_t i = 0; i < record.size(); ++i) {
     const auto fail = [&](const char* reason) {
-      throw BadData(record.name, "time = " + to_text(record.time[i]) + " s in sample " + std::to_string(i) +
-                                     ": " + reason);
+      throw BadData(record.name,
+                    fmt::format("time = {} s in sample {}: {}", to_text(record.time[i]), i, reason));
     };
     if (!(std::abs(record.time[i]) < 4294967295.0)) fail("a ROS stamp cannot hold it");
     const double whole = std::floor(record.time[i]);
@@ -115,8 +116,8 @@ std_msgs::String info_message(const Record& record, const ros::Time& origin) {
     name += c;
   }
   std_msgs::String message;
-  message.data = "{name: \"" + name + "\", time_origin: {secs: " + std::to_string(origin.sec) +
-                 ", nsecs: " + std::to_string(origin.nsec) + "}}";
+  message.data =
+      fmt::format("{{name: \"{}\", time_origin: {{secs: {}, nsecs: {}}}}}", name, origin.sec, origin.nsec);
   return message;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bag_structure.h"
 
+#include <fmt/format.h>
 #include <rosbag/chunked_file.h>
 #include <rosbag/stream.h>
 
@@ -101,8 +102,8 @@ class Checker {
   [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
 
   [[noreturn]] void damaged(const std::string& reason) const {
-    fail("damaged bag: " + reason + " (byte " + std::to_string(record_start_) +
-         "); 'rosbag reindex' may save the part before it");
+    fail(fmt::format("damaged bag: {} (byte {}); 'rosbag reindex' may save the part before it", reason,
+                     record_start_));
   }
 
   std::string take(std::uint64_t count, const char* what) {

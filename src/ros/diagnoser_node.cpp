@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/diagnoser_node.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/diagnosis/healthy_machine.h"
+#include "backlash_diagnosis/diagnosis/baseline.h"
+#include "backlash_diagnosis/ros/curve_job.h"
 #include "backlash_diagnosis/ros/messages.h"
 #include "backlash_diagnosis/ros/parameters.h"
 
@@ -39,6 +42,7 @@ DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandl
     : handle_(handle),
       private_handle_(private_handle),
       folder_("~folder", settings.folder),
+      job_memory_(settings.job_memory),
       reader_(names_of(settings.joints)),
       updater_(handle, private_handle) {
   topic_ = handle_.resolveName("joint_states");
@@ -53,6 +57,7 @@ DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandl
 
 DiagnoserNode::~DiagnoserNode() {
   if (curve_server_) curve_server_->shutdown();
+  for (Joint& joint : joints_) joint.monitor->stop();  // they publish
 }
 
 void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings& common) {
@@ -63,7 +68,12 @@ void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings&
     joint.history = std::make_unique<JointHistory>(
         JointHistory::Settings{history_path(common.history, settings.joint), common.history_interval,
                                limits ? limits->angular : mesh.angular(), settings.rig.digest});
-  joint.monitor = std::make_unique<JointMonitor>(std::move(settings));
+  settings.job_memory = common.job_memory;
+  joint.monitor = std::make_unique<JointMonitor>(
+      std::move(settings),
+      [this, place = joints_.size()](const ros::Time& stamp, const Diagnosis& diagnosis) {
+        publish(joints_[place], stamp, diagnosis);
+      });
   joint.diagnostics =
       std::make_unique<JointDiagnostics>(*joint.monitor, joint.history.get(), topic_, common.diagnostics);
   joint.diagnostics->add_to(updater_);
@@ -110,15 +120,13 @@ void DiagnoserNode::apply(Joint& joint, const JointLive& wanted) {
     joint.monitor->set_limits(std::nullopt);
     return;
   }
-  require(wanted.watch > 0, "watch", wanted.watch, "must be > 0 (all three 0: no limits)");
-  require(wanted.service > wanted.watch, "service", wanted.service, "must be > watch");
-  require(wanted.stop > wanted.service, "stop", wanted.stop, "must be > service");
   const auto& declared = joint.monitor->rig().diagnosis.limits;
   Limits limits;
   limits.angular = declared ? declared->angular : joint.monitor->rig().rig.mesh.angular();
   limits.watch = wanted.watch;
   limits.service = wanted.service;
   limits.stop = wanted.stop;
+  require_increasing(limits);
   joint.monitor->set_limits(limits);
 }
 
@@ -138,7 +146,7 @@ void DiagnoserNode::advertise() {
         const JointMonitor* monitor = find_monitor(joint, why);
         return monitor ? &monitor->rig() : nullptr;
       },
-      folder_);
+      folder_, job_memory_);
 }
 
 void DiagnoserNode::run() {
@@ -155,6 +163,7 @@ void DiagnoserNode::run() {
     ros::WallDuration(1e-3 * kTick).sleep();
   }
   samples.stop();
+  for (Joint& joint : joints_) joint.monitor->stop();
   write_histories();
 }
 
@@ -178,20 +187,21 @@ void DiagnoserNode::on_joint_state(const sensor_msgs::JointState::ConstPtr& mess
   }
 }
 
-void DiagnoserNode::publish(Joint& joint, const PeriodReport& report) {
+void DiagnoserNode::publish(const Joint& joint, const PeriodReport& report) {
   const JointMonitor& monitor = *joint.monitor;
-  if (report.period) {
-    auto m = to_message(*report.period, *monitor.rig().diagnosis.apd, report.period_length);
-    m.header.stamp = report.stamp;
-    m.joint = monitor.joint();
-    distributions_.publish(m);
-  }
-  if (!report.diagnosis) return;
-  if (joint.history) joint.history->take(report.stamp.toSec(), *report.diagnosis);
-  for (const Estimate& estimate : report.diagnosis->estimates) {
+  auto m = to_message(report.period, *monitor.rig().diagnosis.apd, report.period_length);
+  m.header.stamp = report.stamp;
+  m.joint = monitor.joint();
+  distributions_.publish(m);
+}
+
+/// In the thread of the joint.
+void DiagnoserNode::publish(const Joint& joint, const ros::Time& stamp, const Diagnosis& diagnosis) {
+  if (joint.history) joint.history->take(stamp.toSec(), diagnosis);
+  for (const Estimate& estimate : diagnosis.estimates) {
     auto m = to_message(estimate);
-    m.header.stamp = report.stamp;
-    m.joint = monitor.joint();
+    m.header.stamp = stamp;
+    m.joint = joint.monitor->joint();
     estimates_.publish(m);
   }
 }
@@ -302,6 +312,35 @@ bool DiagnoserNode::on_get_curve(backlash_diagnosis::GetCurve::Request& request,
   return true;
 }
 
+MonitoringCurve DiagnoserNode::built_curve(const backlash_diagnosis::BuildCurveGoal& goal,
+                                           JointMonitor& monitor) {
+  CurveRequest request;
+  if (goal.points > 0) request.points = static_cast<int>(goal.points);
+  if (goal.max_backlash != 0) request.max_backlash = goal.max_backlash;
+  if (goal.periods > 0) request.periods = static_cast<int>(goal.periods);
+  request.sampling_rate = goal.sampling_rate;
+  std::string path, best;
+  if (!goal.save_as.empty()) path = folder_.inside("save_as", goal.save_as);
+  request.best_so_far = [&best](const std::string& found) { best = found; };
+  const ros::WallTime start = ros::WallTime::now();
+  const auto progress = [&](double fraction, const std::string& phase) {
+    backlash_diagnosis::BuildCurveFeedback feedback;
+    feedback.phase = phase;
+    feedback.fraction = fraction;
+    feedback.elapsed = (ros::WallTime::now() - start).toSec();
+    feedback.best = best;
+    curve_server_->publishFeedback(feedback);
+    return ros::ok() && !curve_server_->isPreemptRequested();
+  };
+  MonitoringCurve curve = build_curve_as_job(monitor.rig(), request, job_memory_, progress);
+  if (!path.empty()) {
+    folder_.create();
+    write_curve(curve, path);
+  }
+  monitor.set_curve(curve);
+  return curve;
+}
+
 void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal) {
   backlash_diagnosis::BuildCurveResult result;
   JointMonitor* monitor = find_monitor(goal->joint, result.message);
@@ -309,41 +348,10 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
     curve_server_->setAborted(result, result.message);
     return;
   }
-  const ros::WallTime start = ros::WallTime::now();
-  std::mutex told;  // the points and the progress may come from two threads
-  std::string best;
-  const auto progress = [&](double fraction, const std::string& phase) {
-    backlash_diagnosis::BuildCurveFeedback feedback;
-    feedback.phase = phase;
-    feedback.fraction = fraction;
-    feedback.elapsed = (ros::WallTime::now() - start).toSec();
-    {
-      const std::lock_guard<std::mutex> lock(told);
-      feedback.best = best;
-    }
-    curve_server_->publishFeedback(feedback);
-    return ros::ok() && !curve_server_->isPreemptRequested();
-  };
   try {
-    CurveRequest request;
-    if (goal->points > 0) request.points = static_cast<int>(goal->points);
-    if (goal->max_backlash != 0) request.max_backlash = goal->max_backlash;
-    if (goal->periods > 0) request.periods = static_cast<int>(goal->periods);
-    request.sampling_rate = goal->sampling_rate;
-    request.best_so_far = [&](const std::string& found) {
-      const std::lock_guard<std::mutex> lock(told);
-      best = found;
-    };
-    std::string path;
-    if (!goal->save_as.empty()) path = folder_.inside("save_as", goal->save_as);
-    const MonitoringCurve curve = build_curve(monitor->rig(), request, progress);
-    if (!path.empty()) {
-      folder_.create();
-      write_curve(curve, path);
-    }
-    monitor->set_curve(curve);
+    const MonitoringCurve curve = built_curve(*goal, *monitor);
     result.success = true;
-    result.message = "built with " + std::to_string(curve.points.size()) + " points";
+    result.message = fmt::format("built with {} points", curve.points.size());
     result.curve = to_message(curve);
     curve_server_->setSucceeded(result, result.message);
   } catch (const Cancelled& error) {

@@ -73,6 +73,8 @@ parameters (private)
   history   folder, which must exist, for a file JOINT.csv with the estimates over months, and their
             trend on /diagnostics; default: none is kept
   history_interval   s at least from one entry to the next, by the stamps; default 60
+  job_memory   GB that the process of an action may use, and that which builds a missing curve;
+            default 4
   folder    the only folder in which goals of actions may name files, relative to it or absolute;
             default: backlash_diagnosis in ROS_HOME (~/.ros)
 
@@ -110,6 +112,7 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   settings.folder = parameters.text("folder", default_folder());
   settings.history = read_history_folder(parameters);
   settings.history_interval = parameters.number("history_interval", 60, Range::not_negative());
+  settings.job_memory = parameters.number("job_memory", kJobMemory, Range::positive());
   parameters.allow("live");
   parameters.allow("diagnostic_period");  // of diagnostic_updater
   const std::string limits = parameters.text("limits", "");

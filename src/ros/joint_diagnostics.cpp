@@ -127,7 +127,7 @@ void JointDiagnostics::add_history(Status& status) const {
   const JointHistory::State history = history_->state();
   if (!history.problem.empty())
     status.mergeSummary(DiagnosticStatus::ERROR, "history: " + history.problem);
-  else if (history.left_out > 0)
+  else if (history.behind)
     status.mergeSummary(DiagnosticStatus::WARN, "history: stamps are older than its last entry");
   status.add("History", history.path);
   status.add("History entries written", history.entries);
@@ -148,6 +148,7 @@ void JointDiagnostics::describe_input(const MonitorState& state, Status& status)
   const double age = age_of(state);
   summarise_input(state, age, status);
   problems_ = state.bad_messages + c.repeated + c.restarts;
+  replaced_ = state.replaced;
   status.add("Sampling rate (Hz)", state.rate);
   status.add("Latency (s)", state.latency);
   status.add("Age of the last sample (s)", age);
@@ -156,6 +157,7 @@ void JointDiagnostics::describe_input(const MonitorState& state, Status& status)
   status.add("Repeated stamps", c.repeated);
   status.add("Clock jumps", c.restarts);
   status.add("Malformed messages", state.bad_messages);
+  status.add("Estimates left out", state.replaced);
   status.add("Last problem", state.last_problem);
 }
 
@@ -170,6 +172,9 @@ void JointDiagnostics::summarise_input(const MonitorState& state, double age, St
     status.summary(DiagnosticStatus::STALE, "no message for " + to_text(std::round(age)) + " s");
   else if (state.bad_messages + c.repeated + c.restarts > problems_)
     status.summary(DiagnosticStatus::WARN, "samples were left out; last: " + state.last_problem);
+  else if (state.replaced > replaced_)
+    status.summary(DiagnosticStatus::WARN,
+                   "samples come faster than they can be diagnosed: estimates are left out");
   else if (std::fabs(state.latency) > kAnotherTime)
     status.summary(DiagnosticStatus::OK, "receiving; the stamps are of another time than now");
   else if (state.latency > settings_.latency_limit)

@@ -36,7 +36,8 @@ JointHistory::JointHistory(const Settings& settings)
 
 void JointHistory::take(double stamp, const Diagnosis& diagnosis) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (last_ && stamp < *last_ - settings_.interval) {
+  state_.behind = last_ && stamp < *last_ - settings_.interval;
+  if (state_.behind) {
     ++state_.left_out;
     return;
   }

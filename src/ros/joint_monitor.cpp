@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/joint_monitor.h"
 
+#include <fmt/format.h>
 #include <ros/console.h>
 
 #include <chrono>
-#include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/ros/curve_job.h"
 
 namespace backlash {
 namespace {
@@ -27,10 +28,12 @@ std::vector<std::string> MonitorState::warnings() const {
   return all;
 }
 
-JointMonitor::JointMonitor(MonitorSettings settings)
+JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis)
     : settings_(std::move(settings)),
-      diagnosis_settings_(without_settling(settings_.rig.diagnosis)),
-      stream_(stream_settings(settings_)) {
+      diagnosis_settings_(settings_.rig.diagnosis),
+      stream_(stream_settings(settings_)),
+      on_diagnosis_(std::move(on_diagnosis)),
+      worker_([this](const DiagnosisTask& task) { work(task); }) {
   if (settings_.baseline) set_baseline(settings_.baseline);
   if (settings_.curve) {
     curve_warning_ = settings_.curve_warning;
@@ -50,6 +53,7 @@ JointMonitor::~JointMonitor() {
     stop_ = true;
     changed_.notify_all();
   }
+  worker_.stop();
   if (builder_.joinable()) builder_.join();
 }
 
@@ -79,27 +83,46 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const Cha
   if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd)
     if (const double interval = stream_.sampling_interval(); interval > 0)
       start_building(nominal_sampling_rate(interval));
-  auto result = report(time, period);
+  ros::Time last = clock_.stamp(time);
+  if (auto next = due(time)) {
+    last = next->stamp;
+    worker_.add(std::move(*next));
+  }
   changed_.notify_all();
-  return result;
+  if (!period) return std::nullopt;
+  return PeriodReport{*period, stream_.period(), last};
 }
 
-/// Called with the lock held.
-std::optional<PeriodReport> JointMonitor::report(double time, const PeriodResult* period) {
-  PeriodReport report;
-  if (period) report.period = *period;
-  report.period_length = stream_.period();
-  report.stamp = clock_.stamp(time);
+/// The running estimate of this moment, where one is due. Called with the lock held.
+std::optional<DiagnosisTask> JointMonitor::due(double time) {
   // Half a sample is what rounding and jitter may take from an interval of whole periods.
   const double slack = 0.5 * stream_.sampling_interval();
-  if (estimated_ && time < *estimated_ + settings_.estimate_interval - slack) return report;
-  const Record window = stream_.latest(settings_.window);
-  if (window.time.empty()) return std::nullopt;
+  if (estimated_ && time < *estimated_ + settings_.estimate_interval - slack) return std::nullopt;
+  DiagnosisTask next = task(settings_.window);
+  if (next.window.record.time.empty()) return std::nullopt;
   estimated_ = time;
-  report.stamp = clock_.stamp(window.time.back());
-  report.diagnosis = diagnose_settled(window, diagnosis_settings_, curve_.get(), baseline_);
-  latest_ = std::make_shared<const Diagnosis>(*report.diagnosis);
-  return report;
+  return next;
+}
+
+/// What a diagnosis of the last `periods` needs. Called with the lock held.
+DiagnosisTask JointMonitor::task(long periods) const {
+  DiagnosisTask task;
+  task.window = stream_.latest(periods);
+  if (!task.window.record.time.empty()) task.stamp = clock_.stamp(task.window.record.time.back());
+  task.settings = diagnosis_settings_;
+  task.curve = curve_;
+  task.baseline = baseline_;
+  return task;
+}
+
+/// In the worker's thread.
+void JointMonitor::work(const DiagnosisTask& task) {
+  const auto diagnosis = std::make_shared<const Diagnosis>(task.compute());
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    latest_ = diagnosis;
+  }
+  if (on_diagnosis_) on_diagnosis_(task.stamp, *diagnosis);
 }
 
 Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note, ros::Time& stamp) {
@@ -107,21 +130,18 @@ Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note
   const auto ready = [&] { return stop_ || (stream_.periods() >= wanted_periods(periods) && !building_); };
   changed_.wait_for(lock, std::chrono::duration<double>(timeout), ready);
   const long available = stream_.periods();
-  const Record record = stream_.latest(periods);
+  const DiagnosisTask asked = task(periods);
   // Without an APD all that is kept will do, whether it has periods or not.
-  const bool any_length = periods == 0 && !settings_.rig.diagnosis.apd && !record.time.empty();
+  const bool any_length = periods == 0 && !settings_.rig.diagnosis.apd && !asked.window.record.time.empty();
   if (available < wanted_periods(periods) && !any_length)
-    note = "only " + std::to_string(available) + " of " + std::to_string(wanted_periods(periods)) +
-           " whole periods arrived" + (last_problem_.empty() ? "" : "; last problem: " + last_problem_);
-  const auto curve = curve_;
-  const auto baseline = baseline_;
+    note = fmt::format("only {} of {} whole periods arrived{}", available, wanted_periods(periods),
+                       last_problem_.empty() ? "" : "; last problem: " + last_problem_);
   const std::string curve_state = curve_state_;
-  const DiagnosisSettings settings = diagnosis_settings_;
-  stamp = record.time.empty() ? ros::Time() : clock_.stamp(record.time.back());
+  stamp = asked.stamp;
   lock.unlock();  // the subscriber goes on while this computes
-  Diagnosis diagnosis = diagnose_settled(record, settings, curve.get(), baseline);
+  Diagnosis diagnosis = asked.compute();
   for (Estimate& estimate : diagnosis.estimates)
-    if (needs_curve(estimate.method) && !curve) estimate.message += " (" + curve_state + ")";
+    if (needs_curve(estimate.method) && !asked.curve) estimate.message += " (" + curve_state + ")";
   return diagnosis;
 }
 
@@ -137,11 +157,12 @@ void JointMonitor::build(double rate) {
   request.sampling_rate = rate;
   std::string failure;
   try {
-    MonitoringCurve built = build_curve(settings_.rig, request, [this](double fraction, const std::string&) {
+    const auto progress = [this](double fraction, const std::string&) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      curve_state_ = "building, " + std::to_string(std::lround(100 * fraction)) + " %";
+      curve_state_ = fmt::format("building, {:.0f} %", 100 * fraction);
       return !stop_;
-    });
+    };
+    MonitoringCurve built = build_curve_as_job(settings_.rig, request, settings_.job_memory, progress);
     ROS_INFO("%s: built the monitoring curve for %g Hz from %s", settings_.joint.c_str(),
              built.conditions.sampling_rate, settings_.rig.source.c_str());
     set_curve(std::move(built));
@@ -220,6 +241,7 @@ MonitorState JointMonitor::state() const {
   state.any_sample = stream_.counters().accepted > 0;
   state.last_arrival = last_arrival_;
   state.latest = latest_;
+  state.replaced = worker_.replaced();
   return state;
 }
 

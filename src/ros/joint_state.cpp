@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/joint_state.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,8 +22,7 @@ double& at(ChannelValues& values, Channel channel) {
 /// What is wrong with the length of an array; nothing where it is empty or has a value per name.
 std::string size_problem(const std::vector<double>& array, const char* name, std::size_t joints) {
   if (array.empty() || array.size() == joints) return {};
-  return std::string(name) + " has " + std::to_string(array.size()) + " values for " +
-         std::to_string(joints) + " names";
+  return fmt::format("{} has {} values for {} names", name, array.size(), joints);
 }
 
 std::string size_problem(const sensor_msgs::JointState& m) {

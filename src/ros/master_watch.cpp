@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/master_watch.h"
 
+#include <fmt/format.h>
 #include <ros/connection_manager.h>
 #include <ros/console.h>
 #include <ros/init.h>
@@ -71,8 +72,8 @@ bool subscribe_again(const std::string& topic) {
 
 bool serve_again(const std::string& service) {
   XmlRpcValue nothing;
-  const std::string uri = "rosrpc://" + ros::network::getHost() + ":" +
-                          std::to_string(ros::ConnectionManager::instance()->getTCPPort());
+  const std::string uri = fmt::format("rosrpc://{}:{}", ros::network::getHost(),
+                                      ros::ConnectionManager::instance()->getTCPPort());
   return ask("registerService", {service, uri, own_uri()}, nothing);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/parameters.h"
 
+#include <fmt/format.h>
 #include <xmlrpcpp/XmlRpcValue.h>
 
 #include <cmath>
@@ -63,8 +64,8 @@ long Parameters::integer(const std::string& name, long absent, long lower, long 
     throw InvalidParameter("~" + name, shown(found), "must be a whole number");
   const long number = static_cast<int>(found);
   if (number < lower || number > upper)
-    throw InvalidParameter("~" + name, std::to_string(number),
-                           "must be between " + std::to_string(lower) + " and " + std::to_string(upper));
+    throw InvalidParameter("~" + name, fmt::to_string(number),
+                           fmt::format("must be between {} and {}", lower, upper));
   return number;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/simulator_settings.h"
 
+#include <fmt/format.h>
 #include <ros/names.h>
 
 #include <cmath>
@@ -47,7 +48,7 @@ class Overrides {
     given_.push_back("joint = " + printable(name));
     if (parameters_.has(name + "/seed") || n == 0) return;
     file_.simulation.sensors.seed += n;
-    given_.push_back("seed = " + std::to_string(file_.simulation.sensors.seed));
+    given_.push_back(fmt::format("seed = {}", file_.simulation.sensors.seed));
   }
 
   std::string description() const {
@@ -100,7 +101,7 @@ class Overrides {
       throw InvalidParameter("sensors.sampling_rate", sensors.sampling_rate, rates.text());
     if (!given("seed")) return;
     sensors.seed = parameters_.integer(scope_ + "seed", 0, 0, std::numeric_limits<int>::max());
-    given_.push_back("seed = " + std::to_string(sensors.seed));
+    given_.push_back(fmt::format("seed = {}", sensors.seed));
   }
 
   void excitation(const std::string& name, const Range& range, double& value) {

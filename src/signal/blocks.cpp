@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/signal/blocks.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
@@ -18,12 +19,6 @@ constexpr double kSmallestPivot = 1e-10;  // of the equations with columns of le
 constexpr double kUnsteady = 4;  // deviations
 
 }  // namespace
-
-std::string figure(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
 
 std::vector<double> block_means(const std::vector<double>& values, std::size_t length) {
   std::vector<double> means;
@@ -65,8 +60,7 @@ Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorX
                                   const std::vector<std::size_t>& block) {
   const std::size_t blocks = block.empty() ? 0 : *std::max_element(block.begin(), block.end()) + 1;
   if (blocks < 4)
-    throw CannotIdentify("only " + std::to_string(blocks) +
-                         " independent blocks of data: too few for an error");
+    throw CannotIdentify(fmt::format("only {} independent blocks of data: too few for an error", blocks));
   const Eigen::Index n = a.cols();
   const Eigen::VectorXd unit = a.colwise().norm().cwiseInverse();
   std::vector<Eigen::MatrixXd> normal(blocks, Eigen::MatrixXd::Zero(n, n));

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/studies/parameter_search.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
@@ -143,12 +144,6 @@ Candidate judge(const SearchFile& search, const RigFile& file) {
   return best;
 }
 
-std::string shown(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
-
 /// One coordinate per parameter from those of the search, which has none for a fixed parameter (here 0.5).
 std::vector<double> all_coordinates(const SearchFile& search, const std::vector<double>& x) {
   std::vector<double> all;
@@ -241,7 +236,8 @@ std::string beside(const std::string& path, const std::string& file) {
 std::string FreeParameter::value(double u) const {
   if (!choices.empty())
     return choices[std::min(static_cast<std::size_t>(u * choices.size()), choices.size() - 1)];
-  return shown(logarithmic ? lower * std::pow(upper / lower, u) : lower + u * (upper - lower));
+  return fmt::format("{:.4g}",
+                     logarithmic ? lower * std::pow(upper / lower, u) : lower + u * (upper - lower));
 }
 
 SearchFile load_search_file(const std::string& path) {

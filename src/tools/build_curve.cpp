@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Builds a monitoring curve and, where asked, its plot.
+#include <fmt/core.h>
+
 #include <iostream>
-#include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/feedback.h"
 #include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
@@ -40,6 +42,7 @@ Command command() {
       {"seeds", "N",
        "runs per backlash value, each with its own noise and sampling phase" + fallback(defaults.seeds)},
       {"plot", "CURVE.png", "also draw the curve with its scatter"},
+      feedback_option(),
   };
   c.examples = {"build_curve config/sarkar_1997.yaml --out curve.yaml --plot curve.png"};
   c.exit_codes = "  0   done (a stretch where skewness rises is flagged in the curve and told)\n";
@@ -56,20 +59,13 @@ CurveRequest read_request(const Arguments& arguments) {
   return request;
 }
 
-/// Six digits are enough for people; the file has all.
-std::string shown(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-
 void tell(const MonitoringCurve& curve, const std::string& out) {
   const char* unit = curve.conditions.angular ? " rad" : " m";
   const CurvePoint &first = curve.points.front(), &last = curve.points.back();
-  std::cout << out << ": skewness " << shown(curve.nominal(first).mean) << " at backlash "
-            << shown(first.backlash) << unit << " to " << shown(curve.nominal(last).mean) << " at "
-            << shown(last.backlash) << unit << ", " << curve.points.size() << " points, "
-            << shown(curve.conditions.sampling_rate) << " Hz\n";
+  std::cout << fmt::format(
+      "{0}: skewness {2:.6g} at backlash {3:.6g}{1} to {4:.6g} at {5:.6g}{1}, {6} points, {7:.6g} Hz\n", out,
+      unit, curve.nominal(first).mean, first.backlash, curve.nominal(last).mean, last.backlash,
+      curve.points.size(), curve.conditions.sampling_rate);
   if (curve.flat()) {
     std::cerr << "build_curve: the skewness of " << curve.conditions.signal
               << " does not depend on backlash: no backlash can be told from it (flat curve)\n";
@@ -77,7 +73,7 @@ void tell(const MonitoringCurve& curve, const std::string& out) {
   }
   std::vector<std::string> rising;
   for (const CurvePoint& point : curve.points)
-    if (!point.monotonic) rising.push_back(shown(point.backlash));
+    if (!point.monotonic) rising.push_back(fmt::format("{:.6g}", point.backlash));
   if (!rising.empty())
     std::cerr << "build_curve: not monotonic, flagged in the curve, at backlash [" << (unit + 1)
               << "]: " << joined(rising) << '\n';
@@ -85,7 +81,7 @@ void tell(const MonitoringCurve& curve, const std::string& out) {
 
 int build(const Arguments& arguments) {
   const std::string rig = arguments.positional(0), out = arguments.text("out"), plot = arguments.text("plot");
-  const CurveRequest request = read_request(arguments);
+  CurveRequest request = read_request(arguments);
   const RigFile file = load_rig_file(rig);
   check_output(out, {rig});
   if (!plot.empty()) {
@@ -94,12 +90,16 @@ int build(const Arguments& arguments) {
     check_output(plot, {rig});
   }
   MonitoringCurve curve;
-  {
+  if (arguments.has("feedback")) {
+    FeedbackLines lines;
+    request.best_so_far = lines.best_so_far();
+    curve = of_file(rig, [&] { return build_curve(file, request, lines.progress()); });
+  } else {
     ProgressBar bar;
     curve = of_file(rig, [&] { return build_curve(file, request, bar.progress()); });
   }
   write_text(out, curve.to_yaml());
-  tell(curve, out);
+  if (!arguments.has("feedback")) tell(curve, out);
   if (!plot.empty()) {
     std::cout.flush();
     plot_curve(out, plot);

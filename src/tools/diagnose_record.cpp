@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All estimators on one record, without ROS.
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cmath>
 #include <iostream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/diagnosis/healthy_machine.h"
+#include "backlash_diagnosis/diagnosis/baseline.h"
+#include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/report/diagnosis_page.h"
 #include "backlash_diagnosis/report/diagnosis_report.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
@@ -50,8 +52,7 @@ Command command() {
       {"method", "NAME", "only this method: " + joined(diagnosis_methods())},
       {"joint", "NAME", "joint in a bag; default: the rig file's, else the only one"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
-      {"periods", "N",
-       "use only the last N excitation periods (and those before them that settling discards)"},
+      {"periods", "N", "use only the last N whole excitation periods after settling"},
   };
   c.notes = std::string(
                 "backlash is the total free play along the line of action [m], backlash_angle the same as an "
@@ -94,6 +95,7 @@ struct Inputs {
   std::string curve_source;
   std::string no_curve;  // why the rig file gives none
   Record record;
+  std::optional<PeriodWindow> last_periods;  // where only those are asked for
   DiagnosisSettings settings;
   std::optional<Baseline> baseline;
   std::vector<std::string> warnings;  // of the files, not of the record
@@ -112,23 +114,18 @@ ApdSettings settings_of(const MonitoringCurve& curve) {
   return settings;
 }
 
-/// The last `count` whole periods, with as many before them as settling discards.
+/// The last `count` whole periods, as the diagnoser's service cuts them.
 void keep_last_periods(Inputs& in, std::uint64_t count) {
-  Record& record = in.record;
-  const auto& apd = in.settings.apd;
-  double period = apd ? apd->period : 0;
-  if (!(period > 0)) period = excitation_period(record, apd ? apd->signal : Channel::motor_torque);
-  if (!(period > 0)) throw BadData(record.name, "--periods needs an excitation that repeats, none was found");
-  const double interval = record.sampling_interval();
-  const double wanted = (static_cast<double>(count) + (apd ? apd->settling_periods : 0)) * period;
-  const double end =
-      record.time.back() + 0.5 * interval;  // each sample stands for half an interval to both sides
-  if (record.time.front() - 0.5 * interval > end - wanted + 1e-6 * period) {
-    record.warnings.push_back("the record is shorter than the " + std::to_string(count) +
-                              " period(s) asked for: all of it is used");
-    return;
-  }
-  record = record.slice(end - wanted, record.time.back() + interval);
+  PeriodWindow window = cut_periods(in.record, in.settings.apd, static_cast<long>(count));
+  if (!(window.period > 0))
+    throw BadData(in.record.name, "--periods needs an excitation that repeats, none was found");
+  if (window.count < static_cast<long>(count))
+    in.record.warnings.push_back(
+        fmt::format("the record is shorter than the {} period(s) asked for: all of it is used", count));
+  if (window.record.time.empty()) return;  // too short for one: the estimators say so
+  window.record.warnings = in.record.warnings;
+  in.record = window.record;
+  in.last_periods = std::move(window);
 }
 
 /// A curve for this very record, where the rig file tells how.
@@ -269,10 +266,11 @@ int diagnose_record(const Arguments& arguments) {
     report.curve = &*in.curve;
     report.curve_source = in.curve_source;
   }
-  report.diagnosis = diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
+  report.diagnosis = in.last_periods
+                         ? diagnose(*in.last_periods, in.settings, report.curve, in.baseline, in.method)
+                         : diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);
-  const std::string json =
-      to_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  const std::string json = diagnosis_json(report);
   if (out == kStandardOutput) {
     std::cout << json;
   } else {

@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/ros/trace_job.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/feedback.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
 
@@ -29,6 +30,7 @@ Command command() {
       {"cutoff", "HZ",
        "low-pass of all residuals [Hz]; default: 1.36 times the mesh resonance of two inertias, else the "
        "bandwidth of the motion"},
+      feedback_option(),
   };
   c.notes =
       "Two inertias with a mesh between them need motor_torque, motor_position and load_position; one "
@@ -68,17 +70,24 @@ TraceJob job_of(const Arguments& arguments) {
 }
 
 int trace(const Arguments& arguments) {
-  const TraceJob job = job_of(arguments);
+  TraceJob job = job_of(arguments);
   TraceDone done;
   try {
-    ProgressBar bar;
-    done = run_trace(job, bar.progress());
+    if (arguments.has("feedback")) {
+      FeedbackLines lines;
+      job.settings.best_so_far = lines.best_so_far();
+      done = run_trace(job, lines.progress());
+    } else {
+      ProgressBar bar;
+      done = run_trace(job, bar.progress());
+    }
   } catch (const CannotIdentify& error) {
     std::cerr << "trace_residual: " << error.what() << '\n';
     return kBadData;
   }
-  std::cout << trace_summary(done.trace) << "\nreport: " << done.files.page << ", " << done.files.report
-            << "\nrig with what was found: " << done.files.rig << '\n';
+  if (!arguments.has("feedback"))
+    std::cout << trace_summary(done.trace) << "\nreport: " << done.files.page << ", " << done.files.report
+              << "\nrig with what was found: " << done.files.rig << '\n';
   return done.trace.verdict == TraceVerdict::unexplained ? kInconclusive : kHealthy;
 }
 

@@ -10,6 +10,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
+#include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "support/curve.h"
 #include "support/records.h"
 
@@ -24,8 +25,12 @@ ApdSettings settings(double period = 0.1, int settling = 0) {
   return {Channel::sensor_torque, period, settling, {60, -0.4, 0.4}};
 }
 
+ApdResult apd_of(const Record& record, const ApdSettings& apd) {
+  return analyse_apd(cut_periods(record, apd), apd);
+}
+
 Estimate estimate(const Record& record, const MonitoringCurve& curve, const ApdSettings& apd = settings()) {
-  const ApdResult result = analyse_apd(record, apd);
+  const ApdResult result = apd_of(record, apd);
   return estimate_apd_skewness(result, match_curve(record, result, apd, &curve), &curve);
 }
 
@@ -38,7 +43,7 @@ TEST(AnalyseApd, MeanOverThePeriodsOfASquareRoot) {
     record.column(Channel::sensor_torque).push_back(i < 100 ? 0.5 : i < 200 ? (i % 2 ? 0.5 : 1.5) : 2.5);
   }
   const ApdSettings apd = {Channel::sensor_torque, 0.1, 0, {3, 0, 3}};
-  const ApdResult result = analyse_apd(record, apd);
+  const ApdResult result = apd_of(record, apd);
   ASSERT_EQ(result.periods.size(), 3u);
   const double one = 1 / std::sqrt(2.0);   // (M - 2) / sqrt(M - 1) with M = 3
   const double two = -1 / std::sqrt(2.0);  // two equal and one empty: (M - 4) / sqrt(2 (M - 2))
@@ -52,26 +57,26 @@ TEST(AnalyseApd, MeanOverThePeriodsOfASquareRoot) {
 
 TEST(AnalyseApd, LeavesOutSettlingAndWindowsWithGaps) {
   Record record = make_record({});
-  EXPECT_EQ(analyse_apd(record, settings(0.1, 2)).periods.size(), 13u);
-  EXPECT_EQ(analyse_apd(record, settings(0.1, 15)).periods.size(), 0u);
-  EXPECT_TRUE(std::isnan(analyse_apd(record, settings(0.1, 15)).skewness));
+  EXPECT_EQ(apd_of(record, settings(0.1, 2)).periods.size(), 13u);
+  EXPECT_EQ(apd_of(record, settings(0.1, 15)).periods.size(), 0u);
+  EXPECT_TRUE(std::isnan(apd_of(record, settings(0.1, 15)).skewness));
   test::cut_out(record, 720, 740);
-  const ApdResult result = analyse_apd(record, settings(0.1, 2));
+  const ApdResult result = apd_of(record, settings(0.1, 2));
   EXPECT_EQ(result.periods.size(), 12u);
   EXPECT_EQ(result.incomplete, 1);
 }
 
 TEST(AnalyseApd, RecordsThatGiveNothing) {
-  EXPECT_TRUE(analyse_apd(Record(), settings()).periods.empty());
+  EXPECT_TRUE(apd_of(Record(), settings()).periods.empty());
   Record record = make_record({});
   record.column(Channel::sensor_torque).clear();
-  EXPECT_TRUE(analyse_apd(record, settings()).periods.empty());
+  EXPECT_TRUE(apd_of(record, settings()).periods.empty());
   Record outside = make_record({});
   for (double& v : outside.column(Channel::sensor_torque)) v += 7;
-  const ApdResult result = analyse_apd(outside, settings());
+  const ApdResult result = apd_of(outside, settings());
   EXPECT_TRUE(result.periods.empty());
   EXPECT_EQ(result.incomplete, 15);  // no sample inside the classes
-  EXPECT_THROW(analyse_apd(record, {Channel::sensor_torque, 0.1, 0, {1, 0, 1}}), InvalidParameter);
+  EXPECT_THROW(apd_of(record, {Channel::sensor_torque, 0.1, 0, {1, 0, 1}}), InvalidParameter);
 }
 
 TEST(AnalyseApd, EstimatesTheNoise) {
@@ -79,11 +84,11 @@ TEST(AnalyseApd, EstimatesTheNoise) {
   recipe.duration = 10;
   recipe.noise = 0.002;
   // Five standard errors with 990 stretches of 10 samples, see test_noise.cpp: 8 %.
-  const ApdResult many = analyse_apd(make_record(recipe), settings(0.1, 2));
+  const ApdResult many = apd_of(make_record(recipe), settings(0.1, 2));
   EXPECT_NEAR(many.noise / 0.002, 1, 0.08);
   EXPECT_EQ(many.noise_range.lower, many.noise);
   recipe.duration = 0.1;
-  const ApdResult one = analyse_apd(make_record(recipe), settings());
+  const ApdResult one = apd_of(make_record(recipe), settings());
   EXPECT_TRUE(std::isnan(one.noise));
   EXPECT_EQ(one.noise_range.lower, 0);
   EXPECT_GT(one.noise_range.upper, 0.001);
@@ -99,10 +104,10 @@ TEST(ExcitationPeriod, PrefersTheMotorTorque) {
   EXPECT_EQ(excitation_period(Record(), Channel::sensor_torque), 0);
 }
 
-TEST(RunPeriod, AsItGrewFirst) {
-  EXPECT_EQ(run_period(Record(), settings(0.3)), 0.3);
-  EXPECT_EQ(run_period(Record(), settings(0)), 0);
-  EXPECT_NEAR(run_period(make_record({}), settings(0)), 0.1, 1e-12);
+TEST(CutPeriods, ByThePeriodThatIsFoundFirst) {
+  EXPECT_EQ(cut_periods(Record(), settings(0.3)).period, 0.3);
+  EXPECT_EQ(cut_periods(Record(), settings(0)).period, 0);
+  EXPECT_NEAR(cut_periods(make_record({}), settings(0)).period, 0.1, 1e-12);
   RecordRecipe recipe;  // found before the excitation changes
   Record record = make_record(recipe);
   recipe.frequency = 4;
@@ -113,31 +118,50 @@ TEST(RunPeriod, AsItGrewFirst) {
   for (const Channel channel : kChannels)
     record.column(channel).insert(record.column(channel).end(), later.column(channel).begin(),
                                   later.column(channel).end());
-  EXPECT_NEAR(run_period(record, settings(0)), 0.1, 1e-12);
+  EXPECT_NEAR(cut_periods(record, settings(0)).period, 0.1, 1e-12);
   recipe.duration = 0.6;  // 2.4 periods: found in the whole record, not at 0.25 or 0.5 s
-  EXPECT_NEAR(run_period(make_record(recipe), settings(0)), 0.25, 1e-12);
+  EXPECT_NEAR(cut_periods(make_record(recipe), settings(0)).period, 0.25, 1e-12);
 }
 
-TEST(WholePeriods, CutsExactly) {
+TEST(CutPeriods, CutsExactly) {
   RecordRecipe recipe;
   recipe.duration = 1.234;
   for (const double start : {0.0, 1.7e9}) {
     recipe.start = start;
     const Record record = make_record(recipe);
-    const auto cut = whole_periods(record, settings(0.1, 2));
-    ASSERT_TRUE(cut);
-    EXPECT_EQ(cut->size(), 1000u);
-    EXPECT_EQ(cut->time.front(), record.time[200]);
-    EXPECT_EQ(cut->time.back(), record.time[1199]);
-    EXPECT_EQ(whole_periods(record, settings(0.1, 2), 3)->time.front(), record.time[900]);
-    EXPECT_EQ(whole_periods(record, settings(0.1, 2), 99)->time.front(), record.time[200]);
-    EXPECT_EQ(whole_periods(record, settings(0.1, 11))->size(), 100u);
-    EXPECT_FALSE(whole_periods(record, settings(0.1, 12)));
-    EXPECT_FALSE(whole_periods(record, settings(5)));
-    EXPECT_EQ(whole_periods(record, settings(0, 2))->size(), 1000u);
+    const PeriodWindow cut = cut_periods(record, settings(0.1, 2));
+    EXPECT_EQ(cut.record.size(), 1000u);
+    EXPECT_EQ(cut.count, 10);
+    EXPECT_EQ(cut.periods.size(), 10u);
+    EXPECT_EQ(cut.record.name, record.name);
+    EXPECT_EQ(cut.record.time.front(), record.time[200]);
+    EXPECT_EQ(cut.record.time.back(), record.time[1199]);
+    EXPECT_EQ(cut_periods(record, settings(0.1, 2), 3).record.time.front(), record.time[900]);
+    EXPECT_EQ(cut_periods(record, settings(0.1, 2), 3).periods.size(), 3u);
+    EXPECT_EQ(cut_periods(record, settings(0.1, 2), 99).record.time.front(), record.time[200]);
+    EXPECT_EQ(cut_periods(record, settings(0.1, 11)).record.size(), 100u);
+    EXPECT_EQ(cut_periods(record, settings(0.1, 12)).record.size(), 0u);
+    EXPECT_EQ(cut_periods(record, settings(5)).record.size(), 0u);
+    EXPECT_EQ(cut_periods(record, settings(0, 2)).record.size(), 1000u);
+    EXPECT_EQ(cut_periods(record, std::nullopt, 3).record.time.front(), record.time[900]);  // by motor_torque
   }
-  EXPECT_FALSE(whole_periods(Record(), settings()));
-  EXPECT_FALSE(whole_periods(Record(), settings(0)));
+  EXPECT_EQ(cut_periods(Record(), settings()).record.size(), 0u);
+  EXPECT_EQ(cut_periods(Record(), settings(0)).record.size(), 0u);
+}
+
+// What a stream takes for a new run is a hole in a record, and other estimators need not have the signal.
+TEST(CutPeriods, ARecordIsOneRun) {
+  Record record = make_record({});
+  for (std::size_t i = 850; i < record.size(); ++i) record.time[i] += 30;  // whole periods later
+  const PeriodWindow cut = cut_periods(record, settings(0.1, 2));
+  EXPECT_EQ(cut.record.size(), 1300u);
+  EXPECT_EQ(cut.record.time.front(), record.time[200]);
+  EXPECT_EQ(analyse_apd(cut, settings()).periods.size(), 12u);
+  EXPECT_EQ(analyse_apd(cut, settings()).incomplete, 2);  // both ends of the hole
+  record.column(Channel::sensor_torque).clear();
+  const PeriodWindow without = cut_periods(record, settings(0.1, 2));
+  EXPECT_EQ(without.record.size(), 1300u);
+  EXPECT_TRUE(without.periods.empty());
 }
 
 TEST(TravelOf, IgnoresThePeaks) {
@@ -153,7 +177,7 @@ TEST(EstimateApdSkewness, InvertsTheMeanSkewness) {
   RecordRecipe recipe;
   recipe.noise = 1e-3;
   const Record record = make_record(recipe);
-  const ApdResult apd = analyse_apd(record, settings());
+  const ApdResult apd = apd_of(record, settings());
   const MonitoringCurve curve = linear_curve();
   const Estimate e = estimate(record, curve), expected = curve.invert(apd.skewness, 15, apd.noise_range);
   ASSERT_EQ(e.status, Status::ok) << e.message;
@@ -179,7 +203,7 @@ TEST(EstimateApdSkewness, OfASinglePeriodAllNoiseThatItMayHoldCounts) {
   recipe.noise = 0.001;
   MonitoringCurve curve = linear_curve();
   for (CurvePoint& point : curve.points) point.cells[1].mean += 1;  // at the largest noise
-  const ApdResult apd = analyse_apd(make_record(recipe), settings());
+  const ApdResult apd = apd_of(make_record(recipe), settings());
   const Estimate e = estimate(make_record(recipe), curve), silent = curve.invert(apd.skewness, 1, 0);
   ASSERT_EQ(e.status, Status::ok) << e.message;
   EXPECT_EQ(e.lower, silent.lower);
@@ -308,7 +332,7 @@ TEST(EstimateApdSkewness, ConditionsOfTheCurve) {
   Record moving = record;
   for (std::size_t i = 0; i < moving.size(); ++i) moving.column(Channel::load_position)[i] = i;
   EXPECT_EQ(estimate(moving, curve).status, Status::ok);
-  const ApdResult apd = analyse_apd(record, settings());
+  const ApdResult apd = apd_of(record, settings());
   const Estimate none = estimate_apd_skewness(apd, match_curve(record, apd, settings(), nullptr), nullptr);
   EXPECT_EQ(none.status, Status::insufficient_data);
   EXPECT_NE(none.message.find("no monitoring curve"), std::string::npos);

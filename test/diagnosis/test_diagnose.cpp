@@ -127,16 +127,6 @@ TEST(Diagnose, SettlingIsDiscardedForAllMethods) {
   }
 }
 
-TEST(Diagnose, WithoutSettlingChangesNothingElse) {
-  DiagnosisSettings settings = all_settings();
-  const DiagnosisSettings cut = without_settling(settings);
-  EXPECT_EQ(cut.apd->settling_periods, 0);
-  EXPECT_EQ(cut.apd->period, 0.1);
-  EXPECT_TRUE(cut.lost_motion && cut.limits);
-  settings.apd.reset();
-  EXPECT_FALSE(without_settling(settings).apd);
-}
-
 TEST(DiagnosisSettings, ReadFromARigFile) {
   const auto read = [](const std::string& text) {
     const YamlReader yaml = YamlReader::from_text(text, "rig.yaml");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "support/curve.h"
 #include "support/records.h"
@@ -80,6 +81,15 @@ void expect_same(const Diagnosis& a, const Diagnosis& b) {
   EXPECT_EQ(a.apd->total.counts(), b.apd->total.counts());
 }
 
+/// The APDs that a window carries hold its samples, each once.
+void expect_apd_of_samples(const PeriodWindow& window, const ApdSettings& apd) {
+  AmplitudeDistribution all(apd.layout), carried(apd.layout);
+  for (const double value : window.record.column(apd.signal)) all.add(value);
+  for (const PeriodResult& period : window.periods) carried.merge(period.apd);
+  EXPECT_EQ(window.periods.size(), static_cast<std::size_t>(window.count));
+  EXPECT_EQ(carried.counts(), all.counts());
+}
+
 /// Live and offline, on the same samples.
 void expect_live_equals_offline(const Record& record, const ApdSettings& apd, const std::string& what) {
   SCOPED_TRACE(what);
@@ -88,8 +98,7 @@ void expect_live_equals_offline(const Record& record, const ApdSettings& apd, co
   Live run(StreamSettings{apd, 60});
   run.push(record);
   EXPECT_EQ(run.stream.counters().restarts, 0);
-  expect_same(diagnose_settled(run.stream.latest(0), without_settling(settings), &curve),
-              diagnose(record, settings, &curve));
+  expect_same(diagnose(run.stream.latest(0), settings, &curve), diagnose(record, settings, &curve));
 }
 
 TEST(SampleStream, LiveEqualsOffline) {
@@ -124,8 +133,7 @@ TEST(SampleStream, LiveEqualsOfflineAtAnyLength) {
       SCOPED_TRACE(i);
       const Record so_far = record.slice(0, 0.5 * (record.time[i] + (i + 1) * 1e-3));
       ASSERT_EQ(so_far.size(), i + 1);
-      expect_same(diagnose_settled(stream.latest(0), without_settling(settings), &curve),
-                  diagnose(so_far, settings, &curve));
+      expect_same(diagnose(stream.latest(0), settings, &curve), diagnose(so_far, settings, &curve));
     }
   }
 }
@@ -175,7 +183,7 @@ TEST(SampleStream, LatestGivesExactlyTheSamplesAskedFor) {
   const Record record = make_record({});
   run.push(record);
   for (const long count : {1L, 2L, 5L, 13L, 14L, 1000L}) {
-    const Record latest = run.stream.latest(count);
+    const Record latest = run.stream.latest(count).record;
     const std::size_t samples = 100 * std::min(count, 13L);
     ASSERT_EQ(latest.size(), samples);
     EXPECT_EQ(latest.time.front(), record.time[1500 - samples]);
@@ -212,12 +220,12 @@ TEST(SampleStream, TrimmedBuffersGiveWholeWindows) {
             EXPECT_LE(periods, std::max(0L, end - 2));
             for (const long count : {1L, periods}) {
               if (count > periods || periods == 0) continue;
-              const Record latest = stream.latest(count);
-              expect_same(latest,
+              const PeriodWindow latest = stream.latest(count);
+              expect_same(latest.record,
                           record.slice(grid->start(end - count),
                                        std::min(grid->start(end), std::nextafter(record.time[i], 1e300))));
-              EXPECT_EQ(analyse_apd(latest, apd_settings(0.1, 0)).periods.size(),
-                        static_cast<std::size_t>(count));
+              EXPECT_EQ(latest.count, count);
+              expect_apd_of_samples(latest, apd);
             }
           }
         }
@@ -238,14 +246,14 @@ TEST(SampleStream, ABackwardStampStartsANewRun) {
   const Record record = make_record({});
   Live run(StreamSettings{apd_settings(), 60});
   run.push(record);
-  const Record once = run.stream.latest(0);
+  const Record once = run.stream.latest(0).record;
   const auto first_periods = run.periods;
   run.periods.clear();
   run.push(record);  // a looped replay
   EXPECT_EQ(run.stream.counters().restarts, 1);
   EXPECT_NE(run.stream.counters().last_problem.find("back"), std::string::npos);
   EXPECT_EQ(run.stream.counters().accepted, 2 * static_cast<long>(record.size()));
-  expect_same(run.stream.latest(0), once);
+  expect_same(run.stream.latest(0).record, once);
   ASSERT_EQ(run.periods.size(), first_periods.size());
   for (std::size_t i = 0; i < run.periods.size(); ++i) {
     EXPECT_EQ(run.periods[i].index, first_periods[i].index);
@@ -291,7 +299,7 @@ TEST(SampleStream, RepeatedStampsAndValuesThatAreNotFiniteAreLeftOut) {
   EXPECT_EQ(dirty.stream.counters().accepted, 1500);
   EXPECT_EQ(dirty.stream.counters().restarts, 0);
   EXPECT_FALSE(dirty.stream.counters().last_problem.empty());
-  expect_same(dirty.stream.latest(0), clean.stream.latest(0));
+  expect_same(dirty.stream.latest(0).record, clean.stream.latest(0).record);
   EXPECT_THROW(dirty.stream.add(std::nan(""), values_at(record, 0)), InvalidParameter);
 }
 
@@ -305,7 +313,7 @@ TEST(SampleStream, BeginsWithTheSignal) {
   EXPECT_EQ(stream.counters().not_a_number, 5);
   EXPECT_NE(stream.counters().last_problem.find("sensor_torque"), std::string::npos);
   EXPECT_EQ(stream.periods(), 0);
-  EXPECT_TRUE(stream.latest(0).time.empty());
+  EXPECT_TRUE(stream.latest(0).record.time.empty());
 }
 
 // A driver's first message may lack a value; that must not lose the channel for good.
@@ -369,9 +377,9 @@ TEST(SampleStream, ExcitationAfterLongIdling) {
   EXPECT_LE(most, 1.26 * 4 * 200);  // memory stays bounded
   EXPECT_NEAR(run.stream.period(), 0.2, 1e-12);
   EXPECT_GE(run.stream.periods(), 15);
-  const Record latest = run.stream.latest(10);
-  EXPECT_EQ(latest.size(), 400u);
-  EXPECT_EQ(analyse_apd(latest, apd_settings(0.2, 0)).periods.size(), 10u);
+  const PeriodWindow latest = run.stream.latest(10);
+  EXPECT_EQ(latest.record.size(), 400u);
+  EXPECT_EQ(latest.periods.size(), 10u);
 }
 
 TEST(SampleStream, WithoutAnApdAllSamplesCount) {
@@ -379,16 +387,16 @@ TEST(SampleStream, WithoutAnApdAllSamplesCount) {
   const Record record = make_record(recipe);
   Live run(StreamSettings{std::nullopt, 60});
   run.push(record);
-  expect_same(run.stream.latest(0), record);
+  expect_same(run.stream.latest(0).record, record);
   EXPECT_NEAR(run.stream.period(), 0.1, 1e-12);  // from motor_torque
   EXPECT_EQ(run.stream.periods(), 15);
-  EXPECT_EQ(run.stream.latest(3).size(), 300u);
+  EXPECT_EQ(run.stream.latest(3).record.size(), 300u);
   Record still = record;
   for (double& torque : still.column(Channel::motor_torque)) torque = 0.01;
   Live none(StreamSettings{std::nullopt, 60});
   none.push(still);
   EXPECT_EQ(none.stream.periods(), 0);
-  expect_same(none.stream.latest(5), still);
+  expect_same(none.stream.latest(5).record, still);
 }
 
 TEST(SampleStream, RefusesToKeepNothing) {
@@ -403,7 +411,7 @@ TEST(SampleStream, RestartForgetsEverything) {
   run.stream.restart();
   EXPECT_EQ(run.stream.periods(), 0);
   EXPECT_TRUE(run.stream.kept().time.empty());
-  EXPECT_TRUE(run.stream.latest(0).time.empty());
+  EXPECT_TRUE(run.stream.latest(0).record.time.empty());
   run.push(record);
   EXPECT_EQ(run.stream.periods(), 13);
 }

@@ -103,6 +103,14 @@ class Diagnoser:
     def curve(self, joint=""):
         return self._service("get_curve", GetCurve)(joint=joint)
 
+    def jobs(self):
+        """Ids of the processes that work for it."""
+        found = []
+        for task in os.listdir("/proc/%d/task" % self._process.pid):
+            with open("/proc/%d/task/%s/children" % (self._process.pid, task)) as stream:
+                found += [int(child) for child in stream.read().split()]
+        return found
+
     def alive(self):
         return self._process.poll() is None
 

@@ -124,7 +124,7 @@ class OperationsTest(unittest.TestCase):
         self.assertIn("no trend", done.stdout + done.stderr)
 
     def test_history_of_a_looped_bag_has_no_entry_twice(self):
-        diagnoser = self.start(history=self.history, history_interval=0.1, estimate_interval=0.0)
+        diagnoser = self.start(history=self.history, history_interval=0.1, estimate_interval=0.0, hold=0.2)
         self.send_run(10)
         self.wait_for_entries(diagnoser, 3)
         self.send_run(0)
@@ -132,7 +132,14 @@ class OperationsTest(unittest.TestCase):
         _, values = self.diagnostics.wait_for(
             diagnoser.name[1:] + ": joint: backlash", lambda l, m, v: int(v.get("History entries left out", 0)) > 3,
             "entries left out")
+        self.diagnostics.wait_for(diagnoser.name[1:] + ": joint: backlash",
+                                  lambda l, m, v: level(l) == WARN and "older than" in m, "WARN of the history")
         self.assertEqual(values["History entries lost"], "0")
+        # Its stamps are beyond the last entry again: what was left out is past.
+        self.send_run(20)
+        self.diagnostics.wait_for(
+            diagnoser.name[1:] + ": joint: backlash",
+            lambda l, m, v: level(l) == OK and int(v["History entries left out"]) > 3, "OK again")
         times = [float(line["time"]) for line in self.entries()]
         self.assertEqual(sorted(set(times)), times)
 

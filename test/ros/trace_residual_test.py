@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import tempfile
 import threading
 import time
@@ -14,9 +15,9 @@ import actionlib
 import rospy
 import rostest
 from backlash_diagnosis.msg import TraceResidualAction, TraceResidualGoal
-from diagnoser_support import Diagnoser, result_of, rig_path, run_tool
+from diagnoser_support import Diagnoser, build_curve, result_of, rig_path, run_tool
 from sensor_msgs.msg import JointState
-from simulator_support import TIMEOUT, Inbox, Simulator
+from simulator_support import TIMEOUT, Inbox, Simulator, nanoseconds
 
 MISSING = "\nterms:\n  - id: asymmetric_viscous\n    body: motor\n    damping: 30\n"
 SHAKING = ("excitation:\n  type: random\n  rms: 40\n  lower_frequency: 0.15\n  upper_frequency: 3\n"
@@ -101,6 +102,45 @@ class TraceResidualTest(unittest.TestCase):
         self.assertEqual(self.client.get_state(), actionlib.GoalStatus.PREEMPTED)
         self.assertFalse(result.success)
         self.assertFalse(os.path.exists(self.path("cancelled")))
+
+    def test_a_job_that_is_killed_is_told_and_the_node_goes_on(self):
+        first = threading.Event()
+        self.client.send_goal(self.goal(out=self.path("killed")), feedback_cb=lambda f: f.fraction > 0 and first.set())
+        self.assertTrue(first.wait(TIMEOUT))
+        for job in self.diagnoser.jobs():
+            os.kill(job, signal.SIGKILL)
+        result = self.result()
+        self.assertEqual(self.client.get_state(), actionlib.GoalStatus.ABORTED)
+        self.assertFalse(result.success)
+        self.assertIn("trace_residual was ended by signal 9", result.message)
+        self.assertTrue(self.diagnoser.alive())
+        self.client.send_goal(self.goal(out=self.path("after")))
+        self.assertTrue(self.result().success)
+
+    def test_a_job_without_memory_fails_alone(self):
+        with Diagnoser({"rig": self.rig, "folder": self.folder, "job_memory": 0.01}).ready() as diagnoser:
+            client = actionlib.SimpleActionClient(diagnoser.topic("trace_residual"), TraceResidualAction)
+            self.assertTrue(client.wait_for_server(rospy.Duration(TIMEOUT)))
+            client.send_goal(self.goal(out=self.path("small")))
+            result = result_of(client)
+            self.assertEqual(client.get_state(), actionlib.GoalStatus.ABORTED)
+            self.assertTrue(result.message)
+            self.assertTrue(diagnoser.alive())
+
+    def test_estimates_come_while_a_job_runs(self):
+        curve = build_curve(self.folder)
+        with Simulator({"half_gap": 3e-5}) as simulator:
+            with Diagnoser({"curve": curve, "folder": self.folder}, simulator.topic("joint_states")).ready() as diagnoser:
+                estimates = diagnoser.estimates()
+                client = actionlib.SimpleActionClient(diagnoser.topic("trace_residual"), TraceResidualAction)
+                self.assertTrue(client.wait_for_server(rospy.Duration(TIMEOUT)))
+                estimates.wait_for_count(1)
+                before = len(estimates.messages)
+                client.send_goal(self.goal(rig=self.rig, out=self.path("beside")))
+                self.assertTrue(result_of(client).success)
+                stamps = [nanoseconds(m) for m in estimates.messages[before:] if m.method == "lost_motion"]
+        self.assertGreater(len(stamps), 3)
+        self.assertEqual({b - a for a, b in zip(stamps, stamps[1:])}, {300_000_000})  # three periods, none left out
 
     def test_wrong_goals_are_answered_with_the_reason(self):
         motor_only = self.path("motor.csv")

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <sstream>
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "support/data.h"
@@ -240,6 +241,24 @@ TEST_F(Commands, CsvToBagToCsvIsTheSameFile) {
   EXPECT_EQ(run("convert_record a.bag d.csv --rig rig.yaml").code, 65);  // the rig's joint is not 'elbow'
   done("convert_record a.bag d.csv --rig rig.yaml --joint elbow");
   EXPECT_EQ(read("a.csv"), read("d.csv"));
+}
+
+// For programs that start a command: lines instead of a summary, and the same curve.
+TEST_F(Commands, FeedbackIsAnObjectALine) {
+  done("build_curve rig.yaml --points 3 --seeds 1 --periods 1 --out a.yaml");
+  std::istringstream lines(
+      done("build_curve rig.yaml --points 3 --seeds 1 --periods 1 --out b.yaml --feedback").out);
+  EXPECT_EQ(read("a.yaml"), read("b.yaml"));
+  double last = 0;
+  std::string line, best;
+  while (std::getline(lines, line)) {
+    const Json json = Json::parse(line);
+    EXPECT_GE(json["fraction"], last);
+    last = json["fraction"];
+    best = json["best"];
+    EXPECT_FALSE(json["phase"].get<std::string>().empty());
+  }
+  expect_contains(best, "3 of 3 points");
 }
 
 TEST_F(Commands, CurveOfABagIsTheCurveOfTheCsv) {

@@ -20,13 +20,21 @@ struct ApdSettings {
   ApdLayout layout;
 };
 
-/// The APDs of a record.
+/// Whole excitation periods as a SampleStream cuts them: their samples, and the APD of each.
+struct PeriodWindow {
+  Record record;
+  double period = 0;                  // s; 0 where none was found: `record` is all that there is
+  long count = 0;                     // whole periods in `record`
+  std::vector<PeriodResult> periods;  // in order, also those with gaps; none where `record` lacks the signal
+};
+
+/// The APDs of a window.
 struct ApdResult {
   double period = 0;                  // s; 0 where none was found
-  std::vector<PeriodResult> periods;  // complete ones, after settling
+  std::vector<PeriodResult> periods;  // complete ones
   int incomplete = 0;      // windows left out because of gaps, or with no sample inside the classes
   double skewness = kNaN;  // mean over the periods
-  NoiseRange noise_range;  // of the signal after settling
+  NoiseRange noise_range;  // of the signal
   double noise = kNaN;     // its upper end; NaN with fewer than two periods
   AmplitudeDistribution total{ApdLayout{2, 0, 1}};  // all periods together
 };
@@ -42,18 +50,9 @@ double excitation_period(const Record& record, Channel signal);
 /// Length of a run after which its period is searched [s]; after that twice as long each time.
 constexpr double kFirstPeriodSearch = 0.25;
 
-/// Period by which a run is cut into windows [s]: the declared one, else as a stream finds it while the run
-/// grows, else that of the whole record. 0 where there is none.
-double run_period(const Record& record, const ApdSettings& settings);
-
-/// The whole excitation periods of a record after settling, by period and settling of `settings` (0 s:
-/// run_period). `last` > 0: only so many of them, the last. Nothing where there is no period, or not one
-/// whole period after settling.
-std::optional<Record> whole_periods(const Record& record, const ApdSettings& settings, long last = 0);
-
-/// Throws InvalidParameter for a layout or period outside its range; a record without the signal gives no
-/// periods.
-ApdResult analyse_apd(const Record& record, const ApdSettings& settings);
+/// Sums up the APDs of the periods of a window and estimates the noise of the signal. Throws InvalidParameter
+/// for a layout outside its range.
+ApdResult analyse_apd(const PeriodWindow& window, const ApdSettings& settings);
 
 /// A condition of a curve that a record does not meet: what it is about, for an operator who wants to know
 /// where to look, and the reason in words.

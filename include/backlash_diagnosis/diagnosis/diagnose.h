@@ -62,18 +62,15 @@ const std::vector<std::string>& diagnosis_methods();
 /// Whether an estimator needs a monitoring curve; false for an unknown name.
 bool needs_curve(const std::string& method);
 
-/// Runs the estimators (`method` empty: all) on the whole excitation periods of a record after settling, or
-/// on all of it where the rig declares no APD or the excitation has no period. Throws InvalidParameter for an
-/// unknown method; everything that the record lacks becomes a status with its reason. As a SampleStream that
-/// keeps all of the record: the same numbers, but for jumps of the stamps, at which a stream begins anew.
+/// Runs the estimators (`method` empty: all) on what a SampleStream has cut. Throws InvalidParameter for an
+/// unknown method; everything that the samples lack becomes a status with its reason.
+Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings,
+                   const MonitoringCurve* curve, const std::optional<Baseline>& baseline = std::nullopt,
+                   const std::string& method = "");
+
+/// The same for the whole excitation periods of a record after settling, or all of it where the rig declares
+/// no APD or the excitation has no period: cut_periods().
 Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
                    const std::optional<Baseline>& baseline = std::nullopt, const std::string& method = "");
-
-/// The same for a record that was cut already, as a SampleStream does; `settings` without settling.
-Diagnosis diagnose_settled(const Record& record, const DiagnosisSettings& settings,
-                           const MonitoringCurve* curve,
-                           const std::optional<Baseline>& baseline = std::nullopt,
-                           const std::string& method = "");
-DiagnosisSettings without_settling(DiagnosisSettings settings);
 
 }  // namespace backlash

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Samples of one joint as they arrive: keeps the most recent ones as a Record, counts whole excitation
 // periods, and says what was wrong with those it had to leave out. Knows stamps only, no clock: replayed at
-// any rate it does the same.
+// any rate it does the same. The one place where a run is cut into periods: records are cut by it as well.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/diagnosis/diagnose.h"
+#include "backlash_diagnosis/diagnosis/apd_skewness.h"
 #include "backlash_diagnosis/record/time_base.h"
 
 namespace backlash {
@@ -18,6 +17,8 @@ namespace backlash {
 struct StreamSettings {
   std::optional<ApdSettings> apd;  // absent: periods are found from motor_torque, no APD
   double keep = 60;                // s of samples kept, > 0; always at least three periods
+  /// The samples are those of a record: no gap begins a new run, and the signal of the APD may be missing.
+  bool of_record = false;
 };
 
 struct StreamCounters {
@@ -40,15 +41,19 @@ class SampleStream {
   /// not finite.
   const PeriodResult* add(double time, const ChannelValues& values);
 
+  /// Adds all samples of a record.
+  void add(const Record& record);
+
   /// Whole settled periods at hand.
   long periods() const;
 
   /// The last `count` whole settled periods (0: all that are kept); empty where there are none yet. All
-  /// samples where the excitation has no period, and for count 0 without APD.
-  Record latest(long count) const;
+  /// samples where the excitation has no period, and for count 0 without APD. A copy: its cost grows with
+  /// the samples asked for.
+  PeriodWindow latest(long count) const;
 
   double period() const { return period_; }  ///< s; 0 until known
-  double jump_limit() const;                 ///< s
+  double jump_limit() const;                 ///< s; infinite for a record
   double sampling_interval() const;          ///< s, median of the latest samples; 0 with fewer than two
   const StreamCounters& counters() const { return counters_; }
   const Record& kept() const { return record_; }
@@ -66,8 +71,12 @@ class SampleStream {
   bool has_lost_channel(double time, const ChannelValues& values) const;
   void find_period();
   const PeriodResult* start_windows();
+  const PeriodResult* analyse(double time, double value);
   void trim();
+  void forget_results();
   Windows windows() const;
+  std::vector<PeriodResult> results(const Windows& cut) const;
+  PeriodWindow searched_now(long count) const;
 
   StreamSettings settings_;
   StampChecker stamps_;
@@ -80,6 +89,12 @@ class SampleStream {
   std::optional<double> dropped_;   // s, last stamp that was trimmed since the windows began
   std::optional<WindowGrid> grid_;  // once the period and kLeadingSamples samples are there
   std::optional<PeriodAnalyser> analyser_;
+  std::vector<PeriodResult> results_;  // of the windows kept, settling included; storage beyond for the next
+  std::size_t result_count_ = 0;
 };
+
+/// The whole settled periods of a record (`last` > 0: only so many of them, the last), as a stream that keeps
+/// all of it cuts them. Without `apd` the period is that of motor_torque, and nothing settles.
+PeriodWindow cut_periods(const Record& record, const std::optional<ApdSettings>& apd, long last = 0);
 
 }  // namespace backlash

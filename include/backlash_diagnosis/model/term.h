@@ -56,7 +56,7 @@ struct FlankShift {
   double load_slope = 0;   // d opening / d load position
 };
 
-/// Where the shape of a flank is asked for; angles at the load.
+/// A position at which the shape of a flank is evaluated; angles at the load.
 struct FlankPoint {
   double motor_position;  // rad
   double load_position;   // rad
@@ -72,7 +72,7 @@ struct FlankLoad {
   double rate;         // rad/s, of the penetration
 };
 
-/// What sensors and drive make of the machine's own values.
+/// Errors of sensors and drive.
 struct Sensing {
   double load_position_gain = 1;  // -, shown over true
   double torque_delay = 0;        // s, the torque acts that much later than its stamp says
@@ -92,8 +92,8 @@ class Term {
   virtual bool has_dry_friction() const { return false; }
   virtual void add_friction(const Motion&, EndFriction&) const {}
 
-  /// Moves the flanks, and adds nothing then. The slopes make it conservative: the mesh torque acts through
-  /// them on both ends.
+  /// Moves the flanks; such a term adds no torque. The mesh torque acts on both ends through the slopes, so
+  /// that the motion of the flanks is conservative.
   virtual bool shapes_flanks() const { return false; }
   virtual bool shape_follows_torque() const { return false; }
   virtual void shape(const FlankPoint&, FlankShift&) const {}
@@ -101,19 +101,19 @@ class Term {
   /// known.
   virtual double least_opening(double /*half_gap*/) const { return -std::numeric_limits<double>::infinity(); }
 
-  /// Adds to the torque >= 0 with which a flank resists [N m], and nothing else then; the sum of all never
-  /// pulls.
+  /// Adds to the torque with which a closed flank resists [N m], and to nothing else. A flank never pulls:
+  /// the sum is limited to >= 0.
   virtual bool loads_flanks() const { return false; }
   virtual void load_flank(const FlankLoad&, double& /*torque*/) const {}
 
   virtual void sense(Sensing&) const {}
 
-  /// Whether the load would move otherwise without it. False saves the search a simulation.
+  /// False for a term that acts on the motor or on a sensor only: the load then moves as without the term,
+  /// and need not be simulated again.
   virtual bool moves_load() const { return true; }
 };
 
-/// The size of the motion in the records at hand, so that a term can tell which values are worth a try. Load
-/// side.
+/// The size of the motion in the records, from which a term derives the values to try. Load side.
 struct MotionRange {
   double torque = 0;        // N m, standard deviation of the motor's
   double speed = 0;         // rad/s, standard deviation of the motor's
@@ -192,7 +192,7 @@ const std::vector<TermType>& term_types();
 /// for values out of range and for such as do not go together.
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values);
 
-/// What all of them together make of the machine's own values.
+/// The errors of sensors and drive of all terms together.
 Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms);
 
 /// Reads one entry of `terms:`: `id: ID` and that term's parameters.

@@ -31,9 +31,10 @@ struct DiagnoserSettings {
   std::vector<MonitorSettings> joints;
   int queue = 20000;  // messages waiting at most
   DiagnosticsSettings diagnostics;
-  std::string folder;            // in which goals may name files
-  std::string history;           // folder with a file per joint; empty: none is kept
-  double history_interval = 60;  // s
+  std::string folder;              // in which goals may name files
+  std::string history;             // folder with a file per joint; empty: none is kept
+  double history_interval = 60;    // s
+  double job_memory = kJobMemory;  // GB that the process of an action may hold
 };
 
 /// Throws InvalidParameter, BadData, MissingInput.
@@ -65,7 +66,8 @@ class DiagnoserNode {
   };
 
   void on_joint_state(const sensor_msgs::JointState::ConstPtr& message);
-  void publish(Joint& joint, const PeriodReport& report);
+  void publish(const Joint& joint, const PeriodReport& report);
+  void publish(const Joint& joint, const ros::Time& stamp, const Diagnosis& diagnosis);
   bool on_diagnose(backlash_diagnosis::Diagnose::Request& request,
                    backlash_diagnosis::Diagnose::Response& response);
   bool on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
@@ -76,6 +78,7 @@ class DiagnoserNode {
   bool on_get_curve(backlash_diagnosis::GetCurve::Request& request,
                     backlash_diagnosis::GetCurve::Response& response);
   void on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal);
+  MonitoringCurve built_curve(const backlash_diagnosis::BuildCurveGoal& goal, JointMonitor& monitor);
   void advertise();
   void add_joint(MonitorSettings settings, const DiagnoserSettings& common);
   void serve_live(const DiagnoserSettings& settings);
@@ -90,6 +93,7 @@ class DiagnoserNode {
 
   ros::NodeHandle handle_, private_handle_;
   FileFolder folder_;
+  double job_memory_;          // GB
   std::vector<Joint> joints_;  // as many as at the start, so that their addresses stay
   JointStateReader reader_;    // of the same joints
   std::string topic_;

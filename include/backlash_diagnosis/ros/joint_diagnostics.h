@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/base/held_level.h"
+#include "backlash_diagnosis/ros/held_level.h"
 #include "backlash_diagnosis/ros/joint_history.h"
 #include "backlash_diagnosis/ros/joint_monitor.h"
 
@@ -57,7 +57,7 @@ class JointDiagnostics {
   std::string topic_;
   DiagnosticsSettings settings_;
   std::vector<Concern> concerns_;
-  long problems_ = 0, not_a_number_ = 0;  // counted up to the last update
+  long problems_ = 0, not_a_number_ = 0, replaced_ = 0;  // counted up to the last update
   std::mutex mutex_;
 };
 

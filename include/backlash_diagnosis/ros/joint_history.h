@@ -28,6 +28,7 @@ class JointHistory {
     long entries = 0;     // written since the start
     long waiting = 0;     // not written yet
     long left_out = 0;    // older than the last one: a looped bag, or a clock set back
+    bool behind = false;  // the latest verdict was left out
     long lost = 0;        // given up, as too many waited
     std::string problem;  // why the last attempt to write failed; empty: it did not
     Trend trend;

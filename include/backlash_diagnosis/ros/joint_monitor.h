@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // One joint as the diagnoser sees it: its samples, its curve, its baseline, its latest diagnosis.
-// Thread-safe: the subscriber feeds it from one thread while services ask from others.
+// Thread-safe: the subscriber feeds it from one thread while services ask from others, and running estimates
+// are computed in a third.
 #pragma once
 
 #include <condition_variable>
@@ -13,6 +14,8 @@
 #include <vector>
 
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
+#include "backlash_diagnosis/ros/diagnosis_worker.h"
+#include "backlash_diagnosis/ros/job.h"
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 
@@ -28,14 +31,14 @@ struct MonitorSettings {
   int window = 5;                        // periods that the running estimates look back
   double estimate_interval = 0.25;       // s of stamps at least from one running estimate to the next
   double keep = 60;                      // s of samples kept
+  double job_memory = kJobMemory;        // GB, of the process that builds a curve
 };
 
 /// What the outside hears of a completed period.
 struct PeriodReport {
-  std::optional<PeriodResult> period;  // absent for a rig without APD
-  std::optional<Diagnosis> diagnosis;  // over the last `window` periods, where a running estimate is due
-  double period_length = 0;            // s
-  ros::Time stamp;                     // of the last sample
+  PeriodResult period;
+  double period_length = 0;  // s
+  ros::Time stamp;           // of the last sample
 };
 
 struct MonitorState {
@@ -47,6 +50,7 @@ struct MonitorState {
   double rate = 0;                              // Hz, of the samples kept
   double period = 0;                            // s
   long periods = 0;                             // whole settled ones at hand
+  long replaced = 0;                            // running estimates left out, as they took too long
   bool any_sample = false;
   ros::WallTime last_arrival;
   double latency = 0;  // s from stamp to arrival by ROS time, of the latest message
@@ -59,7 +63,11 @@ struct MonitorState {
 
 class JointMonitor {
  public:
-  explicit JointMonitor(MonitorSettings settings);
+  /// Hears of running estimates over the last `window` periods, in their order, from a thread of the monitor;
+  /// `stamp` is that of their last sample.
+  using OnDiagnosis = std::function<void(const ros::Time& stamp, const Diagnosis& diagnosis)>;
+
+  explicit JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis = nullptr);
   ~JointMonitor();
 
   const std::string& joint() const { return settings_.joint; }
@@ -67,13 +75,17 @@ class JointMonitor {
   const std::string& baseline_path() const { return settings_.baseline_path; }
 
   /// Takes what a message says of the joint, or what is wrong with it (see JointStateReader); a report when
-  /// it completes a period. Bad content is counted and told by state().
+  /// it completes a period with an APD. Bad content is counted and told by state(). Where a running estimate
+  /// is due it copies the window; the rest of the work is not done here.
   std::optional<PeriodReport> take(const ros::Time& stamp, const ChannelValues& values,
                                    const std::string& problem, const std::string& topic);
 
   /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s]
   /// of wall time, then diagnoses the latest `periods` (0: all kept).
   Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
+
+  /// Ends the running estimates: the latest that waits is still told.
+  void stop() { worker_.stop(); }
 
   void set_baseline(const std::optional<Baseline>& baseline);
   void set_curve(MonitoringCurve curve);
@@ -87,11 +99,13 @@ class JointMonitor {
  private:
   void start_building(double rate);
   void build(double rate);
-  std::optional<PeriodReport> report(double time, const PeriodResult* period);
+  std::optional<DiagnosisTask> due(double time);
+  DiagnosisTask task(long periods) const;
+  void work(const DiagnosisTask& task);
   long wanted_periods(long periods) const { return periods > 0 ? periods : 1; }
 
   MonitorSettings settings_;
-  DiagnosisSettings diagnosis_settings_;  // without settling: the stream cuts
+  DiagnosisSettings diagnosis_settings_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   StampClock clock_;
@@ -108,6 +122,8 @@ class JointMonitor {
   double latency_ = 0;
   bool building_ = false, build_tried_ = false, stop_ = false;
   std::thread builder_;
+  OnDiagnosis on_diagnosis_;
+  DiagnosisWorker worker_;  // last: it uses all of the others
 };
 
 }  // namespace backlash

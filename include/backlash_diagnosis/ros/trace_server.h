@@ -15,13 +15,17 @@
 
 namespace backlash {
 
+class ScratchFolder;
+
 class TraceServer {
  public:
   /// The rig of a joint; null with the reason in `why`.
   using FindRig = std::function<const RigFile*(const std::string& joint, std::string& why)>;
 
-  /// Serves `name` from then on, in a thread of its own; all paths of a goal must lie in `folder`.
-  TraceServer(const ros::NodeHandle& handle, const std::string& name, FindRig find_rig, FileFolder folder);
+  /// Serves `name` from then on; all paths of a goal must lie in `folder`. The work is done by the command
+  /// trace_residual as a job beside the node, which may hold `memory` [GB].
+  TraceServer(const ros::NodeHandle& handle, const std::string& name, FindRig find_rig, FileFolder folder,
+              double memory);
   ~TraceServer();
 
  private:
@@ -29,9 +33,11 @@ class TraceServer {
 
   void execute(const backlash_diagnosis::TraceResidualGoalConstPtr& goal);
   backlash_diagnosis::TraceResidualResult trace(const backlash_diagnosis::TraceResidualGoal& goal);
+  std::string rig_path(const backlash_diagnosis::TraceResidualGoal& goal, const ScratchFolder& scratch) const;
 
   FindRig find_rig_;
   FileFolder folder_;
+  double memory_;  // GB
   std::unique_ptr<Server> server_;
 };
 

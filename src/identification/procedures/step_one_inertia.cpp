@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The one procedure for a machine of one inertia.
+#include <fmt/core.h>
+
 #include <cmath>
 
 #include "backlash_diagnosis/model/axis_unit.h"
@@ -64,10 +66,8 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   body.viscous_asymmetry = 0;
   body.coulomb_friction = found.coulomb.value;
   body.coulomb_asymmetry = found.offset.value;
-  char text[128];
-  std::snprintf(text, sizeof text, "torque error %.3g %%, low-pass %.3g Hz, torque acts %.3g ms late",
-                100 * found.relative_error, found.cutoff, 1e3 * found.delay.value);
-  report.message = text;
+  report.message = fmt::format("torque error {:.3g} %, low-pass {:.3g} Hz, torque acts {:.3g} ms late",
+                               100 * found.relative_error, found.cutoff, 1e3 * found.delay.value);
   return report;
 }
 

@@ -8,6 +8,7 @@
 
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -58,11 +59,9 @@ std::vector<Point> without_outliers(const std::vector<Point>& points, const Leas
   std::vector<double> sizes;
   for (std::size_t i = 0; i < points.size(); ++i)
     sizes.push_back(fit.residuals.segment<2>(2 * static_cast<Eigen::Index>(i)).norm());
-  std::vector<double> sorted = sizes;
-  std::sort(sorted.begin(), sorted.end());
   // The median of the length of two normal residuals is sqrt(2 ln 2) of their deviation.
-  const double median = sorted[sorted.size() / 2] / std::sqrt(2 * std::log(2.0));
-  const double limit = std::max(kOutlier * median, sorted[sorted.size() * 9 / 10]);
+  const double deviation = median(sizes) / std::sqrt(2 * std::log(2.0));
+  const double limit = std::max(kOutlier * deviation, quantile(sizes, 0.9));
   std::vector<Point> kept;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (sizes[i] <= limit) kept.push_back(points[i]);

@@ -5,7 +5,8 @@
 #include <string>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/diagnosis/healthy_machine.h"
+#include "backlash_diagnosis/diagnosis/baseline.h"
+#include "backlash_diagnosis/diagnosis/diagnose.h"
 
 namespace backlash {
 namespace {

@@ -10,6 +10,6 @@ namespace backlash {
 
 /// The rig with the stiffness of its couplings drawn about the declared values (normal, relative standard
 /// deviation diagnosis.stiffness_uncertainty, at most three of them). Deterministic for a seed.
-Rig machine_of(const RigFile& file, std::uint64_t seed);
+Rig draw_machine(const RigFile& file, std::uint64_t seed);
 
 }  // namespace backlash

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "error_memory.h"
+#include "backlash_diagnosis/signal/error_memory.h"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Diagnoses of one joint, computed in a thread of their own: a joint whose diagnosis takes long delays
+// neither the subscriber nor another joint.
+#pragma once
+
+#include <ros/time.h>
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "backlash_diagnosis/diagnosis/diagnose.h"
+
+namespace backlash {
+
+/// What a diagnosis needs, as it was when the last sample of the window came. Nothing of it is shared with
+/// the stream.
+struct DiagnosisTask {
+  ros::Time stamp;  // of the last sample
+  PeriodWindow window;
+  DiagnosisSettings settings;
+  std::shared_ptr<const MonitoringCurve> curve;  // null: none is there
+  std::optional<Baseline> baseline;
+
+  Diagnosis compute() const { return diagnose(window, settings, curve.get(), baseline); }
+};
+
+/// Works through tasks in their order. Some may wait, so that a moment without processor time loses none;
+/// where it cannot keep up, a new task replaces all that wait, which is counted: what is told is never old.
+class DiagnosisWorker {
+ public:
+  using Work = std::function<void(const DiagnosisTask&)>;
+
+  /// Calls `work` in its thread; what it throws is logged.
+  explicit DiagnosisWorker(Work work);
+  ~DiagnosisWorker();
+  DiagnosisWorker(const DiagnosisWorker&) = delete;
+  DiagnosisWorker& operator=(const DiagnosisWorker&) = delete;
+
+  void add(DiagnosisTask task);  ///< does not wait for work
+  long replaced() const;         ///< tasks that were never worked on
+  void stop();  ///< waits for the present task and the latest that waits; then nothing is taken
+
+ private:
+  void run();
+
+  Work work_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<DiagnosisTask> waiting_;
+  std::size_t samples_ = 0;  // of all that wait
+  long replaced_ = 0;
+  bool stop_ = false;
+  std::thread thread_;
+};
+
+}  // namespace backlash

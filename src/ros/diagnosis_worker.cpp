@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/ros/diagnosis_worker.h"
+
+#include <ros/console.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <exception>
+#include <utility>
+
+namespace backlash {
+namespace {
+
+constexpr std::size_t kMostWaiting = 8;  // tasks; a choice: two seconds of estimates at the default interval
+constexpr std::size_t kMostSamplesWaiting = 1'000'000;  // of all tasks; a choice: 80 MB with all channels
+constexpr int kNiceness = 5;  // a choice: samples are taken first where processors are short
+
+/// Of this thread only: Linux keeps a niceness for each.
+void yield_to_samples() {
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kNiceness);
+}
+
+}  // namespace
+
+DiagnosisWorker::DiagnosisWorker(Work work) : work_(std::move(work)), thread_(&DiagnosisWorker::run, this) {}
+
+DiagnosisWorker::~DiagnosisWorker() {
+  stop();
+}
+
+void DiagnosisWorker::add(DiagnosisTask task) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (stop_) return;
+  samples_ += task.window.record.size();
+  if (waiting_.size() >= kMostWaiting || samples_ > kMostSamplesWaiting) {
+    replaced_ += static_cast<long>(waiting_.size());
+    waiting_.clear();
+    samples_ = task.window.record.size();
+  }
+  waiting_.push_back(std::move(task));
+  changed_.notify_one();
+}
+
+long DiagnosisWorker::replaced() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return replaced_;
+}
+
+void DiagnosisWorker::stop() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+    for (; waiting_.size() > 1; ++replaced_) waiting_.pop_front();
+    changed_.notify_one();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void DiagnosisWorker::run() {
+  yield_to_samples();
+  for (;;) {
+    DiagnosisTask task;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      changed_.wait(lock, [this] { return stop_ || !waiting_.empty(); });
+      if (waiting_.empty()) return;
+      task = std::move(waiting_.front());
+      waiting_.pop_front();
+      samples_ -= task.window.record.size();
+    }
+    try {
+      work_(task);
+    } catch (const std::exception& error) {
+      ROS_ERROR("a diagnosis failed: %s", error.what());
+    }
+  }
+}
+
+}  // namespace backlash

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "backlash_diagnosis/ros/joint_monitor.h"
+#include "support/curve.h"
+#include "support/records.h"
+
+namespace backlash {
+namespace {
+
+using test::make_record;
+using test::values_at;
+
+/// Stamp of a time [s] of a record, to the nanosecond.
+ros::Time stamp_of(double time) {
+  return ros::Time(1'000'000'000, 0) + ros::Duration().fromNSec(std::lround(1e9 * time));
+}
+
+MonitorSettings monitor_settings(const std::string& joint) {
+  MonitorSettings settings;
+  settings.joint = joint;
+  settings.rig = default_rig_file();
+  settings.curve = test::linear_curve();
+  settings.estimate_interval = 0;  // each period
+  return settings;
+}
+
+/// What a monitor tells, in the order in which it does.
+struct Heard {
+  std::mutex mutex;
+  std::vector<ros::Time> stamps;
+  std::vector<Diagnosis> diagnoses;
+
+  JointMonitor::OnDiagnosis listener() {
+    return [this](const ros::Time& stamp, const Diagnosis& diagnosis) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      stamps.push_back(stamp);
+      diagnoses.push_back(diagnosis);
+    };
+  }
+  std::size_t count() {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return stamps.size();
+  }
+};
+
+/// All samples of a record; how many of them completed a period.
+long feed(JointMonitor& monitor, const Record& record, std::size_t from = 0) {
+  long periods = 0;
+  for (std::size_t i = from; i < record.size(); ++i)
+    periods += monitor.take(stamp_of(record.time[i]), values_at(record, i), "", "joint_states").has_value();
+  return periods;
+}
+
+class JointMonitorTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { ros::Time::init(); }
+};
+
+TEST_F(JointMonitorTest, EachPeriodHasItsEstimateAndItIsThatOfItsSamples) {
+  Heard heard;
+  JointMonitor monitor(monitor_settings("elbow"), heard.listener());
+  const Record record = make_record({});
+  std::vector<Diagnosis> expected;
+  for (std::size_t end = 300; end <= record.size(); end += 100) {  // two of 15 periods settle
+    EXPECT_EQ(feed(monitor, record.slice(0, record.time[end - 1] + 1e-4), end - 100 - (end == 300 ? 200 : 0)),
+              1);
+    while (heard.count() < expected.size() + 1) std::this_thread::yield();
+    const std::size_t begin = end - 100 * std::min<std::size_t>(5, (end - 200) / 100);
+    const MonitoringCurve curve = test::linear_curve();
+    DiagnosisSettings settings = default_rig_file().diagnosis;
+    settings.apd->settling_periods = 0;
+    expected.push_back(
+        diagnose(record.slice(record.time[begin] - 1e-4, record.time[end - 1] + 1e-4), settings, &curve));
+    EXPECT_EQ(heard.stamps.back(), stamp_of(record.time[end - 1]));
+  }
+  monitor.stop();
+  ASSERT_EQ(heard.diagnoses.size(), 13u);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(heard.diagnoses[i].verdict.message, expected[i].verdict.message) << i;
+    EXPECT_EQ(heard.diagnoses[i].apd->skewness, expected[i].apd->skewness) << i;
+  }
+  EXPECT_EQ(monitor.state().replaced, 0);
+}
+
+// One joint's listener does not return: samples of both joints are taken and the other joint is diagnosed.
+TEST_F(JointMonitorTest, ASlowJointDelaysNobody) {
+  std::promise<void> allowed;
+  const std::shared_future<void> wait = allowed.get_future().share();
+  std::vector<ros::Time> told;
+  JointMonitor slow(monitor_settings("slow"), [&](const ros::Time& stamp, const Diagnosis&) {
+    told.push_back(stamp);
+    wait.wait();
+  });
+  Heard heard;
+  JointMonitor quick(monitor_settings("quick"), heard.listener());
+  test::RecordRecipe recipe;
+  recipe.duration = 4;
+  const Record record = make_record(recipe);
+  long periods = 0, quick_periods = 0;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const ros::Time stamp = stamp_of(record.time[i]);
+    periods += slow.take(stamp, values_at(record, i), "", "joint_states").has_value();
+    if (!quick.take(stamp, values_at(record, i), "", "joint_states")) continue;
+    ++quick_periods;
+    while (heard.count() < static_cast<std::size_t>(quick_periods)) std::this_thread::yield();
+  }
+  EXPECT_EQ(periods, 38);
+  EXPECT_EQ(heard.count(), 38u);
+  EXPECT_EQ(quick.state().replaced, 0);
+  EXPECT_EQ(slow.state().counters.accepted, 4000);
+  std::string note;
+  ros::Time stamp;
+  EXPECT_GE(slow.diagnose(10, 0, note, stamp).verdict.estimate, 0);  // the service answers as well
+  EXPECT_EQ(note, "");
+  allowed.set_value();
+  slow.stop();
+  EXPECT_GT(slow.state().replaced, 0);
+  // What came last is told, and every estimate was told or counted.
+  EXPECT_EQ(told.back(), stamp_of(record.time.back()));
+  EXPECT_EQ(static_cast<long>(told.size()) + slow.state().replaced, periods);
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+}
+
+// Services ask and settings change while samples come; the sanitizers watch.
+TEST_F(JointMonitorTest, SnapshotsUnderConcurrency) {
+  Heard heard;
+  JointMonitor monitor(monitor_settings("elbow"), heard.listener());
+  test::RecordRecipe recipe;
+  recipe.duration = 6;
+  const Record record = make_record(recipe);
+  std::promise<void> fed;
+  const auto done = fed.get_future().share();
+  const auto busy = [&done] { return done.wait_for(std::chrono::seconds(0)) != std::future_status::ready; };
+  std::thread asking([&] {
+    while (busy()) {
+      std::string note;
+      ros::Time stamp;
+      const Diagnosis diagnosis = monitor.diagnose(3, 0, note, stamp);
+      if (note.empty()) EXPECT_EQ(diagnosis.apd->periods.size(), 3u);
+    }
+  });
+  std::thread changing([&] {
+    for (int i = 1; busy(); i = i % 7 + 1) {
+      monitor.set_window(i, 0);
+      monitor.set_limits(std::nullopt);
+      EXPECT_GE(monitor.state().replaced, 0);
+    }
+  });
+  EXPECT_EQ(feed(monitor, record), 58);
+  fed.set_value();
+  asking.join();
+  changing.join();
+  monitor.stop();
+  EXPECT_GT(heard.count(), 0u);
+  for (const Diagnosis& diagnosis : heard.diagnoses) {
+    EXPECT_GE(diagnosis.apd->periods.size(), 1u);
+    EXPECT_LE(diagnosis.apd->periods.size(), 7u);
+  }
+}
+
+}  // namespace
+}  // namespace backlash
