@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws the figures of a diagnosis as a piece of HTML with the pictures inside; diagnose_record --report calls it.
+"""Draws the figures of a diagnosis, as JSON with the pictures inside; diagnose_record --report calls it.
 
-usage: diagnosis_report.py SERIES.json --out FIGURES.html
+usage: diagnosis_report.py SERIES.json --out FIGURES.json
 """
 import os
 import sys
@@ -206,24 +206,24 @@ def intervals_picture(data):
     yield plotting.picture(figure, "Intervals of all methods; green: those that the verdict stands on")
 
 
-def fragment(series):
+def sections(series):
     data = Data(series)
     pictures = [p for draw in (intervals_picture, curve_picture, apd_picture, loop_picture, time_pictures)
                 for p in draw(data)]
-    return plotting.figures(pictures) + plotting.drawn_with()
+    return [plotting.section("", pictures)]
 
 
 def main():
     parser = plotting.Parser(__doc__.splitlines()[0])
     parser.add_argument("series", metavar="SERIES.json", help="of a diagnosis")
-    parser.add_argument("--out", metavar="FIGURES.html", required=True, help="piece of HTML to write")
+    parser.add_argument("--out", metavar="FIGURES.json", required=True, help="to write")
     arguments = parser.parse_args()
     series = plotting.load_json(arguments.series, "the series of a diagnosis")
     try:
-        text = fragment(series)
+        drawn = sections(series)
     except (KeyError, TypeError, IndexError, ValueError) as error:
         plotting.fail(65, "%s: not the series of a diagnosis: %r" % (arguments.series, error))
-    plotting.save_text(text, arguments.out)
+    plotting.save_sections(drawn, arguments.out)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ Exit codes of all of them: 0 done, 64 usage, 65 not the data, 66 data missing, 7
 """
 import argparse
 import base64
-import html
 import io
 import json
 import os
@@ -81,22 +80,22 @@ def page_pyplot():
 
 
 def picture(figure, caption):
-    """As HTML that holds it."""
+    """As an entry of a section's figures."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=130)
     pyplot().close(figure)
-    return '<figure><img alt="%s" src="data:image/png;base64,%s"><figcaption>%s</figcaption></figure>\n' % (
-        html.escape(caption, True), base64.b64encode(stream.getvalue()).decode(), html.escape(caption))
+    return {"caption": caption, "png": base64.b64encode(stream.getvalue()).decode()}
 
 
-def figures(pictures):
-    return '<div class="figures">\n%s</div>\n' % "".join(pictures)
+def section(heading, pictures):
+    return {"heading": heading, "figures": list(pictures)}
 
 
-def drawn_with():
+def save_sections(sections, path):
+    """The figures of a page, as the page's template wants them (src/report/templates/figures.html)."""
     import matplotlib
-    return '<p class="small">Drawn with matplotlib %s, Python %s.</p>\n' % (
-        html.escape(matplotlib.__version__), html.escape(sys.version.split()[0]))
+    drawn_with = "Drawn with matplotlib %s, Python %s." % (matplotlib.__version__, sys.version.split()[0])
+    save_text(json.dumps({"schema_version": 1, "sections": sections, "drawn_with": drawn_with}), path)
 
 
 def write_whole(path, write):

@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws the figures of a trace_residual report as a piece of HTML with the pictures inside.
+"""Draws the figures of a trace_residual report, as JSON with the pictures inside.
 
-usage: trace_report.py REPORT.json --series SERIES.json --out FIGURES.html
+usage: trace_report.py REPORT.json --series SERIES.json --out FIGURES.json
 """
-import html
 import os
 import sys
 
@@ -153,7 +152,7 @@ def channel_figures(data, channel):
     drawn += [(over_coordinate_figure(data, name, residuals, unit), NAMES[name])
               for name in ("motor_velocity", "motor_position")]
     drawn.append((over_order_figure(data, residuals, unit), "orders of the motor position"))
-    return plotting.figures(plotting.picture(figure, "Residual of %s over %s" % (word, what)) for figure, what in drawn)
+    return [plotting.picture(figure, "Residual of %s over %s" % (word, what)) for figure, what in drawn]
 
 
 def explained(x, y):
@@ -213,12 +212,10 @@ def draw_contributions(axes, contributions, data):
         axes.legend(loc="upper right", markerscale=4)
 
 
-def effect_figure(data, step, contributions):
-    maps = [t for t in step["terms"] if t["id"] == "learned_map"]
+def effect_figures(data, step, contributions):
+    maps = [t for t in step["terms"] if "coordinate" in t]
     units = sorted({c["unit"] for c in contributions})
     count = len(maps) or len(units)
-    if count == 0:
-        return ""
     pictures = []
     for i in range(count):
         figure, axes = new_figure()
@@ -227,35 +224,33 @@ def effect_figure(data, step, contributions):
         else:
             draw_contributions(axes, [c for c in contributions if c["unit"] == units[i]], data)
         pictures.append(plotting.picture(figure, "What %s adds" % step["effect"]))
-    return plotting.figures(pictures)
+    return pictures
 
 
-def fragment(report, series):
+def sections(report, series):
     data = Data(series)
-    text = ""
-    for channel in data.channels:
-        text += "<h3>Residual of %s (measured - model) in the test record</h3>\n" % html.escape(data.words(channel))
-        text += channel_figures(data, channel)
-    for step, drawn in zip(report["steps"], series["steps"]):
-        figure = effect_figure(data, step, drawn["contributions"])
-        if figure:
-            text += "<h3>What %s adds in the test record</h3>\n" % html.escape(step["effect"]) + figure
-    return text + plotting.drawn_with()
+    drawn = [plotting.section("Residual of %s (measured - model) in the test record" % data.words(channel),
+                              channel_figures(data, channel)) for channel in data.channels]
+    for step, shown in zip(report["steps"], series["steps"]):
+        figures = effect_figures(data, step, shown["contributions"])
+        if figures:
+            drawn.append(plotting.section("What %s adds in the test record" % step["effect"], figures))
+    return drawn
 
 
 def main():
     parser = plotting.Parser("Draws the figures of a trace_residual report.")
     parser.add_argument("report", metavar="REPORT.json")
     parser.add_argument("--series", metavar="SERIES.json", required=True, help="of the same trace")
-    parser.add_argument("--out", metavar="FIGURES.html", required=True, help="piece of HTML to write")
+    parser.add_argument("--out", metavar="FIGURES.json", required=True, help="to write")
     arguments = parser.parse_args()
     report = plotting.load_json(arguments.report, "a trace")
     series = plotting.load_json(arguments.series, "the series of a trace")
     try:
-        text = fragment(report, series)
+        drawn = sections(report, series)
     except (KeyError, TypeError, IndexError, ValueError) as error:
         plotting.fail(65, "%s: not a trace: %r" % (arguments.report, error))
-    plotting.save_text(text, arguments.out)
+    plotting.save_sections(drawn, arguments.out)
 
 
 if __name__ == "__main__":

@@ -1,25 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/base/error.h"
 
-#include <sstream>
+#include <fmt/core.h>
 
 namespace backlash {
-namespace {
-
-std::string to_text(double value) {
-  std::ostringstream text;
-  text.precision(12);
-  text << value;
-  return text.str();
-}
-
-}  // namespace
 
 InvalidParameter::InvalidParameter(const std::string& name, const std::string& value,
                                    const std::string& limit)
     : Error(name + " = " + value + ": " + limit), name_(name), value_(value), limit_(limit) {}
 
 InvalidParameter::InvalidParameter(const std::string& name, double value, const std::string& limit)
-    : InvalidParameter(name, to_text(value), limit) {}
+    : InvalidParameter(name, fmt::format("{:.12g}", value), limit) {}
 
 }  // namespace backlash

@@ -14,11 +14,13 @@ namespace backlash {
 void Ticker::tick() {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++done_;
-  if (!stop_ && progress_ && !progress_(static_cast<double>(done_) / total_, phase_)) stop_ = true;
+  if (!stop_ && progress_ && !progress_(double(done_) / double(total_), phase_)) stop_ = true;
   if (stop_) throw Cancelled();
 }
 
-void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job) {
+namespace {
+
+void work_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job, unsigned threads) {
   std::atomic<int> next{0};
   std::mutex mutex;
   std::exception_ptr failure;
@@ -37,17 +39,24 @@ void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(in
     work();
   };
   std::vector<std::thread> helpers;
-  const unsigned workers = std::min<unsigned>(std::thread::hardware_concurrency(), count);
+  const unsigned workers =
+      std::min<unsigned>(threads > 0 ? threads : std::thread::hardware_concurrency(), count);
   for (unsigned i = 1; i < workers; ++i) helpers.emplace_back(helper);
   work();
   for (std::thread& thread : helpers) thread.join();
   if (failure) std::rethrow_exception(failure);
 }
 
-void for_each_in_parallel(int count, const std::function<void(int)>& job) {
+}  // namespace
+
+void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job) {
+  work_in_parallel(count, ticker, job, 0);
+}
+
+void for_each_in_parallel(int count, const std::function<void(int)>& job, unsigned threads) {
   const Progress silent;
   Ticker ticker(silent, count, "");
-  for_each_in_parallel(count, ticker, job);
+  work_in_parallel(count, ticker, job, threads);
 }
 
 }  // namespace backlash

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/base/text.h"
 
+#include <fmt/core.h>
+
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 
 namespace backlash {
 namespace {
@@ -75,10 +76,7 @@ std::string printable(std::string_view text, std::size_t limit) {
     if (length > 0) {
       shown.append(text.substr(0, length));
     } else {
-      char escaped[8];
-      std::snprintf(escaped, sizeof escaped, "\\x%02x",
-                    static_cast<unsigned>(static_cast<unsigned char>(text[0])));
-      shown += escaped;
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[0]));
     }
     text.remove_prefix(length > 0 ? length : 1);
   }

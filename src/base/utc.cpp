@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/base/utc.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 
 namespace backlash {
@@ -13,11 +14,9 @@ std::string utc_time(double time) {
   const auto seconds = static_cast<std::time_t>(std::floor(time));
   std::tm parts{};
   if (::gmtime_r(&seconds, &parts) == nullptr) return {};
-  char text[96];
   // By hand: the year of %F has no leading zeros everywhere.
-  std::snprintf(text, sizeof text, "%04d-%02d-%02dT%02d:%02d:%02dZ", parts.tm_year + 1900, parts.tm_mon + 1,
-                parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
-  return text;
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", parts.tm_year + 1900, parts.tm_mon + 1,
+                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
 }
 
 std::string utc_date(double time) {

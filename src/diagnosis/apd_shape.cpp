@@ -1,31 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/apd_shape.h"
 
-#include <sstream>
+#include <fmt/core.h>
 
 namespace backlash {
 namespace {
 
 Estimate answer(const FamilyMatch& match, const MonitoringCurve& curve, std::size_t periods) {
   Estimate estimate;
-  std::ostringstream text;
-  text.precision(3);
-  text << "rms distance " << match.misfit << " from the nearest distribution of " << curve.conditions.rig
-       << " over " << periods << " period(s)";
+  estimate.message = fmt::format("rms distance {:.3g} from the nearest distribution of {} over {} period(s)",
+                                 match.misfit, curve.conditions.rig, periods);
   const double span = curve.points.back().backlash - curve.points.front().backlash;
   estimate.lower = match.lower;
   if (!match.touches_end) estimate.upper = match.upper;
   if (match.upper - match.lower > 0.5 * span) {
     estimate.status = Status::ambiguous;
-    text << "; more than half of the curve fits";
+    estimate.message += "; more than half of the curve fits";
   } else if (match.touches_end) {
     estimate.status = Status::above_range;
-    text << "; the end of the curve fits, backlash may be larger than it covers";
+    estimate.message += "; the end of the curve fits, backlash may be larger than it covers";
   } else {
     estimate.status = Status::ok;
     estimate.backlash = match.backlash;
   }
-  estimate.message = text.str();
   estimate.backlash_angle = estimate.backlash * curve.backlash_to_angle;
   estimate.angle_lower = estimate.lower * curve.backlash_to_angle;
   estimate.angle_upper = estimate.upper * curve.backlash_to_angle;

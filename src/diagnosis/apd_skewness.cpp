@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <limits>
 #include <utility>
 
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
@@ -26,10 +28,7 @@ bool differs(double value, double reference, double tolerance) {
 }
 
 std::string mismatch(const char* what, double value, double reference, const char* unit) {
-  std::ostringstream text;
-  text.precision(4);
-  text << what << " is " << value << ' ' << unit << ", the curve was made at " << reference << ' ' << unit;
-  return text.str();
+  return fmt::format("{0} is {1:.4g} {3}, the curve was made at {2:.4g} {3}", what, value, reference, unit);
 }
 
 /// `noise`: standard deviation of that of motor_torque.
@@ -56,19 +55,15 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
 
 std::string motion_mismatch(const Record& record, const MonitoringCurve& curve) {
   if (!curve.conditions.output_locked) return {};
-  std::ostringstream text;
-  text.precision(4);
   const double load = range_of(record.column(Channel::load_position));
   const double travel = travel_of(record.column(Channel::motor_position));
-  if (load > 0.05 * curve.conditions.motor_travel) {
-    text << "the output moves by " << load << " rad, the rig says it is locked";
-    return text.str();
-  }
-  if (travel > 1.05 * curve.conditions.motor_travel) {
-    text << "the motor travels " << travel << " rad, more than any backlash on the curve allows ("
-         << curve.conditions.motor_travel << " rad): output free, or backlash above the curve";
-    return text.str();
-  }
+  if (load > 0.05 * curve.conditions.motor_travel)
+    return fmt::format("the output moves by {:.4g} rad, the rig says it is locked", load);
+  if (travel > 1.05 * curve.conditions.motor_travel)
+    return fmt::format(
+        "the motor travels {:.4g} rad, more than any backlash on the curve allows ({:.4g} rad): output free, "
+        "or backlash above the curve",
+        travel, curve.conditions.motor_travel);
   return {};
 }
 
@@ -143,12 +138,9 @@ std::string frequency_mismatch(const Record& record, const ApdResult& apd, const
 
 std::string noise_mismatch(const ApdResult& apd, const ApdSettings& settings, const MonitoringCurve& curve) {
   if (!(apd.noise > kNoiseExcess * curve.noise_levels.back())) return {};
-  std::ostringstream text;
-  text.precision(4);
-  text << "sensor noise is " << apd.noise << ' ' << channel_unit(settings.signal)
-       << " (standard deviation), the curve covers noise up to " << curve.noise_levels.back() << ' '
-       << channel_unit(settings.signal);
-  return text.str();
+  return fmt::format(
+      "sensor noise is {0:.4g} {2} (standard deviation), the curve covers noise up to {1:.4g} {2}", apd.noise,
+      curve.noise_levels.back(), channel_unit(settings.signal));
 }
 
 /// Whether the record is of the kind that the curve is for.
@@ -249,13 +241,12 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
   if (match.refused || !curve->family) return match;
   match.family = match_family(*curve, std::move(samples), match.noise);
   if (match.family->alien()) {
-    std::ostringstream text;
-    text.precision(3);
-    text << "the distribution is " << match.family->misfit << " (rms) from the nearest of "
-         << curve->conditions.rig << ", simulated records were within " << match.family->usual_misfit
-         << ": the machine does something that the rig does not contain";
-    match.mismatch = Mismatch{Mismatch::Concern::curve, text.str()};
-    match.refused = refuse(Status::out_of_domain, text.str());
+    const std::string reason = fmt::format(
+        "the distribution is {:.3g} (rms) from the nearest of {}, simulated records were within {:.3g}: the "
+        "machine does something that the rig does not contain",
+        match.family->misfit, curve->conditions.rig, match.family->usual_misfit);
+    match.mismatch = Mismatch{Mismatch::Concern::curve, reason};
+    match.refused = refuse(Status::out_of_domain, reason);
   }
   return match;
 }

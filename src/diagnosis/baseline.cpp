@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/diagnosis/diagnose.h"
 
 namespace backlash {
 namespace {
@@ -33,6 +34,30 @@ void read(const YamlReader& yaml, const char* value_key, const char* interval_ke
 }
 
 }  // namespace
+
+Baseline baseline_of(const Diagnosis& diagnosis, const std::string& rig, const std::string& rig_digest) {
+  const Verdict& verdict = diagnosis.verdict;
+  // An open or missing interval does not tell how sure the baseline is.
+  if (!std::isfinite(verdict.backlash_angle) || !std::isfinite(verdict.angle_lower) ||
+      !std::isfinite(verdict.angle_upper))
+    throw BadData(rig, "no baseline, there is no value with an interval: " + verdict.message);
+  if (!verdict.dissenters.empty())
+    throw BadData(rig, "no baseline, the estimates contradict each other: " + verdict.message);
+  Baseline baseline;
+  baseline.rig = rig;
+  baseline.rig_digest = rig_digest;
+  for (const int i : verdict.members)
+    if (diagnosis.estimates[i].status == Status::ok)
+      baseline.methods.push_back(diagnosis.estimates[i].method);
+  baseline.backlash = verdict.backlash;
+  baseline.lower = verdict.lower;
+  baseline.upper = verdict.upper;
+  baseline.backlash_angle = verdict.backlash_angle;
+  baseline.angle_lower = verdict.angle_lower;
+  baseline.angle_upper = verdict.angle_upper;
+  if (diagnosis.apd) baseline.skewness = diagnosis.apd->skewness;
+  return baseline;
+}
 
 std::string to_yaml(const Baseline& b) {
   YAML::Emitter out;

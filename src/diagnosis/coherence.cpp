@@ -1,39 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/coherence.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numeric>
-#include <unsupported/Eigen/FFT>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
+#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/spectrum.h"
 #include "refusal.h"
 
 namespace backlash {
 namespace {
 
-using Spectrum = std::vector<std::complex<double>>;
-
-constexpr double kOverlap = 1.0 / 6;  // correlation of Hann windows that overlap by half
 constexpr double kFewestAverages = 16;
+constexpr double kSegmentsPerAverage = 1 + 2.0 / 36;   // theory: Hann windows that overlap by half
 constexpr double kExcited = 0.1;                       // of the mean power in the band, still excited
 constexpr std::size_t kNarrow = 16;                    // lines; a narrower band is no broad one
 constexpr double kFilled = 0.9;                        // share of the lines of the band that are excited
 constexpr double kKurtosisLow = 2, kKurtosisHigh = 5;  // 3: Gaussian; 1: square wave, 1.5: sine
-constexpr double kNeighbours = 1.94;  // 1 + 2 (4/9 + 1/36): neighbouring lines of a Hann window correlate
-
-Spectrum windowed_spectrum(const std::vector<double>& x, std::size_t begin, const std::vector<double>& window,
-                           Eigen::FFT<double>& fft) {
-  std::vector<double> part(x.begin() + static_cast<std::ptrdiff_t>(begin),
-                           x.begin() + static_cast<std::ptrdiff_t>(begin + window.size()));
-  const double mean = std::accumulate(part.begin(), part.end(), 0.0) / static_cast<double>(part.size());
-  for (std::size_t i = 0; i < part.size(); ++i) part[i] = (part[i] - mean) * window[i];
-  Spectrum spectrum;
-  fft.fwd(spectrum, part);
-  return spectrum;
-}
 
 void check(const CoherenceSettings& s) {
   const auto require = [](bool valid, const char* name, double value, const char* limit) {
@@ -147,34 +135,38 @@ void require_random(const Record& record) {
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   const double k = kurtosis(torque);
   if (k < kKurtosisLow || k > kKurtosisHigh)
-    throw Refusal{Status::out_of_domain, "torque is not random noise: kurtosis " + text(k) +
-                                             ", of Gaussian noise 3, of a square wave 1"};
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("torque is not random noise: kurtosis {:.4g}, of Gaussian noise 3, of a square wave 1",
+                    k)};
   if (const auto period = detect_period(record.time, torque))
-    throw Refusal{Status::out_of_domain, "torque repeats every " + text(*period) +
-                                             " s, so that any response repeats with it and is coherent"};
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("torque repeats every {:.4g} s, so that any response repeats with it and is coherent",
+                    *period)};
 }
 
 void judge(const CoherenceSettings& settings, CoherenceDetection& found) {
   found.status = Status::ok;
-  found.message = "mean loss of coherence " + text(found.loss) + " from " + text(found.lower) + " to " +
-                  text(found.upper) + " Hz, " + text(found.spectrum.averages) + " averages";
+  found.message = fmt::format("mean loss of coherence {:.4g} from {:.4g} to {:.4g} Hz, {:.4g} averages",
+                              found.loss, found.lower, found.upper, found.spectrum.averages);
   if (!settings.baseline) {
     found.message += "; without a baseline of the healthy machine no finding";
     return;
   }
-  const double half = 1.96 * std::hypot(found.deviation, settings.baseline->deviation);
+  const double half = kNormalQuantile975 * std::hypot(found.deviation, settings.baseline->deviation);
   found.index = found.loss - settings.baseline->loss;
   found.index_lower = found.index - half;
   found.index_upper = found.index + half;
   if (found.index_lower <= settings.least_growth && settings.least_growth <= found.index_upper) {
     found.status = Status::ambiguous;
-    found.message += "; grown by " + text(found.index) + " +- " + text(half) + ": cannot tell";
+    found.message += fmt::format("; grown by {:.4g} +- {:.4g}: cannot tell", found.index, half);
     return;
   }
   found.nonlinear = found.index_lower > settings.least_growth;
   found.message += *found.nonlinear ? "; play or another nonlinearity present, grown by "
                                     : "; no play or other nonlinearity seen, grown by ";
-  found.message += text(found.index) + " +- " + text(half);
+  found.message += fmt::format("{:.4g} +- {:.4g}", found.index, half);
 }
 
 void fill(const Record& record, const CoherenceSettings& settings, CoherenceDetection& found) {
@@ -183,11 +175,11 @@ void fill(const Record& record, const CoherenceSettings& settings, CoherenceDete
   const auto segment = 2 * static_cast<std::size_t>(std::lround(0.5 * settings.segment * signals.rate));
   const double averages =
       segment >= 8 ? 2.0 * static_cast<double>(signals.torque.size()) / static_cast<double>(segment) - 1 : 0;
-  if (averages / (1 + 2 * kOverlap * kOverlap) < kFewestAverages)
+  if (averages / kSegmentsPerAverage < kFewestAverages)
     throw Refusal{Status::insufficient_data,
-                  "the record holds " + text(std::max(0.0, std::floor(averages))) + " segments of " +
-                      text(settings.segment) + " s, needed are " +
-                      text(std::ceil(kFewestAverages * (1 + 2 * kOverlap * kOverlap)))};
+                  fmt::format("the record holds {:.4g} segments of {:.4g} s, needed are {:.4g}",
+                              std::max(0.0, std::floor(averages)), settings.segment,
+                              std::ceil(kFewestAverages * kSegmentsPerAverage))};
   found.spectrum = estimate_coherence(signals.torque, signals.response, signals.rate, segment);
   const Band band = excited_band(found.spectrum, settings);
   found.lower = found.spectrum.frequency[band.begin];
@@ -200,7 +192,7 @@ void fill(const Record& record, const CoherenceSettings& settings, CoherenceDete
     variance += 2 * (1 - missing) * missing * missing / n / lines;
   }
   found.loss = std::min(1.0, loss);
-  found.deviation = std::sqrt(variance * kNeighbours / lines);
+  found.deviation = std::sqrt(variance * kHannLines / lines);
   judge(settings, found);
 }
 
@@ -208,39 +200,14 @@ void fill(const Record& record, const CoherenceSettings& settings, CoherenceDete
 
 CoherenceSpectrum estimate_coherence(const std::vector<double>& x, const std::vector<double>& y, double rate,
                                      std::size_t segment) {
-  if (segment < 8 || segment % 2 != 0)
-    throw InvalidParameter("segment", static_cast<double>(segment), "must be even and >= 8");
-  if (x.size() != y.size())
-    throw InvalidParameter("y", static_cast<double>(y.size()), "must have as many samples as x");
-  if (2 * x.size() < 3 * segment)
-    throw InvalidParameter("segment", static_cast<double>(segment), "must fit twice, overlapping by half");
-  std::vector<double> window(segment);
-  double power = 0;
-  for (std::size_t i = 0; i < segment; ++i) {
-    window[i] = 0.5 - 0.5 * std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(segment));
-    power += window[i] * window[i];
-  }
-  const std::size_t lines = segment / 2 - 1;
-  std::vector<double> xx(lines, 0.0), yy(lines, 0.0);
-  Spectrum xy(lines, 0.0);
-  Eigen::FFT<double> fft;
-  std::size_t count = 0;
-  for (std::size_t begin = 0; begin + segment <= x.size(); begin += segment / 2, ++count) {
-    const Spectrum a = windowed_spectrum(x, begin, window, fft), b = windowed_spectrum(y, begin, window, fft);
-    for (std::size_t k = 0; k < lines; ++k) {
-      xx[k] += std::norm(a[k + 1]);
-      yy[k] += std::norm(b[k + 1]);
-      xy[k] += std::conj(a[k + 1]) * b[k + 1];
-    }
-  }
+  const WelchSpectra spectra = welch(x, y, 1 / rate, segment);
   CoherenceSpectrum spectrum;
-  spectrum.averages = static_cast<double>(count) / (1 + 2 * kOverlap * kOverlap);
+  spectrum.averages = spectra.averages;
   spectrum.significance = 1 - std::pow(0.05, 1 / (spectrum.averages - 1));
-  for (std::size_t k = 0; k < lines; ++k) {
-    spectrum.frequency.push_back(rate * static_cast<double>(k + 1) / static_cast<double>(segment));
-    const double product = xx[k] * yy[k];
-    spectrum.coherence.push_back(product > 0 ? std::min(1.0, std::norm(xy[k]) / product) : 0);
-    spectrum.input_power.push_back(2 * xx[k] / (rate * power * static_cast<double>(count)));
+  for (std::size_t k = 1; k < spectra.xx.size(); ++k) {
+    spectrum.frequency.push_back(rate * static_cast<double>(k) / static_cast<double>(segment));
+    spectrum.coherence.push_back(spectra.coherence(k));
+    spectrum.input_power.push_back(spectra.xx[k]);
   }
   return spectrum;
 }

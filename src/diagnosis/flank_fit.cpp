@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
@@ -131,7 +132,7 @@ void Fitter::choose_outermost() {
     MatrixXd line(n_, 2);
     line.col(0).setOnes();
     line.col(1) = Eigen::Map<const VectorXd>(w_.load.data(), n_);
-    x -= line * line.colPivHouseholderQr().solve(phi_);
+    x -= line * solve_least_squares(line, phi_).x;
   }
   const std::vector<double> values(x.data(), x.data() + n_);
   const double middle = 0.5 * (quantile(values, 0.1) + quantile(values, 0.9));
@@ -179,7 +180,7 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
       Eigen::Map<const Eigen::Array<char, Eigen::Dynamic, 1>>(use_.data(), n_).cast<double>();
   const double count = used.sum();
   used_.noalias() = used.asDiagonal() * a_;
-  MatrixXd normal = used_.transpose() * a_;
+  MatrixXd normal = transposed_product(used_, a_);
   VectorXd right = used_.transpose() * phi_;
   const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
   // A declaration is worth one window per its own variance times what a correlated record repeats itself.
@@ -198,14 +199,13 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   // Scaled to unit diagonal: the columns are of different units.
   const VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
   const MatrixXd equal = unit.asDiagonal() * normal * unit.asDiagonal();
-  inverse_ =
-      unit.asDiagonal() * equal.ldlt().solve(MatrixXd::Identity(a_.cols(), a_.cols())) * unit.asDiagonal();
+  inverse_ = unit.asDiagonal() * symmetric_inverse(equal) * unit.asDiagonal();
   p_ = inverse_ * right;
   residual_ = phi_ - a_ * p_;
   std::vector<double> sizes;
   for (Eigen::Index i = 0; i < n_; ++i)
     if (use_[i]) sizes.push_back(std::abs(residual_[i]));
-  sigma_ = 1.4826 * median(sizes);
+  sigma_ = kNormalPerMedianDeviation * median(sizes);
 }
 
 /// J, d, C for the next linearisation.

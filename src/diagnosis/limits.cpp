@@ -1,9 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/limits.h"
 
+#include <cmath>
+
 #include "backlash_diagnosis/base/error.h"
 
 namespace backlash {
+
+void require_increasing(const Limits& limits) {
+  const auto require = [](const char* name, double value, double above, const char* limit) {
+    if (!std::isfinite(value) || !(value > above)) throw InvalidParameter(name, value, limit);
+  };
+  require("watch", limits.watch, 0, "must be > 0");
+  require("service", limits.service, limits.watch, "must be > watch");
+  require("stop", limits.stop, limits.service, "must be > service");
+}
 
 Limits read_limits(const YamlReader& yaml) {
   Limits limits;
@@ -12,8 +23,11 @@ Limits read_limits(const YamlReader& yaml) {
   limits.watch = values.number("watch", Range::positive());
   limits.service = values.number("service", Range::positive());
   limits.stop = values.number("stop", Range::positive());
-  if (!(limits.watch <= limits.service && limits.service <= limits.stop))
-    values.fail("service", "limits must not decrease from watch over service to stop");
+  try {
+    require_increasing(limits);
+  } catch (const InvalidParameter& error) {
+    values.fail(error.name(), error.limit());
+  }
   return limits;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/lost_motion.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -85,8 +87,10 @@ LockedMotion collect(const Record& record, const LostMotionSettings& settings) {
     const double tolerance =
         std::isnan(settings.locked_tolerance) ? 0.05 * travel(motion.position) : settings.locked_tolerance;
     if (moved > tolerance) {
-      throw Refusal{Status::out_of_domain, "the output is not locked: load_position moves by " + text(moved) +
-                                               " rad, allowed " + text(tolerance) + " rad"};
+      throw Refusal{
+          Status::out_of_domain,
+          fmt::format("the output is not locked: load_position moves by {:.4g} rad, allowed {:.4g} rad",
+                      moved, tolerance)};
     }
   }
   return motion;
@@ -117,9 +121,9 @@ void require_reached(const LockedMotion& motion, const std::vector<TorqueExcursi
   const auto reached = reached_torque(motion, 0.99);
   for (const std::size_t side : {0, 1}) {
     if (count[side] > 0 || reached[side] >= kReached * level) continue;
-    throw Refusal{Status::out_of_domain, "torque reaches " + text(reached[1]) + " N m and " +
-                                             text(-reached[0]) + " N m, needed are +-" + text(level) +
-                                             " N m"};
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("torque reaches {:.4g} N m and {:.4g} N m, needed are +-{:.4g} N m", reached[1],
+                              -reached[0], level)};
   }
 }
 
@@ -127,9 +131,9 @@ void require_count(const std::vector<TorqueExcursion>& excursions, double level)
   const auto count = count_sides(excursions);
   if (std::min(count[0], count[1]) >= kFewest) return;
   throw Refusal{Status::insufficient_data,
-                "torque goes clearly beyond " + text(level) + " N m and comes back " +
-                    std::to_string(count[1]) + " times, beyond " + text(-level) + " N m " +
-                    std::to_string(count[0]) + " times; needed are " + std::to_string(kFewest) + " each"};
+                fmt::format("torque goes clearly beyond {:.4g} N m and comes back {} times, beyond {:.4g} N "
+                            "m {} times; needed are {} each",
+                            level, count[1], -level, count[0], kFewest)};
 }
 
 Walls read_walls(const LockedMotion& motion, const LostMotionSettings& settings) {
@@ -175,8 +179,9 @@ void require_rest(const WallToWall& play, double deflection) {
   const bool touching = deflection == 0 || play.ringing <= kContactLoss * deflection;
   if (settled && touching) return;
   throw Refusal{Status::out_of_domain,
-                "the motor does not come to rest at the walls: its position varies by " + text(play.ringing) +
-                    " rad rms there (travel " + text(play.travel) + " rad); apply torque more slowly"};
+                fmt::format("the motor does not come to rest at the walls: its position varies by {:.4g} rad "
+                            "rms there (travel {:.4g} rad); apply torque more slowly",
+                            play.ringing, play.travel)};
 }
 
 void require_calm_sensor(const LockedMotion& motion, const Walls& walls, const WallToWall& play) {
@@ -235,9 +240,9 @@ Parts find_parts(LockedMotion motion, const Walls& walls, const LostMotionSettin
 std::string describe(const Walls& walls, const LostMotionSettings& settings, const WallToWall& play,
                      const Parts& parts) {
   std::string message = settings.subtract_elastic_deflection
-                            ? "free play without elastic deflection, read at " +
-                                  text(median_of(walls.readings, &WallReading::torque)) + " N m"
-                            : "play from wall to wall at +-" + text(walls.level) + " N m";
+                            ? fmt::format("free play without elastic deflection, read at {:.4g} N m",
+                                          median_of(walls.readings, &WallReading::torque))
+                            : fmt::format("play from wall to wall at +-{:.4g} N m", walls.level);
   message += ", median of " + std::to_string(play.passages) + " passages";
   if (play.outliers > 0) {
     message += ", " + std::to_string(play.outliers) +
@@ -253,9 +258,9 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
   const double torque = median_of(walls.readings, &WallReading::torque);
   const bool exceeds = !settings.subtract_elastic_deflection && torque > (1 + kTorqueSpan) * walls.level;
   if (exceeds && !settings.elastic_deflection) {
-    throw Refusal{Status::out_of_domain, "torque jumps past the stated " + text(walls.level) + " N m to " +
-                                             text(torque) +
-                                             " N m, and no elastic deflection is known to correct for it"};
+    throw Refusal{Status::out_of_domain, fmt::format("torque jumps past the stated {:.4g} N m to {:.4g} N m, "
+                                                     "and no elastic deflection is known to correct for it",
+                                                     walls.level, torque)};
   }
   const std::vector<double> deflections = deflections_of(walls, settings, exceeds);
   const WallToWall play = measure_wall_to_wall(motion, walls.readings, deflections, walls.switched);
@@ -275,9 +280,9 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
   const double half = std::hypot(play.half_interval(), elastic);
   if (play.value + half < 0) {
     throw Refusal{Status::out_of_domain,
-                  "the travel of " + text(play.travel) +
-                      " rad is less than the elastic deflection that the rig declares: the rig is "
-                      "not this machine, or the motor did not reach both walls"};
+                  fmt::format("the travel of {:.4g} rad is less than the elastic deflection that the rig "
+                              "declares: the rig is not this machine, or the motor did not reach both walls",
+                              play.travel)};
   }
   estimate.status = Status::ok;
   estimate.backlash_angle = std::max(0.0, play.value);

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
 #include "refusal.h"
@@ -139,8 +143,9 @@ Motor collect(const Record& record, const MomentumTransferSettings& settings) {
     const auto travel = [](const std::vector<double>& x) { return quantile_range(x, 0.01); };
     const double moved = settings.load_ratio * travel(record.column(Channel::load_position));
     if (moved > kLockedTravel * travel(motor.position))
-      throw Refusal{Status::out_of_domain,
-                    "the output moves by " + text(moved) + " rad although the rig says that it is locked"};
+      throw Refusal{
+          Status::out_of_domain,
+          fmt::format("the output moves by {:.4g} rad although the rig says that it is locked", moved)};
   }
   motor.load.assign(record.size(), 0.0);
   if (!settings.output_locked)
@@ -189,14 +194,6 @@ std::vector<double> flank_torque(const Pinion& pinion, double inertia, double in
                           (span * span);
   }
   return flank;
-}
-
-/// Standard deviation of white noise from fourth differences, which leave little of the motion.
-double sample_noise(const std::vector<double>& x) {
-  std::vector<double> sizes;
-  for (std::size_t i = 4; i < x.size(); ++i)
-    sizes.push_back(std::abs(x[i] - 4 * x[i - 1] + 6 * x[i - 2] - 4 * x[i - 3] + x[i - 4]));
-  return median(std::move(sizes)) / (0.6745 * std::sqrt(70.0));  // 70: sum of the squares of the weights
 }
 
 double at(const std::vector<double>& x, double index) {
@@ -298,9 +295,10 @@ Flank calm_flank(const Motor& motor, bool tachometer, const MomentumTransferSett
   const double dt = motor.interval;
   const double longest =
       flexible(s) ? std::max(2.0, kLongestAverage * internal_cycle(s) / dt) : kRigidAverage;
-  const double torque = sample_noise(motor.torque);
+  const double torque = noise_from_differences(motor.torque, 4);
   const std::vector<double>& measured = tachometer ? motor.speed : motor.position;
-  const double motion = std::max(sample_noise(measured), smallest_step(measured) / std::sqrt(12.0));
+  const double motion =
+      std::max(noise_from_differences(measured, 4), smallest_step(measured) / std::sqrt(12.0));
   Flank flank;
   for (flank.half = 2; static_cast<double>(flank.half) <= longest; ++flank.half) {
     flank.pinion = reconstruct(motor, s, flank.half);
@@ -312,19 +310,19 @@ Flank calm_flank(const Motor& motor, bool tachometer, const MomentumTransferSett
                              motion * noise_gain(false, tachometer, dt, flank.half, s));
     if (kNoiseFree * flank.noise < 0.5 * flank.level) return flank;
   }
-  throw Refusal{Status::out_of_domain, "impacts cannot be told from noise: the torque on the flank, " +
-                                           text(flank.level) + " N m in the median, has noise of " +
-                                           text(flank.noise) + " N m"};
+  throw Refusal{Status::out_of_domain, fmt::format("impacts cannot be told from noise: the torque on the "
+                                                   "flank, {:.4g} N m in the median, has noise of {:.4g} N m",
+                                                   flank.level, flank.noise)};
 }
 
 void fill(const Record& record, const MomentumTransferSettings& s, Estimate& estimate) {
   const Motor motor = collect(record, s);
   const double cycle = internal_cycle(s);
   if (cycle > 0 && cycle < kSamplesPerCycle * motor.interval)
-    throw Refusal{Status::out_of_domain, "sampled at " + text(1 / motor.interval) +
-                                             " Hz, but motor and pinion swing against each other at " +
-                                             text(1 / cycle) + " Hz: needed are " + text(kSamplesPerCycle) +
-                                             " samples per cycle"};
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("sampled at {:.4g} Hz, but motor and pinion swing against each other at {:.4g} "
+                              "Hz: needed are {:.4g} samples per cycle",
+                              1 / motor.interval, 1 / cycle, kSamplesPerCycle)};
   const Flank flank = calm_flank(motor, record.has(Channel::motor_velocity), s);
   const double shortness =
       shortness_of_impacts(flank.level, static_cast<double>(flank.half) * motor.interval, s);
@@ -336,10 +334,11 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
                                                  " times, needed are " + std::to_string(kFewestCrossings)};
   const double in_flight = torque_in_flight(flank.torque, crossings, flank.half);
   if (in_flight > kFlight * flank.level)
-    throw Refusal{Status::out_of_domain,
-                  "the motor side does not fly freely between the flanks: " + text(in_flight) +
-                      " N m are left there, " + text(flank.level) +
-                      " N m in contact; inertia, damping or friction are not as declared"};
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("the motor side does not fly freely between the flanks: {:.4g} N m are left there, "
+                    "{:.4g} N m in contact; inertia, damping or friction are not as declared",
+                    in_flight, flank.level)};
   // The integral of a speed that jumps between two samples is known to half a sample too.
   const double blur = kTiming * (motor.tachometer ? 1 + shortness : 1);
   std::vector<double> gaps, timing, elastic, speeds;
@@ -353,8 +352,8 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
     speeds.push_back(std::abs(at(motor.speed, c.impact)));
   }
   const RobustScale scale = robust_scale(gaps, 0);
-  const double scatter =
-      student_t_975(gaps.size() - 1) * 1.25 * scale.deviation / std::sqrt(static_cast<double>(gaps.size()));
+  const double scatter = student_t_quantile(0.975, std::max(1.0, static_cast<double>(gaps.size()) - 1)) *
+                         1.25 * scale.deviation / std::sqrt(static_cast<double>(gaps.size()));
   const double half = std::sqrt(scatter * scatter + std::pow(median(timing), 2) +
                                 std::pow(kElasticShare * median(elastic), 2));
   const double gap = std::max(0.0, scale.centre);
@@ -371,9 +370,9 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
   estimate.backlash = s.base_radius * gap;
   estimate.lower = s.base_radius * estimate.angle_lower;
   estimate.upper = s.base_radius * estimate.angle_upper;
-  estimate.message = "median of " + std::to_string(gaps.size()) + " crossings, impacts at " +
-                     text(median(speeds)) + " rad/s, momentum averaged over +-" +
-                     text(static_cast<double>(flank.half) * motor.interval) + " s";
+  estimate.message =
+      fmt::format("median of {} crossings, impacts at {:.4g} rad/s, momentum averaged over +-{:.4g} s",
+                  gaps.size(), median(speeds), static_cast<double>(flank.half) * motor.interval);
   if (estimate.status == Status::below_range)
     estimate.message += "; contact is lost for no longer than elastic deflection and averaging explain";
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
@@ -208,14 +209,12 @@ Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange&
   Estimate estimate;
   estimate.method = "apd_skewness";
   estimate.skewness = skewness;
-  std::ostringstream text;
-  text.precision(4);
-  text << "skewness " << skewness << " over " << periods << " period(s)";
+  std::string& text = estimate.message;
+  text = fmt::format("skewness {:.4g} over {} period(s)", skewness, periods);
   if (flat()) {
     estimate.status = Status::ambiguous;
-    text << "; on the curve the skewness of " << conditions.signal << " does not depend on backlash";
+    text += "; on the curve the skewness of " + conditions.signal + " does not depend on backlash";
     estimate.lower = points.front().backlash;
-    estimate.message = text.str();
     return with_angle(estimate, *this);
   }
   const NoiseRange noise = within(range, noise_levels);
@@ -225,11 +224,9 @@ Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange&
                  last = at(points.back().backlash, noise.upper).mean;
     const bool above_start = skewness > at(points.front().backlash, noise.upper).mean;
     estimate.status = above_start ? Status::below_range : Status::above_range;
-    text << (above_start ? " is higher than the curve at its smallest backlash ("
-                         : " is lower than the curve anywhere (");
-    text << (above_start ? first : last) << ")";
+    text += above_start ? fmt::format(" is higher than the curve at its smallest backlash ({:.4g})", first)
+                        : fmt::format(" is lower than the curve anywhere ({:.4g})", last);
     if (!above_start) estimate.lower = points.back().backlash;
-    estimate.message = text.str();
     return with_angle(estimate, *this);
   }
   const double span = points.back().backlash - points.front().backlash;
@@ -237,18 +234,17 @@ Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange&
   if (!found.touches_end) estimate.upper = found.upper;
   if (found.upper - found.lower > 0.5 * span) {
     estimate.status = Status::ambiguous;
-    text << " fits more than half of the curve";
+    text += " fits more than half of the curve";
   } else if (found.touches_end) {
     estimate.status = Status::above_range;
-    text << " fits the end of the curve; backlash may be larger than it covers";
+    text += " fits the end of the curve; backlash may be larger than it covers";
   } else {
     estimate.status = Status::ok;
     estimate.backlash = found.best;
-    text << " on the curve of " << conditions.rig;
+    text += " on the curve of " + conditions.rig;
     if (found.pieces > 1 || found.in_flagged_stretch)
-      text << "; the curve is not monotonic here, the interval covers all branches";
+      text += "; the curve is not monotonic here, the interval covers all branches";
   }
-  estimate.message = text.str();
   return with_angle(estimate, *this);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -8,6 +10,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
+#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
 #include "refusal.h"
@@ -106,9 +109,10 @@ void require_possible(const TwoEncoders& motion, double inertia) {
   for (std::size_t i = 0; i + lag < motion.motor.size(); ++i)
     jumps += std::abs(motion.motor[i + lag] - motion.motor[i]) > 0.5 * moved;
   if (jumps > kOutliers)
-    throw Refusal{Status::out_of_domain, "motor_position jumps faster than a torque of " + text(torque) +
-                                             " N m can drive the motor: columns are exchanged, or a unit is "
-                                             "not as declared"};
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("motor_position jumps faster than a torque of {:.4g} N m can drive the motor: "
+                              "columns are exchanged, or a unit is not as declared",
+                              torque)};
 }
 
 struct Fits {
@@ -138,34 +142,40 @@ void require_sound(const FlankFit& fit) {
                                                  " times, needed are " + std::to_string(kFewestStays)};
   const double factor = fit.compliance_factor;
   if (!(factor > 1 / kLargestFactor && factor < kLargestFactor))
-    throw Refusal{Status::out_of_domain, "the deflection does not follow the torque as declared: " +
-                                             text(factor) + " times the elastic deflection of the rig"};
+    throw Refusal{Status::out_of_domain, fmt::format("the deflection does not follow the torque as declared: "
+                                                     "{:.4g} times the elastic deflection of the rig",
+                                                     factor)};
   if (std::abs(fit.scale_error) > kLargestScaleError)
     throw Refusal{Status::out_of_domain,
-                  "motor_position and load_position differ by " + text(100 * fit.scale_error) +
-                      " % in scale: the reduction ratio or an encoder is not as declared"};
+                  fmt::format("motor_position and load_position differ by {:.4g} % in scale: the reduction "
+                              "ratio or an encoder is not as declared",
+                              100 * fit.scale_error)};
 }
 
 std::string describe(const FlankFit& fit, bool moves) {
   std::string message = std::to_string(fit.used[0]) + " and " + std::to_string(fit.used[1]) +
                         " windows on the two flanks, " + std::to_string(fit.stays) + " stays; ";
-  message += fit.compliance_from_record ? "elastic deflection from the record, " +
-                                              text(fit.compliance_factor) + " times the declared"
-                                        : std::string("elastic deflection as declared");
+  message += fit.compliance_from_record
+                 ? fmt::format("elastic deflection from the record, {:.4g} times the declared",
+                               fit.compliance_factor)
+                 : std::string("elastic deflection as declared");
   if (moves && std::abs(fit.scale_error) > 1e-4)
-    message +=
-        "; the difference of the encoders drifts by " + text(100 * fit.scale_error) + " % of the travel";
+    message += fmt::format("; the difference of the encoders drifts by {:.4g} % of the travel",
+                           100 * fit.scale_error);
   if (fit.varies)
-    message += "; the play depends on the position of the load, from " + text(fit.least_gap) + " to " +
-               text(fit.largest_gap) + " rad: the interval holds it all";
+    message += fmt::format(
+        "; the play depends on the position of the load, from {:.4g} to {:.4g} rad: the interval holds it "
+        "all",
+        fit.least_gap, fit.largest_gap);
   return message;
 }
 
 void fill(const Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
   const TwoEncoders motion = collect(record, settings);
   if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
-    throw Refusal{Status::out_of_domain, "the output moves by " + text(travel(motion.load)) +
-                                             " rad although the rig says that it is locked"};
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("the output moves by {:.4g} rad although the rig says that it is locked",
+                              travel(motion.load))};
   if (settings.output_locked) require_possible(motion, settings.motor_inertia);
   FlankModel model;
   model.elastic = settings.elastic_deflection;
@@ -175,7 +185,9 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
   const auto [fit, longer] = fit_record(motion, model);
   require_sound(fit);
 
-  const double scatter = student_t_975(fit.stays / 2 - 1) * fit.standard_error;
+  const double scatter =
+      student_t_quantile(0.975, std::max(1.0, std::floor(0.5 * static_cast<double>(fit.stays)) - 1)) *
+      fit.standard_error;
   const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
   const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
   const double bounce = model.moving ? 0 : kBounce * fit.gap;
@@ -186,10 +198,9 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
     upper = std::max(upper, fit.largest_gap + half);
   }
   if (upper < 0)
-    throw Refusal{Status::out_of_domain,
-                  "the flanks are " + text(-fit.gap) +
-                      " rad closer than the declared elastic deflection allows: the rig "
-                      "is not this machine"};
+    throw Refusal{Status::out_of_domain, fmt::format("the flanks are {:.4g} rad closer than the declared "
+                                                     "elastic deflection allows: the rig is not this machine",
+                                                     -fit.gap)};
   estimate.status = Status::ok;
   estimate.backlash_angle = std::max(0.0, fit.gap);
   estimate.angle_lower = std::max(0.0, lower);

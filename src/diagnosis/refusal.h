@@ -2,7 +2,6 @@
 // How estimators give up: a status with its reason, thrown where the record turns out unfit.
 #pragma once
 
-#include <sstream>
 #include <string>
 
 #include "backlash_diagnosis/diagnosis/estimate.h"
@@ -13,14 +12,6 @@ struct Refusal {
   Status status;
   std::string reason;
 };
-
-/// A value for a message: four digits tell people enough.
-inline std::string text(double value) {
-  std::ostringstream stream;
-  stream.precision(4);
-  stream << value;
-  return stream.str();
-}
 
 /// The estimate that `fill` makes, or the status and reason with which it gives up.
 template <typename Fill>

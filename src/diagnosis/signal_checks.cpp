@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstddef>
 #include <limits>
 #include <numeric>
-#include <unsupported/Eigen/FFT>
 
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/spectrum.h"
 
 namespace backlash {
 namespace {
@@ -35,19 +34,11 @@ std::vector<double> resample(const std::vector<double>& time, const std::vector<
 
 /// Autocorrelation at lags 0 .. `lags`, each normalised by the power of the two stretches that it compares: 1
 /// where they are equal, less elsewhere, also in a record of a few periods. 0 where one of them is still.
-std::vector<double> autocorrelation(std::vector<double> x, std::size_t lags) {
+std::vector<double> autocorrelation(const std::vector<double>& x, std::size_t lags) {
   const std::size_t n = x.size();
   std::vector<double> power(n + 1, 0.0);  // of the first samples
   for (std::size_t i = 0; i < n; ++i) power[i + 1] = power[i] + x[i] * x[i];
-  std::size_t padded = 1;
-  while (padded < 2 * n) padded *= 2;
-  x.resize(padded, 0.0);
-  Eigen::FFT<double> fft;
-  std::vector<std::complex<double>> spectrum;
-  fft.fwd(spectrum, x);
-  for (auto& line : spectrum) line = std::norm(line);
-  std::vector<double> product;
-  fft.inv(product, spectrum);
+  const std::vector<double> product = lagged_products(x, lags);
   std::vector<double> r(lags + 1, 0.0);
   for (std::size_t lag = 0; lag <= lags; ++lag) {
     const double early = power[n - lag], late = power[n] - power[lag];
@@ -74,7 +65,7 @@ std::size_t repetition_lag(std::vector<double> x) {
   if (dies_out(x)) return 0;
   const std::size_t longest = n / 2 + 1;  // of a lag: two periods, the last sample of which may be missing
   // A little beyond, so that a hill at the longest lag is told from one that still rises there.
-  const std::vector<double> r = autocorrelation(std::move(x), std::min(n - 1, longest + n / 16 + 2));
+  const std::vector<double> r = autocorrelation(x, std::min(n - 1, longest + n / 16 + 2));
   std::size_t first = 1;
   while (first <= longest && r[first] > 0) ++first;  // past the first zero: the lobe around lag 0
   if (first > longest) return 0;

@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/error_memory.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
 #include "backlash_diagnosis/signal/sen_slope.h"
-#include "error_memory.h"
 #include "trend_message.h"
 
 namespace backlash {
@@ -85,8 +86,8 @@ Line fit(const std::vector<TrendPoint>& points) {
   line.lower = interval.lower;
   line.upper = interval.upper;
   // Variance of a median of normal errors: pi / 2 of that of the mean.
-  line.level_error =
-      1.959964 * scale.deviation * std::sqrt(0.5 * M_PI * memory.level / static_cast<double>(times.size()));
+  line.level_error = kNormalQuantile975 * scale.deviation *
+                     std::sqrt(0.5 * M_PI * memory.level / static_cast<double>(times.size()));
   return line;
 }
 

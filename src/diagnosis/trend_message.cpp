@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "trend_message.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
-#include <iomanip>
-#include <locale>
-#include <sstream>
 
 #include "backlash_diagnosis/base/utc.h"
 
@@ -13,14 +12,9 @@ namespace {
 
 constexpr double kDay = 86400, kYear = 365.25 * kDay;
 
+/// Three digits, plain ones also where the shortest form has an exponent.
 std::string number(double value) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text.precision(3);
-  // Plain digits also where %g would write an exponent.
-  if (std::abs(value) >= 100) text << std::fixed << std::setprecision(0);
-  text << value;
-  return text.str();
+  return std::abs(value) >= 100 ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value);
 }
 
 struct Words {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/diagnosis/verdict.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 #include "backlash_diagnosis/base/text.h"
 
@@ -118,18 +119,11 @@ Grade grade_of(double value, const Limits& limits) {
   return value >= limits.watch ? Grade::watch : Grade::good;
 }
 
-std::string number(double value) {
-  std::ostringstream text;
-  text.precision(4);
-  text << value;
-  return text.str();
-}
-
 std::string shown(const Amount& a, const char* unit) {
-  if (std::isnan(a.value)) return "at least " + number(a.lower) + unit;
-  if (!std::isfinite(a.lower)) return number(a.value) + unit;
-  if (std::isinf(a.upper)) return number(a.value) + unit + " (95 %: " + number(a.lower) + " or more)";
-  return number(a.value) + unit + " (95 %: " + number(a.lower) + " to " + number(a.upper) + ")";
+  if (std::isnan(a.value)) return fmt::format("at least {:.4g}{}", a.lower, unit);
+  if (!std::isfinite(a.lower)) return fmt::format("{:.4g}{}", a.value, unit);
+  if (std::isinf(a.upper)) return fmt::format("{:.4g}{} (95 %: {:.4g} or more)", a.value, unit, a.lower);
+  return fmt::format("{:.4g}{} (95 %: {:.4g} to {:.4g})", a.value, unit, a.lower, a.upper);
 }
 
 std::string names(const Estimates& all, const Set& set) {

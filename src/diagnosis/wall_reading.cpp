@@ -3,9 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/noise.h"
 
 namespace backlash {
 namespace {
@@ -74,18 +73,9 @@ TorqueExcursion largest_stretch(const std::vector<double>& torque, int side, dou
 
 }  // namespace
 
-double torque_noise(const std::vector<double>& torque) {
-  if (torque.size() < 3) return 0;
-  std::vector<double> bends(torque.size() - 2);
-  for (std::size_t i = 0; i < bends.size(); ++i)
-    bends[i] = std::abs(torque[i + 2] - 2 * torque[i + 1] + torque[i]);
-  // 0.6745: median of abs of a standard normal variable; 6: sum of the squares of 1, -2, 1
-  return median(std::move(bends)) / (0.6745 * std::sqrt(6.0));
-}
-
 std::vector<TorqueExcursion> find_excursions(const std::vector<double>& torque, double level) {
   // The sum over an excursion must stand out of the noise: 8 standard deviations of one sample.
-  const double least_sum = 8 * torque_noise(torque);
+  const double least_sum = torque.size() < 3 ? 0 : 8 * noise_from_differences(torque, 2);
   std::vector<TorqueExcursion> excursions;
   int side = 0;
   std::size_t begin = 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
 
@@ -98,7 +99,7 @@ WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<Wa
   // times as much as a mean; two walls and the drift are fitted.
   const double n = static_cast<double>(readings.size());
   const double standard_error = 1.25 * scale.deviation * std::sqrt(2 / n);
-  result.scatter = student_t_975(readings.size() > 4 ? readings.size() - 3 : 1) * standard_error;
+  result.scatter = student_t_quantile(0.975, std::max(1.0, n - 3)) * standard_error;
   return result;
 }
 

@@ -2,11 +2,11 @@
 #include "backlash_diagnosis/identification/finding.h"
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash {
 std::map<std::string, Measured> combine_findings(const std::vector<Finding>& findings, const Rig& rig,
@@ -44,7 +44,7 @@ std::map<std::string, Measured> combine_findings(const std::vector<Finding>& fin
     gradient += row.a * row.b;
     rows.push_back(std::move(row));
   }
-  const Eigen::MatrixXd covariance = information.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd covariance = symmetric_inverse(information);
   const Eigen::VectorXd deviation = covariance * gradient;
   double chi2 = 0;
   for (const Row& row : rows) chi2 += std::pow(row.b - row.a.dot(deviation), 2);

@@ -2,37 +2,34 @@
 #include "backlash_diagnosis/identification/fitted_rig.h"
 
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
-#include "rig_file/rig_text.h"
+#include "backlash_diagnosis/rig_file/rig_document.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 
 namespace backlash {
 namespace {
 
-void write_one_inertia(RigText& text, const Identification& found, double ratio) {
-  const FittedMachine fitted{found.rig, found.parameters, found.units};
-  const Body& motor = found.rig.motor;
-  text.set("gear_train.motor.inertia", motor.inertia / (ratio * ratio),
-           fitted.comment("inertia", ratio * ratio));
-  text.set_directional("motor", "viscous_damping", motor.viscous_damping / (ratio * ratio), 0,
-                       fitted.comment("viscous", ratio * ratio));
-  text.set_directional("motor", "coulomb_friction", motor.coulomb_friction / ratio,
-                       motor.coulomb_asymmetry / ratio, fitted.comment("coulomb", ratio));
+/// What belongs to the parameters of a machine of one inertia, by the names of the table.
+template <typename Value>
+std::map<std::string, Value> by_table(const std::map<std::string, Value>& one_inertia) {
+  std::map<std::string, Value> all;
+  for (const RigParameter& p : servo_parameters())
+    if (const auto at = one_inertia.find(p.one_inertia); at != one_inertia.end()) all[p.name] = at->second;
+  return all;
 }
 
 }  // namespace
 
 std::string fitted_rig_text(const RigFile& declared, const Identification& found) {
-  RigText text(declared);
+  RigDocument document(declared);
   const double ratio = declared.rig.motor_axis_ratio();
   if (declared.rig.mesh.rigid)
-    write_one_inertia(text, found, ratio);
+    document.set_fitted({found.rig, ratio, by_table(found.parameters), by_table(found.units)});
   else
-    write_servo(text, {found.rig, found.parameters, found.units}, ratio);
-  std::string fitted = text.text();
+    document.set_fitted({found.rig, ratio, found.parameters, found.units});
   if (found.gap_map && gap_varies(declared.rig))
-    fitted = with_gap_terms(fitted, declared.source, *found.gap_map,
-                            found.rig.mesh.backlash / found.rig.mesh.lever());
-  rig_file_from_text(fitted, declared.source);  // what is written can be read
-  return fitted;
+    replace_gap_terms(document, *found.gap_map, found.rig.mesh.backlash / found.rig.mesh.lever());
+  document.read();  // what is written can be read
+  return document.text();
 }
 
 }  // namespace backlash

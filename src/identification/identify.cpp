@@ -62,7 +62,7 @@ void read_records(const std::vector<Record>& records, const Rig& declared, Ident
 std::vector<std::string> parameter_names(const Rig& rig) {
   std::vector<std::string> names;
   for (const RigParameter& p : servo_parameters()) {
-    if (p.name == "start_in_gap") continue;
+    if (p.kind == ParameterKind::start_in_gap) continue;
     if (p.get(rig) != 0) names.push_back(p.name);
   }
   return names;

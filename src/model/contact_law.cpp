@@ -35,11 +35,6 @@ ContactSpec read_contact_spec(const YamlReader& yaml) {
   return {type.name, read_parameters(yaml, type.parameters)};
 }
 
-std::shared_ptr<const ContactLaw> read_contact_law(const YamlReader& yaml) {
-  const ContactSpec spec = read_contact_spec(yaml);
-  return find(spec.law)->create(spec.values);
-}
-
 std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, const ParameterValues& values) {
   const ContactLawType* type = find(name);
   if (!type) throw InvalidParameter("contact.law", name, "is not a known contact law");
@@ -49,7 +44,9 @@ std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, cons
     if (const double value = values.at(spec.name); !spec.range.contains(value))
       throw InvalidParameter("contact." + spec.name, value, spec.range.text() + " " + spec.unit);
   }
-  return type->create(values);
+  std::unique_ptr<ContactLaw> law = type->create(values);
+  law->made_of = {name, values};
+  return law;
 }
 
 }  // namespace backlash

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/model/gear_geometry.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
@@ -87,18 +88,11 @@ double tip_reach(const GearCircles& c) {
   return std::sqrt(c.tip_radius * c.tip_radius - c.base_radius * c.base_radius);
 }
 
-template <typename... Parts>
-std::string sentence(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(4);
-  (text << ... << parts);
-  return text.str();
-}
-
 void find_faults(GearGeometry& g) {
   const double tangent = std::tan(g.operating_pressure_angle);
   if (g.contact_ratio < 1)
-    g.faults.push_back(sentence("contact ratio ", g.contact_ratio, " is below 1: contact is interrupted"));
+    g.faults.push_back(
+        fmt::format("contact ratio {:.4g} is below 1: contact is interrupted", g.contact_ratio));
   if (g.approach > g.pinion.base_radius * tangent)
     g.faults.push_back("interference: the tips of the gear reach below the base circle of the pinion");
   if (g.recess > g.gear.base_radius * tangent)
@@ -114,8 +108,9 @@ void remark_undercut(const GearPair& pair, const std::string& name, const SpurGe
   const double sine = std::sin(pair.pressure_angle);
   const double least = 2 * (mate.addendum - gear.profile_shift) / (sine * sine);
   if (gear.teeth < least)
-    remarks.push_back(sentence("undercut: a rack as deep as the mate cuts into the involute of the ", name,
-                               " (", gear.teeth, " teeth, limit ", least, ")"));
+    remarks.push_back(fmt::format(
+        "undercut: a rack as deep as the mate cuts into the involute of the {} ({} teeth, limit {:.4g})",
+        name, gear.teeth, least));
 }
 
 }  // namespace
@@ -157,7 +152,7 @@ GearGeometry gear_geometry(const GearPair& pair) {
   if (g.backlash < 0)
     throw InvalidParameter(
         "centre_distance_change", pair.centre_distance_change,
-        sentence("jams the teeth: they overlap by ", -g.backlash, " m along the line of action"));
+        fmt::format("jams the teeth: they overlap by {:.4g} m along the line of action", -g.backlash));
   g.pitch_circle_backlash = g.backlash / std::cos(g.operating_pressure_angle);
   const double tangent = std::tan(g.operating_pressure_angle);
   g.approach = tip_reach(g.gear) - g.gear.base_radius * tangent;

@@ -13,15 +13,30 @@ namespace {
 constexpr double kWithinReach =
     0.1;  // of half a gap, from which a flank that moves less than that cannot touch
 
-Coupling referred(Coupling coupling, double factor) {
-  coupling.stiffness *= factor;
-  coupling.damping *= factor;
-  coupling.inertia *= factor;
-  return coupling;
+/// A load with rigid couplings behind a mesh that gives way: node 0 is the motor, node 1 the load.
+constexpr TrainLayout kFollowingLoad(false, true, false, true);
+
+TrainLayout layout_of(const Rig& rig) {
+  return {!rig.input_coupling.rigid, !rig.mesh.rigid, !rig.output_coupling.rigid, !rig.link_locked};
 }
 
-double spring(const Coupling& c, double twist) {
-  return c.stiffness * twist;
+/// All but the inertia.
+EquationsOfMotion<double> equations_of(const Rig& rig) {
+  const double square = rig.motor_axis_ratio() * rig.motor_axis_ratio();
+  EquationsOfMotion<double> e{};
+  const Body* parts[] = {&rig.motor, &rig.pinion, &rig.gear, &rig.link};
+  for (int part = 0; part < TrainParts::kPartCount; ++part) {
+    const double to_load = part <= TrainParts::kPinion ? square : 1;
+    e.damping[part] = parts[part]->viscous_damping * to_load;
+    e.asymmetry[part] = parts[part]->viscous_asymmetry * to_load;
+  }
+  e.input_stiffness = rig.input_coupling.stiffness * square;
+  e.input_damping = rig.input_coupling.damping * square;
+  e.output_stiffness = rig.output_coupling.stiffness;
+  e.output_damping = rig.output_coupling.damping;
+  e.lever = rig.mesh.lever();
+  e.start = rig.mesh.start_in_gap;
+  return e;
 }
 
 FrictionLimits directional(const Body& body, double factor) {
@@ -29,20 +44,19 @@ FrictionLimits directional(const Body& body, double factor) {
           (body.coulomb_friction - body.coulomb_asymmetry) * factor};
 }
 
+void keep_from_driving(FrictionLimits& limits) {
+  limits.forward = std::max(0.0, limits.forward);
+  limits.backward = std::max(0.0, limits.backward);
+}
+
 }  // namespace
 
 GearTrain::GearTrain(const Rig& rig)
     : ratio_(rig.motor_axis_ratio()),
-      damping_{rig.motor.viscous_damping * ratio_ * ratio_, rig.pinion.viscous_damping * ratio_ * ratio_,
-               rig.gear.viscous_damping, rig.link.viscous_damping},
-      input_(referred(rig.input_coupling, ratio_ * ratio_)),
-      output_(rig.output_coupling),
-      sensed_damping_(rig.sensor_with_damper ? input_.damping : 0),
-      lever_(rig.mesh.lever()),
-      start_(rig.mesh.start_in_gap),
-      asymmetry_{rig.motor.viscous_asymmetry * ratio_ * ratio_,
-                 rig.pinion.viscous_asymmetry * ratio_ * ratio_, rig.gear.viscous_asymmetry,
-                 rig.link.viscous_asymmetry},
+      layout_(layout_of(rig)),
+      equations_(equations_of(rig)),
+      sensed_damping_(rig.sensor_with_damper ? equations_.input_damping : 0),
+      lever_(equations_.lever),
       coulomb_{directional(rig.motor, ratio_), directional(rig.link, 1)},
       torque_constant_(rig.torque_constant),
       contact_(rig.mesh.contact),
@@ -54,7 +68,7 @@ GearTrain::GearTrain(const Rig& rig)
   else if (!contact_)
     throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
   set_backlash(rig.mesh.backlash);
-  join(rig);
+  sum_inertia(rig);
   bool dry = false;
   EndFriction at_rest;
   for (const auto& term : terms_) {
@@ -69,54 +83,37 @@ GearTrain::GearTrain(const Rig& rig)
   }
   presliding_ = at_rest.motor.presliding > 0 || at_rest.load.presliding > 0;
   const auto rubs = [](const FrictionLimits& f) { return f.forward > 0 || f.backward > 0; };
-  const bool load_rubs = (dry || rubs(coulomb_.load)) && node_[kLink] != kFixed;
+  const bool load_rubs = (dry || rubs(coulomb_.load)) && moves(kLink);
   if (dry || rubs(coulomb_.motor) || (load_rubs && one_body())) dry_ends_.push_back({kMotor, {}});
   if (load_rubs && !one_body()) dry_ends_.push_back({kLink, {}});
-  simplify(rig);
-}
-
-/// Where no more than teeth and springs act; see SmoothTrain.
-void GearTrain::simplify(const Rig& rig) {
-  if (!contact_ || contact_->needs_impact_speed() || variation_ || !terms_.empty() || !dry_ends_.empty())
-    return;
-  SmoothTrain<double> t;
-  layout_ = {!input_.rigid, node_[kGear] != kFixed, !output_.rigid, !rig.link_locked};
-  std::copy(damping_.begin(), damping_.end(), t.damping);
-  std::copy(asymmetry_.begin(), asymmetry_.end(), t.asymmetry);
-  t.input_stiffness = input_.stiffness, t.input_damping = input_.damping;
-  t.output_stiffness = output_.stiffness, t.output_damping = output_.damping;
-  t.lever = lever_, t.start = start_;
-  for (int node = 0; node < dof_; ++node) t.inverse_inertia[node] = 1 / inertia_[node];
-  smooth_ = t;
+  smooth_ = contact_ && !contact_->needs_impact_speed() && !variation_ && terms_.empty() && dry_ends_.empty();
 }
 
 void GearTrain::brake_motor() {
-  smooth_.reset();
+  smooth_ = false;
   braked_ = true;
-  if (dry_ends_.empty() || dry_ends_.front().slot != kMotor)
+  if (dry_ends_.empty() || dry_ends_.front().part != kMotor)
     dry_ends_.insert(dry_ends_.begin(), {kMotor, {}});
 }
 
 double GearTrain::load_inertia() const {
-  return node_[kLink] == kFixed ? std::numeric_limits<double>::infinity() : inertia_[node_[kLink]];
+  return moves(kLink) ? inertia_[layout_.node[kLink]] : std::numeric_limits<double>::infinity();
 }
 
-/// Gives each part its degree of freedom and sums the inertia that moves with it.
-void GearTrain::join(const Rig& rig) {
-  const double square = ratio_ * ratio_;
-  node_[kMotor] = dof_++;
-  node_[kPinion] = input_.rigid ? node_[kMotor] : dof_++;
-  const bool gear_fixed = rig.link_locked && output_.rigid;
-  node_[kGear] = gear_fixed ? kFixed : rig.mesh.rigid ? node_[kPinion] : dof_++;
-  node_[kLink] = rig.link_locked ? kFixed : output_.rigid ? node_[kGear] : dof_++;
-  const double part[kSlots] = {
-      rig.motor.inertia * square + 0.5 * input_.inertia, rig.pinion.inertia * square + 0.5 * input_.inertia,
-      rig.gear.inertia + 0.5 * output_.inertia, rig.link.inertia + 0.5 * output_.inertia};
-  for (int slot = 0; slot < kSlots; ++slot)
-    if (node_[slot] != kFixed) inertia_[node_[slot]] += part[slot];
-  for (int node = 0; node < dof_; ++node)
+/// Sums what moves with each degree of freedom.
+void GearTrain::sum_inertia(const Rig& rig) {
+  const double square = ratio_ * ratio_, input = square * rig.input_coupling.inertia;
+  const double of_part[kPartCount] = {rig.motor.inertia * square + 0.5 * input,
+                                      rig.pinion.inertia * square + 0.5 * input,
+                                      rig.gear.inertia + 0.5 * rig.output_coupling.inertia,
+                                      rig.link.inertia + 0.5 * rig.output_coupling.inertia};
+  for (int part = 0; part < kPartCount; ++part)
+    if (moves(part)) inertia_[layout_.node[part]] += of_part[part];
+  for (int node = 0; node < layout_.dof; ++node) {
     if (!(inertia_[node] > 0))
       throw InvalidParameter("inertia", inertia_[node], "every moving part needs inertia");
+    equations_.inverse_inertia[node] = 1 / inertia_[node];
+  }
 }
 
 void GearTrain::set_backlash(double backlash) {
@@ -125,32 +122,26 @@ void GearTrain::set_backlash(double backlash) {
   half_gap_ = acting_gap_ = 0.5 * backlash;
 }
 
-GearTrain::Slots GearTrain::unpack(const double* state) const {
-  Slots s;
-  for (int slot = 0; slot < kSlots; ++slot) {
-    const int node = node_[slot];
-    s.q[slot] = node == kFixed ? 0 : state[node];
-    s.w[slot] = node == kFixed ? 0 : state[dof_ + node];
-  }
-  return s;
-}
-
-inline double GearTrain::contact_force(const Slots& s) const {
-  if (!contact_) return 0;
-  const double x = relative(s);
+/// Of the teeth [N] at a position in the gap [m] that changes at this rate [m/s].
+inline double GearTrain::force_at(double x, double rate) const {
   const double penetration = std::fabs(x) - acting_gap_;
   if (penetration <= 0) return 0;
   const double side = x > 0 ? 1 : -1;
-  const double rate = side * lever_ * (s.w[kPinion] - s.w[kGear]);
-  const double force = side * contact_->force(penetration, rate, impact_speed_);
-  return variation_ ? force * variation_->factor(lever_ * s.q[kPinion], side) : force;
+  return side * contact_->force(penetration, side * rate, impact_speed_);
 }
 
-FlankPoint GearTrain::flank_point(const Slots& s, int side, double mesh_torque) const {
+inline double GearTrain::contact_force(const PartMotion& s) const {
+  if (!contact_) return 0;
+  const double x = gap_position(s), force = force_at(x, equations_.gap_rate(s));
+  if (!variation_ || force == 0) return force;
+  return force * variation_->factor(lever_ * s.q[kPinion], x > 0 ? 1 : -1);
+}
+
+FlankPoint GearTrain::flank_point(const PartMotion& s, int side, double mesh_torque) const {
   return {s.q[kPinion], s.q[kGear], half_gap_ / lever_, mesh_torque, side};
 }
 
-FlankShift GearTrain::shift(const Slots& s, int side, double mesh_torque) const {
+FlankShift GearTrain::shift(const PartMotion& s, int side, double mesh_torque) const {
   FlankShift sum;
   if (!shaped_) return sum;
   const FlankPoint point = flank_point(s, side, mesh_torque);
@@ -159,7 +150,7 @@ FlankShift GearTrain::shift(const Slots& s, int side, double mesh_torque) const 
 }
 
 /// Of a flank that is closed by `penetration` [m], moving at `rate` [m/s].
-double GearTrain::flank_force(const Slots& s, int side, double penetration, double rate,
+double GearTrain::flank_force(const PartMotion& s, int side, double penetration, double rate,
                               double mesh_torque) const {
   double force = contact_->force(penetration, rate, impact_speed_);
   if (variation_) force *= variation_->factor(lever_ * s.q[kPinion], side);
@@ -171,19 +162,19 @@ double GearTrain::flank_force(const Slots& s, int side, double penetration, doub
 }
 
 /// Force >= 0 on the flank of this side [N], shifted as given.
-inline double GearTrain::shifted_force(const Slots& s, int side, const FlankShift& at,
+inline double GearTrain::shifted_force(const PartMotion& s, int side, const FlankShift& at,
                                        double mesh_torque) const {
-  const double penetration = side * relative(s) - acting_gap_ - lever_ * at.opening;
+  const double penetration = side * gap_position(s) - acting_gap_ - lever_ * at.opening;
   if (!(penetration > 0)) return 0;
-  const double rate = side * lever_ * (s.w[kPinion] - s.w[kGear]) -
-                      lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
+  const double rate =
+      side * equations_.gap_rate(s) - lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
   return flank_force(s, side, penetration, rate, mesh_torque);
 }
 
-/// The same wherever the flank is. Where its shape follows the torque that it carries both are
-/// found together, between no torque and one that the flank does not bear, by the Illinois method. Infinite
-/// where the flank advances faster with the torque than the teeth give way.
-double GearTrain::shaped_force(const Slots& s, int side, FlankShift& at) const {
+/// Force >= 0 on the flank of this side [N], with its shift in `at`. Where the shape follows the torque both
+/// are found together by the Illinois method, between no torque and one that is too large for the flank.
+/// Infinite where the flank advances faster with the torque than the teeth give way.
+double GearTrain::shaped_force(const PartMotion& s, int side, FlankShift& at) const {
   const auto force = [&](double mesh_torque) {
     at = shift(s, side, mesh_torque);
     return shifted_force(s, side, at, mesh_torque);
@@ -220,7 +211,7 @@ inline void GearTrain::press(int side, const FlankShift& at, double flank_torque
 
 /// Adds what both flanks do to pinion and gear and returns the mesh torque. A gap that a term closes
 /// altogether presses both flanks.
-double GearTrain::shaped_torques(const Slots& s, double* torque) const {
+double GearTrain::add_shaped_teeth(const PartMotion& s, double* torque) const {
   double mesh_torque = 0;
   for (const int side : {1, -1}) {
     FlankShift at;
@@ -241,56 +232,39 @@ EndFriction GearTrain::friction(const Motion& motion) const {
     sum.motor.presliding_damping += sum.load.presliding_damping;
     sum.load = {};
   }
-  for (FrictionLimits* limits : {&sum.motor, &sum.load}) {
-    limits->forward = std::max(0.0, limits->forward);
-    limits->backward = std::max(0.0, limits->backward);
-  }
+  keep_from_driving(sum.motor);
+  keep_from_driving(sum.load);
   if (braked_) sum.motor = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   return sum;
 }
 
+/// Adds what the teeth do to pinion and gear and returns the mesh torque.
+inline double GearTrain::add_teeth(const PartMotion& s, double* torque) const {
+  if (shaped_ && contact_) return add_shaped_teeth(s, torque);
+  const double mesh_torque = lever_ * contact_force(s);
+  equations_.add_mesh(mesh_torque, torque);
+  return mesh_torque;
+}
+
 /// All torques but dry friction, per degree of freedom [N m]; returns that through the teeth.
-inline double GearTrain::net_torques(double t, const Slots& s, AppliedTorque applied, double* net) const {
-  double torque[kSlots];
-  for (int slot = 0; slot < kSlots; ++slot)
-    torque[slot] = -damping_[slot] * s.w[slot] - asymmetry_[slot] * std::fabs(s.w[slot]);
-  torque[kMotor] += applied.motor * ratio_;
-  torque[kLink] += applied.load;
-  if (!input_.rigid) {
-    const double through =
-        spring(input_, s.q[kMotor] - s.q[kPinion]) + input_.damping * (s.w[kMotor] - s.w[kPinion]);
-    torque[kMotor] -= through;
-    torque[kPinion] += through;
-  }
-  if (!output_.rigid) {
-    const double through =
-        spring(output_, s.q[kGear] - s.q[kLink]) + output_.damping * (s.w[kGear] - s.w[kLink]);
-    torque[kGear] -= through;
-    torque[kLink] += through;
-  }
-  double mesh_torque;
-  if (shaped_ && contact_) {
-    mesh_torque = shaped_torques(s, torque);
-  } else {
-    mesh_torque = lever_ * contact_force(s);
-    torque[kPinion] -= mesh_torque;
-    torque[kGear] += mesh_torque;
-  }
-  if (!terms_.empty()) {
+inline double GearTrain::net_torques(double t, const PartMotion& s, AppliedTorque applied,
+                                     double* net) const {
+  double mesh_torque = 0;
+  const auto teeth_and_terms = [&](double* torque) {
+    mesh_torque = add_teeth(s, torque);
+    if (terms_.empty()) return;
     const Motion motion = motion_of(t, s, mesh_torque, applied);
     EndTorques ends;
     for (const auto& term : terms_) term->add(motion, ends);
     torque[kMotor] += ends.motor;
     torque[kLink] += ends.load;
-  }
-  std::fill(net, net + kSlots, 0.0);
-  for (int slot = 0; slot < kSlots; ++slot)
-    if (node_[slot] != kFixed) net[node_[slot]] += torque[slot];
+  };
+  equations_.net_torques(layout_, s, applied.motor * ratio_, applied.load, teeth_and_terms, net);
   return mesh_torque;
 }
 
 GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorque applied) const {
-  const Slots s = unpack(state);
+  const PartMotion s = part_motion(state);
   Balance b;
   b.mesh_torque = net_torques(t, s, applied, b.net);
   if (!dry_ends_.empty()) b.friction = friction(motion_of(t, s, b.mesh_torque, applied));
@@ -299,155 +273,160 @@ GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorq
 
 void GearTrain::derivative(double t, const double* state, AppliedTorque applied, double* rate) const {
   if (smooth_) {
-    const auto force = [this](double x, double v) {
-      const double penetration = std::fabs(x) - half_gap_, side = x > 0 ? 1 : -1;
-      return penetration > 0 ? side * contact_->force(penetration, side * v, 0) : 0;
-    };
-    return smooth_->derivative(layout_, state, applied.motor * ratio_, applied.load, half_gap_, force, rate);
+    const auto force = [this](double x, double v) { return force_at(x, v); };
+    return with_constant_number(layout_, [&](auto number) {
+      static constexpr TrainLayout layout = TrainLayout::numbered(number);
+      equations_.derivative(layout, state, applied.motor * ratio_, applied.load, half_gap_, force, rate);
+    });
   }
-  const Slots s = unpack(state);
-  double net[kSlots];
+  const PartMotion s = part_motion(state);
+  double net[kPartCount];
   const double mesh_torque = net_torques(t, s, applied, net);
-  for (int node = 0; node < dof_; ++node) {
-    rate[node] = state[dof_ + node];
-    rate[dof_ + node] = net[node] / inertia_[node];
-  }
+  equations_.accelerate(layout_, state, net, rate);
   if (dry_ends_.empty()) return;
   const EndFriction rubbing = friction(motion_of(t, s, mesh_torque, applied));
   for (const DryEnd& end : dry_ends_) {
-    const int node = node_[end.slot];
-    double& acceleration = rate[dof_ + node];
+    const int node = layout_.node[end.part], speed = layout_.dof + node;
     if (end.mode.stuck())
-      acceleration = rate[node] = 0;
+      rate[speed] = rate[node] = 0;
     else
-      acceleration += end.mode.torque(limits(end, rubbing), state[node], state[dof_ + node]) / inertia_[node];
+      rate[speed] +=
+          end.mode.torque(limits(end, rubbing), state[node], state[speed]) * equations_.inverse_inertia[node];
   }
 }
 
 GearTrain::EndForces GearTrain::end_forces(double t, const double* state, AppliedTorque applied) const {
   const Balance b = balance(t, state, applied);
-  const double load = node_[kLink] == kFixed ? 0 : b.net[node_[kLink]];
-  return {b.net[node_[kMotor]], load, b.mesh_torque, b.friction};
+  const double load = moves(kLink) ? b.net[layout_.node[kLink]] : 0;
+  return {b.net[layout_.node[kMotor]], load, b.mesh_torque, b.friction};
 }
 
-inline GearTrain::Slots GearTrain::ends(const Motion& m) {
+inline GearTrain::PartMotion GearTrain::ends(const Motion& m) {
   return {{m.motor_position, m.motor_position, m.load_position, m.load_position},
           {m.motor_velocity, m.motor_velocity, m.load_velocity, m.load_velocity}};
 }
 
-/// With the torques of the mesh on pinion and gear.
-inline GearTrain::LoadForces GearTrain::with_load_terms(const Motion& motion, double mesh_torque,
-                                                        const double* torque) const {
-  const double v = motion.load_velocity;
-  const double net = torque[kGear] - (damping_[kGear] + damping_[kLink]) * v -
-                     (asymmetry_[kGear] + asymmetry_[kLink]) * std::fabs(v);
-  if (load_terms_.empty()) return {net, mesh_torque, torque[kPinion], coulomb_.load};
-  Motion with_mesh = motion;
-  with_mesh.mesh_torque = mesh_torque;
-  EndTorques ends;
-  EndFriction rubs{{}, coulomb_.load};
-  for (const Term* term : load_terms_) {
-    term->add(with_mesh, ends);
-    term->add_friction(with_mesh, rubs);
-  }
-  rubs.load.forward = std::max(0.0, rubs.load.forward);
-  rubs.load.backward = std::max(0.0, rubs.load.backward);
-  return {net + ends.load, mesh_torque, torque[kPinion], rubs.load};
+/// `add_teeth` adds what the teeth do to pinion and gear and returns the mesh torque.
+template <typename AddTeeth>
+inline GearTrain::LoadForces GearTrain::load_forces(const Motion& motion, const PartMotion& s,
+                                                    const AddTeeth& add_teeth) const {
+  LoadForces forces{0, 0, 0, coulomb_.load};
+  const auto teeth_and_terms = [&](double* torque) {
+    double of_teeth[kPartCount] = {};
+    forces.mesh_torque = add_teeth(of_teeth);
+    forces.mesh_on_motor = of_teeth[kPinion];
+    torque[kGear] += of_teeth[kGear];
+    if (load_terms_.empty()) return;
+    Motion with_mesh = motion;
+    with_mesh.mesh_torque = forces.mesh_torque;
+    EndTorques ends;
+    EndFriction rubs{{}, coulomb_.load};
+    for (const Term* term : load_terms_) {
+      term->add(with_mesh, ends);
+      term->add_friction(with_mesh, rubs);
+    }
+    keep_from_driving(rubs.load);
+    forces.friction = rubs.load;
+    torque[kLink] += ends.load;
+  };
+  double net[kPartCount];
+  equations_.net_torques(kFollowingLoad, s, 0, 0, teeth_and_terms, net);
+  forces.net = net[kFollowingLoad.node[kLink]];
+  return forces;
 }
 
 GearTrain::LoadForces GearTrain::load_forces(const Motion& motion) const {
-  const Slots s = ends(motion);
-  double torque[kSlots] = {};
-  if (shaped_) {
-    const double mesh_torque = shaped_torques(s, torque);
-    return with_load_terms(motion, mesh_torque, torque);
-  }
-  torque[kGear] = lever_ * contact_force(s);
-  torque[kPinion] = -torque[kGear];
-  return with_load_terms(motion, torque[kGear], torque);
+  const PartMotion s = ends(motion);
+  return load_forces(motion, s, [&](double* torque) { return add_teeth(s, torque); });
 }
 
 GearTrain::Flanks GearTrain::flanks(double motor_position, double load_position) const {
   Motion motion{};
   motion.motor_position = motor_position;
   motion.load_position = load_position;
-  const Slots s = ends(motion);
+  const PartMotion s = ends(motion);
   return {shift_within_reach(s, kForward), shift_within_reach(s, kReverse)};
 }
 
-/// Nobody asks where a flank is that cannot touch here.
-FlankShift GearTrain::shift_within_reach(const Slots& s, int side) const {
+/// Infinite for a flank that cannot touch here, which saves computing its shape.
+FlankShift GearTrain::shift_within_reach(const PartMotion& s, int side) const {
   const double half = half_gap_ / lever_;
   double nearest = half;
   for (const Term* term : flank_terms_) nearest += term->least_opening(half);
-  const double away = nearest - side * relative(s) / lever_;
+  const double away = nearest - side * gap_position(s) / lever_;
   if (away > kWithinReach * half) return {std::numeric_limits<double>::infinity(), 0, 0};
   return shift(s, side, 0);
 }
 
 GearTrain::LoadForces GearTrain::load_forces(const Motion& motion, const Flanks& flanks) const {
-  const Slots s = ends(motion);
-  double torque[kSlots] = {}, mesh_torque = 0;
-  for (const int side : {1, -1}) {
-    const FlankShift& at = flanks[side > 0 ? 0 : 1];
-    const double t = lever_ * shifted_force(s, side, at, 0);
-    if (t == 0) continue;
-    press(side, at, t, torque);
-    mesh_torque += side * t;
-  }
-  return with_load_terms(motion, mesh_torque, torque);
+  const PartMotion s = ends(motion);
+  const auto teeth = [&](double* torque) {
+    double mesh_torque = 0;
+    for (const int side : {1, -1}) {
+      const FlankShift& at = flanks[side > 0 ? 0 : 1];
+      const double t = lever_ * shifted_force(s, side, at, 0);
+      if (t == 0) continue;
+      press(side, at, t, torque);
+      mesh_torque += side * t;
+    }
+    return mesh_torque;
+  };
+  return load_forces(motion, s, teeth);
 }
 
 GearTrain::MotorForces GearTrain::motor_forces(const Motion& motion) const {
-  const double w = motion.motor_velocity;
-  double damping = damping_[kMotor] + damping_[kPinion], asymmetry = asymmetry_[kMotor] + asymmetry_[kPinion];
-  EndTorques ends;
-  for (const auto& term : terms_) term->add(motion, ends);
-  double net = ends.motor;
-  if (one_body()) {
-    damping += damping_[kGear] + damping_[kLink];
-    asymmetry += asymmetry_[kGear] + asymmetry_[kLink];
-    net += ends.load;
-  }
-  return {net - damping * w - asymmetry * std::fabs(w), friction(motion).motor};
+  const auto terms = [&](double* torque) {
+    EndTorques ends;
+    for (const auto& term : terms_) term->add(motion, ends);
+    torque[kMotor] += ends.motor;
+    torque[kLink] += ends.load;
+  };
+  double net[kPartCount];
+  equations_.net_torques(layout_, ends(motion), 0, 0, terms, net);
+  return {net[layout_.node[kMotor]], friction(motion).motor};
 }
 
 Observation GearTrain::observe(const double* state, AppliedTorque applied, double t) const {
-  const Slots s = unpack(state);
+  const PartMotion s = part_motion(state);
   const double none = std::nan("");
   Observation o;
   o.motor_torque = applied.motor;
   o.motor_position = s.q[kMotor] * ratio_;
   o.motor_velocity = s.w[kMotor] * ratio_;
   const double twist = s.q[kMotor] - s.q[kPinion], twist_rate = s.w[kMotor] - s.w[kPinion];
-  o.sensor_torque = input_.rigid ? none : (spring(input_, twist) + sensed_damping_ * twist_rate) / ratio_;
-  o.sensor_twist = input_.rigid ? none : twist * ratio_;
-  o.sensor_twist_rate = input_.rigid ? none : twist_rate * ratio_;
+  o.sensor_torque = layout_.input_gives
+                        ? (equations_.input_stiffness * twist + sensed_damping_ * twist_rate) / ratio_
+                        : none;
+  o.sensor_twist = layout_.input_gives ? twist * ratio_ : none;
+  o.sensor_twist_rate = layout_.input_gives ? twist_rate * ratio_ : none;
   o.load_position = load_gain_ * s.q[kLink];
   o.load_velocity = load_gain_ * s.w[kLink];
-  o.load_torque = output_.rigid ? none : spring(output_, s.q[kGear] - s.q[kLink]);
+  o.load_torque = layout_.output_gives ? equations_.output_stiffness * (s.q[kGear] - s.q[kLink]) : none;
   o.motor_current = applied.motor / torque_constant_;
   double rate[kMaxStates];
   derivative(t, state, applied, rate);
-  const bool gear_moves = node_[kGear] != kFixed;
-  o.acceleration = gear_moves ? rate[dof_ + node_[kGear]] : rate[dof_ + node_[kPinion]] * ratio_;
+  const double* const acceleration = rate + layout_.dof;
+  o.acceleration =
+      moves(kGear) ? acceleration[layout_.node[kGear]] : acceleration[layout_.node[kPinion]] * ratio_;
   return o;
 }
 
 double GearTrain::energy(const double* state) const {
-  const Slots s = unpack(state);
-  Slots resting = s;
-  std::fill(resting.w, resting.w + kSlots, 0.0);
+  const PartMotion s = part_motion(state);
+  PartMotion resting = s;
+  std::fill(resting.w, resting.w + kPartCount, 0.0);
   double energy = 0;
-  for (int node = 0; node < dof_; ++node)
-    energy += 0.5 * inertia_[node] * state[dof_ + node] * state[dof_ + node];
-  if (!input_.rigid) energy += 0.5 * input_.stiffness * std::pow(s.q[kMotor] - s.q[kPinion], 2);
-  if (!output_.rigid) energy += 0.5 * output_.stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
+  for (int node = 0; node < layout_.dof; ++node)
+    energy += 0.5 * inertia_[node] * state[layout_.dof + node] * state[layout_.dof + node];
+  if (layout_.input_gives)
+    energy += 0.5 * equations_.input_stiffness * std::pow(s.q[kMotor] - s.q[kPinion], 2);
+  if (layout_.output_gives)
+    energy += 0.5 * equations_.output_stiffness * std::pow(s.q[kGear] - s.q[kLink], 2);
   if (!contact_) return energy;
   for (const int side : {1, -1}) {
     FlankShift at;
     if (shaped_) shaped_force(resting, side, at);
-    const double penetration = side * relative(s) - half_gap_ - lever_ * at.opening;
+    const double penetration = side * gap_position(s) - half_gap_ - lever_ * at.opening;
     if (penetration > 0)
       energy += contact_->elastic_energy(penetration) *
                 (variation_ ? variation_->factor(lever_ * s.q[kPinion], side) : 1);
@@ -456,20 +435,21 @@ double GearTrain::energy(const double* state) const {
 }
 
 double GearTrain::damping_power(const double* state) const {
-  const Slots s = unpack(state);
+  const PartMotion s = part_motion(state);
+  const EquationsOfMotion<double>& e = equations_;
   double power = 0;
-  for (int slot = 0; slot < kSlots; ++slot)
-    power += (damping_[slot] * s.w[slot] + asymmetry_[slot] * std::fabs(s.w[slot])) * s.w[slot];
-  if (!input_.rigid) power += input_.damping * std::pow(s.w[kMotor] - s.w[kPinion], 2);
-  if (!output_.rigid) power += output_.damping * std::pow(s.w[kGear] - s.w[kLink], 2);
+  for (int part = 0; part < kPartCount; ++part)
+    power += (e.damping[part] * s.w[part] + e.asymmetry[part] * std::fabs(s.w[part])) * s.w[part];
+  if (layout_.input_gives) power += e.input_damping * std::pow(s.w[kMotor] - s.w[kPinion], 2);
+  if (layout_.output_gives) power += e.output_damping * std::pow(s.w[kGear] - s.w[kLink], 2);
   return power;
 }
 
 double GearTrain::elastic_deflection(double motor_torque) const {
   const double torque = std::fabs(motor_torque) * ratio_;
   double angle = contact_ ? contact_->static_penetration(torque / lever_) / lever_ : 0;
-  if (!input_.rigid) angle += torque / input_.stiffness;
-  if (!output_.rigid) angle += torque / output_.stiffness;
+  if (layout_.input_gives) angle += torque / equations_.input_stiffness;
+  if (layout_.output_gives) angle += torque / equations_.output_stiffness;
   return std::copysign(angle * ratio_, motor_torque);
 }
 

@@ -9,22 +9,22 @@
 namespace backlash {
 
 const FrictionLimits& GearTrain::limits(const DryEnd& end, const EndFriction& friction) const {
-  return end.slot == kMotor ? friction.motor : friction.load;
+  return end.part == kMotor ? friction.motor : friction.load;
 }
 
 void GearTrain::friction_events(double t, const double* state, AppliedTorque applied, double* values) const {
   const Balance b = balance(t, state, applied);
   for (const DryEnd& end : dry_ends_) {
-    const int node = node_[end.slot];
-    *values++ = end.mode.event(b.net[node], state[dof_ + node], limits(end, b.friction));
+    const int node = layout_.node[end.part];
+    *values++ = end.mode.event(b.net[node], state[layout_.dof + node], limits(end, b.friction));
   }
 }
 
 void GearTrain::begin_friction(double t, double* state, AppliedTorque applied) {
   for (DryEnd& end : dry_ends_) {
     const Balance b = balance(t, state, applied);  // anew: the end before may have been stopped
-    const int node = node_[end.slot];
-    end.mode.begin(b.net[node], state[dof_ + node], limits(end, b.friction), state[node]);
+    const int node = layout_.node[end.part];
+    end.mode.begin(b.net[node], state[layout_.dof + node], limits(end, b.friction), state[node]);
     end.position = state[node];
   }
 }
@@ -33,8 +33,8 @@ bool GearTrain::update_friction(double t, double* state, AppliedTorque applied) 
   bool changed = false;
   for (DryEnd& end : dry_ends_) {
     const Balance b = balance(t, state, applied);
-    const int node = node_[end.slot];
-    changed |= end.mode.update(b.net[node], state[dof_ + node], limits(end, b.friction), state[node]);
+    const int node = layout_.node[end.part];
+    changed |= end.mode.update(b.net[node], state[layout_.dof + node], limits(end, b.friction), state[node]);
     end.position = state[node];
   }
   return changed;
@@ -48,7 +48,8 @@ double GearTrain::presliding_time(double t, const double* state, AppliedTorque a
     const FrictionLimits& friction = limits(end, b.friction);
     const double highest = friction.forward + friction.backward;  // stiffness times distance
     if (!end.mode.stuck() && friction.presliding > 0 && highest > 0)
-      shortest = std::min(shortest, std::sqrt(inertia_[node_[end.slot]] * friction.presliding / highest));
+      shortest =
+          std::min(shortest, std::sqrt(inertia_[layout_.node[end.part]] * friction.presliding / highest));
   }
   return shortest;
 }
@@ -56,8 +57,8 @@ double GearTrain::presliding_time(double t, const double* state, AppliedTorque a
 void GearTrain::hold(double* state) const {
   for (const DryEnd& end : dry_ends_) {
     if (!end.mode.stuck()) continue;
-    state[node_[end.slot]] = end.position;
-    state[dof_ + node_[end.slot]] = 0;
+    state[layout_.node[end.part]] = end.position;
+    state[layout_.dof + layout_.node[end.part]] = 0;
   }
 }
 

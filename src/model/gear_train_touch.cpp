@@ -10,13 +10,13 @@
 
 namespace backlash {
 
-double GearTrain::penetration(const Slots& s, Flank flank) const {
-  return flank * relative(s) - half_gap_ - lever_ * shift(s, flank, 0).opening;
+double GearTrain::penetration(const PartMotion& s, Flank flank) const {
+  return flank * gap_position(s) - half_gap_ - lever_ * shift(s, flank, 0).opening;
 }
 
-double GearTrain::approach(const Slots& s, Flank flank) const {
+double GearTrain::approach(const PartMotion& s, Flank flank) const {
   const FlankShift at = shift(s, flank, 0);
-  return flank * lever_ * (s.w[kPinion] - s.w[kGear]) -
+  return flank * equations_.gap_rate(s) -
          lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
 }
 
@@ -29,7 +29,7 @@ void GearTrain::enter(Flank flank) {
 // motion: a flank that closes and opens within one step of the integrator is found there. A speed of exactly
 // zero, which may last, is no turning point.
 void GearTrain::contact_events(const double* state, double* values) const {
-  const Slots s = unpack(state);
+  const PartMotion s = part_motion(state);
   values[0] = penetration(s, kForward);
   values[1] = penetration(s, kReverse);
   const double no_turn = -std::numeric_limits<double>::min();
@@ -42,7 +42,7 @@ void GearTrain::contact_events(const double* state, double* values) const {
 }
 
 void GearTrain::begin_contact(double* state) {
-  const Slots s = unpack(state);
+  const PartMotion s = part_motion(state);
   const double farthest =
       std::max({lever_ * std::fabs(s.q[kPinion]), lever_ * std::fabs(s.q[kGear]), half_gap_});
   const double rounding = 4 * std::numeric_limits<double>::epsilon() * farthest;
@@ -56,7 +56,7 @@ void GearTrain::begin_contact(double* state) {
 }
 
 bool GearTrain::update_contact(double* state) {
-  const Slots s = unpack(state);
+  const PartMotion s = part_motion(state);
   bool changed = false;
   if (flank_ != kApart && penetration(s, flank_) <= 0) {
     enter(kApart);
@@ -75,24 +75,24 @@ bool GearTrain::update_contact(double* state) {
 }
 
 void GearTrain::touch(Flank flank, double* state) {
-  const Slots s = unpack(state);
+  const PartMotion s = part_motion(state);
   impact_speed_ = std::max(0.0, approach(s, flank));
   enter(flank);
   const std::optional<double> restitution = contact_->jump_restitution(impact_speed_);
   // without play there is no room to bounce
   if (!restitution || half_gap_ == 0 || penetration(s, flank == kForward ? kReverse : kForward) >= 0) return;
-  const int pinion = node_[kPinion], gear = node_[kGear];
+  const int pinion = layout_.node[kPinion], gear = layout_.node[kGear];
   const FlankShift at = shift(s, flank, 0);
   const double to_pinion = lever_ * (flank - at.motor_slope), to_gear = lever_ * (flank + at.load_slope);
   const double wall = std::numeric_limits<double>::infinity();
-  const bool held = braked_ && pinion == node_[kMotor];
-  if (held && gear == kFixed) return;
+  const bool held = braked_ && pinion == layout_.node[kMotor];
+  if (held && gear == TrainLayout::kFixed) return;
   const ImpactSpeeds after =
       speeds_after_impact(held ? wall : inertia_[pinion] / (to_pinion * to_pinion),
-                          gear == kFixed ? wall : inertia_[gear] / (to_gear * to_gear),
+                          gear == TrainLayout::kFixed ? wall : inertia_[gear] / (to_gear * to_gear),
                           {to_pinion * s.w[kPinion], to_gear * s.w[kGear]}, *restitution);
-  if (!held) state[dof_ + pinion] = after.first / to_pinion;
-  if (gear != kFixed) state[dof_ + gear] = after.second / to_gear;
+  if (!held) state[layout_.dof + pinion] = after.first / to_pinion;
+  if (gear != TrainLayout::kFixed) state[layout_.dof + gear] = after.second / to_gear;
   if (contact_->jump_restitution(*restitution * impact_speed_)) enter(kApart);  // else too slow to leave
 }
 

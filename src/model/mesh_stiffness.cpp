@@ -57,7 +57,7 @@ PairStiffness hertz_bending(const GearPair& pair, const GearGeometry& g, const M
            1 / bending_stiffness(pair.gear, pair.module, r2) + 1 / hertz;
   };
   compliance(0),
-      compliance(1);  // the polynomial is linear in the radius: the ends tell whether it holds in between
+      compliance(1);  // the polynomial is linear in the radius: it holds in between if it holds at the ends
   return [=](double life) { return width / compliance(life); };
 }
 

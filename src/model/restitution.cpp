@@ -58,6 +58,10 @@ double restitution_of_damping(double damping) {
       high / (1 + damping / 3));
 }
 
+double hunt_crossley_restitution(double alpha_speed) {
+  return restitution_of_damping(1.5 * alpha_speed);
+}
+
 double damping_of_restitution(double restitution) {
   const double e = restitution;
   if (!(e > 0) || e > 1) throw InvalidParameter("restitution", e, "must be > 0 and <= 1");

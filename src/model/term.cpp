@@ -41,6 +41,12 @@ const TermType& term_type(const std::string& id) {
   throw InvalidParameter("id", id, "is not a known term");
 }
 
+const TermType& term_type_that(bool (*can)(const TermType&)) {
+  for (const TermType& type : term_types())
+    if (can(type)) return type;
+  throw InvalidParameter("term", "of this kind", "is not in the registry");
+}
+
 namespace {
 
 std::shared_ptr<const Term> created(const TermType& type, const ParameterValues& values) {

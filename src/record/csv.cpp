@@ -22,13 +22,13 @@ constexpr char kSeparator = ',';
 
 std::vector<std::string> required_names() {
   std::vector<std::string> names;
-  for (const Channel channel : kTellingChannels) names.push_back(channel_name(channel));
+  for (const Channel channel : kBacklashChannels) names.push_back(channel_name(channel));
   return names;
 }
 
 bool has_required_channel(const std::vector<Channel>& channels) {
   return std::any_of(channels.begin(), channels.end(), [](Channel channel) {
-    return std::find(kTellingChannels.begin(), kTellingChannels.end(), channel) != kTellingChannels.end();
+    return std::find(kBacklashChannels.begin(), kBacklashChannels.end(), channel) != kBacklashChannels.end();
   });
 }
 

@@ -25,9 +25,9 @@ const std::array<Channel, kChannelCount> kChannels = {
     Channel::load_position,      Channel::load_velocity,  Channel::sensor_torque,
     Channel::reference_position, Channel::motor_current,  Channel::acceleration};
 
-const std::array<Channel, 6> kTellingChannels = {Channel::motor_torque,   Channel::sensor_torque,
-                                                 Channel::motor_position, Channel::load_position,
-                                                 Channel::motor_current,  Channel::acceleration};
+const std::array<Channel, 6> kBacklashChannels = {Channel::motor_torque,   Channel::sensor_torque,
+                                                  Channel::motor_position, Channel::load_position,
+                                                  Channel::motor_current,  Channel::acceleration};
 
 const std::string& channel_name(Channel channel) {
   return channel_names()[static_cast<std::size_t>(channel)];
@@ -60,8 +60,8 @@ Channel channel_from_name(const std::string& name) {
   throw InvalidParameter("channel", printable(name), "must be one of " + joined(channel_names()));
 }
 
-bool Record::tells() const {
-  return std::any_of(kTellingChannels.begin(), kTellingChannels.end(),
+bool Record::can_show_backlash() const {
+  return std::any_of(kBacklashChannels.begin(), kBacklashChannels.end(),
                      [this](Channel channel) { return has(channel); });
 }
 

@@ -17,7 +17,7 @@ Record evenly_sampled(const Record& record) {
   const double even = (record.time.back() - record.time.front()) / double(n - 1);
   double worst = 0;
   for (std::size_t k = 0; k < n; ++k)
-    worst = std::max(worst, std::fabs(record.time[k] - record.time.front() - k * even));
+    worst = std::max(worst, std::fabs(record.time[k] - record.time.front() - double(k) * even));
   if (worst <= 0.01 * even) return record;
   for (std::size_t k = 1; k < n; ++k)
     if (record.time[k] - record.time[k - 1] > kGapFactor * interval)
@@ -29,7 +29,7 @@ Record evenly_sampled(const Record& record) {
   out.warnings = record.warnings;
   std::size_t j = 0;
   for (double t = record.time.front(); t <= record.time.back();
-       t = record.time.front() + out.time.size() * interval) {
+       t = record.time.front() + double(out.time.size()) * interval) {
     while (j + 2 < n && record.time[j + 1] < t) ++j;
     const double u = (t - record.time[j]) / (record.time[j + 1] - record.time[j]);
     out.time.push_back(t);

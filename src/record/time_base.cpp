@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/record/time_base.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
-
-std::string short_text(double value, int digits = 6) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
-  return buffer;
-}
 
 std::string seconds(double time) {
   return time_text(time) + " s";
@@ -82,20 +77,21 @@ std::vector<std::string> describe_time_base(const std::vector<double>& time) {
     if (std::abs(deviation) > largest_deviation) largest_deviation = std::abs(deviation), most_uneven = i;
   }
   std::vector<std::string> warnings;
-  const std::string against = "median interval " + short_text(usual) + " s";
+  const std::string against = fmt::format("median interval {:.6g} s", usual);
   if (gaps > 0) {
-    warnings.push_back(counted(gaps, "time gap") + ": the longest " + short_text(longest) +
-                       " s after time = " + seconds(time[longest_gap]) + " (" + against + ")");
+    warnings.push_back(fmt::format("{}: the longest {:.6g} s after time = {} ({})", counted(gaps, "time gap"),
+                                   longest, seconds(time[longest_gap]), against));
   }
   const double mean = sum / static_cast<double>(regular);  // at least half of the intervals are no gap
   const double deviation =
       std::sqrt(std::max(0.0, sum_of_squares / static_cast<double>(regular) - mean * mean));
   if (deviation > kJitterFraction * usual) {
-    warnings.push_back("time jitter: standard deviation of the interval " +
-                       short_text(100 * deviation / usual, 3) + " % of the " + against + ", " +
-                       counted(uneven, "interval") + " off by more than " +
-                       short_text(100 * kJitterFraction) + " %, the largest by " +
-                       short_text(largest_deviation) + " s after time = " + seconds(time[most_uneven]));
+    warnings.push_back(
+        fmt::format("time jitter: standard deviation of the interval {:.3g} % of the {}, {} off by more than "
+                    "{:.6g} %, the "
+                    "largest by {:.6g} s after time = {}",
+                    100 * deviation / usual, against, counted(uneven, "interval"), 100 * kJitterFraction,
+                    largest_deviation, seconds(time[most_uneven])));
   }
   return warnings;
 }

@@ -1,24 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/report/diagnosis_report.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
-#include <iomanip>
 #include <ostream>
-#include <sstream>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
+#include "diagnosis_data.h"
 
-namespace backlash::tools {
+namespace backlash {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr double kDegree = 3.14159265358979323846 / 180;
-
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
 
 /// Null where neither end is known; one null end is an open one.
 Json interval(double lower, double upper) {
@@ -127,16 +122,10 @@ Json curve_json(const MonitoringCurve& curve, const std::string& source) {
   return json;
 }
 
-std::string text_of(double value) {
-  std::ostringstream text;
-  text << std::setprecision(4) << value;
-  return std::isfinite(value) ? text.str() : "?";
-}
-
 std::string with_interval(double value, double lower, double upper, double unit) {
-  std::string text = text_of(value / unit);
+  std::string text = four_digits(value / unit);
   if (std::isfinite(lower) || std::isfinite(upper))
-    text += " [" + text_of(lower / unit) + ", " + text_of(upper / unit) + "]";
+    text += " [" + four_digits(lower / unit) + ", " + four_digits(upper / unit) + "]";
   return text;
 }
 
@@ -147,18 +136,18 @@ void print_estimate(const Estimate& e, std::ostream& out) {
   if (std::isfinite(e.backlash_angle) || std::isfinite(e.angle_lower))
     out << "  backlash angle  " << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, 1)
         << " rad = " << with_interval(e.backlash_angle, e.angle_lower, e.angle_upper, kDegree) << " deg\n";
-  if (std::isfinite(e.skewness)) out << "  skewness        " << text_of(e.skewness) << '\n';
+  if (std::isfinite(e.skewness)) out << "  skewness        " << four_digits(e.skewness) << '\n';
   if (e.components)
-    out << "  gap " << text_of(e.components->gap) << " rad = " << text_of(e.components->gap / kDegree)
-        << " deg, compliance " << text_of(e.components->compliance) << " rad/(N m), Coulomb friction "
-        << text_of(e.components->coulomb) << " N m, at torque " << text_of(e.components->at_torque)
+    out << "  gap " << four_digits(e.components->gap) << " rad = " << four_digits(e.components->gap / kDegree)
+        << " deg, compliance " << four_digits(e.components->compliance) << " rad/(N m), Coulomb friction "
+        << four_digits(e.components->coulomb) << " N m, at torque " << four_digits(e.components->at_torque)
         << " N m\n";
   if (!e.message.empty()) out << "  " << e.message << '\n';
 }
 
 }  // namespace
 
-Json to_json(const DiagnosisReport& report) {
+Json diagnosis_data(const DiagnosisReport& report) {
   Json json;
   json["schema_version"] = 1;
   json["record"] = report.record->name;
@@ -176,16 +165,24 @@ Json to_json(const DiagnosisReport& report) {
   return json;
 }
 
+std::string diagnosis_json(const DiagnosisReport& report) {
+  return dumped(diagnosis_data(report), 2);
+}
+
+std::string four_digits(double value) {
+  return std::isfinite(value) ? fmt::format("{:.4g}", value) : "?";
+}
+
 void print_summary(const DiagnosisReport& report, std::ostream& out) {
   const Record& record = *report.record;
   const double interval = record.sampling_interval();
   out << record.name << ": " << record.size() << " samples, "
-      << text_of(record.time.back() - record.time.front()) << " s";
-  if (interval > 0) out << ", " << text_of(1 / interval) << " Hz";
+      << four_digits(record.time.back() - record.time.front()) << " s";
+  if (interval > 0) out << ", " << four_digits(1 / interval) << " Hz";
   out << '\n';
   for (const std::string& warning : report.warnings) out << "warning: " << warning << '\n';
   for (const Estimate& e : report.diagnosis.estimates) print_estimate(e, out);
   out << "verdict: " << report.diagnosis.verdict.message << '\n';
 }
 
-}  // namespace backlash::tools
+}  // namespace backlash

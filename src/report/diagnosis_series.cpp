@@ -5,18 +5,13 @@
 #include <cmath>
 
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "diagnosis_data.h"
 
-namespace backlash::tools {
+namespace backlash {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr int kPeriods = 3;
 constexpr std::size_t kMostSamples = 20'000;  // of a plot
-
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
 
 Json column(const std::vector<double>& values, std::size_t stride) {
   Json json = Json::array();
@@ -71,14 +66,14 @@ std::string diagnosis_series(const DiagnosisReport& report, const RigFile* rig) 
   const bool linear = rig && rig->rig.linear;
   const bool locked = rig ? rig->rig.link_locked : report.curve && report.curve->conditions.output_locked;
   const Json json = {{"schema_version", 1},
-                     {"report", to_json(report)},
+                     {"report", diagnosis_data(report)},
                      {"linear", linear},
                      {"locked", locked},
                      {"rigid", rig && rig->rig.mesh.rigid},
                      {"record", record_json(*report.record, period_of(report), linear)},
                      {"curve", report.curve ? curve_json(*report.curve) : Json(nullptr)},
                      {"limits", limits_json(report)}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return dumped(json, -1);
 }
 
-}  // namespace backlash::tools
+}  // namespace backlash

@@ -1,28 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/report/identification_report.h"
 
-#include <cmath>
-#include <cstdio>
-#include <iomanip>
+#include <fmt/format.h>
+
+#include <ostream>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
+#include "json.h"
 
-namespace backlash::tools {
+namespace backlash {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostPoints = 3000;  // of a trace, which a plot shows
 constexpr double kZoom = 2;                // s, at full resolution
-
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
-Json measured(const Measured& m) {
-  return {{"value", number(m.value)}, {"standard_error", number(m.standard_error)}};
-}
 
 Json line_json(const FrictionLine& line) {
   return {{"coulomb", measured(line.coulomb)},
@@ -159,7 +150,8 @@ Json details_json(const Identification& found) {
 
 }  // namespace
 
-Json to_json(const Identification& found) {
+std::string identification_json(const Identification& found, const std::string& rig,
+                                const std::vector<std::string>& records) {
   Json json = {{"schema_version", 1},          {"version", version()},       {"procedures", Json::array()},
                {"parameters", Json::object()}, {"channels", Json::object()}, {"warnings", found.warnings}};
   for (const ProcedureReport& p : found.procedures)
@@ -182,29 +174,25 @@ Json to_json(const Identification& found) {
     json["findings"].push_back(std::move(entry));
   }
   json["details"] = details_json(found);
-  return json;
+  json["rig"] = rig;
+  json["records"] = records;
+  return dumped(json, 1);
 }
 
 void print_summary(const Identification& found, std::ostream& out) {
   out << "procedures\n";
   for (const ProcedureReport& p : found.procedures)
-    out << "  " << std::left << std::setw(20) << p.name << (p.records.empty() ? "not used: " : "")
-        << p.message << '\n';
+    out << fmt::format("  {:<20}{}{}\n", p.name, p.records.empty() ? "not used: " : "", p.message);
   out << "\nparameters (load side of the reduction)\n";
   for (const auto& [name, m] : found.parameters) {
-    char line[128];
-    std::snprintf(line, sizeof line, "  %-26s %12.6g  +- %-9.2g %s\n", name.c_str(), m.value,
-                  m.standard_error, found.units.at(name).c_str());
-    out << line;
+    out << fmt::format("  {:<26} {:12.6g}  +- {:<9.2g} {}\n", name, m.value, m.standard_error,
+                       found.units.at(name));
   }
   out << "\nrelative error of the fitted model (what noise alone would leave)\n";
   for (const auto& [name, channel] : found.channels) {
-    char line[128];
-    std::snprintf(line, sizeof line, "  %-26s %.3g %% (%.3g %%)\n", name.c_str(), 100 * channel.error,
-                  100 * channel.floor);
-    out << line;
+    out << fmt::format("  {:<26} {:.3g} % ({:.3g} %)\n", name, 100 * channel.error, 100 * channel.floor);
   }
   for (const std::string& warning : found.warnings) out << "warning: " << warning << '\n';
 }
 
-}  // namespace backlash::tools
+}  // namespace backlash

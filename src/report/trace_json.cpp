@@ -1,36 +1,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The JSON part of trace_report.h.
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <cstdlib>
-#include <nlohmann/json.hpp>
 
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/report/trace_report.h"
+#include "json.h"
 #include "trace_contributions.h"
 
 namespace backlash {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr double kPerCycle = 4;               // samples of a plot per cycle of the low-pass
 constexpr std::size_t kMostSamples = 20'000;  // of a plot
 
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
-Json measured(const Measured& m, const std::string& unit) {
+Json with_unit(const Measured& m, const std::string& unit) {
   return {{"value", number(m.value)}, {"unit", unit}, {"standard_error", number(m.standard_error)}};
 }
 
 Json machine_json(const std::map<std::string, Measured>& parameters, const Trace& trace) {
   Json json = Json::object();
   for (const auto& [name, m] : parameters)
-    json[name] = measured(m, axis_unit(trace.units.at(name), trace.augmented.linear));
+    json[name] = with_unit(m, axis_unit(trace.units.at(name), trace.augmented.linear));
   return json;
 }
 
@@ -51,7 +45,7 @@ Json term_json(const Term& term) {
 Json step_json(const FoundEffect& e, const Trace& trace) {
   Json json = {{"effect", e.id}, {"channel", e.channel}, {"parameters", Json::object()}};
   for (const EffectParameter& p : e.parameters)
-    json["parameters"][p.name] = measured(p.measured, axis_unit(p.unit, trace.augmented.linear));
+    json["parameters"][p.name] = with_unit(p.measured, axis_unit(p.unit, trace.augmented.linear));
   json["test_error_before"] = number(e.test_error_before);
   json["test_error_after"] = number(e.test_error_after);
   const Evidence& v = e.evidence;
@@ -70,18 +64,13 @@ Json step_json(const FoundEffect& e, const Trace& trace) {
   return json;
 }
 
-std::string dumped(const Json& json, int indent) {
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
 /// Every `stride`-th value with seven digits, as many as a plot can show.
 Json column(const std::vector<double>& values, std::size_t stride,
             const std::vector<char>* counts = nullptr) {
   Json json = Json::array();
   for (std::size_t k = 0; k < values.size(); k += stride) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.7g", values[k]);
-    json.push_back(counts && !(*counts)[k] ? Json(nullptr) : number(std::strtod(text, nullptr)));
+    const std::string text = fmt::format("{:.7g}", values[k]);
+    json.push_back(counts && !(*counts)[k] ? Json(nullptr) : number(std::strtod(text.c_str(), nullptr)));
   }
   return json;
 }
@@ -93,11 +82,11 @@ std::size_t stride_of(const TraceSeries& s, double cutoff) {
   return std::max({std::size_t{1}, std::size_t(enough), s.time.size() / kMostSamples + 1});
 }
 
-Json channel_series(const std::string& unit, const std::vector<double>& measured,
+Json channel_series(const std::string& unit, const std::vector<double>& recorded,
                     const std::vector<double>& before, const std::vector<double>& after,
                     const std::vector<char>& counts, std::size_t stride) {
   return {{"unit", unit},
-          {"measured", column(measured, stride)},
+          {"measured", column(recorded, stride)},
           {"before", column(before, stride, &counts)},
           {"after", column(after, stride, &counts)}};
 }
@@ -115,6 +104,7 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
                {"cutoff", {{"value", number(trace.cutoff)}, {"unit", "Hz"}}},
                {"channels", Json::object()},
                {"steps", Json::array()},
+               {"rejected", Json::array()},
                {"unexplained", nullptr}};
   for (const auto& [name, c] : trace.channels)
     json["channels"][name] = {{"before", number(c.before)},
@@ -123,6 +113,8 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
                               {"train_before", number(c.train_before)},
                               {"train_after", number(c.train_after)}};
   for (const FoundEffect& e : trace.steps) json["steps"].push_back(step_json(e, trace));
+  for (const RejectedEffect& r : trace.rejected)
+    json["rejected"].push_back({{"effect", r.id}, {"reason", r.reason}});
   if (trace.unexplained)
     json["unexplained"] = {{"channel", trace.unexplained->channel},
                            {"signature", trace.unexplained->signature}};

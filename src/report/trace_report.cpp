@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/report/trace_report.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "value_text.h"
 
 namespace backlash {
 namespace {
@@ -18,20 +21,13 @@ std::string listed(const std::vector<std::string>& parts) {
   return text;
 }
 
-std::string row(const char* format, const std::string& a, const std::string& b, const std::string& c,
-                const std::string& d) {
-  char line[256];
-  std::snprintf(line, sizeof line, format, a.c_str(), b.c_str(), c.c_str(), d.c_str());
-  return line;
-}
-
 std::string effect_text(const FoundEffect& e, bool linear) {
   std::string text = "  " + e.id;
   for (const auto& [name, word] : e.words) text += " (" + name + ": " + word + ")";
   text += ", " + e.channel + " error " + percent(e.test_error_before) + " -> " + percent(e.test_error_after) +
           "\n";
   for (const EffectParameter& p : e.parameters)
-    text += row("    %-24s %s %s%s\n", p.name, with_error(p.measured), axis_unit(p.unit, linear), "");
+    text += fmt::format("    {:<24} {} {}\n", p.name, with_error(p.measured), axis_unit(p.unit, linear));
   const Evidence& v = e.evidence;
   text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
           percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
@@ -44,29 +40,29 @@ std::string effect_text(const FoundEffect& e, bool linear) {
 }  // namespace
 
 std::string effect_name(const FoundEffect& e) {
-  const auto coordinate = e.words.find("coordinate");
-  if (e.id != "learned_map" || coordinate == e.words.end()) return e.id;
+  const TermType& type = term_type(e.id);
+  if (!type.map) return e.id;
+  const auto coordinate = e.words.find(type.map->coordinate);
+  if (coordinate == e.words.end()) return e.id;
   return "a function of " + coordinate->second + " that is not one of the named effects";
 }
 
 std::string percent(double share) {
-  if (!std::isfinite(share)) return "unknown";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g %%", 100 * share);
-  return text;
+  return std::isfinite(share) ? fmt::format("{:.3g} %", 100 * share) : "unknown";
 }
 
-std::string with_error(const Measured& m) {
-  char text[64];
-  if (!(m.standard_error > 0) || !std::isfinite(m.standard_error)) {
-    std::snprintf(text, sizeof text, "%.6g", m.value);
-    return text;
-  }
+ValueText value_text(const Measured& m) {
+  if (!(m.standard_error > 0) || !std::isfinite(m.standard_error))
+    return {fmt::format("{:.6g}", m.value), ""};
   // As many digits as the error leaves, which has two.
   const double size = std::max(std::fabs(m.value), m.standard_error);
   const int digits = 2 + int(std::floor(std::log10(size)) - std::floor(std::log10(m.standard_error)));
-  std::snprintf(text, sizeof text, "%.*g +- %.2g", std::min(digits, 9), m.value, m.standard_error);
-  return text;
+  return {fmt::format("{:.{}g}", m.value, std::min(digits, 9)), fmt::format("{:.2g}", m.standard_error)};
+}
+
+std::string with_error(const Measured& m) {
+  const ValueText text = value_text(m);
+  return text.error.empty() ? text.value : text.value + " +- " + text.error;
 }
 
 std::string to_string(TraceVerdict verdict) {
@@ -109,26 +105,28 @@ std::string trace_summary(const Trace& trace) {
   const bool linear = trace.augmented.linear;
   std::string text = verdict_sentence(trace) + "\n\nrelative error on the test record, low-passed at " +
                      to_text(std::round(trace.cutoff * 1000) / 1000) + " Hz\n";
-  const char* columns = "  %-12s %10s %10s %14s\n";
-  text += row(columns, "channel", "before", "after", "noise alone");
+  const char* columns = "  {:<12} {:>10} {:>10} {:>14}\n";
+  text += fmt::format(columns, "channel", "before", "after", "noise alone");
   for (const auto& [name, c] : trace.channels)
-    text += row(columns, name, percent(c.before), percent(c.after), percent(c.floor));
+    text += fmt::format(columns, name, percent(c.before), percent(c.after), percent(c.floor));
+  const char* inputs = "  {:<12} {:<18} {:>10} {:>10}\n";
   if (!trace.independence.empty())
     text += "\nshare of lags at which the residual still follows an input (0.01 by chance)\n" +
-            row("  %-12s %-18s %10s %10s\n", "channel", "input", "before", "after");
+            fmt::format(inputs, "channel", "input", "before", "after");
   for (const Independence& i : trace.independence)
-    text += row("  %-12s %-18s %10s %10s\n", i.channel, i.input, percent(i.before), percent(i.after));
+    text += fmt::format(inputs, i.channel, i.input, percent(i.before), percent(i.after));
   if (!trace.steps.empty()) text += "\neffects that were added\n";
   for (const FoundEffect& e : trace.steps) text += effect_text(e, linear);
   if (trace.unexplained)
     text += "\nunexplained\n  " + trace.unexplained->channel + ": " + trace.unexplained->signature + "\n";
   text += "\nmachine (load side of the reduction)\n";
-  const char* machine = "  %-24s %-24s %-24s %s\n";
-  text += row(machine, "parameter", "without effects", "with effects", "unit");
+  const char* machine = "  {:<24} {:<24} {:<24} {}\n";
+  text += fmt::format(machine, "parameter", "without effects", "with effects", "unit");
   for (const auto& [name, value] : trace.parameters) {
     const auto before = trace.base_parameters.find(name);
-    text += row(machine, name, before == trace.base_parameters.end() ? "-" : with_error(before->second),
-                with_error(value), axis_unit(trace.units.at(name), linear));
+    text +=
+        fmt::format(machine, name, before == trace.base_parameters.end() ? "-" : with_error(before->second),
+                    with_error(value), axis_unit(trace.units.at(name), linear));
   }
   for (const std::string& note : trace.notes) text += "note: " + note + "\n";
   for (const std::string& warning : trace.warnings) text += "warning: " + warning + "\n";

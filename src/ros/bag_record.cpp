@@ -167,7 +167,7 @@ class JointRun {
       if (!column.empty() && std::isnan(column.front())) column.clear();
       if (!column.empty()) present.push_back(channel_name(channel));
     }
-    if (!record_.tells())
+    if (!record_.can_show_backlash())
       throw BadData(path_, "joint '" + printable(joint_) + "' on " + printable(topic_) +
                                " has no torque, position, current or acceleration; it has: " +
                                (present.empty() ? "nothing" : joined(present)));

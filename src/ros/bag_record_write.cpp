@@ -72,7 +72,8 @@ class TemporaryFile {
 void check_writable(const Record& record) {
   const auto fail = [&record](const std::string& reason) { throw BadData(record.name, reason); };
   if (record.time.empty()) fail("a record without samples cannot be written");
-  if (!record.tells()) fail("a record needs a torque, position, current or acceleration to be written");
+  if (!record.can_show_backlash())
+    fail("a record needs a torque, position, current or acceleration to be written");
   for (const Channel channel : kChannels) {
     const std::vector<double>& column = record.column(channel);
     if (column.empty()) continue;

@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/diagnosis/healthy_machine.h"
+#include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/ros/curve_job.h"
 #include "backlash_diagnosis/ros/messages.h"
 #include "backlash_diagnosis/ros/parameters.h"
@@ -121,15 +121,13 @@ void DiagnoserNode::apply(Joint& joint, const JointLive& wanted) {
     joint.monitor->set_limits(std::nullopt);
     return;
   }
-  require(wanted.watch > 0, "watch", wanted.watch, "must be > 0 (all three 0: no limits)");
-  require(wanted.service > wanted.watch, "service", wanted.service, "must be > watch");
-  require(wanted.stop > wanted.service, "stop", wanted.stop, "must be > service");
   const auto& declared = joint.monitor->rig().diagnosis.limits;
   Limits limits;
   limits.angular = declared ? declared->angular : joint.monitor->rig().rig.mesh.angular();
   limits.watch = wanted.watch;
   limits.service = wanted.service;
   limits.stop = wanted.stop;
+  require_increasing(limits);
   joint.monitor->set_limits(limits);
 }
 

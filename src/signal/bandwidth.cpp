@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numeric>
-#include <unsupported/Eigen/FFT>
 
-#include "backlash_diagnosis/signal/blocks.h"
+#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/measured.h"
+#include "backlash_diagnosis/signal/noise.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash {
@@ -19,17 +20,12 @@ constexpr double kNoiseFrom = 0.35;         // cycles per sample: the upper thre
 constexpr double kPositionNoiseFrom = 0.1;  // cycles per sample
 constexpr double kBand = 0.05;
 constexpr double kMeanPerMedian = 1 / M_LN2;  // of a periodogram of noise: exponential distribution
+constexpr double kKept = 0.9;                 // choice: share of the third differences that no jump is among
 constexpr double kHighest = 0.4;              // cycles per sample
 constexpr double kRounding = 1e-12;           // of a number in a file
 constexpr double kFewSteps = 10, kOffStep = 0.05, kLeastSteps = 10;  // of a resolution
 
-/// Second differences; of white noise of variance 1 they have the gain 16 sin^4(pi f).
-std::vector<double> second_difference(const std::vector<double>& x) {
-  std::vector<double> d(x.size() - 2);
-  for (std::size_t k = 0; k < d.size(); ++k) d[k] = x[k + 2] - 2 * x[k + 1] + x[k];
-  return d;
-}
-
+/// Of second differences, in power.
 double gain(double f) {
   return 16 * std::pow(std::sin(M_PI * f), 4);
 }
@@ -38,7 +34,7 @@ double gain(double f) {
 /// Hann window scaled so that white noise of variance 1 has the mean 1.
 std::vector<double> periodogram(const std::vector<double>& values) {
   if (values.size() < 64) throw InvalidParameter("samples", double(values.size()), "must be at least 64");
-  const std::vector<double> d = second_difference(values);
+  const std::vector<double> d = differences(values, 2);
   std::size_t size = 1;
   while (size < d.size()) size *= 2;
   std::vector<double> windowed(size, 0.0);
@@ -48,9 +44,7 @@ std::vector<double> periodogram(const std::vector<double>& values) {
     windowed[k] = w * d[k];
     squares += w * w;
   }
-  std::vector<std::complex<double>> lines;
-  Eigen::FFT<double> fft;
-  fft.fwd(lines, windowed);
+  const auto lines = fourier_transform(windowed);
   std::vector<double> power(size / 2);
   for (std::size_t i = 0; i < power.size(); ++i) power[i] = std::norm(lines[i + 1]) / squares;
   return power;
@@ -66,22 +60,23 @@ double white_variance(const std::vector<double>& power, double from, double to) 
   std::vector<double> density;
   for (std::size_t i = 0; i < power.size(); ++i)
     if (const double f = frequency(i, power); f >= from && f < to) density.push_back(power[i] / gain(f));
-  if (density.empty()) return 0;
-  const auto middle = density.begin() + density.size() / 2;
-  std::nth_element(density.begin(), middle, density.end());
-  return kMeanPerMedian * *middle;
+  return density.empty() ? 0 : kMeanPerMedian * median(std::move(density));
 }
 
 /// From third differences, the largest tenth left out: what moves smoothly, and the few samples where a
 /// signal jumps, cancel. A jump is white, so its spectrum does not tell it from noise.
 double variance_between_jumps(const std::vector<double>& x) {
-  constexpr double kNormalShare = 0.6231;  // of the variance of normal values without the largest tenth
-  std::vector<double> square;
-  for (std::size_t k = 3; k < x.size(); ++k)
-    square.push_back(std::pow(x[k] - 3 * x[k - 1] + 3 * x[k - 2] - x[k - 3], 2));
-  const auto kept = square.begin() + square.size() * 9 / 10;
-  std::nth_element(square.begin(), kept, square.end());
-  return std::accumulate(square.begin(), kept, 0.0) / (double(kept - square.begin()) * kNormalShare * 20);
+  std::vector<double> square = differences(x, 3);
+  for (double& d : square) d *= d;
+  const double largest = quantile(square, kKept);
+  const double kept = kKept * double(square.size());
+  double sum = 0, below = 0;
+  for (const double d : square)
+    if (d < largest) sum += d, ++below;
+  sum += (kept - below) * largest;  // of those as large as the largest that is kept
+  // Mean square of normal values that are not among the largest: E[z^2; z^2 <= q] = P(chi^2_3 <= q).
+  static const double share = chi_square_probability(chi_square_quantile(kKept, 1), 3) / kKept;
+  return sum / (kept * share * 20);  // 20: variance of third differences of white noise of variance 1
 }
 
 /// The largest density in the bands above a tenth of the sampling rate.
@@ -105,9 +100,10 @@ double position_noise(const std::vector<double>& position) {
 
 double resolution(const std::vector<double>& position) {
   const auto size = [&](std::size_t k) { return std::fabs(position[k] - position[k - 1]); };
-  double step = INFINITY;
-  for (std::size_t k = 1; k < position.size(); ++k)
-    if (size(k) > kRounding * std::fabs(position[k])) step = std::min(step, size(k));
+  double largest = 0;
+  for (const double x : position) largest = std::max(largest, std::fabs(x));
+  const double step = smallest_step(position, kRounding * largest);
+  if (step == 0) return 0;
   double travel = 0, steps = 0, odd = 0, all = 0;
   for (std::size_t k = 1; k < position.size(); ++k) {
     if (size(k) > kFewSteps * step || size(k) < 0.5 * step) continue;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/signal/blocks.h"
 
-#include <Eigen/Cholesky>
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
@@ -18,12 +19,6 @@ constexpr double kSmallestPivot = 1e-10;  // of the equations with columns of le
 constexpr double kUnsteady = 4;  // deviations
 
 }  // namespace
-
-std::string figure(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
 
 std::vector<double> block_means(const std::vector<double>& values, std::size_t length) {
   std::vector<double> means;
@@ -65,8 +60,7 @@ Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorX
                                   const std::vector<std::size_t>& block) {
   const std::size_t blocks = block.empty() ? 0 : *std::max_element(block.begin(), block.end()) + 1;
   if (blocks < 4)
-    throw CannotIdentify("only " + std::to_string(blocks) +
-                         " independent blocks of data: too few for an error");
+    throw CannotIdentify(fmt::format("only {} independent blocks of data: too few for an error", blocks));
   const Eigen::Index n = a.cols();
   const Eigen::VectorXd unit = a.colwise().norm().cwiseInverse();
   std::vector<Eigen::MatrixXd> normal(blocks, Eigen::MatrixXd::Zero(n, n));
@@ -80,11 +74,11 @@ Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorX
   for (const auto& part : normal) all += part;
   Eigen::MatrixXd changes(n, blocks);
   for (std::size_t b = 0; b < blocks; ++b) {
-    const Eigen::LDLT<Eigen::MatrixXd> rest(all - normal[b]);
-    if (!(rest.vectorD().minCoeff() > kSmallestPivot))
+    const Eigen::MatrixXd rest = all - normal[b];
+    if (!(smallest_pivot(rest) > kSmallestPivot))
       throw CannotIdentify(
           "one part of the data decides alone: the unknowns cannot be told apart without it");
-    changes.col(b) = -rest.solve(gradient[b]).cwiseProduct(unit);
+    changes.col(b) = -solve_symmetric(rest, gradient[b]).cwiseProduct(unit);
   }
   const Eigen::VectorXd mean = changes.rowwise().mean();
   changes.colwise() -= mean;
@@ -94,7 +88,7 @@ Eigen::MatrixXd jackknife_changes(const Eigen::MatrixXd& a, const Eigen::VectorX
 Eigen::MatrixXd jackknife_covariance(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
                                      const std::vector<std::size_t>& block) {
   const Eigen::MatrixXd changes = jackknife_changes(a, residuals, block);
-  return changes * changes.transpose() * (double(changes.cols() - 1) / double(changes.cols()));
+  return gram(changes.transpose()) * (double(changes.cols() - 1) / double(changes.cols()));
 }
 
 double jackknife_error(const Eigen::VectorXd& changes) {

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/signal/least_squares.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -11,6 +8,7 @@
 
 #include "backlash_diagnosis/base/interruption.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
@@ -33,17 +31,14 @@ LeastSquaresFit solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const 
   if (!(size.minCoeff() > 0) || !size.allFinite())
     throw CannotIdentify("an unknown has no effect on the equations");
   const Eigen::VectorXd unit = size.cwiseInverse();
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(weighted * unit.asDiagonal());
-  const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
-  if (!(diagonal.minCoeff() > diagonal.maxCoeff() / kWorstCondition))
+  const Eigen::MatrixXd scaled = weighted * unit.asDiagonal();
+  const QrSolution solution = solve_least_squares(scaled, root.cwiseProduct(b));
+  if (!(solution.diagonal_ratio > 1 / kWorstCondition))
     throw CannotIdentify("the equations cannot tell the unknowns apart");
   LeastSquaresFit fit;
-  fit.values = unit.asDiagonal() * qr.solve(root.asDiagonal() * b);
+  fit.values = unit.cwiseProduct(solution.x);
   fit.residuals = b - a * fit.values;
-  const Eigen::MatrixXd normal = weighted.transpose() * weighted;
-  const Eigen::MatrixXd scaled = unit.asDiagonal() * normal * unit.asDiagonal();
-  fit.covariance = unit.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(a.cols(), a.cols())) *
-                   unit.asDiagonal();
+  fit.covariance = unit.asDiagonal() * symmetric_inverse(gram(scaled)) * unit.asDiagonal();
   return fit;
 }
 
@@ -155,9 +150,7 @@ double variance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
 Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
   const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
   const Eigen::MatrixXd scaled = j * unit.asDiagonal();
-  const Eigen::MatrixXd inverse =
-      (scaled.transpose() * scaled).ldlt().solve(Eigen::MatrixXd::Identity(j.cols(), j.cols()));
-  return variance(j, r) * (unit.asDiagonal() * inverse * unit.asDiagonal());
+  return variance(j, r) * (unit.asDiagonal() * symmetric_inverse(gram(scaled)) * unit.asDiagonal());
 }
 
 }  // namespace
@@ -170,12 +163,12 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
   bool done = false;
   Eigen::MatrixXd j = jacobian(residuals, p, r, scale, options);
   for (int i = 0; i < options.iterations && !done; ++i) {
-    const Eigen::MatrixXd normal = j.transpose() * j;
+    const Eigen::MatrixXd normal = gram(j);
     const Eigen::VectorXd gradient = j.transpose() * r;
     for (bool better = false; !better && !done;) {
       Eigen::MatrixXd damped = normal;
       damped.diagonal() *= 1 + damping;
-      const Eigen::VectorXd step = -damped.ldlt().solve(gradient);
+      const Eigen::VectorXd step = -solve_symmetric(damped, gradient);
       const Eigen::VectorXd q = p + scale.cwiseProduct(step);
       const Eigen::VectorXd moved = try_residuals(residuals, q);
       better = moved.size() == r.size() && moved.squaredNorm() < r.squaredNorm();
@@ -217,8 +210,8 @@ Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block,
   const Eigen::MatrixXd& j = fit.jacobian;
   const Eigen::Index n = j.cols(), end = j.rows() - known;
   const Eigen::VectorXd unit = j.colwise().norm().cwiseInverse();
-  const Eigen::MatrixXd scaled = j * unit.asDiagonal(), one = Eigen::MatrixXd::Identity(n, n);
-  const Eigen::MatrixXd inverse = (scaled.transpose() * scaled).ldlt().solve(one);
+  const Eigen::MatrixXd scaled = j * unit.asDiagonal();
+  const Eigen::MatrixXd inverse = symmetric_inverse(gram(scaled)), one = Eigen::MatrixXd::Identity(n, n);
   Eigen::MatrixXd outer = Eigen::MatrixXd::Zero(n, n);
   double blocks = 0;
   for (Eigen::Index row = 0; row < end; row += block, ++blocks) {
@@ -226,15 +219,15 @@ Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block,
     const auto part = scaled.middleRows(row, rows);
     const Eigen::VectorXd gradient = part.transpose() * fit.residuals.segment(row, rows);
     // As it would be had the block not drawn the fit to itself.
-    const Eigen::VectorXd free = (one - part.transpose() * part * inverse).partialPivLu().solve(gradient);
+    const Eigen::VectorXd free = solve_square(one - product(gram(part), inverse), gradient);
     outer += free * free.transpose();
   }
   if (blocks <= double(n))
     throw CannotIdentify(std::to_string(long(blocks)) +
                          " stretches of the record cannot tell the errors of " + std::to_string(n) +
                          " parameters");
-  outer += scaled.bottomRows(known).transpose() * scaled.bottomRows(known);
-  return unit.asDiagonal() * (inverse * outer * inverse) * unit.asDiagonal();
+  outer += gram(scaled.bottomRows(known));
+  return unit.asDiagonal() * product(product(inverse, outer), inverse) * unit.asDiagonal();
 }
 
 }  // namespace backlash

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/signal/noise.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <optional>
+
+#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -13,8 +16,6 @@ namespace {
 constexpr int kStretch = 10;   // samples
 constexpr int kCubic = 4;      // coefficients
 constexpr double kCalm = 0.2;  // share of the stretches that counts
-constexpr double kQuantile10 = 6.179,
-                 kQuantile6 = 3.070;  // 20 % quantiles of chi-square, 10 and 6 degrees of freedom
 constexpr double kMedianOverCalm =
     2.5;  // 1.5 for white noise: median over 20 % quantile, 10 degrees of freedom
 constexpr std::size_t kEnoughCalm = 20;   // stretches; with fewer, chance alone makes eigenvalues unequal
@@ -59,23 +60,22 @@ double white_share(const std::vector<double>& values, const std::vector<Stretch>
     }
   const double mean = covariance.trace() / order;
   if (!(mean > 0)) return 1;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, order, order>> solver(covariance,
-                                                                                  Eigen::EigenvaluesOnly);
-  return std::max(0.0, solver.eigenvalues()[0]) / mean;
+  return std::max(0.0, symmetric_eigenvalues(covariance)[0]) / mean;
 }
 
 /// From period to period; nothing with fewer than two periods.
 std::optional<NoiseRange> between_periods(const std::vector<double>& signal, double samples_per_period) {
   if (!(samples_per_period >= kStretch && samples_per_period <= 0.5 * signal.size())) return std::nullopt;
   const auto lag = static_cast<std::size_t>(std::lround(samples_per_period));
-  std::vector<double> differences;
-  for (std::size_t i = 0; i + lag < signal.size(); ++i) differences.push_back(signal[i + lag] - signal[i]);
-  auto stretches = stretches_of(differences, [](const Samples& d) { return d.squaredNorm(); });
+  std::vector<double> change;
+  for (std::size_t i = 0; i + lag < signal.size(); ++i) change.push_back(signal[i + lag] - signal[i]);
+  auto stretches = stretches_of(change, [](const Samples& d) { return d.squaredNorm(); });
   if (stretches.empty()) return std::nullopt;
   const std::size_t calm = sort_calm(stretches);
   const double quantile = stretches[calm].sum;
-  const double variance = quantile / kQuantile10 / 2;  // a difference of two samples has twice the variance
-  const double white = calm >= kEnoughCalm ? white_share(differences, stretches, calm) : 1;
+  const double variance = quantile / chi_square_quantile(kCalm, kStretch) /
+                          2;  // a difference of two samples has twice the variance
+  const double white = calm >= kEnoughCalm ? white_share(change, stretches, calm) : 1;
   if (white < kClearlyNotWhite) return NoiseRange{0, std::sqrt(variance * white)};
   const auto middle = stretches.begin() + static_cast<std::ptrdiff_t>(stretches.size() / 2);
   std::nth_element(stretches.begin(), middle, stretches.end());
@@ -83,26 +83,38 @@ std::optional<NoiseRange> between_periods(const std::vector<double>& signal, dou
   return NoiseRange{repeats ? std::sqrt(variance) : 0, std::sqrt(variance)};
 }
 
-/// What a projection leaves of a stretch is orthogonal to all cubics.
-Eigen::Matrix<double, kStretch, kStretch> cubic_residual() {
-  Eigen::Matrix<double, kStretch, kCubic> powers;
+/// Orthonormal cubics over a stretch.
+Eigen::MatrixXd cubics() {
+  Eigen::MatrixXd powers(kStretch, kCubic);
   for (int i = 0; i < kStretch; ++i)
     for (int k = 0; k < kCubic; ++k) powers(i, k) = std::pow((i - 4.5) / 4.5, k);
-  const Eigen::HouseholderQR<Eigen::Matrix<double, kStretch, kCubic>> qr(powers);
-  const Eigen::Matrix<double, kStretch, kCubic> basis =
-      qr.householderQ() * Eigen::Matrix<double, kStretch, kCubic>::Identity();
-  return Eigen::Matrix<double, kStretch, kStretch>::Identity() - basis * basis.transpose();
+  return orthonormal_basis(powers);
 }
 
 /// Within a period; NaN without a stretch.
 double within_period(const std::vector<double>& signal) {
-  static const Eigen::Matrix<double, kStretch, kStretch> residual = cubic_residual();
-  auto stretches = stretches_of(signal, [](const Samples& x) { return (residual * x).squaredNorm(); });
+  static const Eigen::Matrix<double, kStretch, kCubic> cubic = cubics();
+  auto stretches = stretches_of(
+      signal, [](const Samples& x) { return (x - cubic * (cubic.transpose() * x)).squaredNorm(); });
   if (stretches.empty()) return NoiseRange().upper;
-  return std::sqrt(stretches[sort_calm(stretches)].sum / kQuantile6);
+  return std::sqrt(stretches[sort_calm(stretches)].sum / chi_square_quantile(kCalm, kStretch - kCubic));
 }
 
 }  // namespace
+
+std::vector<double> differences(std::vector<double> values, int order) {
+  for (; order > 0 && !values.empty(); --order) {
+    for (std::size_t k = 0; k + 1 < values.size(); ++k) values[k] = values[k + 1] - values[k];
+    values.pop_back();
+  }
+  return values;
+}
+
+double noise_from_differences(const std::vector<double>& values, int order) {
+  double variance = 1;  // binomial(2 order, order), of the differences of white noise of variance 1
+  for (int k = 1; k <= order; ++k) variance *= static_cast<double>(order + k) / k;
+  return kNormalPerMedianDeviation * median_magnitude(differences(values, order)) / std::sqrt(variance);
+}
 
 NoiseRange estimate_noise(const std::vector<double>& signal, double samples_per_period) {
   const double within = within_period(signal);

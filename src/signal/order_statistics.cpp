@@ -48,11 +48,11 @@ double peak_to_peak(const std::vector<double>& values) {
   return *high - *low;
 }
 
-double smallest_step(const std::vector<double>& values) {
+double smallest_step(const std::vector<double>& values, double rounding) {
   double smallest = 0;
   for (std::size_t i = 1; i < values.size(); ++i) {
     const double step = std::abs(values[i] - values[i - 1]);
-    if (step > 0 && (smallest == 0 || step < smallest)) smallest = step;
+    if (step > rounding && (smallest == 0 || step < smallest)) smallest = step;
   }
   return smallest;
 }

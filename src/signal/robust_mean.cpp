@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -17,8 +18,7 @@ std::vector<double> sizes(const std::vector<Measured>& values) {
   for (const Measured& m : values) errors.push_back(m.standard_error);
   if (std::any_of(errors.begin(), errors.end(), [](double e) { return std::isnan(e); }))
     return std::vector<double>(values.size(), 1);
-  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
-  const double typical = errors[errors.size() / 2];
+  const double typical = median(errors);
   std::vector<double> sizes;
   for (const Measured& m : values) {
     const double error = std::hypot(m.standard_error, typical);

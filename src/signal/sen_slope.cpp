@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/not_a_number.h"
+#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -35,8 +37,7 @@ double SenSlope::value() const {
 }
 
 SenSlope::Interval SenSlope::interval(double inflation) const {
-  constexpr double kQuantile = 1.959964;
-  const double reach = kQuantile * std::sqrt(inflation * variance_);
+  const double reach = kNormalQuantile975 * std::sqrt(inflation * variance_);
   // The M-th smallest and the M-th largest slope.
   const double m = std::floor(0.5 * (static_cast<double>(slopes_.size()) - reach));
   if (!(m >= 1)) return {kNaN, kNaN};

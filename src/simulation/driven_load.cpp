@@ -70,18 +70,11 @@ struct Halves {
   }
 };
 
-std::vector<const Term*> load_terms(const Rig& rig) {
-  std::vector<const Term*> terms;
-  for (const auto& term : rig.terms)
-    if (term->moves_load()) terms.push_back(term.get());
-  return terms;
-}
-
 /// Whether terms push the load, which may follow the torque of the motor; flanks do not.
 bool pushed(const Rig& rig) {
-  const std::vector<const Term*> terms = load_terms(rig);
-  return std::any_of(terms.begin(), terms.end(),
-                     [](const Term* term) { return !term->shapes_flanks() && !term->loads_flanks(); });
+  return std::any_of(rig.terms.begin(), rig.terms.end(), [](const auto& term) {
+    return term->moves_load() && !term->shapes_flanks() && !term->loads_flanks();
+  });
 }
 
 class Load {
@@ -137,7 +130,7 @@ class Load {
     return f.net < f.friction.forward && -f.net < f.friction.backward;
   }
 
-  /// `flanks`: where they are at nearly this position; else they are asked.
+  /// `flanks`: where they are at nearly this position, if known.
   Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
     const Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque};
     Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position, rate};
@@ -313,35 +306,29 @@ DrivenLoad follow(Body& load, const RecordedMotion& motion) {
   return out;
 }
 
-/// The parts of a rig that a load feels, one by one; the motor's and what sensors show are not among them.
-bool same_body(const Body& a, const Body& b) {
-  return a.inertia == b.inertia && a.viscous_damping == b.viscous_damping &&
-         a.viscous_asymmetry == b.viscous_asymmetry && a.coulomb_friction == b.coulomb_friction &&
-         a.coulomb_asymmetry == b.coulomb_asymmetry;
-}
-
-bool same_contact(const Mesh& a, const Mesh& b) {
-  if (a.contact == b.contact) return true;
-  return !a.contact_spec.law.empty() && a.contact_spec.law == b.contact_spec.law &&
-         a.contact_spec.values == b.contact_spec.values;
-}
-
-bool same_mesh(const Mesh& a, const Mesh& b) {
-  return a.rigid == b.rigid && a.backlash == b.backlash && a.lever() == b.lever() &&
-         a.start_in_gap == b.start_in_gap && same_contact(a, b) && a.variation == b.variation;
-}
-
-bool same_term(const Term* a, const Term* b) {
-  return a == b || (!a->id.empty() && a->id == b->id && a->values == b->values);
+/// A rig reduced to what acts on its load. What is taken away here is all that does not: a new member of Rig
+/// counts until it is named.
+Rig acting_on_load(Rig rig) {
+  const Rig none;
+  rig.name = none.name;
+  rig.joint = none.joint;
+  rig.reduction_ratio = none.reduction_ratio;
+  rig.motor_side = none.motor_side;
+  rig.linear = none.linear;
+  rig.motor = none.motor;
+  rig.pinion = none.pinion;
+  rig.torque_constant = none.torque_constant;
+  rig.sensor_with_damper = none.sensor_with_damper;
+  if (rig.input_coupling.rigid) rig.input_coupling = none.input_coupling;
+  const auto idle = [](const std::shared_ptr<const Term>& term) { return !term->moves_load(); };
+  rig.terms.erase(std::remove_if(rig.terms.begin(), rig.terms.end(), idle), rig.terms.end());
+  return rig;
 }
 
 }  // namespace
 
 bool moves_same_load(const Rig& a, const Rig& b) {
-  const std::vector<const Term*> terms = load_terms(a), others = load_terms(b);
-  return std::equal(terms.begin(), terms.end(), others.begin(), others.end(), same_term) &&
-         same_body(a.gear, b.gear) && same_body(a.link, b.link) && same_mesh(a.mesh, b.mesh) &&
-         a.output_coupling.inertia == b.output_coupling.inertia && a.link_locked == b.link_locked;
+  return acting_on_load(a) == acting_on_load(b);
 }
 
 bool load_moves_freely(const Rig& rig) {

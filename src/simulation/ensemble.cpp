@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "lanes.h"
@@ -60,7 +59,7 @@ struct LaneTolerance {
 
 /// One attempt at a step; all that it reads and writes.
 struct Attempt {
-  const SmoothTrain<Lanes>& train;
+  const EquationsOfMotion<Lanes>& train;
   const LaneContact& contact;
   const LaneTolerance* tolerances;
   double relative;
@@ -73,10 +72,10 @@ struct Attempt {
   double error;  // worst of all rigs, 1 where it is just allowed
 };
 
-template <int Mask>
+template <int Number>
 BACKLASH_LANES void attempt(Attempt& a) {
-  constexpr FixedLayout<Mask> layout;
-  constexpr int kStates = 2 * layout.dof();
+  static constexpr TrainLayout layout = TrainLayout::numbered(Number);
+  constexpr int kStates = 2 * layout.dof;
   Lanes(*const k)[kMaxStates] = a.rates;
   const auto force = [&](const Lanes& x, const Lanes& v) __attribute__((always_inline)) {
     return a.contact.force(x, v);
@@ -117,37 +116,31 @@ BACKLASH_LANES void attempt(Attempt& a) {
 // The same function for processors with and without AVX2.
 using AttemptFunction = void (*)(Attempt&);
 
-template <int Mask>
+template <int Number>
 void attempt_plain(Attempt& a) {
-  attempt<Mask>(a);
+  attempt<Number>(a);
 }
 
 #if defined(__x86_64__)
-template <int Mask>
+template <int Number>
 __attribute__((target("avx2"))) void attempt_avx2(Attempt& a) {
-  attempt<Mask>(a);
+  attempt<Number>(a);
 }
 
-template <int Mask>
+template <int Number>
 AttemptFunction attempt_of() {
   static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  return has_avx2 ? attempt_avx2<Mask> : attempt_plain<Mask>;
+  return has_avx2 ? attempt_avx2<Number> : attempt_plain<Number>;
 }
 #else
-template <int Mask>
+template <int Number>
 AttemptFunction attempt_of() {
-  return attempt_plain<Mask>;
+  return attempt_plain<Number>;
 }
 #endif
 
-template <int... Masks>
-AttemptFunction attempt_of(int mask, std::integer_sequence<int, Masks...>) {
-  static const AttemptFunction all[] = {attempt_of<Masks>()...};
-  return all[mask];
-}
-
 AttemptFunction attempt_of(const TrainLayout& layout) {
-  return attempt_of(layout.mask(), std::make_integer_sequence<int, 16>());
+  return with_constant_number(layout, [](auto number) { return attempt_of<decltype(number)::value>(); });
 }
 
 }  // namespace
@@ -155,7 +148,7 @@ AttemptFunction attempt_of(const TrainLayout& layout) {
 /// Rigs that share their steps.
 struct alignas(sizeof(Lanes)) Ensemble::Group {
   TrainLayout layout;
-  SmoothTrain<Lanes> train;
+  EquationsOfMotion<Lanes> train;
   LaneContact contact;
   LaneTolerance tolerances[kMaxStates];
   double relative;
@@ -179,17 +172,17 @@ struct alignas(sizeof(Lanes)) Ensemble::Group {
 
 /// A group that is not full moves its last rig several times.
 Ensemble::Group::Group(const GearTrain* trains, std::size_t count, const SolverSettings& solver, bool at_load)
-    : relative(solver.relative_tolerance) {
-  layout = trains[0].layout();
-  states = 2 * layout.dof();
-  attempt = attempt_of(layout);
+    : layout(trains[0].layout()),
+      relative(solver.relative_tolerance),
+      attempt(attempt_of(layout)),
+      states(2 * layout.dof) {
   for (int lane = 0; lane < kLanes; ++lane) {
-    const GearTrain& from = trains[std::min<std::size_t>(lane, count - 1)];
-    const SmoothTrain<double>& one = *from.smooth();
-    for (int part = 0; part < 4; ++part) {
+    const GearTrain& rig = trains[std::min<std::size_t>(lane, count - 1)];
+    const EquationsOfMotion<double>& one = rig.equations();
+    for (int part = 0; part < TrainParts::kPartCount; ++part) {
       train.damping[part][lane] = one.damping[part];
       train.asymmetry[part][lane] = one.asymmetry[part];
-      train.inverse_inertia[part][lane] = part < layout.dof() ? one.inverse_inertia[part] : 0;
+      train.inverse_inertia[part][lane] = one.inverse_inertia[part];
     }
     train.input_stiffness[lane] = one.input_stiffness;
     train.input_damping[lane] = one.input_damping;
@@ -197,16 +190,16 @@ Ensemble::Group::Group(const GearTrain* trains, std::size_t count, const SolverS
     train.output_damping[lane] = one.output_damping;
     train.lever[lane] = one.lever;
     train.start[lane] = one.start;
-    const PowerContact law = *from.power_contact();
+    const PowerContact law = *rig.power_contact();
     contact.exponent = law.exponent;
     contact.stiffness[lane] = law.stiffness;
     contact.loss[lane] = law.loss;
     contact.damping[lane] = law.damping;
-    contact.half_gap[lane] = 0.5 * from.backlash();
-    torque_gain[0][lane] = at_load ? 0 : from.ratio();
+    contact.half_gap[lane] = 0.5 * rig.backlash();
+    torque_gain[0][lane] = at_load ? 0 : rig.ratio();
     torque_gain[1][lane] = at_load ? 1 : 0;
   }
-  const std::vector<StateTolerance> each = state_tolerances(layout.dof(), solver);
+  const std::vector<StateTolerance> each = state_tolerances(layout.dof, solver);
   for (int i = 0; i < states; ++i) tolerances[i] = {Lanes{} + each[i].absolute, Lanes{} + each[i].largest};
 }
 
@@ -285,9 +278,9 @@ bool Ensemble::takes(const std::vector<Rig>& rigs, const ExcitationSettings& exc
     const GearTrain train(rig);
     const std::optional<PowerContact> contact = train.power_contact();
     if (!train.smooth() || !contact) return false;
-    if (layout && *layout != train.layout().mask()) return false;
+    if (layout && *layout != train.layout().number()) return false;
     if (exponent && *exponent != contact->exponent) return false;
-    layout = train.layout().mask();
+    layout = train.layout().number();
     exponent = contact->exponent;
   }
   return true;

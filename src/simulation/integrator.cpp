@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/simulation/integrator.h"
 
+#include <fmt/core.h>
 #include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
@@ -12,7 +13,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <sstream>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
@@ -226,12 +226,9 @@ Integrator::Impl::~Impl() {
 }
 
 void Integrator::Impl::fail(const std::string& what) const {
-  double reached = time;  // where the solver is now; of no interest whether it can tell
+  double reached = time;  // where the solver is now; an error here leaves the time before
   if (memory) multistep ? CVodeGetCurrentTime(memory, &reached) : ERKStepGetCurrentTime(memory, &reached);
-  std::ostringstream text;
-  text.precision(12);
-  text << settings.method << ": " << what << " at t = " << reached << " s";
-  throw IntegrationError(text.str());
+  throw IntegrationError(fmt::format("{}: {} at t = {:.12g} s", settings.method, what, reached));
 }
 
 void Integrator::Impl::check(int code, const char* function) const {
@@ -341,10 +338,7 @@ void Integrator::Impl::refuse_unreachable(double t) const {
                        : t > stop + rounding(stop) ? "lies beyond the stop time"
                                                    : nullptr;
   if (!reason) return;
-  std::ostringstream text;
-  text.precision(17);
-  text << "cannot integrate to t = " << t << " s, which " << reason << "; now";
-  fail(text.str());
+  fail(fmt::format("cannot integrate to t = {:.17g} s, which {}; now", t, reason));
 }
 
 int Integrator::Impl::risen() const {

@@ -37,15 +37,11 @@ SensorModel::SensorModel(const SensorsSettings& settings) : settings_(settings) 
 
 void SensorModel::reset() {
   for (std::size_t i = 0; i < kChannelCount; ++i)
-    if (settings_.channels[i].noise > 0) seed(i);  // else its generator is never asked, and seeding costs
+    if (settings_.channels[i].noise > 0) seed(i);
 }
 
 void SensorModel::seed(std::size_t channel) {
-  std::seed_seq sequence{static_cast<std::uint32_t>(settings_.seed),
-                         static_cast<std::uint32_t>(settings_.seed >> 32),
-                         static_cast<std::uint32_t>(channel)};
-  generators_[channel].seed(sequence);
-  normal_[channel].reset();
+  noise_[channel].emplace(settings_.seed, static_cast<std::uint32_t>(channel));
 }
 
 void SensorModel::set_noise(Channel channel, double noise) {
@@ -61,7 +57,7 @@ double SensorModel::measure(Channel channel, double exact) {
   const std::size_t i = static_cast<std::size_t>(channel);
   const SensorSettings& sensor = settings_.channels[i];
   double value = exact + sensor.offset;
-  if (sensor.noise > 0) value += sensor.noise * normal_[i](generators_[i]);
+  if (sensor.noise > 0) value += sensor.noise * noise_[i]->normal();
   value = std::clamp(value, -sensor.limit, sensor.limit);
   if (sensor.resolution > 0) value = std::round(value / sensor.resolution) * sensor.resolution;
   return std::isnan(exact) ? exact : value;

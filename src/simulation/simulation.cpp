@@ -32,7 +32,7 @@ Simulation::Simulation(const Rig& rig, const SimulationSettings& settings)
       rate_(settings.sensors.sampling_rate),
       delay_(sensing(rig.terms).torque_delay),
       late_samples_(static_cast<long>(std::ceil(std::fabs(delay_) * rate_))),
-      after_sample_(std::max(0.0, late_samples_ / rate_ - std::fabs(delay_))) {
+      after_sample_(std::max(0.0, double(late_samples_) / rate_ - std::fabs(delay_))) {
   forget();
 }
 
@@ -43,10 +43,10 @@ void Simulation::forget() {
 /// Moves on to the next sample, by way of the moment that a later one shows.
 Observation Simulation::observe() {
   if (late_samples_ > 0 && index_ > 0) {
-    plant_.advance_to((index_ - 1) / rate_ + after_sample_);
+    plant_.advance_to(double(index_ - 1) / rate_ + after_sample_);
     past_.push_back(plant_.observe());
   }
-  plant_.advance_to(index_ / rate_);
+  plant_.advance_to(double(index_) / rate_);
   const Observation now = plant_.observe();
   if (late_samples_ == 0) return now;
   const Observation before = past_.front();
@@ -79,8 +79,8 @@ Record simulate_record(const Rig& rig, const SimulationSettings& settings, doubl
   record.name = rig.name;
   record.time.reserve(samples);
   for (long k = 0; k < samples; ++k) {
-    if (progress && k % 1024 == 0 && !progress(double(k) / samples, "simulating")) throw Cancelled();
-    record.time.push_back(k / simulation.sampling_rate());
+    if (progress && k % 1024 == 0 && !progress(double(k) / double(samples), "simulating")) throw Cancelled();
+    record.time.push_back(double(k) / simulation.sampling_rate());
     const Observation o = simulation.step();
     record.column(Channel::motor_torque).push_back(o.motor_torque);
     record.column(Channel::motor_position).push_back(o.motor_position);

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/studies/curve_builder.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <mutex>
 #include <numeric>
-#include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
+#include "drawn_machine.h"
 #include "family_builder.h"
 #include "fine_run.h"
-#include "machine.h"
 
 namespace backlash {
 namespace {
@@ -131,7 +132,7 @@ std::vector<Rig> machines_of(const CurvePlan& plan) {
   for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
   for (int i = 0; i + 1 < count; ++i)
     machines.push_back(
-        with_backlash(machine_of(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
+        with_backlash(draw_machine(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
   for (int i = 0; i < count_beyond(plan); ++i)
     machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
   return machines;
@@ -163,10 +164,8 @@ class PointsDone {
     const std::lock_guard<std::mutex> lock(mutex_);
     lowest_ = std::min(lowest_, point.cells.front().mean);
     highest_ = std::max(highest_, point.cells.front().mean);
-    std::ostringstream text;
-    text.precision(3);
-    text << ++done_ << " of " << request_.points << " points, skewness " << lowest_ << " to " << highest_;
-    request_.best_so_far(text.str());
+    request_.best_so_far(fmt::format("{} of {} points, skewness {:.3g} to {:.3g}", ++done_, request_.points,
+                                     lowest_, highest_));
   }
 
  private:

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "machine.h"
+#include "backlash_diagnosis/base/random.h"
+#include "drawn_machine.h"
 
 namespace backlash {
 namespace {
@@ -28,11 +29,11 @@ void add_noise(Record& record, Channel signal, double relative, double limit, st
   std::vector<double>& values = record.column(signal);
   double square = 0;
   for (const double v : values) square += v * v / static_cast<double>(values.size());
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, relative * std::sqrt(square));
-  for (double& v : values) v = std::clamp(v + normal(random), -limit, limit);
+  Random random(seed);
+  const double deviation = relative * std::sqrt(square);
+  for (double& v : values) v = std::clamp(v + deviation * random.normal(), -limit, limit);
   if (signal == Channel::motor_torque) return;
-  for (double& v : record.column(Channel::motor_torque)) v += normal(random);
+  for (double& v : record.column(Channel::motor_torque)) v += deviation * random.normal();
 }
 
 /// Length of a record [s].
@@ -43,12 +44,8 @@ double duration_of(const RigFile& file, const Draw& d) {
 
 }  // namespace
 
-double uniform(std::mt19937_64& random) {
-  return static_cast<double>(random() >> 11) * 0x1p-53;
-}
-
 Record simulate_fine(RigFile file, const Draw& d, double duration) {
-  Rig rig = machine_of(file, d.seed);
+  Rig rig = draw_machine(file, d.seed);
   rig.mesh.backlash = d.backlash;
   SensorsSettings& sensors = file.simulation.sensors;
   sensors.sampling_rate *= kPhases;

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
@@ -17,10 +16,7 @@ struct Draw {
   std::uint64_t seed;             // of the noise
 };
 
-/// Uniform in [0, 1). Independent of std::uniform_*_distribution, whose results depend on the library.
-double uniform(std::mt19937_64& random);
-
-/// The machine that a rig file describes (machine_of, by d.seed) with the backlash of a draw: exact motion
+/// The machine that a rig file describes (draw_machine, by d.seed) with the backlash of a draw: exact motion
 /// for `duration` [s], several times finer than the sampling, so that a recorder can begin between two
 /// samples.
 Record simulate_fine(RigFile file, const Draw& d, double duration);

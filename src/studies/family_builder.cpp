@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "family_builder.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <random>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
@@ -18,9 +20,7 @@ constexpr int kMostPeriods = 20;  // of a trial's record
 
 /// Seven digits: finer than any torque sensor, and a file of half the size.
 double rounded(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6e", value);
-  return std::strtod(text, nullptr);
+  return std::strtod(fmt::format("{:.6e}", value).c_str(), nullptr);
 }
 
 /// Samples of the first `periods` periods after settling.
@@ -47,8 +47,8 @@ Trials run_trials(const CurvePlan& plan, const FineRun& run, const NoisyFamily& 
   Trials trials;
   for (int k = 0; k < kTrials; ++k) {
     const int seed = plan.request.seeds + static_cast<int>(segment) * kTrials + k;  // not those of the curve
-    std::mt19937_64 generator(static_cast<std::uint64_t>(seed));
-    const int phase = static_cast<int>(generator() % static_cast<std::uint64_t>(plan.phases));
+    Random random(static_cast<std::uint64_t>(seed));
+    const int phase = static_cast<int>(random.below(static_cast<std::size_t>(plan.phases)));
     const auto samples = settled(plan, sample(plan, run, phase, seed, noise), lengths[k % 4]);
     const FamilyDistance distance(members, quantiles_of(samples));
     trials.push_back({distance.smallest().distance, distance.at(segment, 0.5)});

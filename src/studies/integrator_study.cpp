@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/model/restitution.h"
 
 namespace backlash {
 namespace {

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/studies/minimise.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <mutex>
 #include <numeric>
-#include <random>
-#include <sstream>
-#include <thread>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/base/random.h"
 
 namespace backlash {
 namespace {
@@ -21,17 +20,6 @@ using Point = std::vector<double>;
 using Function = std::function<double(const Point&)>;
 
 constexpr double kBestShare = 0.15, kCrossover = 0.9, kLeastStep = 0.4, kMostStep = 0.9;
-
-/// Uniform numbers that are the same with every standard library.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : generator_(seed) {}
-  double uniform() { return static_cast<double>(generator_() >> 11) * 0x1p-53; }  // [0, 1)
-  std::size_t below(std::size_t n) { return static_cast<std::size_t>(uniform() * static_cast<double>(n)); }
-
- private:
-  std::mt19937_64 generator_;
-};
 
 std::vector<Point> latin_hypercube(std::size_t count, std::size_t dimensions, Random& random) {
   std::vector<Point> points(count, Point(dimensions));
@@ -49,30 +37,18 @@ std::vector<Point> latin_hypercube(std::size_t count, std::size_t dimensions, Ra
 class Evaluator {
  public:
   Evaluator(const Function& function, unsigned threads, long budget, const Progress& progress)
-      : function_(function),
-        threads_(threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency())),
-        budget_(budget),
-        progress_(progress) {}
+      : function_(function), threads_(threads), budget_(budget), progress_(progress) {}
 
   std::vector<double> operator()(const std::vector<Point>& points) {
     std::vector<double> values(points.size());
-    std::atomic<std::size_t> next{0};
-    const auto work = [&] {
-      for (std::size_t i = next++; i < points.size() && !stop_; i = next++) try {
+    for_each_in_parallel(
+        static_cast<int>(points.size()),
+        [&](int i) {
           const double value = function_(points[i]);
           values[i] = std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
           tick(values[i]);
-        } catch (...) {
-          const std::lock_guard<std::mutex> lock(mutex_);
-          if (!failure_) failure_ = std::current_exception();
-          stop_ = true;
-        }
-    };
-    std::vector<std::thread> helpers;
-    for (unsigned i = 1; i < threads_; ++i) helpers.emplace_back(work);
-    work();
-    for (std::thread& helper : helpers) helper.join();
-    if (failure_) std::rethrow_exception(failure_);
+        },
+        threads_);
     return values;
   }
 
@@ -81,14 +57,13 @@ class Evaluator {
  private:
   void tick(double value) {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (stop_) throw Cancelled();
     ++done_;
     best_ = std::min(best_, value);
-    if (!progress_ || stop_) return;
-    std::ostringstream phase;
-    phase << done_ << " of " << budget_ << ", best " << best_;
-    if (progress_(std::min(1.0, static_cast<double>(done_) / static_cast<double>(budget_)), phase.str()))
-      return;
-    stop_ = true;  // before the lock is given up, or another thread asks once more
+    if (!progress_) return;
+    const double share = std::min(1.0, static_cast<double>(done_) / static_cast<double>(budget_));
+    if (progress_(share, fmt::format("{} of {}, best {:.6g}", done_, budget_, best_))) return;
+    stop_ = true;  // nobody is asked once more
     throw Cancelled();
   }
 
@@ -98,8 +73,7 @@ class Evaluator {
   const Progress& progress_;
   double best_ = std::numeric_limits<double>::infinity();
   std::mutex mutex_;
-  std::exception_ptr failure_;
-  std::atomic<bool> stop_{false};
+  bool stop_ = false;
 };
 
 /// One trial for every member; `order` lists the members from the best on.

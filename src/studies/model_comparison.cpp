@@ -242,8 +242,10 @@ ComparedRecord compared_record(const Record& given, const Rig& rig, const Compar
 
 std::vector<ModelComparison> compare_models(const std::vector<Rig>& rigs, const ComparedRecord& record,
                                             const ComparisonSettings& settings, const Progress& progress) {
-  OutputErrorSettings fit;
+  if (rigs.empty()) return {};
+  FitSettings fit;
   fit.cutoff = settings.cutoff;
+  fit = with_bands(fit, load_side(rigs.front()), {record.data});  // the same bands for all
   std::vector<ModelComparison> results(rigs.size());
   double done = 0;
   const auto step = [&](const std::string& phase) {

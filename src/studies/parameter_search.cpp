@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/studies/parameter_search.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/rig_file/yaml_edit.h"
+#include "backlash_diagnosis/rig_file/rig_document.h"
 
 namespace backlash {
 namespace {
@@ -143,12 +144,6 @@ Candidate judge(const SearchFile& search, const RigFile& file) {
   return best;
 }
 
-std::string shown(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
-
 /// One coordinate per parameter from those of the search, which has none for a fixed parameter (here 0.5).
 std::vector<double> all_coordinates(const SearchFile& search, const std::vector<double>& x) {
   std::vector<double> all;
@@ -172,27 +167,19 @@ std::string comment_of(const FreeParameter& p) {
   return p.comment + " [" + how + "]";
 }
 
-std::string rig_with(const SearchFile& search, const std::vector<double>& x) {
-  std::string text = search.rig_text;
+RigDocument rig_with(const SearchFile& search, const std::vector<double>& x) {
+  RigDocument rig(search.rig_text, search.source + ": rig");
   const std::vector<std::string> values = values_at(search, x);
   for (std::size_t i = 0; i < values.size(); ++i)
-    text = with_yaml_value(text, search.rig_source, search.parameters[i].key, values[i],
-                           comment_of(search.parameters[i]));
-  return text;
+    rig.set(search.parameters[i].key, values[i], comment_of(search.parameters[i]));
+  return rig;
 }
 
-/// Without the comments before the first key: they tell of the rig that the search began with.
-std::string without_head(const std::string& text) {
-  std::size_t at = 0;
-  while (at < text.size() && (text[at] == '#' || text[at] == '\n')) at = text.find('\n', at) + 1;
-  return text.substr(at);
-}
-
-std::string with_layout(std::string text, const std::string& source, const ApdLayout& layout) {
+void set_layout(RigDocument& rig, const ApdLayout& layout) {
   const std::string how = "[searched]";
-  text = with_yaml_value(text, source, "diagnosis.apd.classes", std::to_string(layout.classes), how);
-  text = with_yaml_value(text, source, "diagnosis.apd.lower", to_text(layout.lower), "N m " + how);
-  return with_yaml_value(text, source, "diagnosis.apd.upper", to_text(layout.upper), "N m " + how);
+  rig.set("diagnosis.apd.classes", std::to_string(layout.classes), how);
+  rig.set("diagnosis.apd.lower", to_text(layout.lower), "N m " + how);
+  rig.set("diagnosis.apd.upper", to_text(layout.upper), "N m " + how);
 }
 
 FreeParameter read_parameter(const YamlReader& yaml) {
@@ -249,7 +236,8 @@ std::string beside(const std::string& path, const std::string& file) {
 std::string FreeParameter::value(double u) const {
   if (!choices.empty())
     return choices[std::min(static_cast<std::size_t>(u * choices.size()), choices.size() - 1)];
-  return shown(logarithmic ? lower * std::pow(upper / lower, u) : lower + u * (upper - lower));
+  return fmt::format("{:.4g}",
+                     logarithmic ? lower * std::pow(upper / lower, u) : lower + u * (upper - lower));
 }
 
 SearchFile load_search_file(const std::string& path) {
@@ -304,10 +292,7 @@ CurveFit fit_of(const RigFile& file, const CurveTarget& target) {
 }
 
 SearchResult search_parameters(const SearchFile& search, const Progress& progress) {
-  const std::string name = search.source + ": rig";
-  const auto judged = [&](const std::vector<double>& x) {
-    return judge(search, rig_file_from_text(rig_with(search, x), name));
-  };
+  const auto judged = [&](const std::vector<double>& x) { return judge(search, rig_with(search, x).read()); };
   const auto objective = [&](const std::vector<double>& x) {
     try {
       return judged(x).value;
@@ -319,12 +304,15 @@ SearchResult search_parameters(const SearchFile& search, const Progress& progres
                                         [](const FreeParameter& p) { return !p.fixed(); });
   const MinimiseResult found = minimise(objective, dimensions, search.minimise, progress);
   SearchResult result;
-  result.rig_text = with_layout(without_head(rig_with(search, found.x)), name, judged(found.x).layout);
+  RigDocument best = rig_with(search, found.x);
+  best.drop_head();  // it tells of the rig that the search began with
+  set_layout(best, judged(found.x).layout);
+  result.rig_text = best.text();
   result.values = values_at(search, found.x);
   const std::vector<double> all = all_coordinates(search, found.x);
   for (std::size_t i = 0; i < all.size(); ++i)
     result.at_bound.push_back(search.parameters[i].choices.empty() && std::fabs(all[i] - 0.5) > 0.49);
-  result.fit = fit_of(rig_file_from_text(result.rig_text, name), search.target);
+  result.fit = fit_of(best.read(), search.target);
   result.evaluations = found.evaluations;
   result.history = found.history;
   return result;

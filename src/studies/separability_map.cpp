@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "drawn_record.h"
 
@@ -35,13 +36,11 @@ void check(const RigFile& file, const MonitoringCurve& curve, const std::vector<
 
 /// What changes from record to record, the same in every cell: levels then differ by the disturbance alone.
 Draw draw(const SeparabilityRequest& request, double period, int record) {
-  std::seed_seq sequence{static_cast<std::uint32_t>(request.seed),
-                         static_cast<std::uint32_t>(request.seed >> 32), static_cast<std::uint32_t>(record)};
-  std::mt19937_64 random(sequence);
+  Random random(request.seed, static_cast<std::uint32_t>(record));
   Draw d{};
   d.periods = request.periods;
-  d.start = period * uniform(random);
-  d.seed = random();
+  d.start = period * random.uniform();
+  d.seed = random.bits();
   return d;
 }
 

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "backlash_diagnosis/base/error.h"
-
 namespace backlash {
 namespace {
 
@@ -54,19 +52,6 @@ Tooth read_tooth(const YamlReader& yaml) {
   if (tooth.distance > tooth.gap) yaml.fail("distance", "must be <= gap");
   if (!(tooth.start_energy() > 0)) yaml.fail("speed", "must be > 0 where no force drives the tooth");
   return tooth;
-}
-
-double hunt_crossley_restitution(double alpha_speed) {
-  if (!(alpha_speed >= 0) || !std::isfinite(alpha_speed))
-    throw InvalidParameter("alpha v", alpha_speed, "must be >= 0 and finite");
-  const double d = 1.5 * alpha_speed;
-  if (d < 1e-6) return 1 - alpha_speed;  // the next term is of the order d^2
-  double low = 0, high = std::min(1.0, 1 / d);
-  for (int i = 0; i < 100; ++i) {
-    const double e = 0.5 * (low + high);
-    (d * (1 + e) > std::log1p(d) - std::log1p(-e * d) ? low : high) = e;
-  }
-  return 0.5 * (low + high);
 }
 
 const char* to_string(AbsoluteTolerance kind) {

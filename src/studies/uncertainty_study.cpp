@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "drawn_record.h"
 
@@ -17,17 +17,14 @@ namespace {
 constexpr double kMisses = 2;  // widths of an interval beyond which a miss was confident
 
 Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
-  std::seed_seq sequence{static_cast<std::uint32_t>(request.seed),
-                         static_cast<std::uint32_t>(request.seed >> 32), static_cast<std::uint32_t>(index)};
-  std::mt19937_64 random(sequence);
+  Random random(request.seed, static_cast<std::uint32_t>(index));
   Draw d{};
-  d.backlash = request.max_backlash * uniform(random);
-  d.noise =
-      request.noise[static_cast<std::size_t>(uniform(random) * static_cast<double>(request.noise.size()))];
-  d.start = period * uniform(random);
+  d.backlash = request.max_backlash * random.uniform();
+  d.noise = request.noise[random.below(request.noise.size())];
+  d.start = period * random.uniform();
   d.periods = request.fewest_periods +
-              static_cast<int>(uniform(random) * (request.most_periods - request.fewest_periods + 1));
-  d.seed = random();
+              static_cast<int>(random.uniform() * (request.most_periods - request.fewest_periods + 1));
+  d.seed = random.bits();
   return d;
 }
 

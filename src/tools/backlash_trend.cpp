@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/base/utc.h"
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/diagnosis/trend.h"
+#include "backlash_diagnosis/report/json_number.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -147,15 +148,6 @@ Inputs read_inputs(const Arguments& arguments) {
   return in;
 }
 
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
-Json interval(double lower, double upper) {
-  if (!std::isfinite(lower) && !std::isfinite(upper)) return nullptr;
-  return Json::array({number(lower), number(upper)});
-}
-
 Json date(double time) {
   const std::string text = std::isfinite(time) ? utc_time(time) : "";
   return text.empty() ? Json(nullptr) : Json(text);
@@ -165,9 +157,9 @@ Json crossing_json(const Trend& trend) {
   if (!trend.reaches) return nullptr;
   const Trend::Crossing& c = *trend.reaches;
   Json json;
-  json["time"] = number(c.time);
+  json["time"] = json_number(c.time);
   json["date"] = date(c.time);
-  json["interval"] = interval(c.earliest, c.latest);
+  json["interval"] = json_interval(c.earliest, c.latest);
   json["date_interval"] = Json::array({date(c.earliest), date(c.latest)});
   return json;
 }
@@ -187,8 +179,8 @@ Json series_json(const Inputs& in) {
     const HistoryEntry& e = *shown[i];
     json["time"].push_back(e.time);
     json["value"].push_back(in.value(e));
-    json["interval"].push_back(in.angular ? interval(e.angle_lower, e.angle_upper)
-                                          : interval(e.lower, e.upper));
+    json["interval"].push_back(in.angular ? json_interval(e.angle_lower, e.angle_upper)
+                                          : json_interval(e.lower, e.upper));
   }
   return json;
 }
@@ -210,10 +202,10 @@ Json report(const Inputs& in, const Trend& trend, const std::string& path) {
   json["known"] = trend.known;
   json["grows"] = trend.grows;
   json["exceeded"] = trend.exceeded;
-  json["rate"] = number(trend.rate);
-  json["rate_interval"] = interval(trend.rate_lower, trend.rate_upper);
-  json["level"] = number(trend.level);
-  json["time"] = number(trend.time);
+  json["rate"] = json_number(trend.rate);
+  json["rate_interval"] = json_interval(trend.rate_lower, trend.rate_upper);
+  json["level"] = json_number(trend.level);
+  json["time"] = json_number(trend.time);
   json["date"] = date(trend.time);
   json["reaches"] = crossing_json(trend);
   json["message"] = trend.message;

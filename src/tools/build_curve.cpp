@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Builds a monitoring curve and, where asked, its plot.
+#include <fmt/core.h>
+
 #include <iostream>
-#include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -58,20 +59,13 @@ CurveRequest read_request(const Arguments& arguments) {
   return request;
 }
 
-/// Six digits are enough for people; the file has all.
-std::string shown(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-
 void tell(const MonitoringCurve& curve, const std::string& out) {
   const char* unit = curve.conditions.angular ? " rad" : " m";
   const CurvePoint &first = curve.points.front(), &last = curve.points.back();
-  std::cout << out << ": skewness " << shown(curve.nominal(first).mean) << " at backlash "
-            << shown(first.backlash) << unit << " to " << shown(curve.nominal(last).mean) << " at "
-            << shown(last.backlash) << unit << ", " << curve.points.size() << " points, "
-            << shown(curve.conditions.sampling_rate) << " Hz\n";
+  std::cout << fmt::format(
+      "{0}: skewness {2:.6g} at backlash {3:.6g}{1} to {4:.6g} at {5:.6g}{1}, {6} points, {7:.6g} Hz\n", out,
+      unit, curve.nominal(first).mean, first.backlash, curve.nominal(last).mean, last.backlash,
+      curve.points.size(), curve.conditions.sampling_rate);
   if (curve.flat()) {
     std::cerr << "build_curve: the skewness of " << curve.conditions.signal
               << " does not depend on backlash: no backlash can be told from it (flat curve)\n";
@@ -79,7 +73,7 @@ void tell(const MonitoringCurve& curve, const std::string& out) {
   }
   std::vector<std::string> rising;
   for (const CurvePoint& point : curve.points)
-    if (!point.monotonic) rising.push_back(shown(point.backlash));
+    if (!point.monotonic) rising.push_back(fmt::format("{:.6g}", point.backlash));
   if (!rising.empty())
     std::cerr << "build_curve: not monotonic, flagged in the curve, at backlash [" << (unit + 1)
               << "]: " << joined(rising) << '\n';

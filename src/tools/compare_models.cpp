@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How well several models of a machine say what a record of it shows: table, JSON and picture.
+#include <fmt/core.h>
+
 #include <cmath>
 #include <iomanip>
 #include <iostream>
@@ -7,6 +9,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/report/json_number.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/studies/model_comparison.h"
 #include "tools/common/command_line.h"
@@ -51,28 +54,20 @@ Command command() {
   return c;
 }
 
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
 /// Shortest decimals that keep six digits: enough for a plot.
 Json numbers(const std::vector<double>& values) {
   Json list = Json::array();
-  for (const double value : values) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", value);
-    list.push_back(std::isfinite(value) ? Json(std::stod(text)) : Json(nullptr));
-  }
+  for (const double value : values) list.push_back(json_number(std::stod(fmt::format("{:.6g}", value))));
   return list;
 }
 
 Json to_json(const Channels& channels) {
   Json json;
   for (const auto& [name, c] : channels)
-    json[name] = {{"error", number(c.error)},
-                  {"floor", number(c.floor)},
-                  {"rms", number(c.rms)},
-                  {"peak", number(c.peak)},
+    json[name] = {{"error", json_number(c.error)},
+                  {"floor", json_number(c.floor)},
+                  {"rms", json_number(c.rms)},
+                  {"peak", json_number(c.peak)},
                   {"unit", c.unit}};
   return json;
 }
@@ -80,21 +75,21 @@ Json to_json(const Channels& channels) {
 Json to_json(const ModelComparison& m, const RigFile& file) {
   Json peaks = Json::array();
   for (const EngagementPeak& p : m.peaks)
-    peaks.push_back({{"measured", number(p.measured)},
-                     {"predicted", number(p.predicted)},
-                     {"measured_frequency", number(p.measured_frequency)},
-                     {"predicted_frequency", number(p.predicted_frequency)},
-                     {"measured_damping_ratio", number(p.measured_damping_ratio)},
-                     {"predicted_damping_ratio", number(p.predicted_damping_ratio)}});
+    peaks.push_back({{"measured", json_number(p.measured)},
+                     {"predicted", json_number(p.predicted)},
+                     {"measured_frequency", json_number(p.measured_frequency)},
+                     {"predicted_frequency", json_number(p.predicted_frequency)},
+                     {"measured_damping_ratio", json_number(p.measured_damping_ratio)},
+                     {"predicted_damping_ratio", json_number(p.predicted_damping_ratio)}});
   return {{"rig", file.source},
           {"name", file.rig.name},
           {"rig_digest", file.digest},
-          {"encoder_offset", number(m.calibration.encoder_offset)},
+          {"encoder_offset", json_number(m.calibration.encoder_offset)},
           {"followed", to_json(m.followed)},
           {"free", to_json(m.free)},
-          {"peak_ratio", number(m.peak_ratio)},
-          {"frequency_ratio", number(m.frequency_ratio)},
-          {"damping_ratio", number(m.damping_ratio)},
+          {"peak_ratio", json_number(m.peak_ratio)},
+          {"frequency_ratio", json_number(m.frequency_ratio)},
+          {"damping_ratio", json_number(m.damping_ratio)},
           {"peaks", peaks},
           {"traces",
            {{"deflection", numbers(m.traces.deflection)},

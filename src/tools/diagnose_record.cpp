@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/diagnosis/healthy_machine.h"
+#include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/report/diagnosis_page.h"
 #include "backlash_diagnosis/report/diagnosis_report.h"
@@ -270,8 +270,7 @@ int diagnose_record(const Arguments& arguments) {
                          ? diagnose(*in.last_periods, in.settings, report.curve, in.baseline, in.method)
                          : diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);
-  const std::string json =
-      to_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  const std::string json = diagnosis_json(report);
   if (out == kStandardOutput) {
     std::cout << json;
   } else {

@@ -2,8 +2,9 @@
 // Geometry and mesh stiffness of a pair of spur gears, from shim to backlash and back.
 #include "backlash_diagnosis/model/gear_geometry.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
-#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -227,15 +228,13 @@ Json stiffness_to_json(const GearPair& pair, MeshStiffnessSettings settings) {
 }
 
 template <typename... Values>
-void line(const char* format, Values... values) {
-  char text[200];
-  std::snprintf(text, sizeof text, format, values...);
-  std::cout << text << '\n';
+void line(const char* format, const Values&... values) {
+  std::cout << fmt::format(fmt::runtime(format), values...) << '\n';
 }
 
 void print_rig(const Json& json) {
   const auto one = [](const char* name, double value, int digits) {
-    line("%-34s%12.*f", name, digits, value);
+    line("{:<34}{:12.{}f}", name, value, digits);
   };
   if (json.contains("bracket")) one("stop setting [um]", 1e6 * json["geometry"]["stop"].get<double>(), 2);
   if (!json.contains("resolution")) return;
@@ -244,10 +243,10 @@ void print_rig(const Json& json) {
 }
 
 void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffness) {
-  line("%-34s%12s%12s", "", "pinion", "gear");
-  line("%-34s%12d%12d", "teeth", pair.pinion.teeth, pair.gear.teeth);
+  line("{:<34}{:>12}{:>12}", "", "pinion", "gear");
+  line("{:<34}{:12}{:12}", "teeth", pair.pinion.teeth, pair.gear.teeth);
   const auto both = [](const char* name, double pinion, double gear) {
-    line("%-34s%12.4f%12.4f", name, 1e3 * pinion, 1e3 * gear);
+    line("{:<34}{:12.4f}{:12.4f}", name, 1e3 * pinion, 1e3 * gear);
   };
   both("reference radius [mm]", g.pinion.reference_radius, g.gear.reference_radius);
   both("base radius [mm]", g.pinion.base_radius, g.gear.base_radius);
@@ -255,7 +254,7 @@ void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffne
   both("operating pitch radius [mm]", g.pinion.operating_radius, g.gear.operating_radius);
   line("");
   const auto one = [](const char* name, double value, int digits) {
-    line("%-34s%12.*f", name, digits, value);
+    line("{:<34}{:12.{}f}", name, value, digits);
   };
   one("centre distance [mm]", 1e3 * g.centre_distance, 4);
   one("  change (shim) [um]", 1e6 * pair.centre_distance_change, 2);
@@ -268,16 +267,16 @@ void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffne
   one("  small-change form [um]", 1e6 * small_change_play(pair), 2);
   one("backlash, pitch circle [um]", 1e6 * g.pitch_circle_backlash, 2);
   const auto angle = [](const char* name, double value) {
-    line("%-34s%12.4f%12.4f deg", name, 1e3 * value, value / kDegree);
+    line("{:<34}{:12.4f}{:12.4f} deg", name, 1e3 * value, value / kDegree);
   };
   angle("backlash at the pinion [mrad]", g.pinion_backlash_angle());
   angle("backlash at the gear [mrad]", g.gear_backlash_angle());
-  line("\nmean mesh stiffness, face width %g mm", 1e3 * stiffness["face_width"].get<double>());
+  line("\nmean mesh stiffness, face width {:g} mm", 1e3 * stiffness["face_width"].get<double>());
   for (const auto& [law, value] : stiffness["laws"].items()) {
     if (value["mean"].is_null())
       std::cout << "  " << law << ": " << value["reason"].get<std::string>() << '\n';
     else
-      line("  %-32s%12.3g N/m", law.c_str(), value["mean"].get<double>());
+      line("  {:<32}{:12.3g} N/m", law, value["mean"].get<double>());
   }
 }
 
@@ -310,7 +309,7 @@ Json report(const Request& request, bool print, bool& faults) {
   }
   json["table"] = Json::array();
   if (print)
-    line("%10s%13s%9s%15s%19s%15s%14s", "shim [um]", "angle [deg]", "eps [-]", "backlash [um]",
+    line("{:>10}{:>13}{:>9}{:>15}{:>19}{:>15}{:>14}", "shim [um]", "angle [deg]", "eps [-]", "backlash [um]",
          "small-change [um]", "pitch c. [um]", "pinion [deg]");
   for (int i = 0; i < request.rows; ++i) {
     const GearPair pair = pair_at(request, request.last * i / (request.rows - 1));
@@ -318,7 +317,7 @@ Json report(const Request& request, bool print, bool& faults) {
     json["table"].push_back(to_json(pair, g, request.bracket));
     faults = faults || !g.faults.empty();
     if (print)
-      line("%10.2f%13.3f%9.3f%15.2f%19.2f%15.2f%14.4f%s", 1e6 * pair.centre_distance_change,
+      line("{:10.2f}{:13.3f}{:9.3f}{:15.2f}{:19.2f}{:15.2f}{:14.4f}{}", 1e6 * pair.centre_distance_change,
            g.operating_pressure_angle / kDegree, g.contact_ratio, 1e6 * g.backlash,
            1e6 * small_change_play(pair), 1e6 * g.pitch_circle_backlash, g.pinion_backlash_angle() / kDegree,
            g.faults.empty() ? "" : "  does not run");

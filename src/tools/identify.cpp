@@ -80,11 +80,8 @@ int identify_machine(const Arguments& arguments) {
   for (const Record& record : records)
     for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);
   write_text(arguments.text("out"), fitted_rig_text(file, found));
-  auto json = to_json(found);
-  json["rig"] = arguments.text("rig");
-  json["records"] = arguments.positionals();
   write_text(arguments.text("json"),
-             json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+             identification_json(found, arguments.text("rig"), arguments.positionals()));
   print_summary(found, std::cout);
   std::cout.flush();
   if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));

@@ -9,6 +9,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/report/json_number.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"
@@ -50,14 +51,10 @@ Command command() {
   return c;
 }
 
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
 Json errors_json(const ToothErrors& e) {
-  return {{"restitution", number(e.restitution)}, {"loop_area", number(e.loop_area)},
-          {"energy", number(e.energy)},           {"energy_gain", number(e.energy_gain)},
-          {"opposite", number(e.opposite)},       {"motion", number(e.motion)}};
+  return {{"restitution", json_number(e.restitution)}, {"loop_area", json_number(e.loop_area)},
+          {"energy", json_number(e.energy)},           {"energy_gain", json_number(e.energy_gain)},
+          {"opposite", json_number(e.opposite)},       {"motion", json_number(e.motion)}};
 }
 
 Json tooth_json(const Tooth& tooth, const ToothReference& reference, const IntegratorStudy& study) {
@@ -66,13 +63,13 @@ Json tooth_json(const Tooth& tooth, const ToothReference& reference, const Integ
                {"duration", tooth.duration},
                {"impact_speed", reference.impact_speed},
                {"depth", reference.depth},
-               {"restitution", number(reference.restitution)},
+               {"restitution", json_number(reference.restitution)},
                {"reference_agreement", reference.agreement},
-               {"reference_restitution_error", number(reference.restitution_error)}};
+               {"reference_restitution_error", json_number(reference.restitution_error)}};
   for (const AbsoluteTolerance kind : kKinds)
     for (const std::string& method : integrator_methods())
       json["right_from"][to_string(kind)][method] =
-          number(study.right_from(tooth.name, method, kind, kRight));
+          json_number(study.right_from(tooth.name, method, kind, kRight));
   for (const ToothRow& row : study.rows)
     if (row.tooth == tooth.name)
       json["runs"].push_back({{"method", row.method},
@@ -93,7 +90,7 @@ Json tooth_json(const Tooth& tooth, const ToothReference& reference, const Integ
 }
 
 Json point_json(const WorkPoint& p) {
-  return {{"method", p.method},           {"tolerance", p.tolerance}, {"error", number(p.error)},
+  return {{"method", p.method},           {"tolerance", p.tolerance}, {"error", json_number(p.error)},
           {"evaluations", p.evaluations}, {"steps", p.steps},         {"cpu_time", p.cpu_time}};
 }
 
@@ -105,7 +102,7 @@ Json work_json(const WorkPrecision& work) {
     for (const auto& [name, cost] : kCosts) {
       at["cheapest"][name] = work.cheapest(level, cost);
       for (const std::string& method : integrator_methods())
-        at[name][method] = number(work.cost(method, level, cost));
+        at[name][method] = json_number(work.cost(method, level, cost));
     }
     json["cost"].push_back(at);
   }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Searches the unprinted parameters of a published monitoring curve.
+#include <fmt/core.h>
+
 #include <cmath>
-#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -9,6 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/report/json_number.h"
 #include "backlash_diagnosis/studies/parameter_search.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -49,19 +51,15 @@ Command command() {
   return c;
 }
 
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
 Json points_json(const std::vector<CurveFit::Point>& points) {
   Json list = Json::array();
   for (const CurveFit::Point& p : points)
     list.push_back({{"backlash", p.backlash},
-                    {"skewness", number(p.skewness)},
-                    {"lowest", number(p.lowest)},
-                    {"highest", number(p.highest)},
-                    {"highest_class", number(p.highest_class)},
-                    {"largest_torque", number(p.largest_torque)}});
+                    {"skewness", json_number(p.skewness)},
+                    {"lowest", json_number(p.lowest)},
+                    {"highest", json_number(p.highest)},
+                    {"highest_class", json_number(p.highest_class)},
+                    {"largest_torque", json_number(p.largest_torque)}});
   return list;
 }
 
@@ -70,8 +68,8 @@ Json fit_json(const CurveFit& fit, const CurveTarget& target) {
   json["published"] = points_json(fit.published);
   for (std::size_t i = 0; i < target.skewness.size(); ++i)
     json["published"][i]["published_skewness"] = target.skewness[i];
-  json["rms"] = number(fit.rms);
-  json["rise"] = number(fit.rise);
+  json["rms"] = json_number(fit.rms);
+  json["rise"] = json_number(fit.rise);
   json["rise_at"] = fit.rise_at;
   json["curve"] = points_json(fit.curve);
   return json;
@@ -92,7 +90,7 @@ Json result_json(const SearchFile& search, const SearchResult& result) {
     json["parameters"].push_back(entry);
   }
   for (const auto& step : result.history)
-    json["history"].push_back({{"evaluations", step.evaluations}, {"best", number(step.value)}});
+    json["history"].push_back({{"evaluations", step.evaluations}, {"best", json_number(step.value)}});
   return json;
 }
 
@@ -118,10 +116,8 @@ void tell(const CurveFit& fit, const CurveTarget& target) {
   std::cout << "half gap [um]  published  achieved  highest class [%]  largest torque [N m]\n";
   for (std::size_t i = 0; i < fit.published.size(); ++i) {
     const CurveFit::Point& p = fit.published[i];
-    char line[120];
-    std::snprintf(line, sizeof line, "%13.1f  %9.4f  %8.4f  %17.1f  %20.3f\n", 0.5e6 * p.backlash,
-                  target.skewness[i], p.skewness, p.highest_class, p.largest_torque);
-    std::cout << line;
+    std::cout << fmt::format("{:13.1f}  {:9.4f}  {:8.4f}  {:17.1f}  {:20.3f}\n", 0.5e6 * p.backlash,
+                             target.skewness[i], p.skewness, p.highest_class, p.largest_torque);
   }
   std::cout << "rms " << fit.rms << "; largest rise " << fit.rise << " on " << fit.curve.size()
             << " points up to " << target.max_backlash << " m\n";

@@ -2,16 +2,18 @@
 // Where skewness can separate backlash from noise, friction and load: table, JSON and picture.
 #include "backlash_diagnosis/studies/separability_map.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <iostream>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/report/json_number.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -61,10 +63,6 @@ Command command() {
   return c;
 }
 
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
 /// A table [level][backlash] of what `get` takes from a cell.
 template <typename Get>
 Json table(const SeparabilityMap& map, const Get& get) {
@@ -83,14 +81,14 @@ Json map_json(const SeparabilityMap& map, const std::vector<std::string>& method
                {"axis", map.disturbance.axis},
                {"none", map.disturbance.none},
                {"levels", map.disturbance.levels},
-               {"skewness", table(map, [](const Cell& c) { return number(c.skewness); })},
-               {"equivalent", table(map, [](const Cell& c) { return number(c.equivalent); })}};
+               {"skewness", table(map, [](const Cell& c) { return json_number(c.skewness); })},
+               {"equivalent", table(map, [](const Cell& c) { return json_number(c.equivalent); })}};
   for (std::size_t m = 0; m < methods.size(); ++m)
     json["methods"][methods[m]] = {
         {"right", table(map, [m](const Cell& c) { return c.answers[m].right; })},
         {"wrong", table(map, [m](const Cell& c) { return c.answers[m].wrong; })},
         {"refused", table(map, [m](const Cell& c) { return c.answers[m].refused; })},
-        {"error", table(map, [m](const Cell& c) { return number(c.answers[m].error); })},
+        {"error", table(map, [m](const Cell& c) { return json_number(c.answers[m].error); })},
         {"status", table(map, [m](const Cell& c) { return to_string(c.answers[m].status); })},
         {"reason", table(map, [m](const Cell& c) { return c.answers[m].reason; })}};
   return json;
@@ -99,7 +97,7 @@ Json map_json(const SeparabilityMap& map, const std::vector<std::string>& method
 Json to_json(const Separability& all, const RigFile& file, const MonitoringCurve& curve,
              const std::string& curve_source, const SeparabilityRequest& request) {
   Json resolution = Json::array();
-  for (const double r : all.resolution) resolution.push_back(number(r));
+  for (const double r : all.resolution) resolution.push_back(json_number(r));
   Json json = {{"schema_version", 1},
                {"version", version()},
                {"rig", file.rig.name},
@@ -111,7 +109,7 @@ Json to_json(const Separability& all, const RigFile& file, const MonitoringCurve
                {"records", request.records},
                {"noise", request.noise},
                {"seed", request.seed},
-               {"slope", number(all.slope)},
+               {"slope", json_number(all.slope)},
                {"backlash", all.backlash},
                {"resolution", resolution}};
   for (const SeparabilityMap& map : all.maps) json["maps"].push_back(map_json(map, all.methods));
@@ -124,10 +122,8 @@ std::string span(const std::vector<SeparabilityCell>& row, double unit) {
     low = std::fmin(low, cell.equivalent);
     high = std::fmax(high, cell.equivalent);
   }
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(1) << std::showpos;
-  if (low <= high) text << low / unit + 0.0 << " .. " << high / unit + 0.0;  // no "-0.0"
-  return low <= high ? text.str() : "-";
+  if (!(low <= high)) return "-";
+  return fmt::format("{:+.1f} .. {:+.1f}", low / unit + 0.0, high / unit + 0.0);  // no "-0.0"
 }
 
 /// Shares of the records, and the largest error of a cell that was not refused.
@@ -139,14 +135,9 @@ std::string outcome(const std::vector<SeparabilityCell>& row, std::size_t method
     worst = std::fmax(worst, std::fabs(a.error));
   }
   const double percent = 100 / (right + wrong + refused);
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(0) << std::setw(3) << percent * right << " /" << std::setw(4)
-       << percent * wrong << " /" << std::setw(4) << percent * refused << std::setw(8);
-  if (std::isnan(worst))
-    text << "-";
-  else
-    text << std::setprecision(1) << worst / unit;
-  return text.str();
+  const std::string largest = std::isnan(worst) ? "-" : fmt::format("{:.1f}", worst / unit);
+  return fmt::format("{:3.0f} /{:4.0f} /{:4.0f}{:>8}", percent * right, percent * wrong, percent * refused,
+                     largest);
 }
 
 void tell(const Separability& all, bool angular) {

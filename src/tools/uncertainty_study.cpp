@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/report/json_number.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -50,19 +51,15 @@ Command command() {
   return c;
 }
 
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
 Json row_json(const StudyRow& row) {
   return {{"method", row.method},
           {"records", row.trials},
           {"told", row.told},
-          {"median_error", number(row.median_error)},
-          {"p95_error", number(row.p95_error)},
-          {"median_width", number(row.median_width)},
-          {"coverage", number(row.coverage)},
-          {"cannot_tell", number(row.cannot_tell)},
+          {"median_error", json_number(row.median_error)},
+          {"p95_error", json_number(row.p95_error)},
+          {"median_width", json_number(row.median_width)},
+          {"coverage", json_number(row.coverage)},
+          {"cannot_tell", json_number(row.cannot_tell)},
           {"confident_misses", row.confident_misses}};
 }
 
@@ -129,8 +126,8 @@ Json trials_json(const std::vector<StudyTrial>& trials) {
                  {"position", trial.position}};
     for (const Estimate& e : trial.estimates)
       json["estimates"][e.method] = {{"status", to_string(e.status)},
-                                     {"backlash", number(e.backlash)},
-                                     {"interval", {number(e.lower), number(e.upper)}}};
+                                     {"backlash", json_number(e.backlash)},
+                                     {"interval", {json_number(e.lower), json_number(e.upper)}}};
     all.push_back(std::move(json));
   }
   return all;
@@ -181,7 +178,8 @@ int study(const Arguments& arguments) {
   Json json = {{"schema_version", 1},  {"version", version()},       {"rig", rig},
                {"seed", request.seed}, {"records", request.records}, {"max_backlash", request.max_backlash}};
   for (const Table& table : tables) {
-    Json entry = {{"position", table.position}, {"half_gap", table.half_gap}, {"noise", number(table.noise)}};
+    Json entry = {
+        {"position", table.position}, {"half_gap", table.half_gap}, {"noise", json_number(table.noise)}};
     for (const StudyRow& row : table.rows) entry["rows"].push_back(row_json(row));
     json["tables"].push_back(std::move(entry));
     print(table);

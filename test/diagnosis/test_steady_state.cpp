@@ -20,7 +20,7 @@ double signal(long k) {
 
 TEST(SteadyState, TheCountIsReal) {
   test::AllocationCount count;
-  double* volatile place = new double(1);  // a compiler may leave out what nobody sees
+  double* volatile place = new double(1);  // volatile: a pair that nobody sees may be left out
   delete place;
   EXPECT_EQ(count.stop(), 1);
 }

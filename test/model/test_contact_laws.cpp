@@ -283,7 +283,8 @@ TEST(ContactLaws, RefusalNamesParameterValueAndLimit) {
 TEST(ContactLaws, ReadFromYaml) {
   const YamlReader yaml =
       YamlReader::from_text("{law: hunt_crossley, stiffness: 1e8, exponent: 1.5, alpha: 0.5}", "t");
-  EXPECT_NEAR(read_contact_law(yaml)->force(1e-4, 0.2, 0), 115, 1e-12);
+  const ContactSpec spec = read_contact_spec(yaml);
+  EXPECT_NEAR(make_contact_law(spec.law, spec.values)->force(1e-4, 0.2, 0), 115, 1e-12);
   EXPECT_NO_THROW(yaml.finish());
 }
 

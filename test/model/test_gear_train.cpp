@@ -369,8 +369,8 @@ TEST(GearTrain, RefusesMasslessPartsAndAMeshWithoutLaw) {
   EXPECT_EQ(message(negative), "backlash = -1e-06: must be >= 0 and finite");
 }
 
-// The equations are written twice, for trains that only their teeth make other than linear and for all
-// others.
+// The same equations, with a layout that the compiler knows where the train is smooth and with one that it
+// does not elsewhere.
 TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> angle(-0.01, 0.01), speed(-0.5, 0.5);

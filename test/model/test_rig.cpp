@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/rig.h"
 #include "support/data.h"
+#include "support/rig_changes.h"
 
 namespace backlash {
 namespace {
@@ -317,6 +318,23 @@ TEST(Rig, ShippedSarkarRigHoldsTheStatedParameters) {
   EXPECT_NEAR(rig.mesh.base_radius, 0.5 * 0.03175 * std::cos(20 * M_PI / 180), 1e-6);  // given in um, cut off
   EXPECT_TRUE(rig.link_locked);
   EXPECT_EQ(GearTrain(rig).dof(), 3);
+}
+
+TEST(Rig, EqualsTheSameMachineMadeAgainAndNoOther) {
+  const Rig rig = parse(kRig);
+  EXPECT_TRUE(rig == parse(kRig));
+  for (const test::RigChange& change : test::rig_changes()) {
+    Rig other = parse(kRig);
+    change.apply(other);
+    EXPECT_FALSE(rig == other) << change.member;
+  }
+  Rig other = rig;
+  other.terms.pop_back();
+  EXPECT_FALSE(rig == other);
+  other = rig;
+  other.terms.back() = make_term("gravity", {{"amplitude", 2}, {"phase", 0.1}});
+  EXPECT_FALSE(rig == other);
+  EXPECT_FALSE(rig == without_load(rig)) << "a contact law that no file names";
 }
 
 }  // namespace

@@ -55,9 +55,9 @@ TEST(Record, TellsByAnyTorquePositionCurrentOrAcceleration) {
     record.column(channel) = {1};
     const bool rate_or_reference = channel == Channel::motor_velocity || channel == Channel::load_velocity ||
                                    channel == Channel::reference_position;
-    EXPECT_EQ(record.tells(), !rate_or_reference) << channel_name(channel);
+    EXPECT_EQ(record.can_show_backlash(), !rate_or_reference) << channel_name(channel);
   }
-  EXPECT_FALSE(Record().tells());
+  EXPECT_FALSE(Record().can_show_backlash());
 }
 
 TEST(Record, UnknownChannelIsNamedWithTheKnownOnes) {

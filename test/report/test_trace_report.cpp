@@ -72,6 +72,7 @@ Trace trace() {
   e.test_error_after = 0.004;
   e.equivalent_to = {"asymmetric_viscous"};
   t.steps = {e};
+  t.rejected = {{"cogging", "others explain it"}};
   t.independence = {{"torque", "motor_velocity", 0.61, 0.012}};
   t.warnings = {"b.csv: 3 gaps"};
   t.series = series();
@@ -104,6 +105,7 @@ TEST(TraceReport, JsonIsTheContract) {
   EXPECT_EQ(step["choices"]["body"], "motor");
   EXPECT_EQ(step["terms"][0], (Json{{"id", "quadratic_drag"}, {"body", "motor"}, {"drag", 2.0}}));
   EXPECT_TRUE(json["unexplained"].is_null());
+  EXPECT_EQ(json["rejected"], (Json{{{"effect", "cogging"}, {"reason", "others explain it"}}}));
   EXPECT_EQ(json["parameters"]["motor_inertia"]["standard_error"], 0.0123);
   EXPECT_EQ(json["base_parameters"]["motor_inertia"]["value"], 6.2);
   EXPECT_EQ(json["independence"][0]["input"], "motor_velocity");

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "support/waves.h"
 
@@ -129,6 +130,31 @@ TEST(Noise, StandardErrorHoldsTheTruth) {
   }
   // Two standard errors hold 95 %, 190 of 200 +- 3; four of these.
   EXPECT_GE(held, 178);
+}
+
+TEST(Differences, ByHand) {
+  EXPECT_EQ(differences({1, 4, 9, 16, 25}, 1), (std::vector<double>{3, 5, 7, 9}));
+  EXPECT_EQ(differences({1, 4, 9, 16, 25}, 2), (std::vector<double>{2, 2, 2}));
+  EXPECT_TRUE(differences({1, 2}, 2).empty());
+}
+
+TEST(NoiseFromDifferences, OfAnAlternatingSignalByHand) {
+  // Every difference of order n is 2^n.
+  const std::vector<double> x = {1, -1, 1, -1, 1, -1, 1, -1};
+  const double per_median = 1.482602218505602, variance[] = {2, 6, 20, 70};
+  for (int order = 1; order <= 4; ++order)
+    EXPECT_NEAR(noise_from_differences(x, order),
+                per_median * std::pow(2, order) / std::sqrt(variance[order - 1]), 1e-12);
+  EXPECT_TRUE(std::isnan(noise_from_differences({1, 2, 3}, 3)));
+}
+
+TEST(NoiseFromDifferences, LeavesACubicAndAJumpOut) {
+  Random random(8);
+  std::vector<double> x;
+  for (int i = 0; i < 40000; ++i)
+    x.push_back(std::pow(1e-2 * i, 3) + (i > 20000 ? 1000 : 0) + 0.5 * random.normal());
+  // A median of n normal sizes is known to 1 / sqrt(0.74 n), 0.6 %; fourth differences overlap by five.
+  EXPECT_NEAR(noise_from_differences(x, 4), 0.5, 5 * 0.5 * 0.006 * std::sqrt(5.0));
 }
 
 }  // namespace

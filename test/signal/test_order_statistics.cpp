@@ -34,6 +34,7 @@ TEST(OrderStatistics, RangesByHand) {
   EXPECT_EQ(peak_to_peak({}), 0);
   EXPECT_EQ(smallest_step({1, 1, 1.5, 1.25, 4}), 0.25);
   EXPECT_EQ(smallest_step({2, 2}), 0);
+  EXPECT_EQ(smallest_step({0, 1e-12, 2, 1}, 1e-9), 1);
 }
 
 }  // namespace

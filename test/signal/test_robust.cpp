@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <utility>
+#include <vector>
 
-#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
+#include "backlash_diagnosis/signal/robust_mean.h"
 
 namespace backlash {
 namespace {
@@ -26,14 +26,16 @@ TEST(Robust, EqualValuesHaveNoScale) {
   EXPECT_EQ(scale.outliers, 0u);
 }
 
-TEST(Robust, StudentQuantileAgreesWithTables) {
-  // Two-sided 95 %, as printed in tables of the t distribution.
-  const std::pair<std::size_t, double> table[] = {{1, 12.706}, {2, 4.303},  {4, 2.776},  {5, 2.571},
-                                                  {7, 2.365},  {10, 2.228}, {30, 2.042}, {120, 1.980}};
-  // The documented error of the expansion is 0.3 %, that of the table half a unit of the last digit.
-  for (const auto& [degrees, value] : table)
-    EXPECT_NEAR(student_t_975(degrees), value, 0.003 * value) << degrees;
-  EXPECT_NEAR(student_t_975(1000000), 1.95996, 1e-4);
+TEST(RobustMean, OneWrongValueAmongEqualOnesIsNamed) {
+  const RobustMean mean = robust_mean({{2, 0.1}, {2, 0.1}, {2, 0.1}, {50, 0.1}, {2, 0.1}});
+  EXPECT_NEAR(mean.value, 2, 1e-6);
+  EXPECT_EQ(mean.outliers, std::vector<std::size_t>{3});
+  EXPECT_GE(mean.standard_error, 0.1 / std::sqrt(5));  // never below what the errors allow
+}
+
+TEST(RobustMean, NothingHasNoMeanAndOneValueIsItsOwn) {
+  EXPECT_THROW(robust_mean({}), CannotIdentify);
+  EXPECT_EQ(robust_mean({{3, 0.5}}).standard_error, 0.5);
 }
 
 }  // namespace

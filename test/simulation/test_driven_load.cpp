@@ -4,9 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <string>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "support/rig_changes.h"
 #include "support/rigs.h"
 #include "support/servo.h"
 
@@ -178,6 +182,65 @@ TEST(DrivenLoad, WhatMovesNoLoadNeedsNoSimulation) {
   // acceleration of some 10 rad/s^2 changes the speed within a sample by 0.01 rad/s, its mean by 1/12 of the
   // change of that
   EXPECT_NEAR(torques.mean[k], followed.mesh_on_motor[k] - viscous - cogging, 0.02);
+}
+
+bool same_motion(const DrivenLoad& a, const DrivenLoad& b) {
+  return a.load == b.load && a.load_rate == b.load_rate && a.mesh_torque == b.mesh_torque &&
+         a.mesh_on_motor == b.mesh_on_motor;
+}
+
+// Whoever keeps a simulated load must not take it for that of another machine.
+TEST(DrivenLoad, AnyChangeOfTheRigThatMovesTheLoadIsSeen) {
+  const Rig rig = other_servo();
+  const Record record = simulate_record(rig, test::servo_run(3, false), 1);
+  const RecordedMotion motion = motion_of(record);
+  const DrivenLoad before = simulate_driven_load(rig, motion);
+  std::set<std::string> idle;  // changes that leave the load as it is
+  const auto expect_seen = [&](const std::string& name, const Rig& changed) {
+    if (moves_same_load(rig, changed)) {
+      EXPECT_TRUE(same_motion(before, simulate_driven_load(changed, motion))) << name;
+      idle.insert(name);
+    }
+  };
+  for (const test::RigChange& change : test::rig_changes()) {
+    Rig changed = rig;
+    change.apply(changed);
+    expect_seen(change.member, changed);
+  }
+  for (const RigParameter& parameter : servo_parameters()) {
+    if (parameter.name == "mesh_alpha") continue;  // of another contact law
+    Rig changed = rig;
+    parameter.set(changed, 1.1 * parameter.get(rig) + (parameter.positive ? 0 : 0.3));
+    expect_seen(parameter.name, changed);
+  }
+  // These are worth a simulation less.
+  const std::set<std::string> expected = {"name",
+                                          "joint",
+                                          "reduction_ratio",
+                                          "motor_side",
+                                          "linear",
+                                          "torque_constant",
+                                          "sensor_with_damper",
+                                          "terms of the motor",
+                                          "motor.inertia",
+                                          "motor.viscous_damping",
+                                          "motor.viscous_asymmetry",
+                                          "motor.coulomb_friction",
+                                          "motor.coulomb_asymmetry",
+                                          "pinion.inertia",
+                                          "pinion.viscous_damping",
+                                          "pinion.viscous_asymmetry",
+                                          "pinion.coulomb_friction",
+                                          "pinion.coulomb_asymmetry",
+                                          "input_coupling.stiffness",
+                                          "input_coupling.damping",
+                                          "input_coupling.inertia",
+                                          "motor_inertia",
+                                          "motor_coulomb",
+                                          "motor_viscous",
+                                          "motor_coulomb_asymmetry",
+                                          "motor_viscous_asymmetry"};
+  EXPECT_EQ(idle, expected);
 }
 
 TEST(DrivenLoad, RefusesOtherTrains) {

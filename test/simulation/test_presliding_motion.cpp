@@ -266,7 +266,10 @@ TEST(PreslidingMotion, TheDrivenLoadRepeatsTheWholeTrain) {
       wrong = std::max(wrong, std::fabs(without.load[k] - truth));
       ASSERT_EQ(motor.friction[k].presliding, 1e-4);
     }
-    EXPECT_LT(worst, 3e-5) << distance;  // as without presliding: impacts within a sample
+    const double limit = 3e-5;  // rad, as without presliding: impacts within a sample
+    EXPECT_LT(worst, limit) << distance;
+    // Held fast instead, a load that rests is off by what its friction gives way: about its distance.
+    EXPECT_GT(wrong, std::max(2 * limit, 0.5 * distance)) << distance;
   }
 }
 
@@ -296,7 +299,9 @@ TEST(PreslidingMotion, FrictionAlongARecordIsThatOfTheSimulation) {
       worst = std::max(worst, std::fabs(found[k] - friction[k]));
       square += std::pow(found[k] - friction[k], 2) / found.size();
     }
-    EXPECT_LT(std::sqrt(square), 0.5) << distance;
+    // Of 47 N m. Samples beside a turn are off most: the turn lies somewhere between them.
+    EXPECT_LT(std::sqrt(square), 0.1) << distance;
+    EXPECT_LT(worst, 2) << distance;
   }
 }
 

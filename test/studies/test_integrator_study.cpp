@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/model/restitution.h"
 #include "backlash_diagnosis/studies/integrator_study.h"
 #include "support/data.h"
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <random>
 #include <string>
@@ -15,6 +16,7 @@
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
+#include "support/servo.h"
 
 namespace backlash {
 namespace {
@@ -90,8 +92,10 @@ Case random_case(Draw& draw, double largest_half_gap, double rate) {
 
 struct Score {
   int answers = 0, right = 0, far = 0;
+  std::map<Status, int> seen;
   std::vector<double> errors;
   void add(const Estimate& e, double truth) {
+    ++seen[e.status];
     if (e.status != Status::ok && e.status != Status::below_range) return;
     ++answers;
     const double rounding = 1e-12, width = e.upper - e.lower;
@@ -115,7 +119,8 @@ TEST(RigEstimators, PositionDifferenceOfTheLockedRig) {
     const Case c = random_case(draw, 100e-6, i % 2 ? 1000 : 5000);
     score.add(estimate_position_difference(c.record, position_settings()), c.backlash);
   }
-  EXPECT_EQ(score.answers, kCases);
+  EXPECT_GE(score.seen[Status::ok], 57);  // a gap of a few um may be below the range
+  EXPECT_EQ(score.seen[Status::ok] + score.seen[Status::below_range], kCases);
   EXPECT_GE(score.right, kFewestRight);
   EXPECT_EQ(score.far, 0);
   EXPECT_LT(score.median_error(), 3e-6);
@@ -132,7 +137,10 @@ TEST(RigEstimators, MomentumTransferOfTheLockedRig) {
     (tachometer ? by_speed : by_position)
         .add(estimate_momentum_transfer(c.record, momentum_settings()), c.backlash);
   }
-  EXPECT_GE(by_speed.answers, 25);  // the noisiest tachometers are refused
+  EXPECT_GE(by_speed.seen[Status::ok], 27);
+  EXPECT_EQ(by_speed.answers + by_speed.seen[Status::out_of_domain],
+            30);  // a noisy tachometer may be refused
+  EXPECT_GE(by_position.seen[Status::ok], 28);
   EXPECT_EQ(by_position.answers, 30);
   EXPECT_GE(by_speed.right + by_position.right,
             by_speed.answers + by_position.answers - kCases + kFewestRight);
@@ -282,21 +290,33 @@ TEST(RigEstimators, CoherenceFallsWithTheGap) {
             Status::out_of_domain);
 }
 
-/// The torque of a slow square wave has two values: play and compliance have the same effect on the
-/// deflection.
-TEST(RigEstimators, WhereTorqueDoesNotTellPlayFromComplianceNoPlayIsInvented) {
-  const RigFile declared =
-      load_rig_file(std::string(BACKLASH_DIAGNOSIS_SOURCE_DIR) + "/config/two_inertia_servo.yaml");
-  std::string softer = declared.text;  // as far from it as the file says that machines are
+/// What position_difference says of a machine that differs from the declared one as far as its file allows.
+Estimate of_softer_servo(const RigFile& declared, double gap, bool square_wave) {
+  std::string softer = declared.text;
   softer.replace(softer.find("460e3"), 5, "400e3");
   RigFile machine = rig_file_from_text(softer, "softer");
-  machine.rig.mesh.backlash = 7e-4;
+  machine.rig.mesh.backlash = gap;
   machine.rig.link.inertia = 125;
   machine.rig.motor.coulomb_friction = 52;
+  if (!square_wave) machine.simulation.excitation = test::shaking(11);
   const Record record = simulate_record(machine.rig, machine.simulation, 20);
-  for (const Estimate& e : diagnose(record, declared.diagnosis, nullptr).estimates) {
-    if (e.method != "position_difference") continue;
-    EXPECT_TRUE(e.status != Status::ok || (e.angle_lower <= 7e-4 && 7e-4 <= e.angle_upper)) << e.message;
+  for (const Estimate& e : diagnose(record, declared.diagnosis, nullptr).estimates)
+    if (e.method == "position_difference") return e;
+  return {};
+}
+
+// The torque of a slow square wave has two values: play and compliance have the same effect on the
+// deflection, and none of it may be called play. With a torque of many values all machines must be ok.
+TEST(RigEstimators, ATorqueOfTwoValuesGivesNoPlay) {
+  const RigFile declared = test::servo_file();
+  for (const double gap : {3e-4, 7e-4, 1.1e-3}) {  // rad
+    const Estimate square = of_softer_servo(declared, gap, true);
+    EXPECT_EQ(square.status, Status::out_of_domain) << gap << ": " << square.message;
+    const Estimate random = of_softer_servo(declared, gap, false);
+    ASSERT_EQ(random.status, Status::ok) << gap << ": " << random.message;
+    EXPECT_LE(random.angle_lower, gap);
+    EXPECT_GE(random.angle_upper, gap);
+    EXPECT_LT(random.angle_upper - random.angle_lower, 0.1 * gap) << "an interval that says something";
   }
 }
 

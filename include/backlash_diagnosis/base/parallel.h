@@ -33,7 +33,7 @@ class Ticker {
 /// thrown.
 void for_each_in_parallel(int count, Ticker& ticker, const std::function<void(int)>& job);
 
-/// The same without progress.
-void for_each_in_parallel(int count, const std::function<void(int)>& job);
+/// The same without progress; with as many threads as said, 0: all processors.
+void for_each_in_parallel(int count, const std::function<void(int)>& job, unsigned threads = 0);
 
 }  // namespace backlash

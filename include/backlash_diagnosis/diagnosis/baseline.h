@@ -10,6 +10,8 @@
 
 namespace backlash {
 
+struct Diagnosis;
+
 /// NaN where not known; the intervals hold with 95 %.
 struct Baseline {
   std::string rig, rig_digest;                                           // name and digest of the rig file
@@ -18,6 +20,10 @@ struct Baseline {
   double backlash_angle = kNaN, angle_lower = kNaN, angle_upper = kNaN;  // rad, axis of motor_position
   double skewness = kNaN;                                                // of the APD
 };
+
+/// What the verdict stands on, as a baseline of the rig with this name and digest. Throws BadData, naming the
+/// rig and the reason, where the verdict is no value with an interval or its estimates contradict each other.
+Baseline baseline_of(const Diagnosis& diagnosis, const std::string& rig, const std::string& rig_digest);
 
 /// The content of a file. There is no date in it: the same machine gives the same file.
 std::string to_yaml(const Baseline& baseline);

@@ -12,8 +12,12 @@ namespace backlash {
 /// (`backlash_angle`). With a baseline they limit the growth since then.
 struct Limits {
   bool angular = false;
-  double watch = 0, service = 0, stop = 0;  // increasing
+  double watch = 0, service = 0, stop = 0;
 };
+
+/// The one rule for limits, wherever they come from: 0 < watch < service < stop, all finite. Throws
+/// InvalidParameter with the name of the first one that breaks it.
+void require_increasing(const Limits& limits);
 
 /// The map `backlash` or `backlash_angle` with `watch`, `service` and `stop`. Throws BadData.
 Limits read_limits(const YamlReader& yaml);

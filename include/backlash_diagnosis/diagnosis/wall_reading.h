@@ -18,10 +18,6 @@ struct TorqueExcursion {
   std::size_t begin = 0, end = 0;
 };
 
-/// Standard deviation of the torque noise [N m], from the second differences of the samples (median of the
-/// absolute values, so that ramps, switches and slips do not count). 0 with fewer than three samples.
-double torque_noise(const std::vector<double>& torque);
-
 /// Excursions above `level` [N m, > 0], one per half cycle (half cycles end where torque passes -level/2 of
 /// the other side), without those that noise alone can make and without the last one if torque has not come
 /// back by then.

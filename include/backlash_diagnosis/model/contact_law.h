@@ -13,12 +13,18 @@
 
 namespace backlash {
 
-/// A force that needs no more than four numbers, for whoever computes it of many teeth at once:
+/// A force with four coefficients, which can be computed for many teeth at once:
 ///   F = max(0, K d^n (1 + loss d') + damping d')
 struct PowerContact {
   double stiffness, exponent;  // K, n
   double loss = 0;             // s/m
   double damping = 0;          // N s/m
+};
+
+/// What a rig file says of a law: so that it can be made again with other values.
+struct ContactSpec {
+  std::string law;
+  ParameterValues values;
 };
 
 /// Contact force along the common normal as a function of penetration d [m] and its rate d' [m/s], d > 0
@@ -27,6 +33,8 @@ struct PowerContact {
 class ContactLaw {
  public:
   virtual ~ContactLaw() = default;
+
+  ContactSpec made_of;  // set by make_contact_law(); empty of another law
 
   /// Force at penetration d > 0; callers handle d <= 0 (no contact, no force). `impact_speed` [m/s] is the
   /// approach speed d' > 0 at the touch that began this contact, 0 if none did (the flanks overlapped from
@@ -60,15 +68,8 @@ struct ContactLawType {
 /// All laws, by the name that a rig file uses.
 const std::vector<ContactLawType>& contact_laws();
 
-/// What a rig file says of a law: so that it can be made again with other values.
-struct ContactSpec {
-  std::string law;
-  ParameterValues values;
-};
-
 /// Reads `law: NAME` and that law's parameters.
 ContactSpec read_contact_spec(const YamlReader& yaml);
-std::shared_ptr<const ContactLaw> read_contact_law(const YamlReader& yaml);
 
 /// Creates a law by name; throws InvalidParameter for an unknown name or a value outside its range.
 std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, const ParameterValues& values);

@@ -18,8 +18,8 @@
 #include <array>
 #include <optional>
 
+#include "backlash_diagnosis/model/equations_of_motion.h"
 #include "backlash_diagnosis/model/rig.h"
-#include "backlash_diagnosis/model/smooth_train.h"
 #include "backlash_diagnosis/model/stick_slip.h"
 
 namespace backlash {
@@ -44,14 +44,14 @@ struct Observation {
   double acceleration;  // rad/s^2, of the gear; of the pinion (as motor_position) where the gear cannot move
 };
 
-class GearTrain {
+class GearTrain : private TrainParts {
  public:
   /// Throws InvalidParameter for a massless part, no contact law or a backlash < 0.
   explicit GearTrain(const Rig& rig);
 
   /// Degrees of freedom, 1 to 4. A state has 2 * dof numbers: first the angles [rad], then the speeds
   /// [rad/s].
-  int dof() const { return dof_; }
+  int dof() const { return layout_.dof; }
   static constexpr int kMaxStates = 8;
 
   /// dstate/dt at time t [s].
@@ -67,9 +67,8 @@ class GearTrain {
     EndFriction friction;  // where both ends are one body, all of it at the motor
   };
   EndForces end_forces(double t, const double* state, AppliedTorque applied) const;
-  /// The same for a load that follows a recorded motor, apart: what acts on the load, with only those terms
-  /// that move it, of a train with rigid couplings and a mesh that gives way. The mesh torque in `motion`
-  /// does not count.
+  /// What acts on the load alone, whose motor moves as recorded: of a train with rigid couplings and a mesh
+  /// that gives way, with only the terms that move the load. The mesh torque in `motion` does not count.
   struct LoadForces {
     double net;            // N m on the link, without dry friction
     double mesh_torque;    // N m, through the teeth, > 0 drives the load forward
@@ -78,9 +77,9 @@ class GearTrain {
   };
   LoadForces load_forces(const Motion& motion) const;
 
-  /// The shift of either flank at these positions, forward flank first, infinite of one that is far away; for
-  /// whoever asks for forces several times where it hardly changes. Only if terms act on the flanks and none
-  /// shapes them by the torque.
+  /// The shift of either flank at these positions, forward flank first; infinite for a flank that is far
+  /// away. Saves time where forces are computed several times at nearly the same position. Only if terms act
+  /// on the flanks and none shapes them by the torque.
   using Flanks = std::array<FlankShift, 2>;
   bool flanks_shift_with_position() const { return shaped_ && !shape_follows_torque_; }
   Flanks flanks(double motor_position, double load_position) const;
@@ -94,11 +93,13 @@ class GearTrain {
   };
   MotorForces motor_forces(const Motion& motion) const;
   /// kg m^2 of all that moves with the motor and with the link (infinite where it is fixed); load-side.
-  double motor_inertia() const { return inertia_[node_[kMotor]]; }
+  double motor_inertia() const { return inertia_[layout_.node[kMotor]]; }
   double load_inertia() const;
 
-  /// The same equations, where nothing but springs, dampers and teeth without memory acts; null elsewhere.
-  const SmoothTrain<double>* smooth() const { return smooth_ ? &*smooth_ : nullptr; }
+  /// Whether nothing acts but springs, dampers and teeth without memory: then equations() with the force of
+  /// the contact law is all of it.
+  bool smooth() const { return smooth_; }
+  const EquationsOfMotion<double>& equations() const { return equations_; }
   std::optional<PowerContact> power_contact() const {
     return contact_ ? contact_->power_contact() : std::nullopt;
   }
@@ -120,11 +121,10 @@ class GearTrain {
   void set_backlash(double backlash);
   double backlash() const { return 2 * half_gap_; }
 
-  /// For a contact law that depends on how a contact began (see ContactLaw::needs_impact_speed) whoever moves
-  /// the train tells it of touches. Between them the teeth have no force at all, so that motion is smooth up
-  /// to the touch: begin_contact() where a state did not come about by motion, then update_contact() wherever
-  /// one of the kContactEvents values rises through 0. Without these calls every contact counts as begun at
-  /// speed 0.
+  /// A contact law may depend on the speed at which a contact began (ContactLaw::needs_impact_speed). Then
+  /// the caller reports touches: begin_contact() after the state was set, and update_contact() each time one
+  /// of the kContactEvents values rises through 0. Between touches the teeth have no force, so that the
+  /// motion is smooth up to the next touch. Without these calls every contact has begun at speed 0.
   bool needs_touches() const { return contact_ && contact_->needs_impact_speed(); }
   static constexpr int kContactEvents = 4;
   void contact_events(const double* state, double* values) const;
@@ -136,10 +136,10 @@ class GearTrain {
   bool update_contact(double* state);
   double impact_speed() const { return impact_speed_; }  // m/s at the last touch, 0 if there was none
 
-  /// Dry friction: like touches, whoever moves the train tells it where the mode of a body changes.
-  /// begin_friction() where the state did not come about by motion (it forgets where bodies turned last);
-  /// update_friction() wherever the torque jumps or one of the friction_event_count() values rises through 0.
-  /// True from the latter: integration must start again.
+  /// Dry friction: the caller also reports where a body begins to stick or to slide. begin_friction() after
+  /// the state was set (it forgets where bodies turned last); update_friction() each time the torque jumps or
+  /// one of the friction_event_count() values rises through 0. Where it returns true integration must start
+  /// again.
   int friction_event_count() const { return static_cast<int>(dry_ends_.size()); }
   void friction_events(double t, const double* state, AppliedTorque applied, double* values) const;
   void begin_friction(double t, double* state, AppliedTorque applied);
@@ -155,70 +155,68 @@ class GearTrain {
   void brake_motor();
 
  private:
-  enum Slot { kMotor, kPinion, kGear, kLink, kSlots };
-  struct Slots {
-    double q[kSlots], w[kSlots];
-  };
+  using PartMotion = EquationsOfMotion<double>::PartMotion;
 
   /// A flank pair: +1 touches where the pinion drives forward, -1 where it drives back.
   enum Flank { kReverse = -1, kApart = 0, kForward = 1 };
 
   /// All torques of one moment, per degree of freedom, and what they are made of.
   struct Balance {
-    double net[kSlots];  // N m, without dry friction
+    double net[kPartCount];  // N m, without dry friction
     double mesh_torque;
     EndFriction friction;
   };
   struct DryEnd {
-    Slot slot;
+    int part;  // kMotor or kLink
     StickSlip mode;
     double position = 0;  // rad, where it sticks
   };
 
-  bool one_body() const { return node_[kLink] == node_[kMotor]; }
-  Slots unpack(const double* state) const;
-  Motion motion_of(double t, const Slots& s, double mesh_torque, AppliedTorque applied) const {
+  bool moves(int part) const { return layout_.node[part] != TrainLayout::kFixed; }
+  bool one_body() const { return layout_.node[kLink] == layout_.node[kMotor]; }
+  PartMotion part_motion(const double* state) const { return equations_.part_motion(layout_, state); }
+  Motion motion_of(double t, const PartMotion& s, double mesh_torque, AppliedTorque applied) const {
     const double motor_torque = applied.motor * ratio_;
     return {t,           s.q[kMotor], s.w[kMotor],
             s.q[kLink],  s.w[kLink],  contact_ ? mesh_torque : motor_torque,
             motor_torque};
   }
-  double net_torques(double t, const Slots& s, AppliedTorque applied, double* net) const;
+  double add_teeth(const PartMotion& s, double* torque) const;
+  double net_torques(double t, const PartMotion& s, AppliedTorque applied, double* net) const;
   Balance balance(double t, const double* state, AppliedTorque applied) const;
-  double relative(const Slots& s) const { return lever_ * (s.q[kPinion] - s.q[kGear]) + start_ * half_gap_; }
-  FlankPoint flank_point(const Slots& s, int side, double mesh_torque) const;
-  FlankShift shift(const Slots& s, int side, double mesh_torque) const;
-  FlankShift shift_within_reach(const Slots& s, int side) const;
-  double flank_force(const Slots& s, int side, double penetration, double rate, double mesh_torque) const;
-  double shaped_torques(const Slots& s, double* torque) const;
-  double shaped_force(const Slots& s, int side, FlankShift& at) const;
-  double shifted_force(const Slots& s, int side, const FlankShift& at, double mesh_torque) const;
+  double gap_position(const PartMotion& s) const { return equations_.gap_position(s, half_gap_); }
+  FlankPoint flank_point(const PartMotion& s, int side, double mesh_torque) const;
+  FlankShift shift(const PartMotion& s, int side, double mesh_torque) const;
+  FlankShift shift_within_reach(const PartMotion& s, int side) const;
+  double flank_force(const PartMotion& s, int side, double penetration, double rate,
+                     double mesh_torque) const;
+  double add_shaped_teeth(const PartMotion& s, double* torque) const;
+  double shaped_force(const PartMotion& s, int side, FlankShift& at) const;
+  double shifted_force(const PartMotion& s, int side, const FlankShift& at, double mesh_torque) const;
   static void press(int side, const FlankShift& at, double flank_torque, double* torque);
-  static Slots ends(const Motion& motion);
-  LoadForces with_load_terms(const Motion& motion, double mesh_torque, const double* torque) const;
+  static PartMotion ends(const Motion& motion);
+  template <typename AddTeeth>
+  LoadForces load_forces(const Motion& motion, const PartMotion& s, const AddTeeth& add_teeth) const;
   EndFriction friction(const Motion& motion) const;
   const FrictionLimits& limits(const DryEnd& end, const EndFriction& friction) const;
-  double penetration(const Slots& s, Flank flank) const;
-  double approach(const Slots& s, Flank flank) const;
+  double penetration(const PartMotion& s, Flank flank) const;
+  double approach(const PartMotion& s, Flank flank) const;
   void enter(Flank flank);
   void touch(Flank flank, double* state);
-  double contact_force(const Slots& s) const;
-  void join(const Rig& rig);
-  void simplify(const Rig& rig);
+  double force_at(double x, double rate) const;
+  double contact_force(const PartMotion& s) const;
+  void sum_inertia(const Rig& rig);
 
   double ratio_;  // load-side torque per torque of the records: Rig::motor_axis_ratio()
-  int dof_ = 0;
-  std::array<int, kSlots> node_{};        // which degree of freedom a part moves with; kFixed if none
-  std::array<double, kSlots> inertia_{};  // per degree of freedom, kg m^2
-  std::array<double, kSlots> damping_;    // per part, N m s/rad
-  Coupling input_, output_;               // referred to the load side
+  TrainLayout layout_;
+  EquationsOfMotion<double> equations_;
+  std::array<double, kPartCount> inertia_{};  // per degree of freedom, kg m^2
   double sensed_damping_;  // N m s/rad, the part of the sensor's damper that sensor_torque shows
   double half_gap_, lever_;
-  double start_;                          // -, Mesh::start_in_gap
-  std::array<double, kSlots> asymmetry_;  // per part, N m s/rad
   EndFriction coulomb_;
   bool shaped_ = false, shape_follows_torque_ = false, loaded_ = false;
   bool braked_ = false;
+  bool smooth_;
   bool presliding_ = false;  // either end has a presliding distance, which does not change
   std::vector<DryEnd> dry_ends_;
   double impact_speed_ = 0;  // m/s, approach speed at the last touch
@@ -228,11 +226,8 @@ class GearTrain {
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
   std::vector<std::shared_ptr<const Term>> terms_;
-  TrainLayout layout_;
-  std::optional<SmoothTrain<double>> smooth_;          // the same equations, where they are that simple
   std::vector<const Term*> flank_terms_, load_terms_;  // of terms_, that shape flanks and that push the load
   double load_gain_;                                   // -, of the load encoder
-  static constexpr int kFixed = -1;
 };
 
 }  // namespace backlash

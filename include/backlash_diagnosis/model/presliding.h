@@ -39,8 +39,8 @@ class Presliding {
 /// The same along a recorded motion: friction [N m] of each sample, > 0 against forward motion, from a start
 /// without load. Limits without presliding give Coulomb friction.
 ///
-/// A rate [rad/s] counts by its sign (0: as before) and for the damping; with the interval [s] also as the
-/// speed that tells where between two samples the body turned, without (0) it turned at the sample before.
+/// The sign of a rate [rad/s] gives the direction (0: as before), its size the damping. With the interval [s]
+/// it also gives where between two samples the body turned; without (0) the body turned at the sample before.
 /// Noise dithers friction away: both columns are to be smooth to within a small part of x_s. Columns of equal
 /// length, or InvalidParameter.
 std::vector<double> presliding_friction(const std::vector<double>& positions,

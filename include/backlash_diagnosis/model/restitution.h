@@ -12,8 +12,12 @@
 
 namespace backlash {
 
-/// e that follows from D >= 0 by the exact relation.
+/// e that follows from D >= 0 by the exact relation. Throws InvalidParameter for another D.
 double restitution_of_damping(double damping);
+
+/// e of an impact at speed v by the law of Hunt and Crossley (contact/hunt_crossley.cpp), whose damping is
+/// D = 3/2 alpha v; `alpha_speed` = alpha v >= 0 [-]. Throws InvalidParameter for another.
+double hunt_crossley_restitution(double alpha_speed);
 
 /// D that gives 0 < e <= 1 by the exact relation, to rounding. Below e = 0.03 it is 1 / e to double
 /// precision. Throws InvalidParameter outside the range.

@@ -82,6 +82,13 @@ struct Rig {
   double backlash_angle(double backlash) const { return backlash / mesh.lever() * motor_axis_ratio(); }
 };
 
+/// Whether all members are equal; NaN equals NaN. Contact laws and terms are equal that were made from the
+/// same values; of others, and of stiffness variations, only the same object is.
+bool operator==(const Body& a, const Body& b);
+bool operator==(const Coupling& a, const Coupling& b);
+bool operator==(const Mesh& a, const Mesh& b);
+bool operator==(const Rig& a, const Rig& b);
+
 /// The same machine with all values at the load side of the reduction.
 Rig load_side(const Rig& rig);
 

@@ -4,9 +4,9 @@
 //   sliding  J a = net - s F_s, s = +-1 the direction, F_s > 0 the friction in that direction
 //   stuck    w = 0, a = 0 while -F_- <= net <= F_+           net: all other torques on the body
 //
-// A body that slides comes to rest where its speed crosses zero; there and wherever the torque jumps it is
-// decided anew. Infinite friction is a brake: it stops a body at once (Karnopp 1985, ASME J. Dyn. Syst. Meas.
-// Control 107:100, with the zero of the speed found as an event instead of his interval of speeds).
+// A body that slides comes to rest where its speed crosses zero. There, and where the torque jumps, the mode
+// is decided again. Infinite friction is a brake: it stops a body at once (Karnopp 1985, ASME J. Dyn. Syst.
+// Meas. Control 107:100, with the zero of the speed found as an event instead of his interval of speeds).
 //
 // Where friction has a presliding distance (Presliding) it goes on from what it is where the speed crosses
 // zero. Such a body sticks only where it is at rest with all torques in balance to a millionth of its
@@ -23,7 +23,7 @@ class StickSlip {
   bool stuck() const { return direction_ == 0; }
   int direction() const { return direction_; }  // +1, 0, -1
 
-  /// Friction on the body [N m] while it slides; a stuck one is held by whoever moves it. Here and below the
+  /// Friction on the body [N m] while it slides; a stuck body is held by the caller. Here and below the
   /// position [rad] and the speed [rad/s] count only with presliding.
   double torque(const FrictionLimits& limits, double position = 0, double speed = 0) const {
     if (limits.presliding > 0) return -memory_.friction(direction_, limits, position, speed);

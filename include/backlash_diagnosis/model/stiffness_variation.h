@@ -47,7 +47,7 @@ class StiffnessVariation {
 ///   youngs_modulus [Pa], poisson_ratio
 ///                for hertz_bending only; in the other laws they cancel, as the face width does
 ///
-/// The gear pair tells how its teeth meet; the play of the rig is that of mesh.backlash (or half_gap), which
+/// The gear pair says how its teeth meet. The play of the rig is that of mesh.backlash (or half_gap), which
 /// wear and set_backlash() change. Throws BadData, also where the gear's base radius differs from the rig's
 /// by more than 0.1 %.
 std::shared_ptr<const StiffnessVariation> read_stiffness_variation(const YamlReader& yaml,

@@ -56,7 +56,7 @@ struct FlankShift {
   double load_slope = 0;   // d opening / d load position
 };
 
-/// Where the shape of a flank is asked for; angles at the load.
+/// A position at which the shape of a flank is evaluated; angles at the load.
 struct FlankPoint {
   double motor_position;  // rad
   double load_position;   // rad
@@ -72,7 +72,7 @@ struct FlankLoad {
   double rate;         // rad/s, of the penetration
 };
 
-/// What sensors and drive make of the machine's own values.
+/// Errors of sensors and drive.
 struct Sensing {
   double load_position_gain = 1;  // -, shown over true
   double torque_delay = 0;        // s, the torque acts that much later than its stamp says
@@ -92,8 +92,8 @@ class Term {
   virtual bool has_dry_friction() const { return false; }
   virtual void add_friction(const Motion&, EndFriction&) const {}
 
-  /// Moves the flanks, and adds nothing then. The slopes make it conservative: the mesh torque acts through
-  /// them on both ends.
+  /// Moves the flanks; such a term adds no torque. The mesh torque acts on both ends through the slopes, so
+  /// that the motion of the flanks is conservative.
   virtual bool shapes_flanks() const { return false; }
   virtual bool shape_follows_torque() const { return false; }
   virtual void shape(const FlankPoint&, FlankShift&) const {}
@@ -101,19 +101,19 @@ class Term {
   /// known.
   virtual double least_opening(double /*half_gap*/) const { return -std::numeric_limits<double>::infinity(); }
 
-  /// Adds to the torque >= 0 with which a flank resists [N m], and nothing else then; the sum of all never
-  /// pulls.
+  /// Adds to the torque with which a closed flank resists [N m], and to nothing else. A flank never pulls:
+  /// the sum is limited to >= 0.
   virtual bool loads_flanks() const { return false; }
   virtual void load_flank(const FlankLoad&, double& /*torque*/) const {}
 
   virtual void sense(Sensing&) const {}
 
-  /// Whether the load would move otherwise without it. False saves the search a simulation.
+  /// False for a term that acts on the motor or on a sensor only: the load then moves as without the term,
+  /// and need not be simulated again.
   virtual bool moves_load() const { return true; }
 };
 
-/// The size of the motion in the records at hand, so that a term can tell which values are worth a try. Load
-/// side.
+/// The size of the motion in the records, from which a term derives the values to try. Load side.
 struct MotionRange {
   double torque = 0;        // N m, standard deviation of the motor's
   double speed = 0;         // rad/s, standard deviation of the motor's
@@ -137,8 +137,32 @@ struct TermSearch {
   std::string phase;     // of an effect strength * sin(... + phase), tried in sine and cosine; empty: none
   double (*typical)(const MotionRange&) = nullptr;  // a strength that would show clearly, > 0
   std::vector<TermShape> shapes;
-  bool pairs = false;  // also two of it with different values of its one shape
+  bool pairs = false;               // also two of it with different values of its one shape
+  bool needs_turning_link = false;  // tells nothing of a locked link
 };
+
+/// One kind of look-up table that is learned from records: what its values are added to, and over what.
+struct MapKind {
+  std::string acts_on, coordinate;  // choices of TermMap::acts_on and TermMap::coordinate
+  std::string coordinate_unit, unit;
+  bool needs_load;                        // only of a load that moves freely
+  double (*typical)(const MotionRange&);  // a value that would show clearly, > 0
+  double least;                           // value that a fit may start with; -infinity: any
+};
+
+/// A term whose law is no formula but a look-up table from the data: it says that there is an effect, not
+/// which.
+struct TermMap {
+  std::string acts_on, coordinate, points, values;  // its parameters
+  std::vector<MapKind> kinds;                       // that are learned
+};
+
+/// What of a record's calibration a term describes as well: where such a term is in the model, its strength
+/// takes over what the calibration has found, and the calibration rests.
+enum class Calibrates { nothing, torque_delay };
+
+/// How a term says that the backlash depends on the position of the load.
+enum class GapVariation { none, harmonic, table };
 
 /// What the registry knows of a term: its id in the rig file, its parameters, how it is made.
 struct TermType {
@@ -146,10 +170,20 @@ struct TermType {
   std::vector<ParameterSpec> parameters;
   std::unique_ptr<Term> (*create)(const ParameterValues&);
   std::optional<TermSearch> search = std::nullopt;  // none: it is never sought
+  std::optional<TermMap> map = std::nullopt;
+  Calibrates calibrates = Calibrates::nothing;
+  GapVariation gap_variation = GapVariation::none;
+  // How friction builds up after a reversal. Every machine's does: it is called missing only where it shows.
+  bool shapes_friction = false;
+  // Beside the declared contact law it does what another law would do alone.
+  bool stands_in_for_contact_law = false;
 };
 
 /// By id; throws InvalidParameter for one that is not in the registry.
 const TermType& term_type(const std::string& id);
+
+/// The first one that `can`; throws InvalidParameter where none can.
+const TermType& term_type_that(bool (*can)(const TermType&));
 
 /// All terms. There is no second list of effects anywhere.
 const std::vector<TermType>& term_types();
@@ -158,7 +192,7 @@ const std::vector<TermType>& term_types();
 /// for values out of range and for such as do not go together.
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values);
 
-/// What all of them together make of the machine's own values.
+/// The errors of sensors and drive of all terms together.
 Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms);
 
 /// Reads one entry of `terms:`: `id: ID` and that term's parameters.

@@ -35,8 +35,8 @@ const char* channel_unit(Channel channel);
 /// Inverse of channel_name; throws InvalidParameter for a name that is no channel.
 Channel channel_from_name(const std::string& name);
 
-/// The channels that can tell of backlash: a record needs at least one of them.
-extern const std::array<Channel, 6> kTellingChannels;
+/// The channels in which backlash can be seen: a record needs at least one of them.
+extern const std::array<Channel, 6> kBacklashChannels;
 
 /// One sample of all channels; NaN where there is none.
 using ChannelValues = std::array<double, kChannelCount>;
@@ -57,8 +57,8 @@ class Record {
   }
   std::vector<double>& column(Channel channel) { return columns_[static_cast<std::size_t>(channel)]; }
 
-  /// Whether it has one of kTellingChannels.
-  bool tells() const;
+  /// Whether it has one of kBacklashChannels.
+  bool can_show_backlash() const;
 
   /// Median distance between samples [s]; 0 with fewer than two samples.
   double sampling_interval() const;

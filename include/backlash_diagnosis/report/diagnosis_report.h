@@ -3,13 +3,12 @@
 #pragma once
 
 #include <iosfwd>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
-namespace backlash::tools {
+namespace backlash {
 
 /// A diagnosis and what it rests on.
 struct DiagnosisReport {
@@ -23,10 +22,10 @@ struct DiagnosisReport {
   Diagnosis diagnosis;
 };
 
-/// Keys in the order of the documentation; NaN is null.
-nlohmann::ordered_json to_json(const DiagnosisReport& report);
+/// The `diagnose_record` JSON of the design; keys in the order of the documentation, NaN is null.
+std::string diagnosis_json(const DiagnosisReport& report);
 
 /// Lengths in m, angles in rad and deg.
 void print_summary(const DiagnosisReport& report, std::ostream& out);
 
-}  // namespace backlash::tools
+}  // namespace backlash

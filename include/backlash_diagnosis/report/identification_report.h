@@ -2,19 +2,20 @@
 // An identification as JSON and as text.
 #pragma once
 
-#include <nlohmann/json.hpp>
-#include <ostream>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/identification/identify.h"
 
-namespace backlash::tools {
+namespace backlash {
 
 /// The `identify` JSON of the design: schema_version, procedures, parameters, channels, warnings; beyond that
-/// what the plots need. Values at the load side of the reduction.
-nlohmann::ordered_json to_json(const Identification& found);
+/// what the plots need, and the paths of the rig and of the records. Values at the load side of the
+/// reduction.
+std::string identification_json(const Identification& found, const std::string& rig,
+                                const std::vector<std::string>& records);
 
 void print_summary(const Identification& found, std::ostream& out);
 
-}  // namespace backlash::tools
+}  // namespace backlash

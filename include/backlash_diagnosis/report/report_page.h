@@ -27,9 +27,12 @@ std::string provenance_sections(const Provenance& provenance);
 /// The command for a shell: the folder it was given in, then its words, quoted where they need it.
 std::string shell_command(const std::vector<std::string>& words);
 
-/// Runs a script of this package, which writes a piece of HTML with its plots to the path after --out, and
-/// returns that. Where it fails: a sentence that says why there are no plots.
+/// Runs a script of this package, which writes its plots as JSON to the path after --out
+/// (scripts/plotting.py), and returns them as HTML; no_figures() where it fails.
 std::string drawn_figures(const std::string& script, const std::vector<std::string>& arguments);
+
+/// The sentence that says why there are no plots.
+std::string no_figures(const std::string& reason);
 
 /// The whole page; `body` is HTML.
 std::string report_page(const std::string& title, const std::string& body);

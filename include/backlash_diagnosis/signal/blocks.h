@@ -4,16 +4,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/signal/measured.h"
 
 namespace backlash {
-
-/// A number with three digits, for messages.
-std::string figure(double value);
 
 /// Means of consecutive blocks of `length` samples; the rest at the end is left out.
 std::vector<double> block_means(const std::vector<double>& values, std::size_t length);

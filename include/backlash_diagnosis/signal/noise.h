@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// White noise on a periodic signal whose motion need not repeat exactly.
+// White noise on a signal whose motion is not known: from differences of successive values, and of a periodic
+// signal whose motion need not repeat exactly.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +8,16 @@
 #include <vector>
 
 namespace backlash {
+
+/// Differences of `order`: 1 x[k+1] - x[k], 2 x[k+2] - 2 x[k+1] + x[k], and so on. Empty where the values are
+/// too few.
+std::vector<double> differences(std::vector<double> values, int order);
+
+/// Standard deviation of white noise from differences of `order` >= 1, which leave little of a slow motion:
+/// of a polynomial of a lower degree nothing. By their median size, so that jumps which are rare do not
+/// count. Differences of white noise of variance 1 have the variance binomial(2 order, order): 2, 6, 20, 70
+/// ... NaN for `order` values or fewer.
+double noise_from_differences(const std::vector<double>& values, int order);
 
 /// Standard deviation of white noise: the same value twice where it could be measured; `lower` is 0 where
 /// only an upper bound is known; `upper` is NaN for a signal too short for either.

@@ -27,7 +27,8 @@ double peak_to_peak(const std::vector<double>& values);
 /// Standard deviation of a normal distribution in units of its median absolute deviation.
 constexpr double kNormalPerMedianDeviation = 1.482602218505602;
 
-/// The smallest change between two successive values, the resolution of a sensor; 0 where none changes.
-double smallest_step(const std::vector<double>& values);
+/// The smallest change between two successive values beyond `rounding` >= 0, the resolution of a sensor; 0
+/// where none changes.
+double smallest_step(const std::vector<double>& values, double rounding = 0);
 
 }  // namespace backlash

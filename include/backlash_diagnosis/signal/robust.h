@@ -19,9 +19,4 @@ struct RobustScale {
 /// `floor` [unit of the values, >= 0] is the smallest difference that may count as one.
 RobustScale robust_scale(const std::vector<double>& values, double floor);
 
-/// 97.5 % quantile of Student's t with `degrees` >= 1 degrees of freedom: half width of a 95 % interval in
-/// standard errors. Tabulated to 4, beyond that the expansion of Fisher and Cornish (1960) to the third
-/// order, error < 0.3 %.
-double student_t_975(std::size_t degrees);
-
 }  // namespace backlash

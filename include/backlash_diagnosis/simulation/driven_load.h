@@ -5,11 +5,11 @@
 //
 // Driven by its torque, a simulated gear train with play soon leaves the recorded one: in the gap the motion
 // is chaotic. Driven by the recorded motor position, with the speed of the simulated load drawn to the
-// recorded one (k [1/s]), it follows, and what remains between simulated and recorded load tells of the
+// recorded one (k [1/s]), it follows. What remains between simulated and recorded load is the error of the
 // model.
 //
 // Where the link is locked or the mesh rigid the load has no motion of its own: it stands, or moves with the
-// motor, and only the torque on the motor is asked for.
+// motor, and only the torque on the motor is computed.
 //
 // Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples. A step is divided
 // where the load comes to rest, turns round or breaks away and where teeth touch or part.
@@ -58,7 +58,8 @@ bool load_moves_freely(const Rig& rig);
 DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion,
                                 double feedback = kLoadFeedback);
 
-/// Whether the loads of both rigs move alike with the same motor.
+/// Whether the loads of both rigs move alike with the same motor. False where any member of Rig differs but
+/// those that are known to act on the motor or on what is shown only.
 bool moves_same_load(const Rig& a, const Rig& b);
 
 /// Beside a load that has been simulated with this motion, by a rig that may differ in what does not move the

@@ -26,8 +26,8 @@ class Excitation {
   /// End of a segment [s]; infinite where the torque never jumps again.
   virtual double segment_end(long segment) const = 0;
 
-  /// Called at the start of each segment, before its torque is asked for, with what can be seen of the
-  /// machine: where a closed loop decides.
+  /// Called at the start of each segment, before its torque is needed, with what can be seen of the machine.
+  /// A closed loop decides here.
   virtual void begin_segment(long /*segment*/, const Observation& /*machine*/) {}
 
   /// Time [s] within which the torque may rise and fall again inside a segment; infinite where it does not.

@@ -9,8 +9,9 @@
 
 #include <array>
 #include <cstdint>
-#include <random>
+#include <optional>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/record.h"
@@ -57,8 +58,7 @@ class SensorModel {
   void seed(std::size_t channel);
 
   SensorsSettings settings_;
-  std::array<std::mt19937_64, kChannelCount> generators_;
-  std::array<std::normal_distribution<double>, kChannelCount> normal_;
+  std::array<std::optional<Random>, kChannelCount> noise_;  // of channels that have noise: seeding costs
 };
 
 }  // namespace backlash

@@ -37,10 +37,6 @@ struct Tooth {
 /// Throws BadData.
 Tooth read_tooth(const YamlReader& yaml);
 
-/// Exact restitution e of a Hunt-Crossley impact at speed v: D (1+e) = ln((1+D)/(1-e D)), D = 3/2 alpha v;
-/// independent of mass, stiffness and exponent. Throws InvalidParameter for alpha_speed = alpha v < 0.
-double hunt_crossley_restitution(double alpha_speed);
-
 /// How a solver's relative tolerance becomes its absolute ones.
 enum class AbsoluteTolerance {
   scaled,  // times the tooth's depth [m] and impact speed [m/s]: the same demand on all states

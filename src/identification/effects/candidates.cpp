@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "candidates.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
-#include "remainder.h"
+#include "orthogonal_part.h"
 
 namespace backlash {
 namespace {
-
-constexpr double kProbe =
-    0.02;  // of the typical strength, of the differences that the sensitivities are taken from
-constexpr double kTelling = 1e-3;  // of a column that is left after what the machine itself can explain
 
 double deviation(const std::vector<double>& x) {
   double sum = 0, square = 0;
@@ -63,16 +59,16 @@ struct Probed {
   Eigen::MatrixXd columns;  // what is left of the sensitivities; none where the machine explains them itself
 };
 
-void probe(Probed& p, const MachineFit& fit, const RecordSet& records, const Remainder& remainder,
-           const Eigen::VectorXd& now) {
+void probe(Probed& p, const MachineFit& fit, const RecordSet& records, const OrthogonalPart& orthogonal,
+           const Eigen::VectorXd& now, double telling) {
   const std::vector<ParameterValues> all = probes(*p.type, p.shape, p.strength);
   p.columns.resize(now.size(), Eigen::Index(all.size()));
   for (std::size_t i = 0; i < all.size(); ++i) {
     Rig rig = fit.machine.rig;
     rig.terms.push_back(make_term(p.type->id, all[i]));
     const Eigen::VectorXd change = records.rows(rig, fit.machine.calibrations) - now;
-    Eigen::VectorXd left = remainder.without(change);
-    if (left.norm() < kTelling * change.norm() || change.norm() == 0) left.setZero();
+    Eigen::VectorXd left = orthogonal.of(change);
+    if (left.norm() < telling * change.norm() || change.norm() == 0) left.setZero();
     p.columns.col(Eigen::Index(i)) = left;
   }
 }
@@ -85,9 +81,7 @@ struct Explained {
 
 Explained explain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& left) {
   Explained e;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
-  qr.setThreshold(1e-6);
-  e.factors = qr.solve(-left);
+  e.factors = solve_least_squares(columns, -left).x;
   e.gain = 1 - (left + columns * e.factors).norm() / left.norm();
   return e;
 }
@@ -107,18 +101,18 @@ bool set_strength(const Probed& p, const double* factors, ParameterValues& value
   return false;
 }
 
-Candidate single(const Probed& p, const Remainder& remainder) {
+Candidate single(const Probed& p, const Eigen::VectorXd& left) {
   Candidate c{p.type->id, {{}}, 0, 0};
-  const Explained e = explain(p.columns, remainder.left());
+  const Explained e = explain(p.columns, left);
   if (set_strength(p, e.factors.data(), c.terms[0])) c.gain = e.gain;
   return c;
 }
 
-Candidate pair(const Probed& a, const Probed& b, const Remainder& remainder) {
+Candidate pair(const Probed& a, const Probed& b, const Eigen::VectorXd& left) {
   Candidate c{a.type->id, {{}, {}}, 0, 0};
   Eigen::MatrixXd both(a.columns.rows(), a.columns.cols() + b.columns.cols());
   both << a.columns, b.columns;
-  const Explained e = explain(both, remainder.left());
+  const Explained e = explain(both, left);
   if (set_strength(a, e.factors.data(), c.terms[0]) &&
       set_strength(b, e.factors.data() + a.columns.cols(), c.terms[1]))
     c.gain = e.gain;
@@ -131,13 +125,13 @@ void keep_better(std::map<std::string, Candidate>& best, const std::string& grou
   if (!first && candidate.gain > at->second.gain) at->second = candidate;
 }
 
-std::vector<Probed> all_probes(const Rig& rig, const MotionRange& range) {
+std::vector<Probed> all_probes(const Rig& rig, const MotionRange& range, double share) {
   std::vector<Probed> all;
   const bool load = load_moves_freely(rig);
   for (const TermType& type : term_types()) {
     if (!type.search) continue;
-    if (rig.link_locked && type.id == "varying_reduction_ratio") continue;  // nothing turns that has a ratio
-    const double strength = kProbe * type.search->typical(range);
+    if (rig.link_locked && type.search->needs_turning_link) continue;
+    const double strength = share * type.search->typical(range);
     for (const ParameterValues& shape : combinations(type, range, load)) {
       std::string group = type.id;
       for (const ParameterSpec& spec : type.parameters)
@@ -169,13 +163,15 @@ MotionRange motion_range(const std::vector<ServoData>& records) {
   return range;
 }
 
-std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range) {
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range,
+                              const ScreenSettings& settings) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
-  const Remainder remainder(fit, now.size());
-  std::vector<Probed> all = all_probes(fit.machine.rig, range);
+  const OrthogonalPart orthogonal(fit, now.size());
+  const Eigen::VectorXd& left = orthogonal.residuals();
+  std::vector<Probed> all = all_probes(fit.machine.rig, range, settings.probe);
   for_each_in_parallel(int(all.size()), [&](int i) {
     try {
-      probe(all[i], fit, records, remainder, now);
+      probe(all[i], fit, records, orthogonal, now, settings.telling);
     } catch (const Cancelled&) {
       throw;
     } catch (const Error&) {  // a load that runs away with it: no candidate
@@ -184,11 +180,10 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, c
   });
   std::map<std::string, Candidate> best;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    keep_better(best, all[i].group, single(all[i], remainder));
+    keep_better(best, all[i].group, single(all[i], left));
     if (!all[i].type->search->pairs) continue;
     for (std::size_t j = 0; j < i; ++j)
-      if (all[j].group == all[i].group)
-        keep_better(best, all[i].group + " pair", pair(all[j], all[i], remainder));
+      if (all[j].group == all[i].group) keep_better(best, all[i].group + " pair", pair(all[j], all[i], left));
   }
   std::vector<Candidate> sorted;
   for (const auto& [group, candidate] : best)

@@ -7,6 +7,7 @@
 
 #include "../fit/joint_fit.h"
 #include "backlash_diagnosis/model/term.h"
+#include "search_settings.h"
 
 namespace backlash {
 
@@ -20,7 +21,8 @@ struct Candidate {
 
 /// The best candidate of each kind and choice, best first. `fit` is the machine as it is fitted now, with the
 /// sensitivities of its residuals; whatever those explain no candidate gets credit for.
-std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range);
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range,
+                              const ScreenSettings& settings);
 
 /// The machine with this candidate's terms, whose strengths, phases and refined shapes are fitted as well.
 Machine with_candidate(Machine machine, const Candidate& candidate, const MotionRange& range);

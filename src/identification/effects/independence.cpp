@@ -7,8 +7,9 @@
 namespace backlash {
 namespace {
 
-constexpr double kBand = 2.576;  // standard deviations of 99 %
-constexpr long kMemory = 400;    // samples, over which colour is summed
+constexpr double kBand = 2.576;  // theory: standard deviations of 99 %
+constexpr long kMemory =
+    400;  // samples, choice: over which colour is summed, and at most a quarter of the record
 
 double mean(const std::vector<double>& x) {
   double sum = 0;

@@ -1,52 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "learned.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
-#include "remainder.h"
+#include "orthogonal_part.h"
 
 namespace backlash {
 namespace {
 
-constexpr int kPoints = 40;
-constexpr double kTail = 0.002;      // of the samples, beyond the outer points
-constexpr double kProbe = 0.05;      // of a strength that would show clearly
-constexpr double kShowing = 0.05;    // of the torque: such a strength
-constexpr double kGapShowing = 0.1;  // of the deflection
-constexpr double kStiffnessShowing = 0.1;
-constexpr double kSoftest = -0.9;  // share that a flank's stiffness may start with
-constexpr int kBlocks = 12;
-constexpr double kRidge = 1e-6;  // of the mean squared sensitivity: decides what nothing else does
-
-struct MapKind {
-  const char *acts_on, *coordinate;
-  bool needs_load;
-};
-
-// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque
-// itself would explain everything, and so would time where the torque is commanded in ramps.
-constexpr MapKind kKinds[] = {
-    {"motor", "motor_position", false},
-    {"motor", "motor_velocity", false},
-    {"motor", "motor_torque", true},
-    {"motor", "mesh_torque", true},
-    {"motor", "time", true},
-    {"load", "load_position", true},
-    {"load", "load_velocity", true},
-    {"load", "mesh_torque", true},
-    {"load", "time", true},
-    {"gap", "load_position", true},
-    {"gap", "mesh_torque", true},
-    {"forward_flank", "load_position", true},
-    {"backward_flank", "load_position", true},
-    {"forward_stiffness", "load_position", true},
-    {"backward_stiffness", "load_position", true},
-};
+constexpr int kPoints = 40;  // choice: of a map; its smoothness is found by cross-validation
 
 std::vector<double> coordinate(const std::string& name, const RecordSet& records, const Machine& machine) {
   std::vector<double> all;
@@ -67,50 +34,42 @@ std::vector<double> coordinate(const std::string& name, const RecordSet& records
 }
 
 /// Evenly spaced over what the records cover.
-std::vector<double> points_over(std::vector<double> values) {
+std::vector<double> points_over(std::vector<double> values, double tail) {
   const auto at = [&](double share) {
     const auto place = values.begin() + long(share * double(values.size() - 1));
     std::nth_element(values.begin(), place, values.end());
     return *place;
   };
-  const double low = at(kTail), high = at(1 - kTail);
+  const double low = at(tail), high = at(1 - tail);
   std::vector<double> points;
   if (!(high > low)) return points;
   for (int i = 0; i < kPoints; ++i) points.push_back(low + (high - low) * i / (kPoints - 1));
   return points;
 }
 
-bool is_stiffness(const std::string& acts_on) {
-  return acts_on.find("stiffness") != std::string::npos;
-}
-
-double clear_strength(const std::string& acts_on, const MotionRange& range) {
-  if (acts_on == "motor" || acts_on == "load") return kShowing * range.torque;
-  return is_stiffness(acts_on) ? kStiffnessShowing : kGapShowing * range.deflection;
-}
-
 ParameterValues map_values(const MapKind& kind, const std::vector<double>& points,
                            std::vector<double> values) {
+  const TermMap& map = *map_term().map;
   ParameterValues p;
-  p.set_choice("acts_on", kind.acts_on);
-  p.set_choice("coordinate", kind.coordinate);
-  p.set_list("points", points);
-  p.set_list("values", std::move(values));
+  p.set_choice(map.acts_on, kind.acts_on);
+  p.set_choice(map.coordinate, kind.coordinate);
+  p.set_list(map.points, points);
+  p.set_list(map.values, std::move(values));
   return p;
 }
 
 /// What is left of the sensitivities to each value of a map.
 Eigen::MatrixXd columns(const MapKind& kind, const std::vector<double>& points, double step,
-                        const MachineFit& fit, const RecordSet& records, const Remainder& remainder,
+                        const MachineFit& fit, const RecordSet& records, const OrthogonalPart& orthogonal,
                         const Eigen::VectorXd& now) {
   Eigen::MatrixXd all(now.size(), kPoints);
   for_each_in_parallel(kPoints, [&](int i) {
     std::vector<double> values(kPoints, 0.0);
     values[i] = step;
     Rig rig = fit.machine.rig;
-    rig.terms.push_back(make_term("learned_map", map_values(kind, points, values)));
+    rig.terms.push_back(make_term(map_term().id, map_values(kind, points, values)));
     try {
-      all.col(i) = remainder.without(records.rows(rig, fit.machine.calibrations) - now) / step;
+      all.col(i) = orthogonal.of(records.rows(rig, fit.machine.calibrations) - now) / step;
     } catch (const Cancelled&) {
       throw;
     } catch (const Error&) {
@@ -127,16 +86,17 @@ struct Blocks {
   std::vector<double> square;
 };
 
-Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const RecordSet& records) {
+Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const RecordSet& records,
+                 int blocks) {
   Blocks b;
-  b.normal.assign(kBlocks, Eigen::MatrixXd::Zero(c.cols(), c.cols()));
-  b.gradient.assign(kBlocks, Eigen::VectorXd::Zero(c.cols()));
-  b.square.assign(kBlocks, 0);
+  b.normal.assign(blocks, Eigen::MatrixXd::Zero(c.cols(), c.cols()));
+  b.gradient.assign(blocks, Eigen::VectorXd::Zero(c.cols()));
+  b.square.assign(blocks, 0);
   for (Eigen::Index i = 0; i < c.rows(); ++i) {
     const RecordSet::Row& row = records.layout()[std::size_t(i)];
     const ServoData& d = records.records()[row.record].data();
     const auto at =
-        std::min<std::size_t>(kBlocks - 1, std::size_t(kBlocks * row.time / (double(d.size()) * d.interval)));
+        std::min<std::size_t>(blocks - 1, std::size_t(blocks * row.time / (double(d.size()) * d.interval)));
     b.normal[at].noalias() += c.row(i).transpose() * c.row(i);
     b.gradient[at] -= c.row(i).transpose() * left[i];
     b.square[at] += left[i] * left[i];
@@ -147,39 +107,40 @@ Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const Re
 Eigen::MatrixXd roughness() {
   Eigen::MatrixXd d = Eigen::MatrixXd::Zero(kPoints - 2, kPoints);
   for (int i = 0; i + 2 < kPoints; ++i) d(i, i) = 1, d(i, i + 1) = -2, d(i, i + 2) = 1;
-  return d.transpose() * d;
+  return gram(d);
 }
 
 /// Squared norm of what is left in blocks that the map did not see.
 double held_out_square(const Blocks& b, const Eigen::MatrixXd& all, const Eigen::VectorXd& gradient,
-                       const Eigen::MatrixXd& belief) {
+                       const Eigen::MatrixXd& prior) {
   double sum = 0;
-  for (int k = 0; k < kBlocks; ++k) {
-    const Eigen::VectorXd v = (all - b.normal[k] + belief).ldlt().solve(gradient - b.gradient[k]);
+  for (std::size_t k = 0; k < b.normal.size(); ++k) {
+    const Eigen::VectorXd v = solve_symmetric(all - b.normal[k] + prior, gradient - b.gradient[k]);
     sum += b.square[k] - 2 * v.dot(b.gradient[k]) + v.dot(b.normal[k] * v);
   }
   return sum;
 }
 
 LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, const Eigen::MatrixXd& c,
-                       const Eigen::VectorXd& left, const RecordSet& records) {
-  const Blocks blocks = in_blocks(c, left, records);
+                       const Eigen::VectorXd& left, const RecordSet& records, const MapSettings& settings) {
+  const Blocks blocks = in_blocks(c, left, records, settings.blocks);
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(kPoints, kPoints);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(kPoints);
-  for (int k = 0; k < kBlocks; ++k) all += blocks.normal[k], gradient += blocks.gradient[k];
+  for (const Eigen::MatrixXd& normal : blocks.normal) all += normal;
+  for (const Eigen::VectorXd& one : blocks.gradient) gradient += one;
   const double mean = all.trace() / kPoints;
   LearnedCandidate best;
   if (!(mean > 0)) return best;
   const Eigen::MatrixXd rough = roughness(),
-                        ridge = kRidge * mean * Eigen::MatrixXd::Identity(kPoints, kPoints);
+                        ridge = settings.ridge * mean * Eigen::MatrixXd::Identity(kPoints, kPoints);
   double least = INFINITY;
-  for (double weight = 1e-4 * mean; weight < 1e5 * mean; weight *= 10) {
-    const Eigen::MatrixXd belief = weight * rough + ridge;
-    const double square = held_out_square(blocks, all, gradient, belief);
+  for (double weight = settings.roughest * mean; weight < settings.smoothest * mean; weight *= 10) {
+    const Eigen::MatrixXd prior = weight * rough + ridge;
+    const double square = held_out_square(blocks, all, gradient, prior);
     if (!(square < least)) continue;
     least = square;
-    Eigen::VectorXd v = (all + belief).ldlt().solve(gradient);
-    if (is_stiffness(kind.acts_on)) v = v.cwiseMax(kSoftest);
+    Eigen::VectorXd v = solve_symmetric(all + prior, gradient);
+    v = v.cwiseMax(kind.least);
     best.values = map_values(kind, points, {v.begin(), v.end()});
     best.smoothness = weight;
     best.gain = 1 - std::sqrt(std::max(0.0, square)) / left.norm();
@@ -189,18 +150,33 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
 
 }  // namespace
 
+const TermType& map_term() {
+  static const TermType& type = term_type_that([](const TermType& t) { return t.map.has_value(); });
+  return type;
+}
+
+const MapKind& kind_of(const ParameterValues& values) {
+  const TermMap& map = *map_term().map;
+  for (const MapKind& kind : map.kinds)
+    if (kind.acts_on == values.choice(map.acts_on) && kind.coordinate == values.choice(map.coordinate))
+      return kind;
+  throw InvalidParameter(map.coordinate, values.choice(map.coordinate), "is not one that is learned");
+}
+
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
-                                         const MotionRange& range) {
+                                         const MotionRange& range, const MapSettings& settings) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
-  const Remainder remainder(fit, now.size());
+  const OrthogonalPart orthogonal(fit, now.size());
   std::vector<LearnedCandidate> all;
-  for (const MapKind& kind : kKinds) {
+  for (const MapKind& kind : map_term().map->kinds) {
     if (kind.needs_load && !load_moves_freely(fit.machine.rig)) continue;
-    const std::vector<double> points = points_over(coordinate(kind.coordinate, records, fit.machine));
+    const std::vector<double> points =
+        points_over(coordinate(kind.coordinate, records, fit.machine), settings.tail);
     if (points.empty()) continue;
-    const double step = kProbe * clear_strength(kind.acts_on, range);
-    const LearnedCandidate one = learn(
-        kind, points, columns(kind, points, step, fit, records, remainder, now), remainder.left(), records);
+    const double step = settings.probe * kind.typical(range);
+    const LearnedCandidate one =
+        learn(kind, points, columns(kind, points, step, fit, records, orthogonal, now),
+              orthogonal.residuals(), records, settings);
     if (one.gain > 0) all.push_back(one);
   }
   std::stable_sort(all.begin(), all.end(),
@@ -208,19 +184,23 @@ std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet&
   return all;
 }
 
-Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range) {
+Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range,
+                 const MapSettings& settings) {
   const std::size_t place = machine.rig.terms.size();
-  machine.rig.terms.push_back(make_term("learned_map", candidate.values));
-  const double scale = clear_strength(candidate.values.choice("acts_on"), range);
+  machine.has_map = true;
+  machine.rig.terms.push_back(make_term(map_term().id, candidate.values));
+  const TermMap& map = *map_term().map;
+  const double scale = kind_of(candidate.values).typical(range);
   for (std::size_t i = 0; i < kPoints; ++i)
-    machine.parameters.push_back(list_parameter(place, "values", i, scale));
-  const double root = std::sqrt(candidate.smoothness), ridge = std::sqrt(kRidge * candidate.smoothness);
+    machine.parameters.push_back(list_parameter(place, map.values, i, scale));
+  const double root = std::sqrt(candidate.smoothness),
+               ridge = std::sqrt(settings.ridge * candidate.smoothness);
   for (std::size_t i = 0; i < kPoints; ++i) {
-    machine.beliefs.push_back(
-        [=](const Rig& rig) { return ridge * rig.terms[place]->values.list("values")[i]; });
+    machine.priors.push_back(
+        [=, &map](const Rig& rig) { return ridge * rig.terms[place]->values.list(map.values)[i]; });
     if (i + 2 < kPoints)
-      machine.beliefs.push_back([=](const Rig& rig) {
-        const std::vector<double>& v = rig.terms[place]->values.list("values");
+      machine.priors.push_back([=, &map](const Rig& rig) {
+        const std::vector<double>& v = rig.terms[place]->values.list(map.values);
         return root * (v[i] - 2 * v[i + 1] + v[i + 2]);
       });
   }

@@ -4,22 +4,30 @@
 
 #include "../fit/joint_fit.h"
 #include "backlash_diagnosis/model/term.h"
+#include "search_settings.h"
 
 namespace backlash {
 
-/// A learned_map term, and how much it explains of blocks that it was not fitted to.
+/// The values of a map_term(), and how much it explains of blocks that it was not fitted to.
 struct LearnedCandidate {
   ParameterValues values;
   double smoothness = 0;  // weight of the squared second differences of its values, in units of the rows
   double gain = 0;        // held out: relative decrease of the norm of all residuals
 };
 
+/// The term whose law is learned.
+const TermType& map_term();
+
+/// What the values of a learned map are and follow. Throws InvalidParameter for a kind that is never learned.
+const MapKind& kind_of(const ParameterValues& values);
+
 /// A map over every coordinate, best first: values by least squares on what the machine's own parameters
 /// leave, as smooth as cross-validation over blocks of the records says.
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
-                                         const MotionRange& range);
+                                         const MotionRange& range, const MapSettings& settings);
 
 /// The machine with this map, whose values are fitted as well, held as smooth as they are.
-Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range);
+Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range,
+                 const MapSettings& settings);
 
 }  // namespace backlash

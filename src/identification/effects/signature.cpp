@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "signature.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 
 #include "backlash_diagnosis/model/axis_unit.h"
@@ -11,10 +12,13 @@
 namespace backlash {
 namespace {
 
-constexpr int kBins = 24, kFolds = 12;
-constexpr int kLargestOrder = 80;
-constexpr double kWorthNaming = 0.05;  // of the variance
-constexpr double kWorthSaying = 0.01;  // of the signal: what is smaller lies within what any model neglects
+constexpr int kBins = 24,
+              kFolds = 12;  // choice: classes of a coordinate; parts of each record, for cross-validation
+constexpr int kLargestOrder = 80;      // choice: of the motor position, load side
+constexpr double kWorthNaming = 0.05;  // choice: of the variance
+constexpr double kWorthSaying =
+    0.01;  // choice: of the signal: what is smaller lies within what any model neglects
+constexpr std::size_t kMostNames = 3;  // choice
 
 /// Residual of one channel and what it may follow, samples that count, of all records.
 struct Samples {
@@ -93,7 +97,7 @@ std::pair<int, double> strongest_order(const Samples& s, const std::vector<doubl
 }  // namespace
 
 std::optional<Unexplained> signature(const Machine& machine, const RecordSet& records, double clear) {
-  Leftover left = records.leftover(machine);
+  Misfit left = records.misfit(machine);
   if (left.torque_share < kWorthSaying) left.torque = 0;
   if (left.deflection_share < kWorthSaying) left.deflection = 0;
   if (std::max(left.torque, left.deflection) < clear) return std::nullopt;
@@ -105,21 +109,18 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
   shares.emplace_back(share, "order " + std::to_string(order) + " of the motor position");
   std::stable_sort(shares.begin(), shares.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
-  char text[160];
-  const std::string unit = axis_unit(deflection ? "rad" : "N m", machine.rig.linear);
-  std::snprintf(text, sizeof text, "%.3g %s rms, %.1f times the noise floor", s.rms, unit.c_str(),
-                deflection ? left.deflection : left.torque);
-  Unexplained u{deflection ? "deflection" : "torque", text};
+  Unexplained u{deflection ? "deflection" : "torque",
+                fmt::format("{:.3g} {} rms, {:.1f} times the noise floor", s.rms,
+                            axis_unit(deflection ? "rad" : "N m", machine.rig.linear),
+                            deflection ? left.deflection : left.torque)};
   if (shares.front().first < kWorthNaming) {
     u.signature += "; follows no coordinate";
     return u;
   }
   u.signature += "; follows";
-  for (std::size_t i = 0; i < 3 && shares[i].first >= kWorthNaming; ++i) {
-    std::snprintf(text, sizeof text, "%s %s (%.0f %% of its variance)", i ? "," : "",
-                  shares[i].second.c_str(), 100 * shares[i].first);
-    u.signature += text;
-  }
+  for (std::size_t i = 0; i < kMostNames && shares[i].first >= kWorthNaming; ++i)
+    u.signature += fmt::format("{} {} ({:.0f} % of its variance)", i ? "," : "", shares[i].second,
+                               100 * shares[i].first);
   return u;
 }
 

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "validation.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash {
 namespace {
 
-constexpr int kBlocks = 12;
-constexpr double kKnown = 0.6;  // of each record, for the prediction forward in time
+constexpr double kRidge =
+    1e-10;  // theory: of a squared sensitivity: what only the left-out rows tell stays where it is
 
 double duration(const PreparedServo& record) {
   return double(record.data().size()) * record.data().interval;
@@ -29,9 +30,10 @@ Eigen::VectorXd without(const LeastSquaresFit& fit, const Eigen::MatrixXd& norma
                         const std::vector<Eigen::Index>& rows) {
   const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
   const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd rest = unit.asDiagonal() * (normal - j.transpose() * j) * unit.asDiagonal();
-  rest.diagonal().array() += 1e-10;  // what only these rows tell stays where it is
-  return unit.asDiagonal() * rest.ldlt().solve(unit.asDiagonal() * (j.transpose() * fit.residuals(rows)));
+  Eigen::MatrixXd rest = unit.asDiagonal() * (normal - gram(j)) * unit.asDiagonal();
+  rest.diagonal().array() += kRidge;
+  const Eigen::VectorXd gradient = j.transpose() * fit.residuals(rows);
+  return unit.asDiagonal() * solve_symmetric(rest, unit.asDiagonal() * gradient);
 }
 
 void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& r,
@@ -65,15 +67,16 @@ Squares all_but_worst(const std::vector<double>& before, const std::vector<doubl
 
 }  // namespace
 
-HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records) {
+HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records,
+                 const AcceptanceSettings& settings) {
   const LeastSquaresFit& f = fit.fit;
-  const Eigen::MatrixXd normal = f.jacobian.transpose() * f.jacobian;
+  const Eigen::MatrixXd normal = gram(f.jacobian);
   HeldOut out;
   const auto everything = rows_where(records, [](const RecordSet::Row&) { return true; });
   add_squares(records, everything, f.residuals(everything), out.torque_train, out.deflection_train);
-  for (int b = 0; b < kBlocks; ++b) {
+  for (int b = 0; b < settings.blocks; ++b) {
     const auto rows = rows_where(records, [&](const RecordSet::Row& row) {
-      return int(kBlocks * row.time / duration(records.records()[row.record])) == b;
+      return int(settings.blocks * row.time / duration(records.records()[row.record])) == b;
     });
     const Eigen::VectorXd change = without(f, normal, rows);
     double torque = 0, deflection = 0;
@@ -82,7 +85,7 @@ HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& r
     out.deflection.push_back(deflection);
   }
   const auto late = rows_where(records, [&](const RecordSet::Row& row) {
-    return row.time > kKnown * duration(records.records()[row.record]);
+    return row.time > settings.earlier_part * duration(records.records()[row.record]);
   });
   const Eigen::VectorXd change = without(f, normal, late);
   Eigen::VectorXd r = f.residuals(late) + f.jacobian(late, Eigen::all) * change;

@@ -4,11 +4,12 @@
 
 #include "../fit/joint_fit.h"
 #include "backlash_diagnosis/identification/effects/effect_search.h"
+#include "search_settings.h"
 
 namespace backlash {
 
 /// Norms of the residuals of one fit, each block of the records predicted by what the other blocks say
-/// (linear about the fit), and the last two fifths predicted by the first three (simulated).
+/// (linear about the fit), and the later part predicted by the earlier (simulated).
 struct HeldOut {
   std::vector<double> torque, deflection;  // squares, per block
   double torque_forward = 0, deflection_forward = 0;
@@ -16,7 +17,8 @@ struct HeldOut {
 };
 
 /// `start` is what the fit's values belong to. Both fits to be compared must have the same weights.
-HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records);
+HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records,
+                 const AcceptanceSettings& settings);
 
 /// What the second fit has gained on the first, of the channel that gains most.
 struct Gain {

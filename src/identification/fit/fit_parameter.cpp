@@ -9,9 +9,9 @@ namespace backlash {
 
 FitParameter machine_parameter(const std::string& name, const Rig& rig) {
   const RigParameter& p = servo_parameter(name);
-  if (const double value = p.get(rig); p.positive && !(value > 0))
+  if (const double value = p.get(rig); p.positive() && !(value > 0))
     throw InvalidParameter(name, value, "must be > 0");
-  return {p.name, p.unit, p.positive, 1, p.get, p.set};
+  return {p.name, p.unit, p.positive(), 1, p.get, p.set};
 }
 
 FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale) {

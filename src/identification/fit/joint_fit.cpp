@@ -11,16 +11,17 @@
 namespace backlash {
 namespace {
 
-constexpr double kFarthest = 30;      // times the start or a part of it: approached, never reached
-constexpr double kWideStep = 1e-2;    // of the differences that the errors are taken from
-constexpr double kBlock = 1;          // s: the slowest oscillation that a servo record shows
-constexpr double kNegligible = 2e-3;  // of a signal: no floor is lower, no model need be better
-constexpr double kSaturated = 3;      // where tanh no longer moves: 0.995 of the largest delay
-constexpr double kVague = 30;         // times the scale: what is believed of a parameter before any record
-constexpr double kDefaultGap = 1e-4;  // rad, scale of an encoder offset where the rig has no gap
+constexpr double kFarthest = 30;    // choice: times the start or a part of it: approached, never reached
+constexpr double kWideStep = 1e-2;  // simulation: relative, of the differences that the errors are taken from
+constexpr double kNegligible = 2e-3;  // choice: of a signal: no floor is lower, no model need be better
+constexpr double kVague = 30;  // choice: times the scale: standard deviation of the prior of a parameter
+constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
+constexpr double kOversampling =
+    1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
+constexpr long kFewestBlocks = 4;  // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
-  return std::max(1L, std::lround(0.4 / (record.cutoff * record.data().interval)));
+  return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));
 }
 
 double rms(const std::vector<double>& values, const std::vector<char>& counts) {
@@ -47,10 +48,10 @@ Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, con
   const Machine machine = unknowns.machine(p);
   Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
   const Eigen::Index own = rows.size();
-  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.beliefs.size()));
-  rows.segment(own, unknowns.size()) = unknowns.beliefs(p);
-  for (std::size_t i = 0; i < machine.beliefs.size(); ++i)
-    rows[own + unknowns.size() + Eigen::Index(i)] = machine.beliefs[i](machine.rig);
+  rows.conservativeResize(own + unknowns.size() + Eigen::Index(machine.priors.size()));
+  rows.segment(own, unknowns.size()) = unknowns.prior(p);
+  for (std::size_t i = 0; i < machine.priors.size(); ++i)
+    rows[own + unknowns.size() + Eigen::Index(i)] = machine.priors[i](machine.rig);
   return rows;
 }
 
@@ -68,6 +69,10 @@ void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
 }
 
 }  // namespace
+
+double size(const Misfit& misfit) {
+  return std::hypot(misfit.torque, misfit.deflection);
+}
 
 RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double feedback) {
   for (const ServoData& d : data) {
@@ -103,8 +108,8 @@ void RecordSet::weigh(const Machine& machine) {
   }
 }
 
-Leftover RecordSet::leftover(const Machine& machine) const {
-  Leftover sum;
+Misfit RecordSet::misfit(const Machine& machine) const {
+  Misfit sum;
   for (std::size_t i = 0; i < records_.size(); ++i) {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
@@ -192,7 +197,7 @@ std::vector<Calibration> Unknowns::calibrations(const Eigen::VectorXd& values) c
   return all;
 }
 
-Eigen::VectorXd Unknowns::beliefs(const Eigen::VectorXd& values) const {
+Eigen::VectorXd Unknowns::prior(const Eigen::VectorXd& values) const {
   Eigen::VectorXd sigma = kVague * scale();
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     if (start_.parameters[i].positive) sigma[Eigen::Index(i)] = std::log(kFarthest);
@@ -235,10 +240,13 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records, const Non
 
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records) {
   const Unknowns unknowns(start);
-  const Eigen::Index known = unknowns.size() + Eigen::Index(start.beliefs.size()),
+  const Eigen::Index known = unknowns.size() + Eigen::Index(start.priors.size()),
                      rows = fit.fit.residuals.size() - known;
-  const Eigen::Index wanted = 2 * std::lround(kBlock / records.row_interval());
-  const Eigen::Index block = std::clamp<Eigen::Index>(rows / (4 * unknowns.size()), 1, wanted);
+  double longest = 0;  // s
+  for (const PreparedServo& record : records.records())
+    longest = std::max(longest, time_between_reversals(record.data()));
+  const Eigen::Index wanted = std::max(1L, 2 * std::lround(longest / records.row_interval()));
+  const Eigen::Index block = std::clamp<Eigen::Index>(rows / (kFewestBlocks * unknowns.size()), 1, wanted);
   widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);

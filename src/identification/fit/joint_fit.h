@@ -19,8 +19,9 @@ struct Machine {
   std::vector<FitParameter> parameters;
   std::vector<Calibration> calibrations;
   /// What is known of the rig beside the records: one more row each, in standard deviations.
-  std::vector<std::function<double(const Rig&)>> beliefs = {};
+  std::vector<std::function<double(const Rig&)>> priors = {};
   double largest_delay = 3;  // samples; approached, never reached; 0: delays are not fitted
+  bool has_map = false;      // a learned map with its many values is among the parameters
 };
 
 /// Standard deviation of either residual of one record [N m, rad].
@@ -28,12 +29,15 @@ struct Weights {
   double torque = 1, deflection = 1;
 };
 
-/// What is left of one channel of all records: root mean square in units of the noise floor, or of a
-/// negligible part of the signal where that is more.
-struct Leftover {
+/// What a machine leaves of the channels of all records: root mean square in units of the noise floor, or of
+/// a negligible part of the signal where that is more.
+struct Misfit {
   double torque = 0, deflection = 0;
   double torque_share = 0, deflection_share = 0;  // of the signal's standard deviation instead
 };
+
+/// Of both channels together.
+double size(const Misfit& misfit);
 
 /// Records made ready at one bandwidth, with the weights of their channels. One row per channel and as many
 /// samples as a signal of this bandwidth has independent values: of each record torque and deflection in
@@ -44,7 +48,7 @@ class RecordSet {
 
   /// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
   void weigh(const Machine& machine);
-  Leftover leftover(const Machine& machine) const;
+  Misfit misfit(const Machine& machine) const;
 
   Eigen::VectorXd rows(const Rig& rig, const std::vector<Calibration>& calibrations) const;
 
@@ -80,8 +84,8 @@ class Unknowns {
   /// Throws InvalidParameter for what is refused by the rig.
   Rig rig(const Eigen::VectorXd& values) const;
   std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
-  /// One row per value: vaguely, it is not far from its start. So what the records do not tell stays there.
-  Eigen::VectorXd beliefs(const Eigen::VectorXd& values) const;
+  /// One row per value: a wide prior about its start, so that what the records do not tell stays there.
+  Eigen::VectorXd prior(const Eigen::VectorXd& values) const;
   Machine machine(const Eigen::VectorXd& values) const;
   std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const;
   Measured parameter(const LeastSquaresFit& fit, std::size_t i) const;
@@ -98,7 +102,9 @@ class Unknowns {
 
 MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options);
 
-/// Covariance of the fitted values from wide steps and from whole stretches of the records, the larger.
+/// Covariance of the fitted values from wide steps and from blocks of the records as long as the time between
+/// two reversals of the motor, the larger: until the next reversal what friction and play leave keeps its
+/// sign.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
 }  // namespace backlash

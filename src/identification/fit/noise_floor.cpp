@@ -6,6 +6,7 @@
 #include <complex>
 #include <unsupported/Eigen/FFT>
 
+#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
@@ -56,11 +57,9 @@ struct Spring {
 /// Of the teeth under the usual torque of a record, about which noise moves them.
 Spring mesh_spring(const Rig& rig, const std::vector<double>& torque) {
   if (rig.mesh.rigid || !rig.mesh.contact->power_contact()) return {};
-  double square = 0;
-  for (const double t : torque) square += t * t / double(torque.size());
   const PowerContact law = *rig.mesh.contact->power_contact();
   const double lever = rig.mesh.lever(),
-               depth = rig.mesh.contact->static_penetration(std::sqrt(square) / lever);
+               depth = rig.mesh.contact->static_penetration(usual_torque(torque) / lever);
   const double force = law.stiffness * std::pow(depth, law.exponent);
   const double stiffness = law.exponent == 1 ? law.stiffness : law.exponent * force / depth;
   return {stiffness * lever * lever, (law.damping + law.loss * force) * lever * lever};
@@ -74,7 +73,7 @@ NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vecto
   const bool free = load_moves_freely(rig);
   const double motor_inertia = train.motor_inertia(), load_inertia = train.load_inertia();
   const auto [k, b] = mesh_spring(rig, data.torque);
-  const double rate_cutoff = load_rate_cutoff(data.interval);
+  const double rate_cutoff = data.load_rate_cutoff;
   const std::vector<double> load_power =
       free ? load_noise(data, load) : std::vector<double>(data.size() / 2, 0.0);
   const double lines = double(load_power.size());

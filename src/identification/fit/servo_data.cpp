@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
@@ -16,13 +17,17 @@
 namespace backlash {
 namespace {
 
-constexpr std::size_t kStart = 10;        // samples
-constexpr std::size_t kLeastToTell = 64;  // samples, for the noise of a position
-constexpr double kRateNoise = 0.95;  // of a five-point difference of white noise of deviation 1, per sample
-constexpr double kClear = 0.02;      // of the speed: noise that does not hide its direction
-constexpr double kWidestBand = 0.2;  // of the sampling rate
-constexpr double kNarrower = 0.9;
-constexpr double kLeastPeriods = 10;  // of the band, in the record: below, nothing is smoothed
+constexpr std::size_t kStart = 10;        // samples, choice: of the line that the load's start is taken from
+constexpr std::size_t kLeastToTell = 64;  // samples, theory: for the noise of a position (bandwidth.h)
+constexpr double kRateNoise =
+    0.95;  // theory: of a five-point difference of white noise of deviation 1, per sample
+constexpr double kClear = 0.02;  // choice: of the speed: noise that does not hide its direction
+constexpr double kSureSpeed =
+    5;  // choice: standard deviations of the speed's noise, from which it has a sign
+constexpr double kWidestBand = 0.2;   // theory: of the sampling rate, up to which differences are derivatives
+constexpr double kNarrower = 0.9;     // choice: from one band that is tried to the next
+constexpr double kLeastPeriods = 10;  // choice: of the band, in the record: below, nothing is smoothed
+constexpr double kLoadRateBand = 120 / kTriedResonance;  // simulation: in units of the mesh resonance
 
 std::vector<double> scaled(const Record& record, Channel channel, double factor) {
   std::vector<double> values = record.column(channel);
@@ -96,8 +101,16 @@ void smooth_slow_motion(ServoData& data) {
 
 }  // namespace
 
-double load_rate_cutoff(double interval) {
-  return std::min(kLoadRateCutoff, 0.2 / interval);
+double time_between_reversals(const ServoData& data) {
+  const double sure = kSureSpeed * data.rate_noise;
+  int direction = 0, reversals = 0;
+  for (const double rate : data.motor_rate) {
+    if (std::fabs(rate) <= sure) continue;
+    const int now = rate > 0 ? 1 : -1;
+    reversals += direction == -now;
+    direction = now;
+  }
+  return double(data.size()) * data.interval / (reversals + 1);
 }
 
 Record load_side(const Record& record, const Rig& rig) {
@@ -130,8 +143,11 @@ ServoData servo_data(const Record& raw, const Rig& rig) {
   data.motor_acceleration = second_difference(data.motor, data.interval);
   if (!record.has(Channel::load_position)) return data;
   data.load = scaled(record, Channel::load_position, 1);
-  data.load_rate =
-      low_pass(fast_derivative(data.load, data.interval), data.interval, load_rate_cutoff(data.interval));
+  const double highest = kWidestBand / data.interval;
+  const double resonance =
+      load_moves_freely(rig) ? mesh_resonance(load_side(rig), usual_torque(data.torque)) : 0;
+  data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
+  data.load_rate = low_pass(fast_derivative(data.load, data.interval), data.interval, data.load_rate_cutoff);
   std::tie(data.first_load, data.first_load_rate) = start_of(data.load);
   data.first_load_rate /= data.interval;
   return data;

@@ -16,10 +16,11 @@
 namespace backlash {
 namespace {
 
-constexpr double kEnds = 3;       // periods of the cutoff at either end, where the filter has not settled
-constexpr double kStarts = 12;    // time constants of the feedback, until the start of the load is forgotten
-constexpr double kSureSpeed = 5;  // standard deviations of the motor speed, from which it has a sign
-constexpr long kReach = 2;        // samples to either side that it uses
+constexpr double kEnds = 3;  // theory: periods of the cutoff at either end, where the filter has not settled
+constexpr double kStarts =
+    12;  // theory: time constants of the feedback: of the load's start exp(-12) is left
+constexpr double kSureSpeed = 5;  // choice: standard deviations of the motor speed, from which it has a sign
+constexpr long kReach = 2;        // theory: samples to either side that the five-point difference uses
 
 // A second difference is the mean of the acceleration over two intervals with triangular weights, exactly. So
 // torques are averaged alike: one that is smooth, by Simpson's weights; one that is held from its sample to
@@ -161,7 +162,8 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
   torque_of_moment_ = over_second_difference(servo.torque);
   torque_held_ = held_over_second_difference(servo.torque);
   const long n = static_cast<long>(servo.size()), ends = std::lround(kEnds / (cutoff * servo.interval));
-  const long begin = std::max(ends, std::lround(kStarts / (feedback * servo.interval)));
+  const bool drawn = feedback > 0 && !servo.load.empty();
+  const long begin = drawn ? std::max(ends, std::lround(kStarts / (feedback * servo.interval))) : ends;
   counts.assign(n, 0);
   settled.assign(n, 0);
   for (long k = begin; k < n - ends; ++k) {
@@ -197,7 +199,7 @@ ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calib
   return r;
 }
 
-ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSettings& settings,
                               const Calibration& calibration) {
   const PreparedServo prepared(data, settings.cutoff, settings.feedback);
   ServoResiduals r = prepared.residuals(rig, calibration);

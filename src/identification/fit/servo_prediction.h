@@ -28,7 +28,7 @@ struct PreparedServo {
   ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
 
   const ServoData& data() const { return *data_; }
-  double cutoff, feedback;
+  double cutoff, feedback;     // Hz, 1/s
   std::vector<int> direction;  // +1, -1: the motor slides that way; 0: dry friction may take any value
   std::vector<char> settled;   // away from the ends of the record
   std::vector<char> counts;    // settled, and the motor slides

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/clearance.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <sstream>
 
 #include "backlash_diagnosis/identification/procedures/flank_fit.h"
 #include "backlash_diagnosis/record/resampling.h"
@@ -15,26 +16,18 @@
 namespace backlash {
 namespace {
 
-constexpr double kCutoff = 40;       // Hz, of the travel in which passages are sought
-constexpr double kFineCutoff = 120;  // Hz, of the penetration
-constexpr double kMisfit = 0.02;     // of the travel, deviation of a passage that fits
-constexpr double kOutlier = 3;       // of the median deviation
-constexpr int kPushes[] = {2, 3};    // degrees of the push over J
-constexpr double kSlow = 0.2;        // of the fastest: below it friction changes
-constexpr double kSensitive = 0.05;  // of the gap, between the two pushes: worth a warning
-constexpr double kUncertain = 0.25;  // of the gap: beyond it is not told
-constexpr double kFlanks = 1.3;      // by which flanks must better the fit
-constexpr int kLeastSamples = 20;
+constexpr double kCutoff = 3.85;      // simulation: times the frequency of the load on a flank
+constexpr double kFineCutoff = 11.5;  // simulation: the same
+constexpr double kMisfit = 0.02;      // choice: of the travel, deviation of a passage that fits
+constexpr double kOutlier = 3;        // choice: of the median deviation
+constexpr int kPushes[] = {2, 3};     // choice: degrees of the push over J
+constexpr double kSlow = 0.2;         // choice: of the fastest: below it friction changes
+constexpr double kSensitive = 0.05;   // choice: of the gap, between the two pushes: worth a warning
+constexpr double kUncertain = 0.25;   // choice: of the gap: beyond it is not told
+constexpr double kFlanks = 1.3;       // simulation: by which flanks must better the fit
+constexpr int kLeastSamples = 20;     // choice: of a passage
 
 using Values = std::vector<double>;
-
-template <typename... Parts>
-std::string sentence(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(4);
-  (text << ... << parts);
-  return text.str();
-}
 
 /// From one turning point to the next.
 struct Stretch {
@@ -46,7 +39,7 @@ struct Run {
   double interval = 0;
 };
 
-Run prepare(const Record& given) {
+Run prepare(const Record& given, const ClearanceSettings& settings) {
   if (!given.has(Channel::motor_position) || !given.has(Channel::load_position))
     throw CannotIdentify("the clearance needs the positions of motor and load");
   const Record record = evenly_sampled(given);
@@ -56,8 +49,8 @@ Run prepare(const Record& given) {
   run.interval = record.sampling_interval();
   const Values& load = record.column(Channel::load_position);
   for (std::size_t i = 0; i < load.size(); ++i) run.relative.push_back(load[i] - run.motor[i]);
-  run.smooth = low_pass(run.relative, run.interval, std::min(kCutoff, 0.2 / run.interval));
-  run.fine = low_pass(run.relative, run.interval, std::min(kFineCutoff, 0.4 / run.interval));
+  run.smooth = low_pass(run.relative, run.interval, std::min(settings.cutoff, 0.2 / run.interval));
+  run.fine = low_pass(run.relative, run.interval, std::min(settings.fine_cutoff, 0.4 / run.interval));
   return run;
 }
 
@@ -159,8 +152,9 @@ void require_brake(const Run& run, const std::vector<Stretch>& stretches, double
   for (const Stretch& s : stretches)
     moving += travel_of(run.motor, s.begin, s.end) > most * travel_of(run.smooth, s.begin, s.end);
   if (2 * moving > int(stretches.size()))
-    throw CannotIdentify(sentence("the motor is not braked: in ", moving, " of ", stretches.size(),
-                                  " passages it moves more than ", 100 * most, " % of the load's travel"));
+    throw CannotIdentify(fmt::format(
+        "the motor is not braked: in {} of {} passages it moves more than {:.4g} % of the load's travel",
+        moving, stretches.size(), 100 * most));
 }
 
 struct Passages {
@@ -189,9 +183,8 @@ Passages fit_without_outliers(const Run& run, std::vector<Stretch> stretches, do
   Passages p;
   for (int round = 0;; ++round) {
     if (int(stretches.size()) < least)
-      throw CannotIdentify(sentence("only ", stretches.size(),
-                                    " passages are a free flight between two flanks; ", least,
-                                    " are needed"));
+      throw CannotIdentify(fmt::format("only {} passages are a free flight between two flanks; {} are needed",
+                                       stretches.size(), least));
     p.fit = fit_all(run, stretches, stiffness, push);
     p.stretches.clear();
     p.measured.clear();
@@ -222,9 +215,19 @@ Measured gap_of(const Passages& p) {
 
 }  // namespace
 
+ClearanceSettings clearance_settings(double stiffness, double load_inertia) {
+  ClearanceSettings settings;
+  settings.stiffness = stiffness;
+  settings.load_inertia = load_inertia;
+  const double contact = std::sqrt(stiffness / load_inertia) / (2 * M_PI);  // Hz
+  settings.cutoff = kCutoff * contact;
+  settings.fine_cutoff = kFineCutoff * contact;
+  return settings;
+}
+
 Clearance identify_clearance(const Record& record, const ClearanceSettings& settings) {
   const double held = held_frequency(settings);
-  const Run run = prepare(record);
+  const Run run = prepare(record, settings);
   std::vector<Stretch> stretches = find_passages(run, settings.contact_time);
   require_brake(run, stretches, settings.most_motor_travel);
   Clearance c;
@@ -242,14 +245,16 @@ Clearance identify_clearance(const Record& record, const ClearanceSettings& sett
   const double difference = std::fabs(gaps[0].value - gaps[1].value);
   const double noise = std::max(gaps[0].standard_error, gaps[1].standard_error);
   if (by_push[1].fit.without_flanks < kFlanks * by_push[1].fit.deviation)
-    throw CannotIdentify(sentence("the load meets no flanks: its passages fit a slow push alone to ",
-                                  by_push[1].fit.without_flanks, " rad, with flanks to ",
-                                  by_push[1].fit.deviation, " rad"));
+    throw CannotIdentify(
+        fmt::format("the load meets no flanks: its passages fit a slow push alone to {:.4g} rad, with flanks "
+                    "to {:.4g} rad",
+                    by_push[1].fit.without_flanks, by_push[1].fit.deviation));
   c.gap = {0.5 * (gaps[0].value + gaps[1].value), std::hypot(noise, difference)};
   if (c.gap.standard_error > kUncertain * c.gap.value)
-    throw CannotIdentify(sentence("the passages do not tell flank from push: ", gaps[0].value,
-                                  " rad with a parabola, ", gaps[1].value, " rad with a cubic, error ", noise,
-                                  " rad"));
+    throw CannotIdentify(
+        fmt::format("the passages do not tell flank from push: {:.4g} rad with a parabola, {:.4g} rad with a "
+                    "cubic, error {:.4g} rad",
+                    gaps[0].value, gaps[1].value, noise));
   const Passages& p = by_push[1];
   c.passages = p.measured;
   c.lower = p.fit.flanks.lower;
@@ -260,13 +265,14 @@ Clearance identify_clearance(const Record& record, const ClearanceSettings& sett
   for (const GapPassage& passage : c.passages) travels.push_back({passage.travel, passage.deviation});
   c.travel = robust_mean(travels);
   if (2 * c.passages.size() < std::size_t(c.found))
-    c.warnings.push_back(sentence("only ", c.passages.size(), " of ", c.found, " passages fit"));
+    c.warnings.push_back(fmt::format("only {} of {} passages fit", c.passages.size(), c.found));
   if (p.fit.contact.damping == 0)
     c.warnings.push_back(
         "the load seems to meet no damping on the flanks: they are touched too softly, distrust the gap");
   if (difference > kSensitive * c.gap.value)
-    c.warnings.push_back(sentence("the gap hangs on how the push is modelled: ", gaps[0].value,
-                                  " rad with a parabola, ", gaps[1].value, " rad with a cubic"));
+    c.warnings.push_back(fmt::format(
+        "the gap hangs on how the push is modelled: {:.4g} rad with a parabola, {:.4g} rad with a cubic",
+        gaps[0].value, gaps[1].value));
   return c;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/constant_speed.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -11,9 +13,9 @@
 namespace backlash {
 namespace {
 
-constexpr std::size_t kLeastBlocks = 4;
-constexpr double kSettled = 1e-4;      // of the speed
-constexpr double kMostSettling = 0.5;  // of a stretch
+constexpr std::size_t kLeastBlocks = 4;  // theory: for a standard error
+constexpr double kSettled = 1e-4;        // choice: of the speed
+constexpr double kMostSettling = 0.5;    // choice: of a stretch
 
 void require(const ConstantSpeedOptions& options) {
   if (!(options.block > 0)) throw InvalidParameter("block", options.block, "must be > 0 s");
@@ -79,8 +81,9 @@ std::vector<ConstantSpeedRun> find_constant_speed(const Record& recorded,
     first = end;
   }
   if (runs.empty())
-    throw CannotIdentify(record.name + ": no " + figure(options.least) + " s of constant speed (within " +
-                         figure(100 * options.spread) + " %, in means of " + figure(options.block) + " s)");
+    throw CannotIdentify(
+        fmt::format("{}: no {:.3g} s of constant speed (within {:.3g} %, in means of {:.3g} s)", record.name,
+                    options.least, 100 * options.spread, options.block));
   return runs;
 }
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/decay.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "backlash_diagnosis/record/resampling.h"
+#include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
@@ -13,36 +15,21 @@
 namespace backlash {
 namespace {
 
-constexpr double kSearched = 12;       // periods after a step in which ringing may begin
-constexpr double kShape = 0.01;        // of the amplitude: misfit that contact with friction and drift leaves
-constexpr double kNoiseMargin = 1.2;   // of the residuals' deviation over the noise
-constexpr double kLeastAmplitude = 5;  // deviations
-constexpr int kHeld = 2;               // eighths of a period
-constexpr double kSteady = 0.1;        // of the torque's travel: it is constant within this
+constexpr double kSearched = 12;  // choice: periods after a step in which ringing may begin
+constexpr double kShape =
+    0.01;  // simulation: of the amplitude: misfit that contact with friction and drift leaves
+constexpr double kNoiseMargin = 1.2;   // choice: of the residuals' deviation over the noise
+constexpr double kLeastAmplitude = 5;  // choice: deviations
+constexpr int kHeld = 2;               // choice: eighths of a period
+constexpr double kSteady = 0.1;        // choice: of the torque's travel: it is constant within this
 
 using Values = std::vector<double>;
-
-template <typename... Parts>
-std::string sentence(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(4);
-  (text << ... << parts);
-  return text.str();
-}
 
 /// Standard deviation of the noise from fourth differences, which slow signals do not reach; not below that
 /// of the sensor's steps, which a signal at rest does not show.
 double noise_of(const Values& y) {
-  Values fourth;
-  double step = std::numeric_limits<double>::infinity();
-  const double rounding = 1e-9 * (quantile(y, 1) - quantile(y, 0));
-  for (std::size_t i = 4; i < y.size(); ++i) {
-    fourth.push_back(std::fabs(y[i] - 4 * y[i - 1] + 6 * y[i - 2] - 4 * y[i - 3] + y[i - 4]));
-    const double d = std::fabs(y[i] - y[i - 1]);
-    if (d > rounding) step = std::min(step, d);
-  }
-  return std::max(kNormalPerMedianDeviation * quantile(fourth, 0.5) / std::sqrt(70.0),
-                  std::isfinite(step) ? step / std::sqrt(12.0) : 0);
+  const double step = smallest_step(y, 1e-9 * peak_to_peak(y));
+  return std::max(noise_from_differences(y, 4), step / std::sqrt(12.0));
 }
 
 /// Where a two-level signal changes level, with a dead band of half its travel about the middle.
@@ -99,7 +86,7 @@ Run prepare(const Record& given, RingingSignal signal, double period) {
   run.period = period;
   if (period < 8 * run.interval)
     throw CannotIdentify(
-        sentence("ringing of ", 1 / period, " Hz cannot be seen at ", 1 / run.interval, " Hz"));
+        fmt::format("ringing of {:.4g} Hz cannot be seen at {:.4g} Hz", 1 / period, 1 / run.interval));
   const bool speeds = signal == RingingSignal::speed_difference;
   run.signal = difference(r.column(speeds ? Channel::motor_velocity : Channel::motor_position),
                           r.column(speeds ? Channel::load_velocity : Channel::load_position));
@@ -210,12 +197,13 @@ void fill(DecayIdentification& d, const DecaySettings& s) {
   d.damping_by_rate.value -= s.bearing_damping;
   const double expected = std::sqrt(k / j), found = d.natural_frequency.value;
   if (std::fabs(found / expected - 1) > 0.05)
-    d.warnings.push_back(sentence("the ringing is at ", found / (2 * M_PI),
-                                  " Hz, stiffness and inertia give ", expected / (2 * M_PI),
-                                  " Hz: one of them does not belong to this record"));
+    d.warnings.push_back(
+        fmt::format("the ringing is at {:.4g} Hz, stiffness and inertia give {:.4g} Hz: one of them does not "
+                    "belong to this record",
+                    found / (2 * M_PI), expected / (2 * M_PI)));
   if (std::isfinite(d.peak_damping_ratio.value) && std::fabs(d.peak_damping_ratio.value / z - 1) > 0.2)
-    d.warnings.push_back(sentence("the peaks give a damping ratio of ", d.peak_damping_ratio.value,
-                                  ", the whole ringing ", z));
+    d.warnings.push_back(fmt::format("the peaks give a damping ratio of {:.4g}, the whole ringing {:.4g}",
+                                     d.peak_damping_ratio.value, z));
 }
 
 }  // namespace
@@ -233,10 +221,10 @@ DecayIdentification identify_decay(const Record& record, const DecaySettings& se
       d.ringings.push_back(*r);
   }
   if (int(d.ringings.size()) < settings.least_engagements)
-    throw CannotIdentify(sentence(d.ringings.size(), " of ", d.steps,
-                                  " steps are followed by ringing in contact above ", "the noise (",
-                                  run.noise, d.signal == RingingSignal::speed_difference ? " rad/s" : " rad",
-                                  "); ", settings.least_engagements, " are needed"));
+    throw CannotIdentify(fmt::format(
+        "{} of {} steps are followed by ringing in contact above the noise ({:.4g}{}); {} are needed",
+        d.ringings.size(), d.steps, run.noise,
+        d.signal == RingingSignal::speed_difference ? " rad/s" : " rad", settings.least_engagements));
   fill(d, settings);
   return d;
 }

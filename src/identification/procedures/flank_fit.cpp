@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/flank_fit.h"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash {
 namespace {
@@ -18,12 +17,12 @@ FlankContact contact_of(const std::vector<FlankPassage>& passages, const Flanks&
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   for (const FlankPassage& p : passages) {
     const Eigen::MatrixXd c = p.columns(flanks);
-    normal += c.transpose() * c;
+    normal += gram(c);
     right -= c.transpose() * p.measured();
   }
   if (std::isfinite(stiffness))
     return {stiffness, std::max(0.0, (right[1] - normal(0, 1) * stiffness) / normal(1, 1))};
-  const Eigen::Vector2d k = normal.inverse() * right;
+  const Eigen::Vector2d k = solve_square(normal, right);
   if (k[1] < 0) return {right[0] / normal(0, 0), 0};
   return {k[0], k[1]};
 }
@@ -52,8 +51,7 @@ FlankPassage::FlankPassage(const Eigen::VectorXd& position, Eigen::VectorXd smoo
   const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(size(), -1, 1);
   powers.col(0).setOnes();
   for (int k = 1; k < polynomial; ++k) powers.col(k) = powers.col(k - 1).array() * t;
-  basis_ = Eigen::HouseholderQR<Eigen::MatrixXd>(powers).householderQ() *
-           Eigen::MatrixXd::Identity(size(), polynomial);
+  basis_ = orthonormal_basis(powers);
   measured_ = without_polynomial(position);
 }
 

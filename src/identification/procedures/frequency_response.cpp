@@ -5,12 +5,12 @@
 #include <cmath>
 #include <numeric>
 #include <string>
-#include <unsupported/Eigen/FFT>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/stepped_sine.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash {
@@ -18,17 +18,14 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kSteppedShare = 0.9;  // of the time in sine runs; less is no stepped sine
-constexpr double kHighest = 0.25;      // of the sampling rate
-constexpr double kOverlap = 1.0 / 6;   // correlation of Hann windows that overlap by half
-constexpr double kNeighbours =
-    1 + 2 * (4.0 / 9 + 1.0 / 36);       // of neighbouring lines of Hann windows, squared
-constexpr double kLongestSegment = 16;  // s, if not asked for
+constexpr double kSteppedShare = 0.9;   // choice: of the time in sine runs; less is no stepped sine
+constexpr double kHighest = 0.25;       // choice: of the sampling rate
+constexpr double kLongestSegment = 16;  // s, choice: if not asked for
 constexpr std::size_t kShortestSegment = 64, kFewestSegments = 8;
-constexpr std::size_t kFirstLine = 3;  // below, what drifts leaks in
-constexpr double kExcited = 1e-5;      // of the largest power of a line
-constexpr std::size_t kLeakReach = 8;  // lines
-constexpr double kAlone = 1e-2;        // of a line's power, three lines beside it: it stands alone
+constexpr std::size_t kFirstLine = 3;  // theory: below, what drifts leaks in
+constexpr double kExcited = 1e-5;      // choice: of the largest power of a line
+constexpr std::size_t kLeakReach = 8;  // theory: lines
+constexpr double kAlone = 1e-2;        // choice: of a line's power, three lines beside it: it stands alone
 
 struct Signals {
   std::vector<double> torque, speed;
@@ -117,44 +114,6 @@ std::vector<ResponsePoint> stepped_points(const Signals& s, const SineRuns& sine
   return points;
 }
 
-/// Sums over segments of the spectra, line by line.
-struct Spectra {
-  std::vector<double> uu, yy;
-  std::vector<Complex> uy;
-  std::size_t segments = 0;
-};
-
-std::vector<Complex> windowed_spectrum(const std::vector<double>& x, std::size_t begin,
-                                       const std::vector<double>& window, Eigen::FFT<double>& fft) {
-  const auto first = x.begin() + static_cast<std::ptrdiff_t>(begin);
-  std::vector<double> part(first, first + static_cast<std::ptrdiff_t>(window.size()));
-  const double mean = std::accumulate(part.begin(), part.end(), 0.0) / double(part.size());
-  for (std::size_t i = 0; i < part.size(); ++i) part[i] = (part[i] - mean) * window[i];
-  std::vector<Complex> spectrum;
-  fft.fwd(spectrum, part);
-  return spectrum;
-}
-
-Spectra welch(const Signals& s, std::size_t segment) {
-  std::vector<double> window(segment);
-  for (std::size_t i = 0; i < segment; ++i)
-    window[i] = 0.5 - 0.5 * std::cos(2 * M_PI * double(i) / double(segment));
-  const std::size_t lines = segment / 2;
-  Spectra sum{std::vector<double>(lines, 0.0), std::vector<double>(lines, 0.0),
-              std::vector<Complex>(lines, 0.0), 0};
-  Eigen::FFT<double> fft;
-  for (std::size_t begin = 0; begin + segment <= s.torque.size(); begin += segment / 2, ++sum.segments) {
-    const auto u = windowed_spectrum(s.torque, begin, window, fft),
-               y = windowed_spectrum(s.speed, begin, window, fft);
-    for (std::size_t k = 0; k < lines; ++k) {
-      sum.uu[k] += std::norm(u[k]);
-      sum.yy[k] += std::norm(y[k]);
-      sum.uy[k] += std::conj(u[k]) * y[k];
-    }
-  }
-  return sum;
-}
-
 /// Highest of its neighbours, with nearly nothing three lines away.
 bool alone(const std::vector<double>& power, std::size_t k) {
   return power[k] >= power[k - 1] && power[k] > power[k + 1] &&
@@ -203,18 +162,18 @@ bool reverses(const std::vector<double>& speed) {
 
 FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) {
   const std::size_t segment = segment_length(s, settings.segment);
-  const Spectra sum = welch(s, segment);
-  const double n = double(sum.segments) / (1 + 2 * kOverlap * kOverlap);
-  const double largest = *std::max_element(sum.uu.begin() + kFirstLine, sum.uu.end());
+  const WelchSpectra spectra = welch(s.torque, s.speed, s.interval, segment);
+  const std::vector<double>& power = spectra.xx;
+  const double largest = *std::max_element(power.begin() + kFirstLine, power.end());
   const bool both_signs = reverses(s.speed);
   FrequencyResponse response;
   std::size_t single = 0;  // line of the last sine that stands alone
-  for (std::size_t k = kFirstLine; k + 3 < sum.uu.size(); ++k) {
-    if (!(sum.uu[k] > kExcited * largest) || !(sum.yy[k] > 0) || leaked(sum.uu, k)) continue;
+  for (std::size_t k = kFirstLine; k + 3 < power.size(); ++k) {
+    if (!(power[k] > kExcited * largest) || !(spectra.yy[k] > 0) || leaked(power, k)) continue;
     if (single > 0 && k <= single + 2) continue;
     double line = double(k);
-    if (alone(sum.uu, k)) {
-      line = interpolated(sum.uu, k);
+    if (alone(power, k)) {
+      line = interpolated(power, k);
       single = k;
       while (!response.points.empty() &&
              response.points.back().frequency * double(segment) * s.interval >= double(k) - 2.5)
@@ -222,12 +181,12 @@ FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) 
     }
     ResponsePoint point;
     point.frequency = line / (double(segment) * s.interval);
-    point.response = sum.uy[k] / sum.uu[k];
-    point.coherence = std::min(1.0, std::norm(sum.uy[k]) / (sum.uu[k] * sum.yy[k]));
-    point.standard_error = std::sqrt((1 - point.coherence) / (2 * n * point.coherence));
+    point.response = spectra.xy[k] / power[k];
+    point.coherence = spectra.coherence(k);
+    point.standard_error = std::sqrt((1 - point.coherence) / (2 * spectra.averages * point.coherence));
     point.reverses = both_signs;
     response.points.push_back(point);
-    if (single != k) response.variance_factor = kNeighbours;
+    if (single != k) response.variance_factor = kHannLines;
   }
   return response;
 }

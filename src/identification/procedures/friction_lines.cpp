@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/friction_lines.h"
 
-#include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
+#include <fmt/core.h>
 
-#include "backlash_diagnosis/signal/blocks.h"
+#include <algorithm>
+#include <boost/math/tools/toms748_solve.hpp>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kSameSpeed = 0.01;  // relative: speeds closer than this count as one
-constexpr double kSurprise = 0.01;   // chance of so much curvature on a straight line, that is worth telling,
-                                     // or of a row so far off among all
+constexpr double kSameSpeed = 0.01;  // choice: relative: speeds closer than this count as one
+constexpr double kSurprise = 0.01;   // choice: chance of so much curvature on a straight line, that is worth
+                                    // telling, or of a row so far off among all
 
 struct Rows {
   Eigen::VectorXd speed, torque, error;
@@ -55,36 +60,29 @@ Line weighted_line(const Rows& rows, const Eigen::VectorXd& weight) {
   Eigen::MatrixXd a(rows.speed.size(), 2);
   a << Eigen::VectorXd::Ones(a.rows()), rows.speed;
   Line line;
-  line.covariance = Eigen::Matrix2d(a.transpose() * weight.asDiagonal() * a).inverse();
+  line.covariance = symmetric_inverse(gram(weight.cwiseSqrt().asDiagonal() * a));
   line.values = line.covariance * (a.transpose() * weight.cwiseProduct(rows.torque));
   line.chi2 = weight.dot((rows.torque - a * line.values).cwiseAbs2());
   return line;
 }
 
-/// Weights 1 / (s^2 + u^2); u^2 from chi^2 = degrees of freedom by bisection.
+/// Weights 1 / (s^2 + u^2); u^2 from chi^2 = degrees of freedom.
 Eigen::VectorXd weights(const Rows& rows) {
   const auto with = [&](double u2) {
     return Eigen::VectorXd((rows.error.cwiseAbs2().array() + u2).inverse().matrix());
   };
   const double freedom = double(rows.speed.size()) - 2;
-  double low = 0, high = 1e-12 + rows.torque.squaredNorm();
+  const double most = 1e-12 + rows.torque.squaredNorm();
   if (freedom <= 0 || (rows.error.minCoeff() > 0 && weighted_line(rows, with(0)).chi2 <= freedom))
     return with(0);
-  for (int i = 0; i < 100; ++i) {
-    const double middle = 0.5 * (low + high);
-    (weighted_line(rows, with(middle)).chi2 > freedom ? low : high) = middle;
-  }
-  return with(high);
-}
-
-/// P(|T| > t) of Student's t with whole degrees of freedom (Abramowitz and Stegun 1964, 26.7.3 and 26.7.4).
-double chance_of(double t, int freedom) {
-  const double angle = std::atan(std::fabs(t) / std::sqrt(double(freedom)));
-  const double c = std::cos(angle);
-  const bool odd = freedom % 2 == 1;
-  double term = odd ? c : 1, sum = freedom > 1 ? term : 0;
-  for (int k = odd ? 3 : 2; k <= freedom - 2; k += 2) sum += term *= c * c * double(k - 1) / double(k);
-  return 1 - (odd ? 2 / M_PI * (angle + std::sin(angle) * sum) : std::sin(angle) * sum);
+  const auto excess = [&](double u2) { return weighted_line(rows, with(u2)).chi2 - freedom; };
+  if (excess(most) >= 0) return with(most);
+  std::uintmax_t calls = 200;
+  const double smallest = std::numeric_limits<double>::min();  // u^2 = 0 may divide by an error of 0
+  if (excess(smallest) <= 0) return with(smallest);
+  const auto root = boost::math::tools::toms748_solve(excess, smallest, most,
+                                                      boost::math::tools::eps_tolerance<double>(), calls);
+  return with(root.second);
 }
 
 /// t value of one more column beside constant and speed, and its coefficient.
@@ -109,13 +107,15 @@ void test_curvature(FrictionLine& line, const Rows& rows, const Eigen::VectorXd&
   std::tie(line.quadratic, line.quadratic_t) = extra_term(rows, weight, rows.speed.cwiseAbs2());
   line.root_t = extra_term(rows, weight, root).second;
   const int freedom = int(a.rows()) - 3;
-  if (std::min(chance_of(line.quadratic_t, freedom), chance_of(line.root_t, freedom)) > kSurprise) return;
+  if (std::min(student_t_two_sided(line.quadratic_t, freedom), student_t_two_sided(line.root_t, freedom)) >
+      kSurprise)
+    return;
   const bool concave = line.quadratic * sign < 0;
-  line.warnings.push_back("a straight line leaves a " + std::string(concave ? "concave" : "convex") +
-                          " trend: quadratic term " + figure(line.quadratic) +
-                          " N m s^2/rad^2 (t = " + figure(line.quadratic_t) +
-                          "), root (t = " + figure(line.root_t) + "); a + b sqrt(|w|) leaves " +
-                          figure(line.root_rms) + " N m rms, the line " + figure(line.rms) + " N m");
+  line.warnings.push_back(
+      fmt::format("a straight line leaves a {} trend: quadratic term {:.3g} N m s^2/rad^2 (t = {:.3g}), root "
+                  "(t = {:.3g}); a + b sqrt(|w|) leaves {:.3g} N m rms, the line {:.3g} N m",
+                  std::string(concave ? "concave" : "convex"), line.quadratic, line.quadratic_t, line.root_t,
+                  line.root_rms, line.rms));
 }
 
 /// Residual of each row against the line through the others, over its standard error.
@@ -129,10 +129,11 @@ void name_far_rows(FrictionLine& line, const Rows& rows, const Eigen::VectorXd& 
     const double scaled = weight[i] * line.residual[i] * line.residual[i] / (1 - leverage);
     const double variance = (all.chi2 - scaled) / double(n - 3);
     const double t = std::sqrt(scaled / std::max(variance, 1e-12 * all.chi2));
-    if (double(n) * chance_of(t, int(n) - 3) < kSurprise)
-      line.warnings.push_back("the run at " + figure(rows.speed[i]) + " rad/s (" + figure(rows.torque[i]) +
-                              " N m) lies " + figure(t) +
-                              " standard deviations off the line through the others");
+    if (double(n) * student_t_two_sided(t, int(n) - 3) < kSurprise)
+      line.warnings.push_back(
+          fmt::format("the run at {:.3g} rad/s ({:.3g} N m) lies {:.3g} standard deviations off the line "
+                      "through the others",
+                      rows.speed[i], rows.torque[i], t));
   }
 }
 

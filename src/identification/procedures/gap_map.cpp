@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/gap_map.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 #include <utility>
 
 #include "backlash_diagnosis/identification/procedures/harmonics.h"
@@ -12,32 +13,26 @@
 #include "backlash_diagnosis/signal/blocks.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash {
 namespace {
 
 constexpr double kTurn = 2 * M_PI;
-constexpr double kSteady = 0.05;     // of the median speed
-constexpr double kSettled = 5e-3;    // of the median speed: the filter's own at the ends of a run
-constexpr double kMostStart = 0.25;  // of a run, for starting and for stopping
-constexpr double kSpeedCutoff = 5;   // Hz, of the speed that is judged
-constexpr double kBackwards = 0.01;  // share of samples that may go the other way: starting and stopping
-constexpr int kLeastSamples = 5;     // per bin and direction
-constexpr double kRelevant = 1e-3;   // of the mean: smaller harmonics may be the steps of the sensors
-constexpr double kLopsided = 0.1;    // of the bin's width
-constexpr int kLeastBins = 8;
-constexpr int kCentreOrders = 6;  // of the centre line beside the scale
+constexpr double kSteady = 0.05;     // choice: of the median speed
+constexpr double kSettled = 5e-3;    // choice: of the median speed: the filter's own at the ends of a run
+constexpr double kMostStart = 0.25;  // choice: of a run, for starting and for stopping
+constexpr double kSpeedCutoff = 5;   // Hz, choice: of the speed that is judged
+constexpr double kBackwards =
+    0.01;                         // choice: share of samples that may go the other way: starting and stopping
+constexpr int kLeastSamples = 5;  // choice: per bin and direction
+constexpr double kRelevant = 1e-3;  // choice: of the mean: smaller harmonics may be the steps of the sensors
+constexpr double kLopsided = 0.1;   // choice: of the bin's width
+constexpr int kLeastBins = 8;       // theory: three unknowns per harmonic
+constexpr int kCentreOrders = 6;    // choice: of the centre line beside the scale
 
 using Values = std::vector<double>;
-
-template <typename... Parts>
-std::string sentence(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(3);
-  (text << ... << parts);
-  return text.str();
-}
 
 /// The steady part of a run.
 struct Run {
@@ -64,11 +59,12 @@ Run steady_part(const Record& given) {
     run.difference.push_back(motor[i] - load[i]);
   }
   if (backwards > kBackwards * double(speed.size()))
-    throw CannotIdentify(sentence(record.name, ": the speed reverses: ", backwards, " of ", speed.size(),
-                                  " samples go against the median of ", run.speed, " rad/s"));
+    throw CannotIdentify(
+        fmt::format("{}: the speed reverses: {} of {} samples go against the median of {:.3g} rad/s",
+                    record.name, backwards, speed.size(), run.speed));
   if (run.load.size() < 100 || 2 * run.load.size() < to - from || run.speed == 0)
-    throw CannotIdentify(sentence(record.name, ": only ", run.load.size(), " of ", to - from,
-                                  " samples within 5 % of the median speed"));
+    throw CannotIdentify(fmt::format("{}: only {} of {} samples within 5 % of the median speed", record.name,
+                                     run.load.size(), to - from));
   return run;
 }
 
@@ -88,21 +84,6 @@ std::vector<std::pair<double, double>> averaged(const Run& run, double width) {
   std::vector<std::pair<double, double>> means;
   for (const auto& [place, sum] : sums) means.emplace_back(sum.load / sum.count, sum.difference / sum.count);
   return means;
-}
-
-/// By how much the variance of a mean of neighbours exceeds that of independent values: 1 + 2 sum of
-/// correlations.
-double inflation(const Values& residual) {
-  double zero = 0, sum = 1;
-  for (const double r : residual) zero += r * r;
-  if (zero == 0) return 1;
-  for (std::size_t lag = 1; lag < residual.size() / 4; ++lag) {
-    double product = 0;
-    for (std::size_t i = lag; i < residual.size(); ++i) product += residual[i] * residual[i - lag];
-    if (product < 0.05 * zero) break;
-    sum += 2 * product / zero;
-  }
-  return sum;
 }
 
 /// Slope of motor over load position. Over a turn and more the centre line repeats and is told from the slope
@@ -125,7 +106,7 @@ void measure_scale(Run& run, double width) {
   }
   const LeastSquaresFit fit = fit_linear(a, b);
   const Measured slope = fit.parameter(1);
-  const double root = std::sqrt(inflation({fit.residuals.begin(), fit.residuals.end()}));
+  const double root = std::sqrt(correlation_length({fit.residuals.begin(), fit.residuals.end()}));
   run.scale = {1 + slope.value / travel, root * slope.standard_error / travel};
 }
 
@@ -176,7 +157,7 @@ Binned bin_run(const Run& run, double level, double slope, int bins) {
       continue;
     }
   }
-  const double root = std::sqrt(inflation(residual));
+  const double root = std::sqrt(correlation_length(residual));
   for (auto& [bin, value] : binned.value) value.standard_error *= root;
   return binned;
 }
@@ -199,8 +180,8 @@ std::vector<GapBin> common_bins(const Binned& forward, const Binned& reverse, in
     common.push_back(b);
   }
   if (int(common.size()) < kLeastBins)
-    throw CannotIdentify(sentence("the runs share only ", common.size(), " of ", bins,
-                                  " bins of load position; ", kLeastBins, " are needed"));
+    throw CannotIdentify(fmt::format("the runs share only {} of {} bins of load position; {} are needed",
+                                     common.size(), bins, kLeastBins));
   return common;
 }
 
@@ -250,15 +231,16 @@ void say(GapMap& map) {
       lowest = std::min(lowest, g);
       highest = std::max(highest, g);
     }
-    map.statement =
-        sentence("the gap varies with load position between ", lowest, " and ", highest, " rad, ",
-                 100 * (highest - lowest) / mean, " % of its mean (confidence ", 100 * map.confidence, " %)");
+    map.statement = fmt::format(
+        "the gap varies with load position between {:.3g} and {:.3g} rad, {:.3g} % of its mean (confidence "
+        "{:.3g} %)",
+        lowest, highest, 100 * (highest - lowest) / mean, 100 * map.confidence);
   } else {
     // Amplitude that one harmonic would have to have: 3 standard errors of sqrt(2 / bins) deviations.
-    map.statement = sentence("no variation of the gap with load position is found; one below ",
-                             std::max(3 * map.deviation * std::sqrt(2.0 / double(map.bins.size())),
-                                      kRelevant * map.mean_separation.value),
-                             " rad would not be seen");
+    map.statement = fmt::format(
+        "no variation of the gap with load position is found; one below {:.3g} rad would not be seen",
+        std::max(3 * map.deviation * std::sqrt(2.0 / double(map.bins.size())),
+                 kRelevant * map.mean_separation.value));
   }
 }
 
@@ -286,8 +268,9 @@ GapMap identify_gap_map(const Record& one_way, const Record& other_way, const Ga
   Run forward = steady_part(one_way), reverse = steady_part(other_way);
   if (forward.speed < 0) std::swap(forward, reverse);
   if (!(forward.speed > 0 && reverse.speed < 0))
-    throw CannotIdentify(sentence("both runs go one way (", forward.speed, " and ", reverse.speed,
-                                  " rad/s): a gap map needs one each way"));
+    throw CannotIdentify(
+        fmt::format("both runs go one way ({:.3g} and {:.3g} rad/s): a gap map needs one each way",
+                    forward.speed, reverse.speed));
   const double width = kTurn / settings.bins;
   measure_scale(forward, width);
   measure_scale(reverse, width);
@@ -310,8 +293,8 @@ GapMap identify_gap_map(const Record& one_way, const Record& other_way, const Ga
   map.bins = common_bins(forward_bins, reverse_bins, settings.bins);
   map.coverage = double(map.bins.size()) / settings.bins;
   if (map.coverage < 0.999)
-    map.warnings.push_back(sentence("both runs together cover ", 100 * map.coverage,
-                                    " % of the turn: the map holds only there"));
+    map.warnings.push_back(fmt::format(
+        "both runs together cover {:.3g} % of the turn: the map holds only there", 100 * map.coverage));
   fit_series(map, settings);
   // Runs from one start to opposite ends lie a turn apart, and the scale over that distance is part of the
   // gap.

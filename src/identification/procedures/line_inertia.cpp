@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/line_inertia.h"
 
+#include <fmt/core.h>
+
 #include <Eigen/Core>
 #include <algorithm>
+#include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <complex>
 
@@ -16,11 +19,12 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr std::size_t kLeastCycles = 4;
-constexpr double kLeastShare = 0.5;      // of the speed's variance that the sine must explain
-constexpr double kSettled = 1e-3;        // of the amplitude, of a cycle from those of the second half
-constexpr double kScatter = 4;           // deviations of those, the same
-constexpr std::size_t kMostGroups = 20;  // of cycles, for the error
+constexpr std::size_t kLeastCycles = 4;  // choice
+constexpr double kLeastShare = 0.5;      // choice: of the speed's variance that the sine must explain
+constexpr double kSettled = 1e-3;        // choice: of the amplitude, of a cycle from those of the second half
+constexpr double kScatter = 4;           // choice: deviations of those, the same
+constexpr std::size_t kMostGroups = 20;  // choice: of cycles, for the error
+constexpr int kCycleBits = 22;           // choice: of the number of cycles, relative 5e-7
 
 /// x = Re(amplitude exp(i w k)) + polynomial, k in samples.
 struct Sine {
@@ -75,7 +79,7 @@ Eigen::VectorXd windowed(const std::vector<double>& values, std::size_t step) {
          (1 - phase.cos());
 }
 
-/// Frequency in rad per sample: the largest of a grid of whole cycles, refined by golden section.
+/// Frequency in rad per sample: the largest of a grid of whole cycles, refined between its neighbours.
 double largest_line(const std::vector<double>& values) {
   const std::size_t step = std::max<std::size_t>(1, values.size() / 4000);
   const Eigen::VectorXd x = windowed(values, step);
@@ -86,16 +90,12 @@ double largest_line(const std::vector<double>& values) {
     for (const double value : x) sum += value * phase, phase *= turn;
     return std::norm(sum);
   };
-  double best = width * double(kLeastCycles), most = 0;
+  double best = double(kLeastCycles), most = 0;
   for (Eigen::Index i = kLeastCycles; i < x.size() / 4; ++i)
-    if (const double p = power(width * double(i)); p > most) most = p, best = width * double(i);
-  double low = best - width, high = best + width;
-  const double ratio = 0.5 * (std::sqrt(5.0) - 1);
-  while (high - low > 1e-6 * best) {
-    const double a = high - ratio * (high - low), b = low + ratio * (high - low);
-    power(a) > power(b) ? high = b : low = a;
-  }
-  return 0.5 * (low + high) / double(step);
+    if (const double p = power(width * double(i)); p > most) most = p, best = double(i);
+  const auto missing = [&](double cycles) { return -power(width * cycles); };
+  const double cycles = boost::math::tools::brent_find_minima(missing, best - 1, best + 1, kCycleBits).first;
+  return width * cycles / double(step);
 }
 
 /// Leading cycles whose sine differs from those of the second half: it is faded in, or a transient dies. At
@@ -140,9 +140,8 @@ Section choose(const Record& record, const LineInertiaOptions& options, const st
   if (s.cycles > kLeastCycles && per_cycle > 8)
     skip(options.skip + double(unsettled_cycles(speed, s.begin, s.cycles, s.w)));
   if (s.cycles < kLeastCycles)
-    throw CannotIdentify(record.name + ": " + std::to_string(s.cycles) + " cycles of " +
-                         figure(s.w / (2 * M_PI * s.interval)) + " Hz after the start, inertia needs " +
-                         std::to_string(kLeastCycles));
+    throw CannotIdentify(fmt::format("{}: {} cycles of {:.3g} Hz after the start, inertia needs {}",
+                                     record.name, s.cycles, s.w / (2 * M_PI * s.interval), kLeastCycles));
   s.count = std::min<std::size_t>(record.size() - s.begin, std::lround(double(s.cycles) * per_cycle));
   return s;
 }
@@ -171,12 +170,14 @@ Impedance impedance(const Record& record, const Section& s, double delay) {
 void require_one_way(const Record& record, const Sine& speed) {
   const double least = std::fabs(speed.mean) - std::fabs(speed.slope) - std::abs(speed.amplitude);
   if (speed.explained < kLeastShare)
-    throw CannotIdentify(record.name + ": no sine stands out of the speed (it explains " +
-                         figure(100 * speed.explained) + " % of the variance)");
+    throw CannotIdentify(
+        fmt::format("{}: no sine stands out of the speed (it explains {:.3g} % of the variance)", record.name,
+                    100 * speed.explained));
   if (least <= 0)
-    throw CannotIdentify(record.name + ": the speed reverses (mean " + figure(speed.mean) +
-                         " rad/s, amplitude " + figure(std::abs(speed.amplitude)) +
-                         " rad/s): Coulomb friction would count as inertia and damping");
+    throw CannotIdentify(
+        fmt::format("{}: the speed reverses (mean {:.3g} rad/s, amplitude {:.3g} rad/s): Coulomb friction "
+                    "would count as inertia and damping",
+                    record.name, speed.mean, std::abs(speed.amplitude)));
 }
 
 /// The motion of all that turns, as if it were the motor's: mean of motor and load, weighted with their

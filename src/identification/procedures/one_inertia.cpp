@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/one_inertia.h"
 
+#include <fmt/core.h>
+
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <algorithm>
+#include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <limits>
 
@@ -11,22 +13,24 @@
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/blocks.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kLargestDelay = 2;   // sampling intervals
-constexpr double kVagueDelay = 1;     // sampling intervals of standard error
-constexpr double kLeastPeriods = 40;  // of the cutoff
-constexpr double kPeriods = 100;      // where the cutoff is chosen
-constexpr double kLeastShare = 0.05;  // of the samples in each direction
-constexpr double kStanding = 4;       // standard deviations of the speed's noise
-constexpr double kSignNoise = 1e-3;   // of the speed: how sharply its sign is taken
-constexpr double kSignBandwidth = 4;  // but not below four times the cutoff
-constexpr double kShortest = 0.25;    // of the memory: a standstill that matters
-constexpr std::size_t kBlocks = 30;
-constexpr double kMuchLeft = 0.1;  // relative error that is worth a warning
+constexpr double kLargestDelay = 2;   // choice: sampling intervals
+constexpr int kDelayBits = 12;        // choice: the search ends within 0.001 of an interval
+constexpr double kVagueDelay = 1;     // choice: sampling intervals of standard error
+constexpr double kLeastPeriods = 40;  // choice: of the cutoff
+constexpr double kPeriods = 100;      // choice: where the cutoff is chosen
+constexpr double kLeastShare = 0.05;  // choice: of the samples in each direction
+constexpr double kStanding = 4;       // choice: standard deviations of the speed's noise
+constexpr double kSignNoise = 1e-3;   // choice: of the speed: how sharply its sign is taken
+constexpr double kSignBandwidth = 4;  // choice: but not below four times the cutoff
+constexpr double kShortest = 0.25;    // choice: of the memory: a standstill that matters
+constexpr std::size_t kBlocks = 30;   // choice: left out one at a time, for the errors
+constexpr double kMuchLeft = 0.1;     // choice: relative error that is worth a warning
 
 /// What the equations need of a record.
 struct Signals {
@@ -86,8 +90,8 @@ Signals prepare(const Record& record, double cutoff) {
     throw InvalidParameter("cutoff", cutoff, "must be > 0 and at most 0.4 of the sampling rate");
   s.cutoff = cutoff > 0 ? cutoff : std::max(motion_bandwidth(position, t), kPeriods / (double(n) * t));
   if (double(n) * t * s.cutoff < kLeastPeriods)
-    throw CannotIdentify(record.name + ": " + figure(double(n) * t) + " s are too short for a motion of " +
-                         figure(s.cutoff) + " Hz");
+    throw CannotIdentify(fmt::format("{}: {:.3g} s are too short for a motion of {:.3g} Hz", record.name,
+                                     double(n) * t, s.cutoff));
   s.position_noise = position_noise(position);
   s.time = record.time;
   s.torque = low_pass(record.column(Channel::motor_torque), t, s.cutoff);
@@ -127,31 +131,20 @@ void require_both_directions(const std::string& name, const Signals& s) {
   double forward = 0, backward = 0;
   for (const auto k : s.used) (s.columns(k, 1) > 0 ? forward : backward) += 1;
   if (s.used.size() < 64 || std::min(forward, backward) < kLeastShare * double(s.time.size()))
-    throw CannotIdentify(name + ": moves forward in " + figure(100 * forward / double(s.time.size())) +
-                         " % and backward in " + figure(100 * backward / double(s.time.size())) +
-                         " % of the samples: Coulomb friction and offset cannot be told apart");
+    throw CannotIdentify(
+        fmt::format("{}: moves forward in {:.3g} % and backward in {:.3g} % of the samples: Coulomb friction "
+                    "and offset cannot be told apart",
+                    name, 100 * forward / double(s.time.size()), 100 * backward / double(s.time.size())));
 }
 
-/// Delay [samples] with the smallest residual, golden section to a thousandth.
+/// Delay [samples] with the smallest residual.
 double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
-  const Eigen::MatrixXd q = a.householderQr().householderQ() * Eigen::MatrixXd::Identity(a.rows(), a.cols());
+  const Eigen::MatrixXd q = orthonormal_basis(a);
   const auto left = [&](double delay) {
     const Eigen::VectorXd b = picked(delayed(s.torque, delay), s.used);
     return (b - q * (q.transpose() * b)).squaredNorm();
   };
-  const double ratio = 0.5 * (std::sqrt(5.0) - 1);
-  double low = -kLargestDelay, high = kLargestDelay;
-  double x = high - ratio * (high - low), y = low + ratio * (high - low), fx = left(x), fy = left(y);
-  while (high - low > 1e-3) {
-    if (fx < fy) {
-      high = y, y = x, fy = fx;
-      fx = left(x = high - ratio * (high - low));
-    } else {
-      low = x, x = y, fx = fy;
-      fy = left(y = low + ratio * (high - low));
-    }
-  }
-  return 0.5 * (low + high);
+  return boost::math::tools::brent_find_minima(left, -kLargestDelay, kLargestDelay, kDelayBits).first;
 }
 
 /// The delay is one more column: what the torque would gain by one sample of it.
@@ -215,9 +208,10 @@ OneInertia identify_one_inertia(const Record& recorded, const OneInertiaOptions&
     solution = solve(s, a, best_delay(s, a), true);
     out.delay = {solution.delay * s.interval, solution.error[4] * s.interval};
     if (std::fabs(solution.delay) > kLargestDelay - 0.01 || solution.error[4] > kVagueDelay) {
-      out.warnings.push_back("the delay between torque and position cannot be told (" +
-                             figure(solution.delay) + " +- " + figure(solution.error[4]) +
-                             " samples, searched within two): taken as 0");
+      out.warnings.push_back(
+          fmt::format("the delay between torque and position cannot be told ({:.3g} +- {:.3g} samples, "
+                      "searched within two): taken as 0",
+                      solution.delay, solution.error[4]));
       solution = solve(s, a, 0, false);
       out.delay = {0, std::numeric_limits<double>::quiet_NaN()};
     }
@@ -234,9 +228,10 @@ OneInertia identify_one_inertia(const Record& recorded, const OneInertiaOptions&
   out.measured.assign(measured.begin(), measured.end());
   out.predicted.assign(predicted.begin(), predicted.end());
   if (out.relative_error > std::max(kMuchLeft, 3 * out.floor))
-    out.warnings.push_back("the model leaves " + figure(100 * out.relative_error) +
-                           " % of the torque, noise alone would leave " + figure(100 * out.floor) +
-                           " %: the machine has effects that one inertia with friction lacks");
+    out.warnings.push_back(
+        fmt::format("the model leaves {:.3g} % of the torque, noise alone would leave {:.3g} %: the machine "
+                    "has effects that one inertia with friction lacks",
+                    100 * out.relative_error, 100 * out.floor));
   return out;
 }
 

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "procedures.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
-#include <cstdio>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
 namespace backlash {
 std::string plus_minus(const Measured& m, const std::string& unit) {
-  char text[96];
-  std::snprintf(text, sizeof text, "%.5g +- %.2g %s", m.value, m.standard_error, unit.c_str());
-  return text;
+  return fmt::format("{:.5g} +- {:.2g} {}", m.value, m.standard_error, unit);
 }
 
 Measured with_model_error(Measured m, double share) {
@@ -67,7 +66,7 @@ void update_from_findings(IdentificationCase& c) {
   c.result.rig = c.declared;
   for (const auto& [name, m] : c.result.parameters) {
     const RigParameter& parameter = servo_parameter(name);
-    if (!parameter.positive || m.value > 0) parameter.set(c.result.rig, m.value);
+    if (!parameter.positive() || m.value > 0) parameter.set(c.result.rig, m.value);
   }
 }
 

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/ringing.h"
 
-#include <Eigen/QR>
 #include <cmath>
 
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 
 namespace backlash {
 namespace {
 
-constexpr int kLinear = 4;  // c0, c1, p, q
-constexpr double kMostDamping = 0.9;
+constexpr int kLinear = 4;            // c0, c1, p, q
+constexpr double kMostDamping = 0.9;  // theory: damping ratio; above, nothing rings
 
 /// The damped sine as a problem in (rate, frequency) alone.
 class DampedSine {
@@ -21,9 +21,7 @@ class DampedSine {
 
   Eigen::VectorXd residuals(const Eigen::VectorXd& p) const { return y_ - basis(p) * coefficients(p); }
 
-  Eigen::VectorXd coefficients(const Eigen::VectorXd& p) const {
-    return basis(p).colPivHouseholderQr().solve(y_);
-  }
+  Eigen::VectorXd coefficients(const Eigen::VectorXd& p) const { return solve_least_squares(basis(p), y_).x; }
 
  private:
   Eigen::MatrixXd basis(const Eigen::VectorXd& p) const {
@@ -117,7 +115,7 @@ void measure_peaks(Ringing& r) {
       a.row(k + reach) << 1, k, double(k) * k;
       b[k + reach] = y[i + k];
     }
-    const Eigen::Vector3d c = a.colPivHouseholderQr().solve(b);
+    const Eigen::Vector3d c = solve_least_squares(a, b).x;
     const double at = -c[1] / (2 * c[2]);
     if (!(std::fabs(at) <= reach)) continue;
     if (!r.peak.empty() && r.peak.back() * y[i] > 0) continue;  // a plateau

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/sensor_calibration.h"
 
+#include <fmt/core.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -13,9 +15,9 @@
 namespace backlash {
 namespace {
 
-constexpr double kMoving = 0.1;       // of the largest speed: slower does not count as moving one way
-constexpr double kLeastSpread = 0.1;  // of the largest speed
-constexpr std::size_t kParts = 10;    // blocks of rows of one run that are left out one at a time
+constexpr double kMoving = 0.1;       // choice: of the largest speed: slower does not count as moving one way
+constexpr double kLeastSpread = 0.1;  // choice: of the largest speed
+constexpr std::size_t kParts = 10;    // choice: blocks of rows of one run that are left out one at a time
 
 /// Means of two channels while the motor turns one way.
 struct OneWayRun {
@@ -119,8 +121,9 @@ SpeedCalibration calibrate_speed(const Record& record, const CalibrationOptions&
   const Equations e = equations(runs, false);
   const double largest = std::max(std::fabs(e.least), std::fabs(e.most));
   if (e.most - e.least < kLeastSpread * largest)
-    throw CannotIdentify(record.name + ": speeds from " + figure(e.least) + " to " + figure(e.most) +
-                         " rad/s only: scale and offset cannot be told apart");
+    throw CannotIdentify(
+        fmt::format("{}: speeds from {:.3g} to {:.3g} rad/s only: scale and offset cannot be told apart",
+                    record.name, e.least, e.most));
   const LeastSquaresFit fit = solve(e);
   return {fit.parameter(0), combination(fit, Eigen::Vector2d(-e.centre, 1)),
           cut_warning(runs.size(), record.name)};

@@ -10,8 +10,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kSuspicious = 3;          // standard errors
-constexpr std::size_t kTracePoints = 400;  // of a plot
+constexpr double kSuspicious = 3;          // choice: standard errors
+constexpr std::size_t kTracePoints = 400;  // choice: of a plot
 
 CalibrationTrace thinned(const Record& record) {
   CalibrationTrace trace{record.name, {}, {}};

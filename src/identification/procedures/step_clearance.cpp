@@ -10,15 +10,14 @@
 namespace backlash {
 namespace {
 
-constexpr double kClearanceModel = 0.005;  // a push that is no polynomial, steps of the sensor
+constexpr double kClearanceModel = 0.005;  // simulation: a push that is no polynomial, steps of the sensor
 
 }  // namespace
 
 ProcedureReport run_clearance(IdentificationCase& c) {
   ProcedureReport report{"clearance", {}, ""};
-  ClearanceSettings settings;
-  settings.stiffness = servo_parameter("mesh_stiffness").get(c.result.rig);
-  settings.load_inertia = c.result.rig.link.inertia;
+  const ClearanceSettings settings =
+      clearance_settings(servo_parameter("mesh_stiffness").get(c.result.rig), c.result.rig.link.inertia);
   std::string reasons;
   for (const CaseRecord& r : c.records) {
     if (r.motor_moves || !r.load_moves) continue;

@@ -10,7 +10,7 @@
 namespace backlash {
 namespace {
 
-constexpr double kDecayModel = 0.01;  // the contact's own damping at the start of a ringing
+constexpr double kDecayModel = 0.01;  // simulation: the contact's own damping at the start of a ringing
 
 double relative(const Measured& m) {
   return m.standard_error / m.value;

@@ -10,18 +10,24 @@
 namespace backlash {
 namespace {
 
+/// Friction of one direction: the mean, and half the difference with its sign.
+void add_directional(std::map<std::string, double>& combination, const RigParameter& mean, double sign) {
+  combination[mean.name] = 1;
+  if (const RigParameter* asymmetry = asymmetry_of(mean)) combination[asymmetry->name] = sign;
+}
+
 /// Both directions of one subject, and what they say about the bodies in `bodies`.
 void add_friction(IdentificationCase& c, const std::string& subject,
-                  const std::vector<ConstantSpeedRun>& runs, const std::vector<std::string>& bodies) {
+                  const std::vector<ConstantSpeedRun>& runs, const std::vector<RigPart>& bodies) {
   FrictionDetail detail{subject, {}};
   for (const Direction direction : {Direction::positive, Direction::negative}) {
     const double sign = direction == Direction::positive ? 1 : -1;
     try {
       const FrictionLine line = fit_friction_line(runs, direction);
       std::map<std::string, double> coulomb, viscous;
-      for (const std::string& body : bodies) {
-        coulomb[body + "_coulomb"] = viscous[body + "_viscous"] = 1;
-        coulomb[body + "_coulomb_asymmetry"] = viscous[body + "_viscous_asymmetry"] = sign;
+      for (const RigPart body : bodies) {
+        add_directional(coulomb, servo_parameter(body, ParameterKind::coulomb_friction), sign);
+        add_directional(viscous, servo_parameter(body, ParameterKind::viscous_friction), sign);
       }
       add_finding(c, "friction_lines", coulomb, {sign * line.coulomb.value, line.coulomb.standard_error});
       add_finding(c, "friction_lines", viscous, line.viscous);
@@ -44,10 +50,10 @@ ProcedureReport run_friction_lines(IdentificationCase& c) {
   struct Subject {
     const char* name;
     bool (CaseRecord::*wanted)() const;
-    std::vector<std::string> bodies;
+    std::vector<RigPart> bodies;
   };
-  for (const Subject& s : {Subject{"motor", &CaseRecord::motor_alone, {"motor"}},
-                           Subject{"drive", &CaseRecord::drive, {"motor", "load"}}}) {
+  for (const Subject& s : {Subject{"motor", &CaseRecord::motor_alone, {RigPart::motor}},
+                           Subject{"drive", &CaseRecord::drive, {RigPart::motor, RigPart::link}}}) {
     std::vector<ConstantSpeedRun> runs;
     try {
       const auto used = on_each(c, s.wanted, [&](const CaseRecord& r) {

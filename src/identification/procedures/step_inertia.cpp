@@ -10,7 +10,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kLineModel = 0.0005;  // share of the motor in the inertia, not known better than to 40 %
+constexpr double kLineModel =
+    0.0005;  // theory: share of the motor in the inertia, not known better than to 40 %
 
 }  // namespace
 

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The one procedure for a machine of one inertia.
+#include <fmt/core.h>
+
 #include <cmath>
 
+#include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
 namespace backlash {
@@ -46,15 +50,12 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   }
   if (!c.result.one_inertia) throw CannotIdentify(reasons);
   const OneInertia& found = *c.result.one_inertia;
-  const bool linear = c.declared.linear;
   c.result.parameters = {{"inertia", found.inertia},
                          {"viscous", found.viscous},
                          {"coulomb", found.coulomb},
                          {"offset", found.offset}};
-  c.result.units = {{"inertia", linear ? "kg" : "kg m^2"},
-                    {"viscous", linear ? "N s/m" : "N m s/rad"},
-                    {"coulomb", linear ? "N" : "N m"},
-                    {"offset", linear ? "N" : "N m"}};
+  for (const RigParameter& p : servo_parameters())
+    if (!p.one_inertia.empty()) c.result.units[p.one_inertia] = axis_unit(p.unit, c.declared.linear);
   c.result.channels["torque"] = {found.relative_error, found.floor};
   c.result.delay = found.delay;
   c.result.warnings.insert(c.result.warnings.end(), found.warnings.begin(), found.warnings.end());
@@ -62,12 +63,11 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   body.inertia =
       found.inertia.value - c.declared.pinion.inertia - c.declared.gear.inertia - c.declared.link.inertia;
   body.viscous_damping = found.viscous.value;
+  body.viscous_asymmetry = 0;
   body.coulomb_friction = found.coulomb.value;
   body.coulomb_asymmetry = found.offset.value;
-  char text[128];
-  std::snprintf(text, sizeof text, "torque error %.3g %%, low-pass %.3g Hz, torque acts %.3g ms late",
-                100 * found.relative_error, found.cutoff, 1e3 * found.delay.value);
-  report.message = text;
+  report.message = fmt::format("torque error {:.3g} %, low-pass {:.3g} Hz, torque acts {:.3g} ms late",
+                               100 * found.relative_error, found.cutoff, 1e3 * found.delay.value);
   return report;
 }
 

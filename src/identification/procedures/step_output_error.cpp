@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The last step of an identification: everything together, on the raw records.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -13,11 +15,13 @@ namespace {
 
 // Errors fall with the root of the time, while another motion tells apart what one motion mixes. So the time
 // that a fit may take goes in equal parts to the few records in which the teeth change flanks most.
-constexpr double kTellingCutoff = 5;  // Hz, of the deflection
-constexpr double kMostSeconds = 60;   // of all records
-constexpr std::size_t kMostRecords = 3;
-constexpr double kTellingShare = 0.3;  // of the most telling record, from which another is worth its time
-constexpr double kFewestSeconds = 2;
+constexpr double kTellingCutoff = 5;     // Hz, choice: of the deflection, far below any mesh resonance
+constexpr double kHighestCutoff = 0.2;   // choice: of the sampling rate
+constexpr double kMostSeconds = 60;      // s, choice (time): of all records
+constexpr std::size_t kMostRecords = 3;  // choice (time)
+constexpr double kTellingShare =
+    0.3;  // choice: of the most telling record, from which another is worth its time
+constexpr double kFewestSeconds = 2;  // s, choice: of a record
 
 struct Stretch {
   const CaseRecord* record;
@@ -32,7 +36,7 @@ Stretch most_telling(const CaseRecord& r, double seconds) {
              &load = r.record.column(Channel::load_position);
   std::vector<double> deflection(motor.size());
   for (std::size_t k = 0; k < motor.size(); ++k) deflection[k] = motor[k] - load[k];
-  const double cutoff = std::min(kTellingCutoff, 0.2 / interval);
+  const double cutoff = std::min(kTellingCutoff, kHighestCutoff / interval);
   deflection = low_pass(deflection, interval, cutoff);
   std::vector<double> sum(motor.size(), 0);
   for (std::size_t k = 1; k < sum.size(); ++k)
@@ -100,7 +104,7 @@ ProcedureReport run_output_error(IdentificationCase& c) {
     report.records.push_back(s.record->record.name);
   }
   OutputErrorSettings settings;
-  settings.cutoff = std::min(settings.cutoff, 0.2 / data.front().interval);
+  settings.fit = with_bands(settings.fit, c.declared, data);
   settings.parameters = c.names;
   settings.findings = c.result.findings;
   const OutputError fit = fit_output_error(c.result.rig, data, settings);
@@ -110,7 +114,7 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   c.result.delay = Measured{fit.calibrations.front().torque_delay * data.front().interval, std::nan("")};
   std::vector<double> torque, deflection;
   for (std::size_t i = 0; i < data.size(); ++i) {
-    const ServoPrediction p = predict_servo(fit.rig, data[i], settings, fit.calibrations[i]);
+    const ServoPrediction p = predict_servo(fit.rig, data[i], settings.fit, fit.calibrations[i]);
     torque.push_back(spread(p.measured_torque));
     deflection.push_back(spread(p.measured_deflection));
     c.result.torque.push_back({report.records[i], data[i].interval, p.measured_torque, p.torque, p.counts});
@@ -119,11 +123,9 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   }
   c.result.channels["torque"] = total(fit.torque, torque);
   c.result.channels["deflection"] = total(fit.deflection, deflection);
-  char text[128];
-  std::snprintf(text, sizeof text, "torque error %.2g %% (noise alone %.2g %%), deflection %.2g %% (%.2g %%)",
-                100 * c.result.channels["torque"].error, 100 * c.result.channels["torque"].floor,
-                100 * c.result.channels["deflection"].error, 100 * c.result.channels["deflection"].floor);
-  report.message = text;
+  const ChannelError &t = c.result.channels["torque"], &d = c.result.channels["deflection"];
+  report.message = fmt::format("torque error {:.2g} % (noise alone {:.2g} %), deflection {:.2g} % ({:.2g} %)",
+                               100 * t.error, 100 * t.floor, 100 * d.error, 100 * d.floor);
   return report;
 }
 

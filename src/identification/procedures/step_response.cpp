@@ -10,9 +10,9 @@
 namespace backlash {
 namespace {
 
-constexpr double kResponseModel = 0.002;  // a mesh that is not quite linear
+constexpr double kResponseModel = 0.002;  // simulation: a mesh that is not quite linear
 constexpr double kLeastCoherence =
-    0.1;  // dropping faint points would leave the anti-resonance those that noise lifts
+    0.1;  // simulation: dropping faint points would leave the anti-resonance those that noise lifts
 
 std::size_t reversing(const FrequencyResponse& response) {
   return std::count_if(response.points.begin(), response.points.end(),
@@ -38,12 +38,13 @@ ResponseDetail respond(const Record& record) {
       best = std::move(d);
     }
   }
-  const std::pair<const char*, Kept> kinds[] = {
-      {"a", Kept::total_inertia}, {"b", Kept::motor_inertia}, {"c", Kept::both_inertias}};
-  for (const auto& [letter, kept] : kinds) {
+  const std::pair<const char*, KnownInertia> kinds[] = {{"a", KnownInertia::total_inertia},
+                                                        {"b", KnownInertia::motor_inertia},
+                                                        {"c", KnownInertia::both_inertias}};
+  for (const auto& [letter, known] : kinds) {
     try {
       best.alternatives[letter] =
-          split_stiffness(kept, best.resonances, best.plateaus.total, best.plateaus.motor);
+          split_stiffness(known, best.resonances, best.plateaus.total, best.plateaus.motor);
     } catch (
         const CannotIdentify&) {  // frequencies and inertias that contradict each other: the fit tells more
     }

@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/procedures/stepped_sine.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
 
 constexpr std::size_t kFewestCycles = 4, kMostCycles = 200;
-constexpr std::size_t kFewestForNoise = 64;  // samples that tell the noise
+constexpr std::size_t kFewestForNoise = 64;  // theory: samples that tell the noise
 constexpr double kBetween =
     2.5;  // cycles between two runs that count as inside: the step from one to the other
-constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // cycles
-constexpr double kJitter = 5;                              // deviations of a passage
-constexpr std::size_t kJitterReach = 10;                   // passages on either side that tell the deviation
-constexpr double kSameHeight = 0.2;                        // of the amplitude
-constexpr double kNoSine = 0.1;                            // of the torque's power
-constexpr double kTurn = 0.1;                              // of the torque's range; a smaller turn is noise
-constexpr double kNoiseTurn = 8;                           // standard deviations; the same for known noise
-constexpr double kMostTurn = 0.5;                          // of the range, lest the sine itself be noise
-constexpr double kFewestSamples = 8;  // a cycle or a group of them is fitted with, three unknowns
+constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // choice: cycles
+constexpr double kJitter = 5;                              // choice: deviations of a passage
+constexpr std::size_t kJitterReach = 10;  // choice: passages on either side that tell the deviation
+constexpr double kSameHeight = 0.2;       // choice: of the amplitude
+constexpr double kNoSine = 0.1;           // choice: of the torque's power
+constexpr double kTurn = 0.1;             // choice: of the torque's range; a smaller turn is noise
+constexpr double kNoiseTurn = 8;          // choice: standard deviations; the same for known noise
+constexpr double kMostTurn = 0.5;         // choice: of the range, lest the sine itself be noise
+constexpr double kFewestSamples = 8;      // theory: a cycle or a group of them is fitted with, three unknowns
 
 /// A rising passage of the mean between a minimum and the next maximum.
 struct Passage {
@@ -57,7 +57,7 @@ void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
       normal += b * b.transpose();
       right += b * u[k];
     }
-    const Eigen::Vector3d fit = normal.ldlt().solve(right);
+    const Eigen::Vector3d fit = solve_symmetric(normal, right);
     const double early = std::atan2(fit[1], fit[2]) / (2 * M_PI);
     const bool found = std::isfinite(early) && std::fabs(early) < 0.25;
     refined.push_back(found ? Passage{rough - early * period, fit[0], std::hypot(fit[1], fit[2])}
@@ -98,9 +98,8 @@ double allowance(const std::vector<Passage>& p, std::size_t i) {
     third.push_back(std::fabs(p[k + 3].at - 3 * p[k + 2].at + 3 * p[k + 1].at - p[k].at) * 3 /
                     (p[k + 3].at - p[k].at));
   if (third.empty()) return kMostUneven;
-  const auto middle = third.begin() + static_cast<std::ptrdiff_t>(third.size() / 2);
-  std::nth_element(third.begin(), middle, third.end());
-  const double deviation = 1.4826 * *middle / std::sqrt(20.0);  // 1 + 9 + 9 + 1
+  const double deviation =
+      kNormalPerMedianDeviation * median(std::move(third)) / std::sqrt(20.0);  // 1 + 9 + 9 + 1
   return std::clamp(kJitter * deviation, kLeastUneven, kMostUneven);
 }
 
@@ -138,7 +137,7 @@ LineFit fit_line(const std::vector<double>& u, const std::vector<double>& y, con
     normal += a * a.transpose();
     right += a * Eigen::RowVector2d(u[k], y[k]);
   }
-  LineFit fit{normal.ldlt().solve(right), Eigen::RowVector2d::Zero(), Eigen::RowVector2d::Zero()};
+  LineFit fit{solve_symmetric(normal, right), Eigen::RowVector2d::Zero(), Eigen::RowVector2d::Zero()};
   const double count = double(end - begin);
   for (std::size_t k = begin; k < end; ++k) {
     const Eigen::RowVector2d line = row(double(k), middle, half, run.frequency()).transpose() * fit.values;
@@ -173,7 +172,7 @@ double cycle_scatter(const std::vector<double>& u, const std::vector<double>& y,
       normal += b * b.transpose();
       right += b * (Eigen::RowVector2d(u[k], y[k]) - trend);
     }
-    const Eigen::Matrix<double, 3, 2> values = normal.ldlt().solve(right);
+    const Eigen::Matrix<double, 3, 2> values = solve_symmetric(normal, right);
     found.push_back(amplitude(values.col(1).tail<2>()) / amplitude(values.col(0).tail<2>()));
     mean += found.back() / double(groups);
   }

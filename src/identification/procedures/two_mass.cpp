@@ -40,11 +40,11 @@ void require_positive(const Measured& m, const char* what) {
 using Row = std::array<double, 7>;     // in the order of StiffnessSplit
 using Inputs = std::array<double, 4>;  // F_R, F_AR, total, motor inertia
 
-Row split(Kept kept, const Inputs& in) {
+Row split(KnownInertia known, const Inputs& in) {
   const double ratio = std::pow(in[0] / in[1], 2);  // (JM + JL) / JM, (5.5)
   double total = in[2], motor = in[3];
-  if (kept == Kept::total_inertia) motor = total / ratio;
-  if (kept == Kept::motor_inertia) total = motor * ratio;
+  if (known == KnownInertia::total_inertia) motor = total / ratio;
+  if (known == KnownInertia::motor_inertia) total = motor * ratio;
   const double load = total - motor, reduced = motor * load / total;
   const double first = stiffness_of(in[1], load), second = stiffness_of(in[0], reduced);
   return {motor, load, reduced, first, second, frequency_of(first, reduced), frequency_of(second, load)};
@@ -74,7 +74,7 @@ Complex TwoMass::load_response(double frequency) const {
   return z.mesh / z.divisor();
 }
 
-StiffnessSplit split_stiffness(Kept kept, const Resonances& measured, const Measured& total_inertia,
+StiffnessSplit split_stiffness(KnownInertia known, const Resonances& measured, const Measured& total_inertia,
                                const Measured& motor_inertia) {
   std::array<Measured, 4> given{measured.resonance, measured.anti_resonance, total_inertia, motor_inertia};
   require_positive(given[0], "resonance");
@@ -82,15 +82,15 @@ StiffnessSplit split_stiffness(Kept kept, const Resonances& measured, const Meas
   if (!(given[0].value > given[1].value))
     throw CannotIdentify("resonance " + to_text(given[0].value) + " Hz not above the anti-resonance " +
                          to_text(given[1].value) + " Hz");
-  if (kept == Kept::motor_inertia) given[2] = {};
-  if (kept == Kept::total_inertia) given[3] = {};
-  if (kept != Kept::motor_inertia) require_positive(total_inertia, "total inertia");
-  if (kept != Kept::total_inertia) require_positive(motor_inertia, "motor inertia");
-  if (kept == Kept::both_inertias && !(total_inertia.value > motor_inertia.value))
+  if (known == KnownInertia::motor_inertia) given[2] = {};
+  if (known == KnownInertia::total_inertia) given[3] = {};
+  if (known != KnownInertia::motor_inertia) require_positive(total_inertia, "total inertia");
+  if (known != KnownInertia::total_inertia) require_positive(motor_inertia, "motor inertia");
+  if (known == KnownInertia::both_inertias && !(total_inertia.value > motor_inertia.value))
     throw CannotIdentify("total inertia " + to_text(total_inertia.value) +
                          " kg m^2 not above the motor inertia " + to_text(motor_inertia.value) + " kg m^2");
   const Inputs at{given[0].value, given[1].value, given[2].value, given[3].value};
-  const Row row = split(kept, at);
+  const Row row = split(known, at);
   Row variance{};
   for (std::size_t i = 0; i < at.size(); ++i) {
     if (std::isnan(at[i])) continue;
@@ -98,7 +98,7 @@ StiffnessSplit split_stiffness(Kept kept, const Resonances& measured, const Meas
     Inputs more = at, less = at;
     more[i] += step;
     less[i] -= step;
-    const Row upper = split(kept, more), lower = split(kept, less);
+    const Row upper = split(known, more), lower = split(known, less);
     for (std::size_t k = 0; k < row.size(); ++k)
       variance[k] += std::pow((upper[k] - lower[k]) / (2 * step) * given[i].standard_error, 2);
   }

@@ -8,16 +8,17 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
 
 using Points = std::vector<ResponsePoint>;
 
-constexpr double kWindow = 2;                 // of |H|^2, around an extremum
-constexpr std::size_t kBeside = 3;            // points on either side of an extremum
-constexpr double kLeastError = 1e-3;          // relative, of any point
-constexpr double kBelow = 0.5, kAbove = 1.5;  // of F_AR and F_R: bands of the plateaus
+constexpr double kWindow = 2;                 // choice: of |H|^2, around an extremum
+constexpr std::size_t kBeside = 3;            // choice: points on either side of an extremum
+constexpr double kLeastError = 1e-3;          // choice: relative, of any point
+constexpr double kBelow = 0.5, kAbove = 1.5;  // theory: of F_AR and F_R: bands of the plateaus
 
 /// Median of a value over five neighbours: a single bad point makes no extremum.
 std::vector<double> smoothed(const Points& points, const std::function<double(const ResponsePoint&)>& value) {
@@ -27,8 +28,7 @@ std::vector<double> smoothed(const Points& points, const std::function<double(co
     const std::size_t reach = std::min<std::size_t>({2, i, n - 1 - i});
     std::vector<double> near;
     for (std::size_t k = i - reach; k <= i + reach; ++k) near.push_back(value(points[k]));
-    std::nth_element(near.begin(), near.begin() + reach, near.end());
-    out.push_back(near[reach]);
+    out.push_back(median(std::move(near)));
   }
   return out;
 }
@@ -94,7 +94,7 @@ Measured checked_plateau(const FrequencyResponse& motor, double from, double to,
   std::vector<double> inside;
   for (const ResponsePoint& p : motor.points)
     if (p.frequency >= from && p.frequency <= to) inside.push_back(p.frequency);
-  const double middle = inside[inside.size() / 2];
+  const double middle = median(std::move(inside));
   const double difference =
       plateau(motor, from, middle, factor).value - plateau(motor, middle, to, factor).value;
   found.standard_error = std::hypot(found.standard_error, difference);

@@ -8,14 +8,15 @@
 
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
 
-constexpr double kLeastError = 1e-3;   // relative: what sampling and transients leave
-constexpr double kOutlier = 5;         // deviations
-constexpr std::size_t kPool = 2;       // neighbours on either side whose errors are pooled
-constexpr double kStartDamping = 0.1;  // damping ratio
+constexpr double kLeastError = 1e-3;   // choice: relative: what sampling and transients leave
+constexpr double kOutlier = 5;         // choice: deviations
+constexpr std::size_t kPool = 2;       // choice: neighbours on either side whose errors are pooled
+constexpr double kStartDamping = 0.1;  // choice: damping ratio
 
 struct Point {
   double frequency = 0, error = 0;
@@ -58,11 +59,9 @@ std::vector<Point> without_outliers(const std::vector<Point>& points, const Leas
   std::vector<double> sizes;
   for (std::size_t i = 0; i < points.size(); ++i)
     sizes.push_back(fit.residuals.segment<2>(2 * static_cast<Eigen::Index>(i)).norm());
-  std::vector<double> sorted = sizes;
-  std::sort(sorted.begin(), sorted.end());
   // The median of the length of two normal residuals is sqrt(2 ln 2) of their deviation.
-  const double median = sorted[sorted.size() / 2] / std::sqrt(2 * std::log(2.0));
-  const double limit = std::max(kOutlier * median, sorted[sorted.size() * 9 / 10]);
+  const double deviation = median(sizes) / std::sqrt(2 * std::log(2.0));
+  const double limit = std::max(kOutlier * deviation, quantile(sizes, 0.9));
   std::vector<Point> kept;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (sizes[i] <= limit) kept.push_back(points[i]);
@@ -92,7 +91,7 @@ TwoMass TwoMassFit::model() const {
 TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse& load) {
   const Resonances seen = find_resonances(motor);
   const InertiaPlateaus inertias = find_inertias(motor, seen);
-  const StiffnessSplit start = split_stiffness(Kept::total_inertia, seen, inertias.total, {});
+  const StiffnessSplit start = split_stiffness(KnownInertia::total_inertia, seen, inertias.total, {});
   const double k = start.stiffness_anti_resonance.value, total = inertias.total.value;
   const double critical = 2 * std::sqrt(k * start.reduced_inertia.value);
   const double viscous = 2 * M_PI * motor.points.front().frequency * total;

@@ -5,8 +5,8 @@
 // Canudas de Wit (1994, Automatica 30:1083) report it as common in drives; Janot, Gautier and Brunot (2019)
 // have it as the offset of the EMPS benchmark.
 #include "end_of_train.h"
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

@@ -2,8 +2,8 @@
 // Free play beside that of the rig file, the same in every position: both flanks are farther away,
 //   o = b / 2      opening [rad at the load], b additional backlash [rad at the load]
 // For a rig that declares none; where it declares some, b < 0 takes of it.
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

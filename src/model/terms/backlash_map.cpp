@@ -75,14 +75,17 @@ void check(const std::vector<double>& positions, const std::vector<double>& back
 }  // namespace
 
 TermType backlash_map_term() {
-  return {"backlash_map",
-          {{"positions", "rad", Range::any(), "of the load, increasing, within one turn", true},
-           {"backlash", "rad", Range::not_negative(), "total free play at each position", true},
-           {"centre", "rad", Range::any(), "middle of the gap at each position", true}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            check(p.list("positions"), p.list("backlash"), p.list("centre"));
-            return std::make_unique<BacklashMap>(p.list("positions"), p.list("backlash"), p.list("centre"));
-          }};
+  TermType type{"backlash_map",
+                {{"positions", "rad", Range::any(), "of the load, increasing, within one turn", true},
+                 {"backlash", "rad", Range::not_negative(), "total free play at each position", true},
+                 {"centre", "rad", Range::any(), "middle of the gap at each position", true}},
+                [](const ParameterValues& p) -> std::unique_ptr<Term> {
+                  check(p.list("positions"), p.list("backlash"), p.list("centre"));
+                  return std::make_unique<BacklashMap>(p.list("positions"), p.list("backlash"),
+                                                       p.list("centre"));
+                }};
+  type.gap_variation = GapVariation::table;
+  return type;
 }
 
 }  // namespace backlash

@@ -5,8 +5,8 @@
 // Trans. Ind. Electron. 43) give the cause and the harmonics.
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

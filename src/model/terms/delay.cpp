@@ -22,12 +22,14 @@ class Delay : public Term {
 }  // namespace
 
 TermType delay_term() {
-  return {"delay",
-          {{"delay", "s", Range::between(-1, 1), "d, > 0: the torque acts later than its stamp says"}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<Delay>(p.at("delay"));
-          },
-          TermSearch{"delay", "", [](const MotionRange& range) { return range.interval; }, {}}};
+  TermType type{"delay",
+                {{"delay", "s", Range::between(-1, 1), "d, > 0: the torque acts later than its stamp says"}},
+                [](const ParameterValues& p) -> std::unique_ptr<Term> {
+                  return std::make_unique<Delay>(p.at("delay"));
+                },
+                TermSearch{"delay", "", [](const MotionRange& range) { return range.interval; }, {}}};
+  type.calibrates = Calibrates::torque_delay;
+  return type;
 }
 
 }  // namespace backlash

@@ -33,7 +33,7 @@ class EndOfTrain {
 /// A term that adds to the dry friction of one end.
 class EndFrictionTerm : public Term {
  public:
-  explicit EndFrictionTerm(const ParameterValues& values) : end_(values) {}
+  explicit EndFrictionTerm(const ParameterValues& parameters) : end_(parameters) {}
   bool has_dry_friction() const override { return true; }
   bool moves_load() const override { return end_.is_load(); }
 
@@ -44,7 +44,7 @@ class EndFrictionTerm : public Term {
 /// A term that adds a smooth torque on one end.
 class EndTorqueTerm : public Term {
  public:
-  explicit EndTorqueTerm(const ParameterValues& values) : end_(values) {}
+  explicit EndTorqueTerm(const ParameterValues& parameters) : end_(parameters) {}
   bool moves_load() const override { return end_.is_load(); }
 
  protected:

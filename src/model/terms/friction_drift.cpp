@@ -2,14 +2,14 @@
 // Dry friction that changes as the machine runs (warms up):
 //   added friction = A (1 - exp(-r t)) / (1 - exp(-r S))        A [N m] at t = S [s], r [1/s], t time
 // With a time constant tau = 1 / r: A_end (1 - exp(-t / tau)), A_end = A / (1 - exp(-r S)). Of A_end and tau
-// a slow drift (tau >> S) tells only the ratio; A is the change over the span S whatever r, and r goes
+// a slow drift (tau >> S) determines only the ratio; A is the change over the span S whatever r, and r goes
 // through 0, where the drift is linear, A t / S, to r < 0, where it gets faster. Bittencourt and Gunnarsson
 // (2012, J. Dyn. Syst. Meas. Control 134:051013) measured such changes with temperature on robot joints.
 #include <cmath>
 
 #include "end_of_train.h"
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

@@ -4,8 +4,8 @@
 // Sarkar, Ellis and Moore (1997), Table 1 (m_L d_L sin(theta_L) g).
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

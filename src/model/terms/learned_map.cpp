@@ -12,8 +12,10 @@
 // wrong direction faster than the teeth. It cannot follow speeds, time or motor torque.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "backlash_diagnosis/base/error.h"
+#include "search_values.h"
 #include "terms.h"
 
 namespace backlash {
@@ -169,28 +171,61 @@ void check(const std::vector<double>& points, const std::vector<double>& values)
     if (!(points[i] > points[i - 1])) throw InvalidParameter("points", points[i], "must increase");
 }
 
+constexpr double kClearStiffness = 0.1;  // of the declared: a change that would show (choice)
+constexpr double kSoftest = -0.9;  // of the declared, that a fit may start with: teeth must bear (choice)
+constexpr double kAnyValue = -std::numeric_limits<double>::infinity();
+
+double clear_stiffness(const MotionRange&) {
+  return kClearStiffness;
+}
+
+// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque
+// itself would explain everything, and so would time where the torque is commanded in ramps.
+std::vector<MapKind> kinds() {
+  return {
+      {"motor", "motor_position", "rad", "N m", false, clear_torque, kAnyValue},
+      {"motor", "motor_velocity", "rad/s", "N m", false, clear_torque, kAnyValue},
+      {"motor", "motor_torque", "N m", "N m", true, clear_torque, kAnyValue},
+      {"motor", "mesh_torque", "N m", "N m", true, clear_torque, kAnyValue},
+      {"motor", "time", "s", "N m", true, clear_torque, kAnyValue},
+      {"load", "load_position", "rad", "N m", true, clear_torque, kAnyValue},
+      {"load", "load_velocity", "rad/s", "N m", true, clear_torque, kAnyValue},
+      {"load", "mesh_torque", "N m", "N m", true, clear_torque, kAnyValue},
+      {"load", "time", "s", "N m", true, clear_torque, kAnyValue},
+      {"gap", "load_position", "rad", "rad", true, clear_angle, kAnyValue},
+      {"gap", "mesh_torque", "N m", "rad", true, clear_angle, kAnyValue},
+      {"forward_flank", "load_position", "rad", "rad", true, clear_angle, kAnyValue},
+      {"backward_flank", "load_position", "rad", "rad", true, clear_angle, kAnyValue},
+      {"forward_stiffness", "load_position", "rad", "-", true, clear_stiffness, kSoftest},
+      {"backward_stiffness", "load_position", "rad", "-", true, clear_stiffness, kSoftest},
+  };
+}
+
 }  // namespace
 
 TermType learned_map_term() {
-  return {"learned_map",
-          {{"acts_on",
-            "-",
-            Range::any(),
-            "what it is added to",
-            false,
-            {"motor", "load", "gap", "forward_flank", "backward_flank", "forward_stiffness",
-             "backward_stiffness"}},
-           {"coordinate", "-", Range::any(), "x", false, coordinates()},
-           {"points", "rad, rad/s, N m or s", Range::any(), "of x, increasing", true},
-           {"values", "N m, of a gap or flank rad, of a stiffness -", Range::any(), "f at each point", true}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            check(p.list("points"), p.list("values"));
-            const std::string& on = p.choice("acts_on");
-            if (on == "motor" || on == "load") return std::make_unique<LearnedTorque>(p);
-            if (on == "forward_stiffness" || on == "backward_stiffness")
-              return std::make_unique<LearnedStiffness>(p);
-            return std::make_unique<LearnedGap>(p);
-          }};
+  TermType type{
+      "learned_map",
+      {{"acts_on",
+        "-",
+        Range::any(),
+        "what it is added to",
+        false,
+        {"motor", "load", "gap", "forward_flank", "backward_flank", "forward_stiffness",
+         "backward_stiffness"}},
+       {"coordinate", "-", Range::any(), "x", false, coordinates()},
+       {"points", "rad, rad/s, N m or s", Range::any(), "of x, increasing", true},
+       {"values", "N m, of a gap or flank rad, of a stiffness -", Range::any(), "f at each point", true}},
+      [](const ParameterValues& p) -> std::unique_ptr<Term> {
+        check(p.list("points"), p.list("values"));
+        const std::string& on = p.choice("acts_on");
+        if (on == "motor" || on == "load") return std::make_unique<LearnedTorque>(p);
+        if (on == "forward_stiffness" || on == "backward_stiffness")
+          return std::make_unique<LearnedStiffness>(p);
+        return std::make_unique<LearnedGap>(p);
+      }};
+  type.map = TermMap{"acts_on", "coordinate", "points", "values", kinds()};
+  return type;
 }
 
 }  // namespace backlash

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -43,14 +43,15 @@ double travel(const MotionRange& range) {
   return std::min(range.to - range.from, 2 * M_PI);
 }
 
-/// Only where the load has been; anywhere else nothing tells.
+/// Only where the load has been: the records say nothing of other positions.
 std::vector<double> positions(const MotionRange& range) {
   std::vector<double> all;
   for (int i = 0; i < kPlaces; ++i) all.push_back(range.from + (i + 0.5) / kPlaces * travel(range));
   return all;
 }
 
-/// Each about two thirds like all bumps of a fourth to four times the distance of the places, wherever.
+/// Half and twice the distance of two places: a bump of any width from a fourth to four times that distance,
+/// at any position, has a correlation of at least 0.6 with the nearest of these.
 std::vector<double> widths(const MotionRange& range) {
   return {0.5 * travel(range) / kPlaces, 2 * travel(range) / kPlaces};
 }

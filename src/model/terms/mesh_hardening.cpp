@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -38,17 +38,20 @@ std::vector<double> exponents(const MotionRange&) {
 }  // namespace
 
 TermType mesh_hardening_term() {
-  return {"mesh_hardening",
-          {{"torque", "N m", Range::any(), "A"},
-           {"penetration", "rad", Range::positive(), "D, at the load, where A is added"},
-           {"exponent", "-", Range::between(1, 10), "e"}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<MeshHardening>(p.at("torque"), p.at("penetration"), p.at("exponent"));
-          },
-          TermSearch{"torque",
-                     "",
-                     clear_torque,
-                     {{"penetration", penetrations, false}, {"exponent", exponents, false}}}};
+  TermType type{"mesh_hardening",
+                {{"torque", "N m", Range::any(), "A"},
+                 {"penetration", "rad", Range::positive(), "D, at the load, where A is added"},
+                 {"exponent", "-", Range::between(1, 10), "e"}},
+                [](const ParameterValues& p) -> std::unique_ptr<Term> {
+                  return std::make_unique<MeshHardening>(p.at("torque"), p.at("penetration"),
+                                                         p.at("exponent"));
+                },
+                TermSearch{"torque",
+                           "",
+                           clear_torque,
+                           {{"penetration", penetrations, false}, {"exponent", exponents, false}}}};
+  type.stands_in_for_contact_law = true;
+  return type;
 }
 
 }  // namespace backlash

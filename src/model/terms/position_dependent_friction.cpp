@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "end_of_train.h"
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

@@ -41,15 +41,17 @@ std::vector<double> dampings(const MotionRange& range) {
 }  // namespace
 
 TermType presliding_term() {
-  return {"presliding",
-          {{"body", "-", Range::any(), "whose friction it is", false, {"motor", "load"}},
-           {"distance", "rad", Range::not_negative(), "x_s, at the load"},
-           {"damping", "N m s/rad", Range::not_negative(), "of the bristles; 0: Dahl's law"}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"),
-                                                    p.at("damping"));
-          },
-          TermSearch{"distance", "", typical, {{"damping", dampings, true}}}};
+  TermType type{"presliding",
+                {{"body", "-", Range::any(), "whose friction it is", false, {"motor", "load"}},
+                 {"distance", "rad", Range::not_negative(), "x_s, at the load"},
+                 {"damping", "N m s/rad", Range::not_negative(), "of the bristles; 0: Dahl's law"}},
+                [](const ParameterValues& p) -> std::unique_ptr<Term> {
+                  return std::make_unique<PreslidingTerm>(p.choice("body") == "motor", p.at("distance"),
+                                                          p.at("damping"));
+                },
+                TermSearch{"distance", "", typical, {{"damping", dampings, true}}}};
+  type.shapes_friction = true;
+  return type;
 }
 
 }  // namespace backlash

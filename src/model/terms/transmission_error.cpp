@@ -4,8 +4,8 @@
 // Both flanks move together: one opens where the other closes.
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {

@@ -4,8 +4,8 @@
 // Both flanks move alike. Yumrukcal (2013, Section 5.4) measured up to 15 percent.
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -29,14 +29,17 @@ class VaryingBacklash : public Term {
 }  // namespace
 
 TermType varying_backlash_term() {
-  return {"varying_backlash",
-          {{"amplitude", "-", Range::any(), "a, relative to the backlash"},
-           {"order", "1/rad", Range::positive(), "n, periods per load turn"},
-           {"phase", "rad", Range::any(), "p"}},
-          [](const ParameterValues& p) -> std::unique_ptr<Term> {
-            return std::make_unique<VaryingBacklash>(p.at("amplitude"), p.at("order"), p.at("phase"));
-          },
-          TermSearch{"amplitude", "phase", [](const MotionRange&) { return 0.1; }, {orders<12>()}, true}};
+  TermType type{
+      "varying_backlash",
+      {{"amplitude", "-", Range::any(), "a, relative to the backlash"},
+       {"order", "1/rad", Range::positive(), "n, periods per load turn"},
+       {"phase", "rad", Range::any(), "p"}},
+      [](const ParameterValues& p) -> std::unique_ptr<Term> {
+        return std::make_unique<VaryingBacklash>(p.at("amplitude"), p.at("order"), p.at("phase"));
+      },
+      TermSearch{"amplitude", "phase", [](const MotionRange&) { return 0.1; }, {orders<12>()}, true}};
+  type.gap_variation = GapVariation::harmonic;
+  return type;
 }
 
 }  // namespace backlash

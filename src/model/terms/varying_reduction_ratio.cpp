@@ -3,13 +3,13 @@
 // motor angle at the load side is q_P (1 + a T), T the torque through the mesh,
 //   o_s = -s a T q_P      opening of the flank of side s = +-1 [rad at the load]
 // a [1/(N m)]. Equal tooth counts keep the mean ratio, so over whole turns no gear can do this; over the
-// travel of a sector it tells a residual that is proportional to travel and torque. Valid while
+// travel of a sector it describes a residual that is proportional to travel and torque. Valid while
 // |a q_P| times the mesh stiffness [N m/rad] is below 1, and not conservative.
 #include <algorithm>
 #include <cmath>
 
+#include "search_values.h"
 #include "terms.h"
-#include "tries.h"
 
 namespace backlash {
 namespace {
@@ -42,7 +42,7 @@ TermType varying_reduction_ratio_term() {
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<VaryingReductionRatio>(p.at("change"));
           },
-          TermSearch{"change", "", clear_change, {}}};
+          TermSearch{"change", "", clear_change, {}, false, true}};
 }
 
 }  // namespace backlash

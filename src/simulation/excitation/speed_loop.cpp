@@ -20,12 +20,12 @@ class SpeedLoop : public Excitation {
       : controller_(controller), reference_(std::move(reference)) {}
 
   double torque(double, long) const override { return torque_; }
-  double segment_end(long segment) const override { return (segment + 1) / controller_.rate; }
+  double segment_end(long segment) const override { return double(segment + 1) / controller_.rate; }
 
   void begin_segment(long segment, const Observation& machine) override {
     if (segment == sampled_) return;  // the machine was changed between two samples
     sampled_ = segment;
-    const double error = reference_(segment / controller_.rate) - machine.motor_velocity;
+    const double error = reference_(double(segment) / controller_.rate) - machine.motor_velocity;
     const double integral = integral_ + controller_.integral * error / controller_.rate;
     const double demand = controller_.proportional * error + integral;
     torque_ = std::clamp(demand, -controller_.torque_limit, controller_.torque_limit);

@@ -21,11 +21,11 @@ class SteppedSine : public Excitation {
 
   double torque(double t, long segment) const override {
     const std::size_t k = step(segment);
-    const double s = t - turns(segment) * period() - starts_[k];
+    const double s = t - double(turns(segment)) * period() - starts_[k];
     return bias_ + amplitude_ * std::sin(2 * M_PI * frequencies_[k] * s);
   }
   double segment_end(long segment) const override {
-    return turns(segment) * period() + starts_[step(segment) + 1];
+    return double(turns(segment)) * period() + starts_[step(segment) + 1];
   }
   double shortest_period(long segment) const override { return 1 / frequencies_[step(segment)]; }
   double period() const override { return starts_.back(); }

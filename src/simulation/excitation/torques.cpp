@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/simulation/excitation.h"
 #include "limits.h"
 
@@ -53,7 +53,7 @@ class Square : public Excitation {
   double torque(double, long segment) const override {
     return bias_ + (segment % 2 == 0 ? amplitude_ : -amplitude_);
   }
-  double segment_end(long segment) const override { return (segment + 1) / (2 * frequency_); }
+  double segment_end(long segment) const override { return double(segment + 1) / (2 * frequency_); }
   double period() const override { return 1 / frequency_; }
 
  private:
@@ -87,7 +87,7 @@ class MultiSine : public Excitation {
   double bias_;
 };
 
-class Random : public MultiSine {
+class RandomTorque : public MultiSine {
  public:
   using MultiSine::MultiSine;
   double period() const override { return 0; }
@@ -103,10 +103,10 @@ class Chirp : public Excitation {
         shortest_(1 / std::max(start, end)),
         bias_(bias) {}
   double torque(double t, long segment) const override {
-    const double s = t - segment * duration_;
+    const double s = t - double(segment) * duration_;
     return bias_ + amplitude_ * std::sin(2 * M_PI * (start_ + 0.5 * rate_ * s) * s);
   }
-  double segment_end(long segment) const override { return (segment + 1) * duration_; }
+  double segment_end(long segment) const override { return double(segment + 1) * duration_; }
   double shortest_period(long) const override { return shortest_; }
   double period() const override { return duration_; }
 
@@ -161,15 +161,13 @@ std::unique_ptr<Excitation> random_excitation(double rms, double lower, double u
   require("bias", bias, Range::any());
   if (!(upper > lower))
     throw InvalidParameter("excitation.upper_frequency", upper, "must be > lower_frequency");
-  std::mt19937_64 generator(seed);
-  // The same numbers on every platform, which std::uniform_real_distribution does not promise.
-  const auto uniform = [&generator] { return static_cast<double>(generator() >> 11) * 0x1p-53; };
+  Random random(seed);
   std::vector<SineLine> sines;
   for (int k = 0; k < lines; ++k) {
-    const double frequency = lower + (upper - lower) * (k + uniform()) / lines;
-    sines.push_back({rms * std::sqrt(2.0 / lines), frequency, 2 * M_PI * uniform()});
+    const double frequency = lower + (upper - lower) * (k + random.uniform()) / lines;
+    sines.push_back({rms * std::sqrt(2.0 / lines), frequency, 2 * M_PI * random.uniform()});
   }
-  return std::make_unique<Random>(std::move(sines), bias);
+  return std::make_unique<RandomTorque>(std::move(sines), bias);
 }
 
 std::unique_ptr<Excitation> external_excitation() {

@@ -69,6 +69,8 @@ TEST(ServoData, LeavesThePositionThatDrivesALoadAlone) {
   Record record = rounded_sine(kSlow);
   Rig rig = locked();
   rig.link_locked = false;
+  rig.link.inertia = 10;
+  rig.mesh.contact = make_contact_law("linear", {{"stiffness", 1e5}, {"damping", 100}});
   record.column(Channel::load_position) = record.column(Channel::motor_position);
   EXPECT_EQ(servo_data(record, rig).motor, record.column(Channel::motor_position));
 }

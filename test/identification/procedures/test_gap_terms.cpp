@@ -70,23 +70,26 @@ TEST(GapTerms, WindUpFromTheRigByHand) {
 }
 
 TEST(GapTerms, RigFileGetsTheEntriesAndKeepsTheRest) {
-  const std::string text = load_rig_file(kVarying).text;
-  const std::string changed = with_gap_terms(text, kVarying, hand_made_map(), 5.358e-4);
-  const RigFile file = rig_file_from_text(changed, kVarying);
+  RigDocument document(load_rig_file(kVarying));
+  replace_gap_terms(document, hand_made_map(), 5.358e-4);
+  const std::string changed = document.text();
+  const RigFile file = document.read();
   EXPECT_EQ(file.rig.terms.size(), 2u);
   // The text has five decimals of the relative amplitude, four of the phase: 5e-6 of 5.4e-4 and 5e-5 of 4e-5.
   for (const double q : {0.0, 0.7, 2.0, 3.3, 5.9})
     EXPECT_NEAR(gap_in_train(file.rig, q), gap_of(5.358e-4, q), 1e-8) << q;
   for (const char* part : {"# As a look-up table", "\nexcitation:", "15 % at most.\nterms:\n  - id: "})
     EXPECT_NE(changed.find(part), std::string::npos) << part;
-  EXPECT_THROW(with_gap_terms("terms: []\n", "x.yaml", hand_made_map(), 5e-4), BadData);
+  RigDocument none("terms: []\n", "x.yaml");
+  EXPECT_THROW(replace_gap_terms(none, hand_made_map(), 5e-4), BadData);
 }
 
 TEST(GapTerms, RefusesAGapThatIsNone) {
   GapMap map = hand_made_map();
   map.mean_gap.value = -1e-6;
   EXPECT_THROW(with_gap_map(load_rig_file(kVarying).rig, map), InvalidParameter);
-  EXPECT_THROW(gap_terms_yaml(map, 0), InvalidParameter);
+  RigDocument document(load_rig_file(kVarying));
+  EXPECT_THROW(replace_gap_terms(document, map, 0), InvalidParameter);
   EXPECT_THROW(make_term("varying_backlash", {{"amplitude", 0.1}, {"order", -1}, {"phase", 0}}),
                InvalidParameter);
   EXPECT_THROW(make_term("no such", {}), InvalidParameter);

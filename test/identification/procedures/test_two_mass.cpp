@@ -21,22 +21,22 @@ constexpr Measured sure(double value) {
 // Table 5.1 as printed: alternative, F_R, F_AR, Jm, Jl, Ks1, Jp, Ks2, F_R calc, F_AR calc; Hz, kg m^2, 1000 N
 // m/rad.
 struct PrintedRow {
-  Kept kept;
+  KnownInertia known;
   double total, motor;  // what the configuration's plateaus gave (Table 5.2)
   double r, ar, jm, jl, ks1, jp, ks2, r_calc, ar_calc;
 };
 constexpr PrintedRow kTable51[] = {
-    {Kept::total_inertia, 48.9, 6.0, 36, 14.5, 8.4, 40.5, 336, 6.9, 355, 35.0, 14.9},
-    {Kept::motor_inertia, 48.9, 6.0, 36, 14.5, 6.0, 29.2, 242, 5.0, 256, 35.0, 14.9},
-    {Kept::both_inertias, 48.9, 6.0, 36, 14.5, 6.0, 42.9, 356, 5.3, 270, 41.3, 12.6},
-    {Kept::total_inertia, 114.6, 6.3, 37.75, 10.5, 8.9, 105.8, 460, 8.2, 460, 37.8, 10.5},
-    {Kept::motor_inertia, 114.6, 6.3, 37.75, 10.5, 6.3, 74.9, 326, 5.8, 326, 37.8, 10.5},
-    {Kept::both_inertias, 114.6, 6.3, 37.75, 10.5, 6.3, 108.4, 472, 5.9, 334, 44.9, 8.8},
+    {KnownInertia::total_inertia, 48.9, 6.0, 36, 14.5, 8.4, 40.5, 336, 6.9, 355, 35.0, 14.9},
+    {KnownInertia::motor_inertia, 48.9, 6.0, 36, 14.5, 6.0, 29.2, 242, 5.0, 256, 35.0, 14.9},
+    {KnownInertia::both_inertias, 48.9, 6.0, 36, 14.5, 6.0, 42.9, 356, 5.3, 270, 41.3, 12.6},
+    {KnownInertia::total_inertia, 114.6, 6.3, 37.75, 10.5, 8.9, 105.8, 460, 8.2, 460, 37.8, 10.5},
+    {KnownInertia::motor_inertia, 114.6, 6.3, 37.75, 10.5, 6.3, 74.9, 326, 5.8, 326, 37.8, 10.5},
+    {KnownInertia::both_inertias, 114.6, 6.3, 37.75, 10.5, 6.3, 108.4, 472, 5.9, 334, 44.9, 8.8},
 };
 
 TEST(TwoMass, Table51RecomputesFromItsPrintedInertias) {
   for (const PrintedRow& row : kTable51) {
-    const StiffnessSplit s = split_stiffness(Kept::both_inertias, {sure(row.r), sure(row.ar)},
+    const StiffnessSplit s = split_stiffness(KnownInertia::both_inertias, {sure(row.r), sure(row.ar)},
                                              sure(row.jm + row.jl), sure(row.jm));
     // Inertias are printed to 0.1 kg m^2 (0.8 % of 6.0 and more of what follows), some cells truncated: Jp to
     // 0.1, stiffness to 0.6 %, frequencies to 0.1 Hz and the 0.3 % that the inertia leaves.
@@ -51,22 +51,22 @@ TEST(TwoMass, Table51RecomputesFromItsPrintedInertias) {
 TEST(TwoMass, Table51InertiasFollowFromTheFrequenciesButForTwoRows) {
   for (const PrintedRow& row : kTable51) {
     const StiffnessSplit s =
-        split_stiffness(row.kept, {sure(row.r), sure(row.ar)}, sure(row.total), sure(row.motor));
+        split_stiffness(row.known, {sure(row.r), sure(row.ar)}, sure(row.total), sure(row.motor));
     const bool first = row.total == 48.9;
-    if (first && row.kept == Kept::total_inertia) {
+    if (first && row.known == KnownInertia::total_inertia) {
       // 48.9 / (36/14.5)^2: printed 8.4 and 40.5 do not follow (REFERENCE 3.4).
       EXPECT_NEAR(s.motor_inertia.value, 7.93, 0.005);
       EXPECT_NEAR(s.load_inertia.value, 48.9 - 7.93, 0.005);
-    } else if (first && row.kept == Kept::motor_inertia) {
+    } else if (first && row.known == KnownInertia::motor_inertia) {
       EXPECT_NEAR(s.load_inertia.value, 6.0 * (36 * 36 / (14.5 * 14.5) - 1), 1e-9);  // 30.98, printed 29.2
       EXPECT_GT(s.load_inertia.value - row.jl, 1.7);
     } else {
       EXPECT_NEAR(s.motor_inertia.value, row.jm, 0.051);
       // 6.3 is printed to 0.05: 0.8 % of the 81.2 that row 2b's total then is.
-      EXPECT_NEAR(s.load_inertia.value, row.jl, row.kept == Kept::motor_inertia ? 0.65 : 0.11);
+      EXPECT_NEAR(s.load_inertia.value, row.jl, row.known == KnownInertia::motor_inertia ? 0.65 : 0.11);
     }
     // What the alternative keeps, it keeps.
-    if (row.kept != Kept::both_inertias) {
+    if (row.known != KnownInertia::both_inertias) {
       EXPECT_NEAR(s.resonance.value, row.r, 1e-9);
       EXPECT_NEAR(s.anti_resonance.value, row.ar, 1e-9);
     }
@@ -108,8 +108,9 @@ TEST(TwoMass, ResponseIsEquations232And235) {
 TEST(TwoMass, SplitPropagatesErrors) {
   const Resonances measured{{37.75, 0.2}, {10.5, 0.05}};
   const Measured total{114.6, 1.0}, motor{6.3, 0.2};
-  for (const Kept kept : {Kept::total_inertia, Kept::motor_inertia, Kept::both_inertias}) {
-    const StiffnessSplit stated = split_stiffness(kept, measured, total, motor);
+  for (const KnownInertia known :
+       {KnownInertia::total_inertia, KnownInertia::motor_inertia, KnownInertia::both_inertias}) {
+    const StiffnessSplit stated = split_stiffness(known, measured, total, motor);
     std::mt19937_64 random(4);
     std::normal_distribution<double> normal;
     const auto draw = [&](const Measured& m) { return sure(m.value + m.standard_error * normal(random)); };
@@ -117,7 +118,7 @@ TEST(TwoMass, SplitPropagatesErrors) {
     double square[3]{};
     for (int i = 0; i < kDraws; ++i) {
       const StiffnessSplit s = split_stiffness(
-          kept, {draw(measured.resonance), draw(measured.anti_resonance)}, draw(total), draw(motor));
+          known, {draw(measured.resonance), draw(measured.anti_resonance)}, draw(total), draw(motor));
       square[0] += std::pow(s.stiffness_anti_resonance.value - stated.stiffness_anti_resonance.value, 2);
       square[1] += std::pow(s.stiffness_resonance.value - stated.stiffness_resonance.value, 2);
       square[2] += std::pow(s.load_inertia.value - stated.load_inertia.value, 2);
@@ -126,16 +127,18 @@ TEST(TwoMass, SplitPropagatesErrors) {
     const double expected[] = {stated.stiffness_anti_resonance.standard_error,
                                stated.stiffness_resonance.standard_error, stated.load_inertia.standard_error};
     for (int k = 0; k < 3; ++k)
-      EXPECT_NEAR(std::sqrt(square[k] / kDraws) / expected[k], 1, 0.055) << int(kept) << " " << k;
+      EXPECT_NEAR(std::sqrt(square[k] / kDraws) / expected[k], 1, 0.055) << int(known) << " " << k;
   }
 }
 
 TEST(TwoMass, SplitRefusesWhatCannotBe) {
   const Measured total{50, 1}, motor{6, 1};
-  EXPECT_THROW(split_stiffness(Kept::both_inertias, {sure(10), sure(12)}, total, motor), CannotIdentify);
-  EXPECT_THROW(split_stiffness(Kept::both_inertias, {sure(12), sure(10)}, motor, total), CannotIdentify);
-  EXPECT_THROW(split_stiffness(Kept::total_inertia, {sure(12), sure(10)}, {}, motor), CannotIdentify);
-  EXPECT_NO_THROW(split_stiffness(Kept::motor_inertia, {sure(12), sure(10)}, {}, motor));
+  EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(10), sure(12)}, total, motor),
+               CannotIdentify);
+  EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(12), sure(10)}, motor, total),
+               CannotIdentify);
+  EXPECT_THROW(split_stiffness(KnownInertia::total_inertia, {sure(12), sure(10)}, {}, motor), CannotIdentify);
+  EXPECT_NO_THROW(split_stiffness(KnownInertia::motor_inertia, {sure(12), sure(10)}, {}, motor));
 }
 
 /// A response without noise, points 0.25 Hz apart.

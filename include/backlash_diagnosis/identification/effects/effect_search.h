@@ -25,7 +25,7 @@
 namespace backlash {
 
 struct TraceSettings {
-  double cutoff = 0;  // Hz, low-pass of all residuals; 0: 60 for two inertias, else the motion's bandwidth
+  double cutoff = 0;                // Hz, low-pass of all residuals; 0: that of the machine (fit_settings.h)
   double least_gain = 0.03;         // of a residual that an effect brings near its floor
   double least_gain_unclear = 0.1;  // of one that stays far above its floor, as on real machines
   std::size_t most_effects = 6;
@@ -67,6 +67,11 @@ struct TraceChannel {
   double train_before = 0, train_after = 0;
 };
 
+/// An effect that was tried and is not in the model, and why.
+struct RejectedEffect {
+  std::string id, reason;
+};
+
 /// Share of lags at which the residual of a channel correlates with an input beyond the 99 % band of
 /// independence (about 0.01 where nothing is missing), on the test record.
 struct Independence {
@@ -101,6 +106,7 @@ struct Trace {
   std::map<std::string, TraceChannel> channels;
   std::vector<Independence> independence;
   std::vector<FoundEffect> steps;
+  std::vector<RejectedEffect> rejected;  // each effect once
   std::optional<Unexplained> unexplained;
   std::vector<std::string> notes;  // what was added to the model and is too small to be called missing
   std::vector<std::string> warnings;

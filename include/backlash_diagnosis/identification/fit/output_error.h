@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// All parameters of a servo with two inertias and two encoders together, from the raw record.
+// All parameters of a servo with two inertias and two encoders together, from the raw record, by the
+// multi-start fit.
 //
 // The load is simulated driven by the recorded motor position (simulation/driven_load.h). Two residuals
 // count, each divided by its noise floor, which the record itself tells:
@@ -17,6 +18,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/identification/finding.h"
+#include "backlash_diagnosis/identification/fit/fit_settings.h"
 #include "backlash_diagnosis/identification/fit/servo_data.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
@@ -24,12 +26,9 @@
 namespace backlash {
 
 struct OutputErrorSettings {
-  double cutoff = 60;                   // Hz, low-pass of both residuals
-  double feedback = kLoadFeedback;      // 1/s
+  FitSettings fit;
   std::vector<std::string> parameters;  // of servo_parameters(), to be fitted
   std::vector<Finding> findings;        // of other records, which count by their standard errors
-  int iterations = 20;
-  double step = 1e-3;  // of the differences, relative
 };
 
 /// Relative error norm(r) / norm(y - mean(y)), and what noise alone leaves.
@@ -62,14 +61,16 @@ struct ServoPrediction {
   ChannelError torque_error, deflection_error;
 };
 
-ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+/// `settings` have their bands, see with_bands().
+ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSettings& settings,
                               const Calibration& calibration);
 
 /// Fits the calibration alone and predicts: what a rig says of a record that it has not seen.
-ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const OutputErrorSettings& settings,
+ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const FitSettings& settings,
                                    Calibration& calibration);
 
-/// Starts from the values in `rig`. Throws CannotIdentify, InvalidParameter.
+/// Starts from the values in `rig`; bands that the settings do not have are those of `rig`. Throws
+/// CannotIdentify, InvalidParameter.
 OutputError fit_output_error(const Rig& rig, const std::vector<ServoData>& records,
                              const OutputErrorSettings& settings);
 

@@ -26,10 +26,17 @@ struct ClearanceSettings {
   /// a quarter of a period of w; NaN: w is fitted.
   double stiffness = std::numeric_limits<double>::quiet_NaN();     // N m/rad
   double load_inertia = std::numeric_limits<double>::quiet_NaN();  // kg m^2
+  // Of the travel in which passages are sought, and of the penetration. Simulation: of a load that rings on a
+  // flank at 10 Hz; clearance_settings() has those of a machine.
+  double cutoff = 40, fine_cutoff = 120;  // Hz
   double contact_time = 0.05;      // s, before and after the middle half of the travel, that are fitted
   double most_motor_travel = 0.1;  // of the load's travel in a passage: more is a motor that is not braked
   int least_passages = 3;
 };
+
+/// The settings of a machine: stiffness k [N m/rad] and load inertia J [kg m^2], both > 0, are held, and the
+/// low-passes are 3.85 and 11.5 times sqrt(k / J) / 2 pi.
+ClearanceSettings clearance_settings(double stiffness, double load_inertia);
 
 /// One passage of the gap, from turning point to turning point.
 struct GapPassage {

@@ -8,10 +8,9 @@
 // load's friction winds the mesh up (gap_map.h). GapUse::directly is that use, for comparison.
 #pragma once
 
-#include <string>
-
 #include "backlash_diagnosis/identification/procedures/gap_map.h"
 #include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/rig_file/rig_document.h"
 
 namespace backlash {
 
@@ -35,14 +34,9 @@ bool gap_varies(const Rig& rig);
 /// not > 0.
 Rig with_gap_map(Rig rig, const GapMap& map, GapUse use = GapUse::corrected);
 
-/// The entries of `terms:` for a rig file whose backlash_angle is `mean_gap` [rad], indented by two; empty
-/// where the map has no orders.
-std::string gap_terms_yaml(const GapMap& map, double mean_gap);
-
-/// The text of a rig file with these entries instead of its varying_backlash and backlash_map; its
-/// backlash_angle must be, or be made, `mean_gap`. `name` is for messages. Throws BadData where there are
-/// none to replace in block style ("  - id: varying_backlash").
-std::string with_gap_terms(const std::string& text, const std::string& name, const GapMap& map,
-                           double mean_gap);
+/// Puts one term varying_backlash per order of the map into a rig file, in place of those that gap_varies()
+/// asks for. `mean_gap` [rad] is the backlash_angle of the document. Throws InvalidParameter where it is not
+/// > 0, BadData where there are no such terms in block style.
+void replace_gap_terms(RigDocument& document, const GapMap& map, double mean_gap);
 
 }  // namespace backlash

@@ -65,8 +65,8 @@ struct InertiaPlateaus {
 };
 InertiaPlateaus find_inertias(const FrequencyResponse& motor, const Resonances& resonances);
 
-/// Two inertias and two frequencies for three unknowns: which inertia is kept (Table 5.1).
-enum class Kept {
+/// Two inertias and two frequencies for three unknowns: which inertia is taken as measured (Table 5.1).
+enum class KnownInertia {
   total_inertia,  // (a) motor inertia from the ratio of the frequencies (5.5); the thesis prefers this
   motor_inertia,  // (b) total inertia from it
   both_inertias,  // (c) ratio of the frequencies left unexplained
@@ -82,7 +82,7 @@ struct StiffnessSplit {
 /// Standard errors by linear propagation, inputs taken for independent. Inertias that the choice does not
 /// keep are not read. Throws CannotIdentify where a needed value is not > 0, the resonance not above the
 /// anti-resonance, or the total not above the motor inertia.
-StiffnessSplit split_stiffness(Kept kept, const Resonances& measured, const Measured& total_inertia,
+StiffnessSplit split_stiffness(KnownInertia known, const Resonances& measured, const Measured& total_inertia,
                                const Measured& motor_inertia);
 
 /// All parameters from the whole response at once.

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "acceptance.h"
+#include "effect_roles.h"
+#include "steps.h"
+#include "trial.h"
+
+namespace backlash {
+namespace {
+
+bool nothing_can_be_found(const Misfit& m, const SearchSettings& settings) {
+  return std::max(m.torque, m.deflection) < settings.revision.at_floor &&
+         std::max(m.torque_share, m.deflection_share) < settings.acceptance.noise;
+}
+
+HeldOut held_out_of(const Trial& trial, const Hypothesis& h, const SearchContext& context) {
+  return held_out(trial.fit, trial.start, h.fitted->records, context.settings.acceptance);
+}
+
+/// The other trials that gain nearly as much as `best`.
+std::vector<Candidate> alternatives(const Trial& best, double gain, const std::vector<Trial>& trials,
+                                    const HeldOut& now, const Hypothesis& h, const SearchContext& context) {
+  std::vector<Candidate> all;
+  for (const Trial& other : trials) {
+    if (other.candidate.id == best.candidate.id) continue;
+    if (compare(now, held_out_of(other, h, context)).total >= context.settings.revision.alike * gain)
+      all.push_back(other.candidate);
+  }
+  return all;
+}
+
+}  // namespace
+
+Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
+  const Misfit& left = misfit(before);
+  if (nothing_can_be_found(left, context.settings)) return before;
+  context.tell(fmt::format("screening (torque {:.3g}, deflection {:.3g} times the noise floor)", left.torque,
+                           left.deflection));
+  const RecordSet& records = before.fitted->records;
+  const Trials trials = tried_best(
+      before, screen(before.fitted->fit, records, context.range, context.settings.screen), context);
+  Hypothesis h = before;
+  for (const RejectedEffect& r : trials.rejected) h = with_rejected(std::move(h), r.id, r.reason);
+  const HeldOut now =
+      held_out(before.fitted->fit, before.fitted->start, records, context.settings.acceptance);
+  for (const Trial& trial : trials.fitted) {
+    const Trial best = best_neighbour(before, trial, context);
+    const Gain gain = compare(now, held_out_of(best, before, context));
+    const std::string reason = objection(gain, best.fit.machine, records, context.settings);
+    if (!reason.empty()) {
+      h = with_rejected(std::move(h), best.candidate.id, reason);
+      continue;
+    }
+    std::vector<Effect> effects = h.effects;
+    effects.push_back(
+        {best.candidate, gain, alternatives(best, gain.total, trials.fitted, now, before, context), {}, {}});
+    if (auto with = refitted(h, std::move(effects), context)) return *with;
+    h = with_rejected(std::move(h), best.candidate.id, "the machine cannot be fitted with it at new weights");
+  }
+  return h;
+}
+
+Hypothesis add_effects(const Hypothesis& before, const SearchContext& context) {
+  Hypothesis h = before;
+  while (h.effects.size() < context.settings.asked.most_effects) {
+    const std::size_t count = h.effects.size();
+    h = add_effect(h, context);
+    if (h.effects.size() == count) break;
+  }
+  return h;
+}
+
+Hypothesis add_effects_or_teeth(const Hypothesis& before, const SearchContext& context) {
+  Hypothesis h = before;
+  std::size_t tried_with = 0;  // effects, when other teeth were tried last
+  for (;;) {
+    const std::size_t count = h.effects.size();
+    if (count < context.settings.asked.most_effects) h = add_effect(h, context);
+    const bool more = h.effects.size() > count;
+    const bool hardening = more && stands_in_for_contact_law(h.effects.back().candidate.id);
+    if ((hardening || !more) && tried_with != h.effects.size()) {
+      tried_with = h.effects.size();
+      if (auto other = with_other_teeth(h, context)) {
+        h = std::move(*other);
+        continue;
+      }
+    }
+    if (!more) return h;
+  }
+}
+
+}  // namespace backlash

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
+#include "steps.h"
+
+namespace backlash {
+namespace {
+
+/// All that the rig declares, of the bodies and the mesh that it has.
+bool can_be_fitted(const RigParameter& p, const Rig& rig) {
+  if (p.kind == ParameterKind::start_in_gap || !p.known_to(rig)) return false;
+  if (p.part == RigPart::link && !load_moves_freely(rig)) return false;
+  return p.get(rig) != 0;
+}
+
+/// With a locked link the middle of the gap and of both wind-ups is in the middle of the travel, and both
+/// flanks must have touched.
+void start_in_travel(Machine& machine, const std::vector<ServoData>& data) {
+  double& gap = machine.rig.mesh.backlash;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const auto [low, high] = std::minmax_element(data[i].motor.begin(), data[i].motor.end());
+    machine.calibrations[i].encoder_offset = -0.5 * (*low + *high);
+    gap = std::min(gap, 0.5 * (*high - *low) * machine.rig.mesh.lever());
+  }
+}
+
+}  // namespace
+
+std::vector<FitParameter> declared_parameters(const Rig& rig) {
+  std::vector<FitParameter> all;
+  for (const RigParameter& declared : servo_parameters()) {
+    if (!can_be_fitted(declared, rig)) continue;
+    FitParameter p = machine_parameter(declared.name, rig);
+    // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
+    // With a locked link damping is hardly told and stays where it is.
+    if (p.positive && declared.is_friction() && !rig.link_locked) {
+      p.positive = false;
+      p.scale = p.get(rig);
+    }
+    all.push_back(p);
+  }
+  return all;
+}
+
+Hypothesis fit_declared(const Rig& declared, const SearchContext& context) {
+  Machine machine;
+  machine.rig = declared;
+  machine.calibrations.resize(context.data.size());
+  if (declared.link_locked) start_in_travel(machine, context.data);
+  machine.parameters = declared_parameters(machine.rig);
+  Hypothesis h;
+  h.base = std::make_shared<const BandFit>(fit_to_records(
+      context.data, machine, context.settings.fit, [&] { context.tell("fit of the declared machine"); }));
+  h.declared = std::make_shared<const Machine>(std::move(machine));
+  h.fitted = h.base;
+  context.tell_hypothesis(h);
+  return h;
+}
+
+}  // namespace backlash

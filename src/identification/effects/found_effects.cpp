@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "found_effects.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "learned.h"
+
+namespace backlash {
+namespace {
+
+constexpr double kWorse = 1.05;  // choice: times the error on the test record: an effect that does harm
+
+/// Of a learned map: where its coordinate reaches and how large it gets.
+void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
+  const TermMap& map = *term_type(term.id).map;
+  const MapKind& kind = kind_of(term.values);
+  effect.words = {{map.acts_on, kind.acts_on}, {map.coordinate, kind.coordinate}};
+  effect.curve_x = term.values.list(map.points);
+  effect.curve_y = term.values.list(map.values);
+  const std::string &x = kind.coordinate, &unit = kind.coordinate_unit;
+  const auto largest = std::max_element(effect.curve_y.begin(), effect.curve_y.end(),
+                                        [](double a, double b) { return std::fabs(a) < std::fabs(b); });
+  const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
+  effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
+                       {x + "_to", unit, {effect.curve_x.back(), 0}},
+                       {"largest", kind.unit, at_largest}};
+  fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
+}
+
+/// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0.
+void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted,
+              FoundEffect& effect) {
+  const TermType& type = term_type(term.id);
+  if (type.map) return describe_map(term, fitted, effect);
+  const TermSearch& search = *type.search;
+  std::map<std::string, Measured> found;
+  const auto take = [&](const std::string& name) {
+    found[name] = fitted.front();
+    fitted.erase(fitted.begin());
+  };
+  take(search.strength);
+  if (!search.phase.empty()) take(search.phase);
+  for (const TermShape& shape : search.shapes)
+    if (shape.refined) take(shape.name);
+  for (const ParameterSpec& spec : type.parameters) {
+    if (!spec.choices.empty()) {
+      effect.words[spec.name + suffix] = term.values.choice(spec.name);
+      continue;
+    }
+    const auto at = found.find(spec.name);
+    const Measured m = at != found.end() ? at->second : Measured{term.values.at(spec.name), 0};
+    effect.parameters.push_back({spec.name + suffix, spec.unit, m});
+  }
+}
+
+/// Each other effect that reaches most of the gain, once.
+std::vector<std::string> ids_of(const Effect& effect) {
+  std::vector<std::string> ids;
+  for (const Candidate& c : effect.alternatives)
+    if (c.id != effect.candidate.id && std::find(ids.begin(), ids.end(), c.id) == ids.end())
+      ids.push_back(c.id);
+  return ids;
+}
+
+}  // namespace
+
+FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
+  MachineFit fit = fitted.fit;
+  judge_errors(fit, fitted.start, fitted.records);
+  const Unknowns unknowns(fitted.start);
+  FittedValues out;
+  for (std::size_t i = 0; i < fitted.start.parameters.size(); ++i) {
+    const Measured m = unknowns.parameter(fit.fit, i);
+    if (i < declared)
+      out.machine[fitted.start.parameters[i].name] = m;
+    else
+      out.effects.push_back(m);
+  }
+  return out;
+}
+
+std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<Measured> fitted,
+                                       const std::vector<ServoPrediction>& on_test) {
+  std::vector<FoundEffect> all;
+  const auto error = [](const ServoPrediction& p, const std::string& channel) {
+    return channel == "torque" ? p.torque_error.error : p.deflection_error.error;
+  };
+  std::size_t place = h.declared->rig.terms.size();
+  for (std::size_t i = 0; i < h.effects.size(); ++i) {
+    const Effect& accepted = h.effects[i];
+    auto step = std::find_if(all.begin(), all.end(),
+                             [&](const FoundEffect& e) { return e.id == accepted.candidate.id; });
+    if (step == all.end()) {
+      FoundEffect e;
+      e.id = accepted.candidate.id;
+      e.channel = accepted.gain.deflection ? "deflection" : "torque";
+      e.evidence = accepted.gain.evidence;
+      e.equivalent_to = ids_of(accepted);
+      e.nearest = accepted.nearest;
+      e.test_error_before = error(on_test[i], e.channel);
+      step = all.insert(all.end(), e);
+    }
+    step->test_error_after = error(on_test[i + 1], step->channel);
+    for (std::size_t t = 0; t < accepted.candidate.terms.size(); ++t, ++place) {
+      step->terms.push_back(place);
+      const std::size_t number = step->terms.size();
+      describe(*h.fitted->fit.machine.rig.terms[place], number > 1 ? "_" + std::to_string(number) : "",
+               fitted, *step);
+    }
+  }
+  return all;
+}
+
+std::vector<std::string> harm_warnings(const std::vector<FoundEffect>& steps) {
+  std::vector<std::string> warnings;
+  for (const FoundEffect& e : steps)
+    if (e.test_error_after > kWorse * e.test_error_before)
+      warnings.push_back(
+          fmt::format("{} makes the test record worse ({} {:.3g} -> {:.3g} %): not to be believed", e.id,
+                      e.channel, 100 * e.test_error_before, 100 * e.test_error_after));
+  return warnings;
+}
+
+}  // namespace backlash

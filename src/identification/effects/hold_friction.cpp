@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "steps.h"
+
+namespace backlash {
+namespace {
+
+/// Friction below 0, of one direction or of both: it would drive the body.
+bool drives(const FitParameter& p, const Rig& rig) {
+  const RigParameter& friction = servo_parameter(p.name);
+  if (!friction.is_friction() || friction.is_asymmetry()) return false;
+  const RigParameter* asymmetry = asymmetry_of(friction);
+  return p.get(rig) < (asymmetry ? std::fabs(asymmetry->get(rig)) : 0);
+}
+
+/// The first friction that drives, or the difference of its directions where that is fitted.
+std::optional<FitParameter> negative_friction(const Hypothesis& h) {
+  const std::vector<FitParameter>& all = h.declared->parameters;
+  const Rig& rig = h.fitted->fit.machine.rig;
+  const auto negative =
+      std::find_if(all.begin(), all.end(), [&](const FitParameter& p) { return drives(p, rig); });
+  if (negative == all.end()) return std::nullopt;
+  const auto difference = std::find_if(all.begin(), all.end(), [&](const FitParameter& p) {
+    return servo_parameter(p.name).mean == negative->name;
+  });
+  return difference != all.end() ? *difference : *negative;
+}
+
+/// A hypothesis to start a fit from, with this parameter 0 and no longer fitted.
+Hypothesis with_held(const Hypothesis& h, const FitParameter& parameter) {
+  Hypothesis held = h;
+  BandFit fitted = *h.fitted;
+  parameter.set(fitted.fit.machine.rig, 0);
+  held.fitted = std::make_shared<const BandFit>(std::move(fitted));
+  Machine declared = *h.declared;
+  declared.parameters.erase(std::remove_if(declared.parameters.begin(), declared.parameters.end(),
+                                           [&](const FitParameter& p) { return p.name == parameter.name; }),
+                            declared.parameters.end());
+  held.declared = std::make_shared<const Machine>(std::move(declared));
+  held.held.push_back(parameter.name);
+  return held;
+}
+
+}  // namespace
+
+Hypothesis hold_friction(const Hypothesis& before, const SearchContext& context) {
+  const FitSettings& settings = context.settings.fit;
+  Hypothesis h = before;
+  while (const auto negative = negative_friction(h)) {
+    const Hypothesis held = with_held(h, *negative);
+    if (h.effects.empty()) {
+      h = held;
+      h.fitted = std::make_shared<const BandFit>(fit_in_band(context.data, start_with(held, {}, context),
+                                                             settings.cutoff, settings.tolerance, settings));
+      continue;
+    }
+    auto with = refitted(held, held.effects, context);
+    if (!with)
+      throw CannotIdentify(negative->name + " comes out below 0, and with 0 the machine cannot be fitted");
+    h = std::move(*with);
+  }
+  return h;
+}
+
+}  // namespace backlash

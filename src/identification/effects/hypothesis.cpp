@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "hypothesis.h"
+
+#include <algorithm>
+
+#include "../fit/calibration.h"
+#include "effect_roles.h"
+#include "learned.h"
+
+namespace backlash {
+namespace {
+
+bool has(const std::vector<Effect>& effects, const std::string& id) {
+  return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return e.candidate.id == id; });
+}
+
+bool has(const std::vector<Effect>& effects, bool (*is)(const std::string& id)) {
+  return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return is(e.candidate.id); });
+}
+
+/// A map over the recorded torque may take it away, and all inertia with it: no residual, less than noise.
+bool takes_noise_away(const std::vector<Effect>& effects, const Misfit& misfit, const MapSettings& settings) {
+  return misfit.torque < settings.less_than_noise &&
+         std::any_of(effects.begin(), effects.end(), [](const Effect& e) {
+           return is_learned(e.candidate.id) &&
+                  kind_of(e.candidate.terms.front()).coordinate == channel_name(Channel::motor_torque);
+         });
+}
+
+BandFit fit_with_effects(Machine machine, bool delay, const SearchContext& context) {
+  const FitSettings& settings = context.settings.fit;
+  if (delay)
+    without_calibration(machine);
+  else
+    machine.largest_delay = Machine().largest_delay;  // calibration may have stood in for the effect
+  Machine rough =
+      fit_in_band(context.data, machine, settings.cutoff, settings.rough_tolerance, settings).fit.machine;
+  if (!delay) {
+    restore_hold(rough);
+    limit_delay(rough, settings.calibration_delay);
+  }
+  return fit_in_band(context.data, rough, settings.cutoff, settings.tolerance, settings);
+}
+
+}  // namespace
+
+const Misfit& misfit(const Hypothesis& h) {
+  return h.fitted->misfit;
+}
+
+double size(const Hypothesis& h) {
+  return size(misfit(h));
+}
+
+bool clearly_right(const Misfit& misfit, const SearchContext& context) {
+  return std::max(misfit.torque, misfit.deflection) < context.settings.revision.clearly_right;
+}
+
+bool has_learned_map(const std::vector<Effect>& effects) {
+  return has(effects, is_learned);
+}
+
+Hypothesis with_rejected(Hypothesis h, const std::string& effect, const std::string& reason) {
+  h.rejected.push_back({effect, reason});
+  return h;
+}
+
+std::vector<RejectedEffect> rejected_effects(const Hypothesis& h) {
+  std::vector<RejectedEffect> all;
+  for (const RejectedEffect& r : h.rejected) {
+    if (has(h.effects, r.id)) continue;
+    const auto same = [&](const RejectedEffect& other) { return other.id == r.id; };
+    all.erase(std::remove_if(all.begin(), all.end(), same), all.end());
+    all.push_back(r);
+  }
+  return all;
+}
+
+Machine extended(Machine machine, const Candidate& candidate, const SearchContext& context) {
+  if (!is_learned(candidate.id)) return with_candidate(std::move(machine), candidate, context.range);
+  return with_map(std::move(machine), {candidate.terms.front(), candidate.smoothness, 0}, context.range,
+                  context.settings.maps);
+}
+
+Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, const SearchContext& context) {
+  Machine machine = h.fitted->fit.machine;
+  machine.rig.terms = h.declared->rig.terms;
+  machine.parameters = h.declared->parameters;
+  machine.priors = h.declared->priors;
+  machine.has_map = false;
+  machine.largest_delay = h.base->fit.machine.largest_delay;
+  for (const Effect& effect : effects) machine = extended(std::move(machine), effect.candidate, context);
+  return machine;
+}
+
+std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
+                                   const SearchContext& context) {
+  auto fit = attempted(
+      [&] { return fit_with_effects(start_with(h, effects, context), has(effects, is_delay), context); });
+  if (!fit || takes_noise_away(effects, fit->misfit, context.settings.maps)) return std::nullopt;
+  Hypothesis other = h;
+  other.fitted = std::make_shared<const BandFit>(std::move(*fit));
+  const Machine& machine = other.fitted->fit.machine;
+  std::size_t place = h.declared->rig.terms.size();
+  for (Effect& effect : effects)
+    for (ParameterValues& values : effect.candidate.terms) values = machine.rig.terms[place++]->values;
+  if (!effects.empty()) effects.back().after = std::make_shared<const Machine>(machine);
+  other.effects = std::move(effects);
+  context.tell_hypothesis(other);
+  return other;
+}
+
+}  // namespace backlash

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the search compares: a machine with some effects, fitted, with the evidence for each effect and the
+// reasons why others are not in it. A value: steps of the search take one and give another, cheap to copy.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../fit/multi_start.h"
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/effects/effect_search.h"
+#include "candidates.h"
+#include "search_settings.h"
+#include "validation.h"
+
+namespace backlash {
+
+/// An effect that is in the model.
+struct Effect {
+  Candidate candidate;  // with fitted values
+  Gain gain;
+  std::vector<Candidate> alternatives;   // other effects that reach most of its gain, as fitted
+  std::vector<std::string> nearest;      // of a learned map: named effects that explain part of the same
+  std::shared_ptr<const Machine> after;  // fitted with this effect and those before it
+};
+
+struct Hypothesis {
+  std::shared_ptr<const Machine> declared;  // the machine without effects, where its fits start
+  std::shared_ptr<const BandFit> base;      // that, fitted
+  std::shared_ptr<const BandFit> fitted;    // with the effects; base if there are none
+  std::vector<Effect> effects;
+  bool other_teeth = false;              // not those that the rig file declares
+  std::vector<std::string> held;         // friction of the machine that is held at 0
+  std::vector<RejectedEffect> rejected;  // the latest last
+};
+
+/// What all steps read, and whom they tell. `settings.fit` has its bands.
+struct SearchContext {
+  const std::vector<ServoData>& data;
+  MotionRange range;
+  SearchSettings settings;
+  std::function<void(const std::string& phase)> tell;      // throws Cancelled
+  std::function<void(const Hypothesis&)> tell_hypothesis;  // one that was fitted
+};
+
+const Misfit& misfit(const Hypothesis& h);
+/// Of the misfit, of both channels.
+double size(const Hypothesis& h);
+/// What is left of either channel is close to noise: no other set of effects needs to be tried.
+bool clearly_right(const Misfit& misfit, const SearchContext& context);
+bool has_learned_map(const std::vector<Effect>& effects);
+
+Hypothesis with_rejected(Hypothesis h, const std::string& effect, const std::string& reason);
+/// All effects that were rejected and are not in it after all, each with the latest reason.
+std::vector<RejectedEffect> rejected_effects(const Hypothesis& h);
+
+/// The machine with the terms of a candidate, whose values are fitted as well.
+Machine extended(Machine machine, const Candidate& candidate, const SearchContext& context);
+/// The machine with these effects alone, at the values that it has now: a start for a fit.
+Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, const SearchContext& context);
+
+/// The same machine with these effects instead, fitted at weights of its own. Nothing where that fails, or
+/// where a map over the torque takes the noise away with it.
+std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
+                                   const SearchContext& context);
+
+/// The result of a fit, or nothing where the model cannot be fitted or followed.
+template <typename Fit>
+auto attempted(const Fit& fit) -> std::optional<decltype(fit())> {
+  try {
+    return fit();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace backlash

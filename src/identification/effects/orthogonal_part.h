@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the machine's own parameters cannot take up of residuals and of sensitivities.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "../fit/joint_fit.h"
+
+namespace backlash {
+
+/// Projects rows onto what is orthogonal to the sensitivities of a fit: the first `rows` rows, those of the
+/// records.
+class OrthogonalPart {
+ public:
+  OrthogonalPart(const MachineFit& fit, Eigen::Index rows);
+
+  Eigen::VectorXd of(const Eigen::VectorXd& column) const;
+  /// That of the residuals of the fit.
+  const Eigen::VectorXd& residuals() const { return residuals_; }
+
+ private:
+  Eigen::MatrixXd basis_;  // orthonormal, of the sensitivities
+  Eigen::VectorXd residuals_;
+};
+
+}  // namespace backlash

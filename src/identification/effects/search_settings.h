@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Every number that steers the search for missing effects, one struct per step. Each with its unit and its
+// origin: theory, simulation (tried on simulated machines whose truth is known) or choice (what is asked for,
+// or the time that the search may take).
+#pragma once
+
+#include <cstddef>
+
+#include "backlash_diagnosis/identification/effects/effect_search.h"
+#include "backlash_diagnosis/identification/fit/fit_settings.h"
+
+namespace backlash {
+
+/// Which candidates there are, from sensitivities alone.
+struct ScreenSettings {
+  double probe =
+      0.02;  // theory: of a strength that shows clearly, for differences above the noise of the simulation
+  double telling =
+      1e-3;  // theory: of a sensitivity, to be left after what the machine's own parameters explain
+};
+
+/// Which candidates are fitted with the machine, and how.
+struct TrialSettings {
+  std::size_t most = 6;       // choice (time): candidates
+  double worth_trying = 0.2;  // choice: of the best predicted gain
+  double least_predicted =
+      0.3;               // simulation: of the gain that is asked for; sensitivities mislead by so much
+  double far_off = 1.2;  // simulation: times the wanted residuals, after the rough half of a fit
+  double tie =
+      0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
+  double better_neighbour = 1e-3;  // choice: of the residuals, for the next order in the grid to replace this
+};
+
+/// When an effect is believed (least gains: TraceSettings).
+struct AcceptanceSettings {
+  int blocks = 12;                // choice: of each record, each left out once
+  double earlier_part = 0.6;      // choice: of each record, that the later part is predicted from
+  double earlier_gain = 0.5;      // choice: of the least gain, on the later part
+  double most_blocks = 0.6;       // choice: share of the blocks that must get better
+  double least_in_noise = 0.012;  // choice: gain that always is enough in a residual that is mostly noise
+  double sure = 5.5;      // theory: standard deviations that noise does not reach in a thousand trials
+  double near_floor = 2;  // choice: times the floor: what is left is mostly noise
+  double noise = 0.01;  // choice: of the signal: a floor above it may hide something, what is below may stay
+};
+
+/// When a set of effects is good enough, or another is better.
+struct RevisionSettings {
+  double at_floor =
+      1.03;  // theory: times the floor, which is itself known to some per cent: nothing can be found
+  double clearly_right = 1.3;  // simulation: times the floor: no other order, no other set needs to be tried
+  double clearly_less = 0.9;   // choice: of a residual: worth another set of effects
+  double as_good = 1.02;       // choice: of a residual: then fewer parameters are better
+  double alike = 0.8;          // choice: of the best gain: another name for the same
+  double half = 0.5;           // choice: of a residual: an effect that explains less may stand in for another
+};
+
+/// Learned maps, where no named effect explains what is left.
+struct MapSettings {
+  double something_left = 1.25;  // simulation: times the floor
+  std::size_t trials = 2;        // choice (time): maps that are fitted with the machine
+  std::size_t nearest = 3;       // choice: named effects that are told beside a map
+  double less_than_noise = 0.8;  // theory: times the floor: a residual cannot be that small
+  double probe = 0.05;           // theory: of a strength that shows clearly, as ScreenSettings::probe
+  double tail = 0.002;           // choice: of the samples, beyond the outer points
+  double ridge = 1e-6;           // theory: of the mean squared sensitivity: decides what nothing else does
+  int blocks = 12;               // choice: of each record, for cross-validation
+  double smoothest = 1e5,
+         roughest = 1e-4;  // choice: of the mean squared sensitivity, weights of curvature that are tried
+};
+
+struct SearchSettings {
+  explicit SearchSettings(const TraceSettings& trace = {}) : asked(trace) {
+    fit.cutoff = trace.cutoff;
+    // The search makes hundreds of fits, each from the end of another: fewer steps and starts are enough
+    // (time).
+    fit.iterations = 12;
+    fit.other_starts = 4;
+    fit.tolerance = 1e-5;
+    fit.step = 1e-4;  // simulation: orders of a position show better than over wider differences
+    fit.calibration_delay =
+        0.5;  // theory: samples, as far as a held torque may be misjudged; more is an effect
+  }
+
+  TraceSettings asked;
+  FitSettings fit;
+  ScreenSettings screen;
+  TrialSettings trials;
+  AcceptanceSettings acceptance;
+  RevisionSettings revision;
+  MapSettings maps;
+  double shape_of_friction = 0.01;  // choice: of the signal: less is how friction begins, not an effect
+  double unexplained = 2;           // choice: times the floor, beyond which something is left
+};
+
+}  // namespace backlash

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The steps of the search for missing effects, one file each: each takes a hypothesis and gives another, the
+// same where it finds nothing better. A set of effects that is tried and not taken leaves its reason in
+// `rejected`.
+#pragma once
+
+#include "hypothesis.h"
+
+namespace backlash {
+
+/// The declared machine, fitted. Friction may come out below 0 here: the machine may lack an effect.
+Hypothesis fit_declared(const Rig& declared, const SearchContext& context);
+/// The parameters that the rig declares and such records can tell.
+std::vector<FitParameter> declared_parameters(const Rig& rig);
+
+/// One more named effect: the first of the best trials that convinces and that the machine can be fitted
+/// with.
+Hypothesis add_effect(const Hypothesis& h, const SearchContext& context);
+/// Named effects until nothing helps.
+Hypothesis add_effects(const Hypothesis& h, const SearchContext& context);
+/// The same; where mesh hardening is found, and once more beside all effects, other teeth are tried.
+Hypothesis add_effects_or_teeth(const Hypothesis& h, const SearchContext& context);
+
+/// Hertzian teeth instead of mesh hardening, which teeth of another law than declared look like. Nothing
+/// where there is no hardening, or they do not leave clearly less.
+std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context);
+
+/// Without one effect; those that came after it are fitted again, one by one.
+Hypothesis without_effect(const Hypothesis& h, std::size_t effect, const SearchContext& context);
+
+/// Without the effects that the others explain as well.
+Hypothesis drop_superfluous(const Hypothesis& h, const SearchContext& context);
+
+/// An early effect may have stood in for a later one: where much is left, sets without it are tried.
+Hypothesis reconsider(const Hypothesis& h, const SearchContext& context);
+
+/// What explains the same alone may explain more, or the same with fewer parameters, beside the others.
+Hypothesis try_equivalents(const Hypothesis& h, const SearchContext& context);
+
+/// One learned map, of those that explain most.
+Hypothesis add_map(const Hypothesis& h, const SearchContext& context);
+/// Learned maps where named effects leave much: tried without the effects that may be stand-ins, then with
+/// named effects on top.
+Hypothesis add_learned(const Hypothesis& h, const SearchContext& context);
+
+/// No effects where they leave more than they explain: they may be stand-ins for what has no name.
+Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
+
+/// Friction of the machine that comes out below 0 held at 0, one parameter after the other. Throws
+/// CannotIdentify where the machine cannot be fitted with that.
+Hypothesis hold_friction(const Hypothesis& h, const SearchContext& context);
+
+}  // namespace backlash

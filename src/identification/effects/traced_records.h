@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Records that a trace can use, and what it warns of.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/fit/servo_data.h"
+
+namespace backlash {
+
+/// Throws CannotIdentify for a record without load position, which a rig with two inertias needs, with a load
+/// that stands, or of a motor so slow that its speed drowns in the noise of its encoder; and what
+/// servo_data() throws.
+ServoData traced_data(const Record& record, const Rig& rig);
+
+/// Throws CannotIdentify where a record is sampled at another rate than `test`.
+void require_same_rate(const std::vector<ServoData>& train, const ServoData& test);
+
+/// Where the test record leaves what the training records know: travel, speed, torque.
+std::vector<std::string> range_warnings(const std::vector<ServoData>& train, const ServoData& test,
+                                        bool linear);
+
+}  // namespace backlash

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A candidate fitted together with the machine.
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "hypothesis.h"
+
+namespace backlash {
+
+struct Trial {
+  Candidate candidate;  // as fitted
+  Machine start;        // what fit.fit.values belong to
+  MachineFit fit;
+  double residual = 0;  // norm of all rows
+};
+
+/// Fits machine and candidate with the weights of the hypothesis, so that fits can be compared. Nothing where
+/// that fails or, half way, is far from the residual that is wanted.
+std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, const SearchContext& context,
+                           double wanted = std::numeric_limits<double>::infinity());
+
+struct Trials {
+  std::vector<Trial> fitted;             // best first; of those that tie the simplest
+  std::vector<RejectedEffect> rejected;  // those that were not worth a fit, or could not be fitted
+};
+/// The most promising of the candidates, which come best first.
+Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
+                  const SearchContext& context);
+
+/// Sensitivities of a model that lacks an effect may mislead about orders: those beside the trial's in the
+/// grid of its shapes are fitted too, unless what it leaves is noise.
+Trial best_neighbour(const Hypothesis& h, const Trial& trial, const SearchContext& context);
+
+}  // namespace backlash

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the machine before and after each effect says of a record that the search has not seen.
+#pragma once
+
+#include <vector>
+
+#include "hypothesis.h"
+
+namespace backlash {
+
+/// What a machine says of a record that it was not fitted to, with the record's own calibration. `settings`
+/// have their bands.
+ServoPrediction predicted(Machine machine, const ServoData& record, const FitSettings& settings);
+
+/// The machine before any effect, then with each effect and those before it.
+std::vector<ServoPrediction> predicted_by_all(const Hypothesis& h, const ServoData& record,
+                                              const FitSettings& settings);
+
+/// Relative error of a channel over all training records, as fitted.
+double train_error(const Machine& machine, const std::vector<ServoData>& data, const FitSettings& settings,
+                   ChannelError ServoPrediction::*channel);
+
+/// The record as two models have it.
+TraceSeries trace_series(const ServoData& data, const ServoPrediction& before, const ServoPrediction& after);
+
+/// Whether the residuals of both still follow torque or speed. `cutoff` [Hz] of the residuals.
+std::vector<Independence> independence(const TraceSeries& series, const ServoData& data, double cutoff);
+
+}  // namespace backlash

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a fit makes of the delay of the torque: held between samples or of the moment, calibration or effect.
+#pragma once
+
+#include "joint_fit.h"
+
+namespace backlash {
+
+/// A torque that seems to act more than a quarter of a sample before a held one would is that of the moment.
+void release_hold(Machine& machine);
+/// The reverse: a torque of the moment that seems to act more than a quarter of a sample later is held. Asked
+/// once an effect has been added that the delay may have been fitted in place of.
+void restore_hold(Machine& machine);
+
+/// Where a delay is longer than `longest` [samples] that much stays and is fitted no more, so that the rest
+/// shows as an effect.
+void limit_delay(Machine& machine, double longest);
+
+/// No delay by calibration, where a term of the model is the delay.
+void without_calibration(Machine& machine);
+
+/// Puts the mean delay of the calibrations into the last term, a delay, and leaves none to calibration.
+/// `interval` [s] between samples.
+void move_delay_to_term(Machine& machine, double interval);
+
+}  // namespace backlash

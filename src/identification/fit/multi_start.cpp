@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "multi_start.h"
+
+#include <cmath>
+#include <optional>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
+#include "calibration.h"
+
+namespace backlash {
+
+NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map) {
+  NonlinearOptions options;
+  options.iterations = with_map ? settings.iterations_of_map : settings.iterations;
+  options.step = settings.step;
+  options.tolerance = tolerance;
+  options.parallel = true;
+  return options;
+}
+
+BandFit fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
+                    const FitSettings& settings) {
+  RecordSet records(data, cutoff, settings.feedback);
+  records.weigh(start);
+  MachineFit fit = fit_machine(start, records, fit_options(settings, tolerance, start.has_map));
+  const Misfit misfit = records.misfit(fit.machine);
+  return {std::move(fit), std::move(start), std::move(records), misfit};
+}
+
+Machine other_start(Machine machine, double spread, std::uint64_t seed) {
+  Random random(seed);
+  for (const FitParameter& p : machine.parameters) {
+    const double share = 2 * random.uniform() - 1;
+    if (p.positive) p.set(machine.rig, p.get(machine.rig) * std::exp(spread * share));
+  }
+  return machine;
+}
+
+BandFit fit_from_starts(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
+                        const BeforeFit& before_fit) {
+  const int others = start.parameters.empty() ? 0 : settings.other_starts;
+  std::optional<BandFit> best;
+  for (int i = 0; i <= others; ++i) {
+    if (before_fit) before_fit();
+    const Machine from = i == 0 ? start : other_start(start, settings.start_spread, settings.seed + i);
+    try {
+      BandFit one = fit_in_band(data, from, settings.rough_cutoff, settings.rough_tolerance, settings);
+      const double least = best ? size(best->misfit) : INFINITY, left = size(one.misfit);
+      if (left < least) best = std::move(one);
+      if (left < settings.at_floor || std::fabs(left / least - 1) < settings.same_minimum) break;
+    } catch (const CannotIdentify&) {
+      if (i == others && !best) throw;
+    }
+  }
+  return std::move(*best);
+}
+
+BandFit fit_to_records(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
+                       const BeforeFit& before_fit) {
+  const auto fit = [&](const Machine& from, double tolerance) {
+    if (before_fit) before_fit();
+    return fit_in_band(data, from, settings.cutoff, tolerance, settings);
+  };
+  Machine machine = fit_from_starts(data, start, settings, before_fit).fit.machine;
+  release_hold(machine);
+  machine = fit(machine, settings.rough_tolerance).fit.machine;
+  release_hold(machine);
+  limit_delay(machine, settings.calibration_delay);
+  machine = fit(machine, settings.rough_tolerance).fit.machine;
+  return fit(machine, settings.tolerance);
+}
+
+}  // namespace backlash

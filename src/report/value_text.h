@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A number with its error, as people read it.
+#pragma once
+
+#include <string>
+
+#include "backlash_diagnosis/signal/measured.h"
+
+namespace backlash {
+
+struct ValueText {
+  std::string value;  // as many digits as the error leaves
+  std::string error;  // two digits; empty: not known, or 0
+};
+
+ValueText value_text(const Measured& m);
+
+}  // namespace backlash

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The steps of the search, each on a machine whose missing effect is written down.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "identification/effects/contact_shape.h"
+#include "identification/effects/learned.h"
+#include "identification/effects/search.h"
+#include "identification/effects/steps.h"
+#include "support/one_inertia_bench.h"
+#include "support/servo.h"
+
+namespace backlash {
+namespace {
+
+using test::cogging_effect;
+using test::cogging_torque;
+using test::drag_effect;
+using test::OneInertiaMachine;
+using test::SearchBench;
+
+OneInertiaMachine with_cogging() {
+  OneInertiaMachine machine;
+  machine.extra = cogging_torque(0.8, 7, 0.6);
+  return machine;
+}
+
+std::vector<std::string> ids(const Hypothesis& h) {
+  std::vector<std::string> all;
+  for (const Effect& effect : h.effects) all.push_back(effect.candidate.id);
+  return all;
+}
+
+std::string reason(const Hypothesis& h, const std::string& id) {
+  for (const RejectedEffect& r : rejected_effects(h))
+    if (r.id == id) return r.reason;
+  return "";
+}
+
+TEST(Hypothesis, KeepsTheLatestReasonOfWhatIsNotInIt) {
+  Hypothesis h;
+  h = with_rejected(h, "gravity", "first");
+  h = with_rejected(h, "cogging", "second");
+  const Hypothesis before = h;
+  h = with_rejected(h, "gravity", "third");
+  h.effects.push_back(cogging_effect(1, 1, 0));
+  ASSERT_EQ(rejected_effects(h).size(), 1u);
+  EXPECT_EQ(rejected_effects(h)[0].id, "gravity");
+  EXPECT_EQ(rejected_effects(h)[0].reason, "third");
+  EXPECT_EQ(rejected_effects(before).size(), 2u);  // a value: what was made of it changes nothing
+}
+
+TEST(Hypothesis, RefittedHasTheEffectsAsFitted) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const auto with = refitted(h, {cogging_effect(0.5, 7, 0.3)}, bench.context);
+  ASSERT_TRUE(with);
+  EXPECT_NEAR(with->effects[0].candidate.terms[0].at("amplitude"), 0.8, 0.02);
+  EXPECT_EQ(with->effects[0].after->rig.terms.size(), 1u);
+  EXPECT_LT(misfit(*with).torque, 1.2);
+  EXPECT_EQ(with->base, h.base);
+  EXPECT_TRUE(h.effects.empty());
+}
+
+TEST(FitDeclared, FitsWhatTheRigDeclares) {
+  const SearchBench bench{OneInertiaMachine()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  EXPECT_EQ(h.declared->parameters.size(), 3u);
+  EXPECT_NEAR(h.fitted->fit.machine.rig.motor.inertia, 2, 0.02);
+  EXPECT_EQ(h.fitted, h.base);
+}
+
+TEST(AddEffect, AddsWhatIsMissingAndNothingElse) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const Hypothesis with = add_effects(h, bench.context);
+  EXPECT_EQ(ids(with), std::vector<std::string>{"cogging"});
+  EXPECT_EQ(with.effects[0].candidate.terms[0].at("order"), 7);
+  EXPECT_FALSE(rejected_effects(with).empty());
+  for (const RejectedEffect& r : rejected_effects(with)) EXPECT_FALSE(r.reason.empty()) << r.id;
+
+  const SearchBench healthy{OneInertiaMachine()};
+  const Hypothesis none =
+      add_effects(fit_declared(test::one_inertia_rig(), healthy.context), healthy.context);
+  EXPECT_TRUE(none.effects.empty());
+}
+
+TEST(AddEffect, NoMoreThanAskedFor) {
+  SearchBench bench{with_cogging()};
+  bench.context.settings.asked.most_effects = 0;
+  EXPECT_TRUE(
+      add_effects(fit_declared(test::one_inertia_rig(), bench.context), bench.context).effects.empty());
+}
+
+TEST(DropSuperfluous, TakesOutWhatTheOthersExplain) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const auto both = refitted(h, {drag_effect(0.05), cogging_effect(0.8, 7, 0.6)}, bench.context);
+  ASSERT_TRUE(both);
+  const Hypothesis kept = drop_superfluous(*both, bench.context);
+  EXPECT_EQ(ids(kept), std::vector<std::string>{"cogging"});
+  EXPECT_EQ(reason(kept, "quadratic_drag"), "the other effects explain the same");
+}
+
+TEST(WithoutEffect, LeavesTheOthersFitted) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const auto both = refitted(h, {drag_effect(0.05), cogging_effect(0.8, 7, 0.6)}, bench.context);
+  ASSERT_TRUE(both);
+  EXPECT_EQ(ids(without_effect(*both, 0, bench.context)), std::vector<std::string>{"cogging"});
+  EXPECT_LT(size(without_effect(*both, 0, bench.context)), 1.3);
+  EXPECT_EQ(ids(without_effect(*both, 1, bench.context)), std::vector<std::string>{"quadratic_drag"});
+  EXPECT_GT(size(without_effect(*both, 1, bench.context)), 2);
+}
+
+// The first effect was taken for what two others are together.
+TEST(Reconsider, FindsTheSetWithoutTheStandIn) {
+  OneInertiaMachine machine;
+  machine.extra = [](double q, double) { return 0.8 * std::sin(7 * q + 0.6) + 0.8 * std::sin(9 * q + 0.2); };
+  SearchBench bench{machine};
+  bench.context.settings.asked.most_effects = 2;
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const auto wrong = refitted(h, {drag_effect(0.1), cogging_effect(0.8, 7, 0.6)}, bench.context);
+  ASSERT_TRUE(wrong);
+  const Hypothesis right = reconsider(*wrong, bench.context);
+  EXPECT_EQ(ids(right), (std::vector<std::string>{"cogging", "cogging"}));
+  EXPECT_LT(size(right), 1.3);
+  EXPECT_NE(reason(right, "quadratic_drag").find("stood in"), std::string::npos);
+}
+
+TEST(Reconsider, LeavesAloneWhatIsClearlyRight) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const auto both = refitted(h, {drag_effect(0.05), cogging_effect(0.8, 7, 0.6)}, bench.context);
+  ASSERT_TRUE(both);
+  EXPECT_EQ(reconsider(*both, bench.context).fitted, both->fitted);
+}
+
+TEST(TryEquivalents, TakesTheAlternativeThatExplainsMore) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  Effect wrong = drag_effect(0.05);
+  wrong.alternatives = {cogging_effect(0.8, 7, 0.6).candidate};
+  const auto start = refitted(h, {wrong}, bench.context);
+  ASSERT_TRUE(start);
+  const Hypothesis swapped = try_equivalents(*start, bench.context);
+  EXPECT_EQ(ids(swapped), std::vector<std::string>{"cogging"});
+  ASSERT_EQ(swapped.effects[0].alternatives.size(), 1u);
+  EXPECT_EQ(swapped.effects[0].alternatives[0].id, "quadratic_drag");
+
+  Effect right = cogging_effect(0.8, 7, 0.6);
+  right.alternatives = {drag_effect(0.05).candidate};
+  const auto good = refitted(h, {right}, bench.context);
+  ASSERT_TRUE(good);
+  EXPECT_EQ(ids(try_equivalents(*good, bench.context)), std::vector<std::string>{"cogging"});
+}
+
+TEST(OtherTeeth, AreAsStiffAndDampedUnderTheSameTorque) {
+  const Rig rig = test::servo_file().rig;
+  const auto other = with_hertzian_teeth(rig, 200);
+  ASSERT_TRUE(other);
+  const ContactLaw &linear = *rig.mesh.contact, &hertz = *other->mesh.contact;
+  const double depth = 200 / 460e3;  // rad
+  EXPECT_NEAR(hertz.force(depth, 0, 0), 200, 1e-6);
+  EXPECT_NEAR(hertz.force(depth, 0.01, 0) - 200, linear.force(depth, 0.01, 0) - 200, 1e-6);
+  EXPECT_FALSE(with_hertzian_teeth(*other, 200));  // they are already
+}
+
+TEST(OtherTeeth, AreNotTriedWithoutHardening) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const auto with = refitted(h, {cogging_effect(0.8, 7, 0.6)}, bench.context);
+  ASSERT_TRUE(with);
+  EXPECT_FALSE(with_other_teeth(*with, bench.context));
+}
+
+/// A torque over the position that no named effect has: a step that is rounded a little.
+double unnamed(double q) {
+  return 1.5 * std::tanh(8 * (q - 0.2)) * (q > -0.5 ? 1 : -0.6);
+}
+
+TEST(Learned, MapsAreOverTheCoordinateThatTheResidualFollows) {
+  OneInertiaMachine machine;
+  machine.extra = [](double q, double) { return unnamed(q); };
+  const SearchBench bench{machine};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const std::vector<LearnedCandidate> maps =
+      learn_maps(h.fitted->fit, h.fitted->records, bench.context.range, bench.context.settings.maps);
+  ASSERT_FALSE(maps.empty());
+  EXPECT_EQ(maps[0].values.choice("coordinate"), "motor_position");
+  EXPECT_GT(maps[0].gain, 0.5);
+  const Hypothesis with = add_map(h, bench.context);
+  ASSERT_EQ(ids(with), std::vector<std::string>{"learned_map"});
+  // The term adds a torque to the motor, so the motor has to give the opposite. What is constant or lies
+  // within its rounded corners the friction takes up or the smoothness hides: the change over a wide stretch
+  // is compared.
+  const std::vector<double>&x = with.effects[0].candidate.terms[0].list("points"),
+        &y = with.effects[0].candidate.terms[0].list("values");
+  const auto at = [&](double q) {
+    return y[std::size_t(std::lower_bound(x.begin(), x.end(), q) - x.begin())];
+  };
+  EXPECT_NEAR(at(0.8) - at(0.0), -(unnamed(0.8) - unnamed(0.0)), 0.4);
+}
+
+TEST(AddLearned, NothingWhereNothingIsLeft) {
+  const SearchBench bench{OneInertiaMachine()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  EXPECT_EQ(add_learned(h, bench.context).fitted, h.fitted);
+}
+
+/// A fit that left so much; two inertias, or one.
+Hypothesis that_leaves(double before, double after, const Rig& rig, const SearchBench& bench) {
+  const auto fit = [&](double left) {
+    return std::make_shared<const BandFit>(
+        BandFit{{}, {}, RecordSet(bench.data, 5, 50), Misfit{left, 0, 0.1, 0.1}});
+  };
+  Hypothesis h;
+  Machine declared;
+  declared.rig = rig;
+  h.declared = std::make_shared<const Machine>(declared);
+  h.base = fit(before);
+  h.fitted = fit(after);
+  h.effects = {cogging_effect(0.8, 7, 0.6)};
+  return h;
+}
+
+TEST(DropStandIns, OfTwoInertiasWhatLeavesMoreThanItExplains) {
+  const SearchBench bench{OneInertiaMachine()};
+  const Rig servo = test::servo_file().rig;
+  Hypothesis h = that_leaves(20, 15, servo, bench);
+  const Hypothesis none = drop_stand_ins(h, bench.context);
+  EXPECT_TRUE(none.effects.empty());
+  EXPECT_EQ(none.fitted, h.base);
+  EXPECT_FALSE(reason(none, "cogging").empty());
+  // Most of it explained; near the floor; of one channel.
+  h = that_leaves(20, 5, servo, bench);
+  h.effects[0].gain.evidence.gain = 0.75;
+  EXPECT_EQ(drop_stand_ins(h, bench.context).effects.size(), 1u);
+  EXPECT_EQ(drop_stand_ins(that_leaves(2.2, 1.9, servo, bench), bench.context).effects.size(), 1u);
+  EXPECT_EQ(drop_stand_ins(that_leaves(20, 15, test::one_inertia_rig(), bench), bench.context).effects.size(),
+            1u);
+}
+
+TEST(HoldFriction, BelowZeroIsHeldAtZero) {
+  OneInertiaMachine machine;
+  machine.viscous = -0.4;
+  const SearchBench bench{machine};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  EXPECT_NEAR(h.fitted->fit.machine.rig.motor.viscous_damping, -0.4, 0.03);
+  const Hypothesis held = hold_friction(h, bench.context);
+  EXPECT_EQ(held.held, std::vector<std::string>{"motor_viscous"});
+  EXPECT_EQ(held.fitted->fit.machine.rig.motor.viscous_damping, 0);
+  EXPECT_EQ(held.declared->parameters.size(), 2u);
+
+  const SearchBench usual{OneInertiaMachine()};
+  const Hypothesis same = fit_declared(test::one_inertia_rig(), usual.context);
+  EXPECT_EQ(hold_friction(same, usual.context).fitted, same.fitted);
+}
+
+TEST(ShareOfSignal, OfASineIsItsPartOfTheTorque) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
+  const auto with = refitted(h, {cogging_effect(0.8, 7, 0.6)}, bench.context);
+  ASSERT_TRUE(with);
+  // Standard deviation of the sine over that of the torque; 20 %: the positions are not evenly spread.
+  const double expected = 0.8 / std::sqrt(2.0) / bench.context.range.torque;
+  EXPECT_NEAR(share_of_signal(*with, "cogging") / expected, 1, 0.2);
+  EXPECT_EQ(share_of_signal(*with, "gravity"), 0);
+}
+
+TEST(SearchEffects, CanBeStoppedAndIsTheSameEveryTime) {
+  const SearchBench bench{with_cogging()};
+  const auto found = [&] {
+    return search_effects(test::one_inertia_rig(), bench.data, bench.context.settings, nullptr).found;
+  };
+  const Hypothesis a = found(), b = found();
+  ASSERT_EQ(ids(a), std::vector<std::string>{"cogging"});
+  EXPECT_EQ(a.effects[0].candidate.terms, b.effects[0].candidate.terms);
+  EXPECT_THROW(search_effects(test::one_inertia_rig(), bench.data, bench.context.settings,
+                              [](double, const std::string&) { return false; }),
+               Cancelled);
+}
+
+}  // namespace
+}  // namespace backlash
