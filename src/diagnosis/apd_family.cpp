@@ -101,15 +101,15 @@ std::shared_ptr<const NoisyFamily> NoisyFamilies::at(const ApdFamily& family, do
   const long level = none ? std::numeric_limits<long>::min() : std::lround(std::log(sigma) / step);
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto known =
-      std::find_if(kept_.begin(), kept_.end(), [&](const Kept& k) { return k.level == level; });
-  if (known != kept_.end()) {
-    kept_.splice(kept_.begin(), kept_, known);
+      std::find_if(cached_.begin(), cached_.end(), [&](const CachedFamily& k) { return k.level == level; });
+  if (known != cached_.end()) {
+    cached_.splice(cached_.begin(), cached_, known);
   } else {
-    kept_.push_front(
+    cached_.push_front(
         {level, std::make_shared<NoisyFamily>(family, none ? 0 : std::exp(double(level) * step))});
-    if (kept_.size() > kMostLevels) kept_.pop_back();
+    if (cached_.size() > kMostLevels) cached_.pop_back();
   }
-  return kept_.front().family;
+  return cached_.front().family;
 }
 
 // Squares of differences from products of the members with the record: those among the members are known
@@ -153,7 +153,7 @@ std::vector<std::pair<double, double>> FamilyDistance::within(std::size_t segmen
   for (std::size_t phase = 0; phase < phases_; ++phase) {
     const Parabola& p = parabolas_[segment * phases_ + phase];
     if (p.at(p.lowest()) > limit) continue;  // most
-    for (const auto& interval : not_positive(p.a, p.b, p.c - limit)) all.push_back(interval);
+    for (const auto& interval : quadratic_at_most_zero(p.a, p.b, p.c - limit)) all.push_back(interval);
   }
   return all;
 }

@@ -234,7 +234,7 @@ CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSett
   match.noise = with_standard_error(apd.noise_range, samples.size());
   if (match.refused || !curve->family) return match;
   match.family = match_family(*curve, std::move(samples), match.noise);
-  if (match.family->alien()) {
+  if (match.family->fits_no_member()) {
     const std::string reason = fmt::format(
         "the distribution is {:.3g} (rms) from the nearest of {}, simulated records were within {:.3g}: the "
         "machine does something that the rig does not contain",

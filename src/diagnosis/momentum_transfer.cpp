@@ -158,7 +158,7 @@ Motor collect(const Record& record, const MomentumTransferSettings& settings) {
   return motor;
 }
 
-/// What the motor hands on [N m], and where that leaves the pinion [rad].
+/// Torque that the motor transmits [N m], and the resulting position of the pinion [rad].
 struct Pinion {
   std::vector<double> torque, position;
 };

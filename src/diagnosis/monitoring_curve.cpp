@@ -89,7 +89,7 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
     };
     widen(cell.between, next.between, 1);
     widen(cell.within, next.within, std::max(1, periods));
-    for (const auto& [begin, end] : not_positive(a, b, c)) {
+    for (const auto& [begin, end] : quadratic_at_most_zero(a, b, c)) {
       if (result.pieces == 0) result.lower = from + begin * span;
       if (result.pieces == 0 || from + begin * span > result.upper) ++result.pieces;
       result.upper = from + end * span;

@@ -79,7 +79,7 @@ SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
   return Fit::take;
 }
 
-/// Whether the run waits in vain for a channel that only its beginning had.
+/// Whether a channel that the run began with has stopped for good.
 bool SampleStream::has_lost_channel(double time, const ChannelValues& values) const {
   return !record_.time.empty() && std::isfinite(get(values, needed())) &&
          time - record_.time.back() > jump_limit();

@@ -9,7 +9,7 @@
 
 namespace backlash {
 
-/// What a trend needs: fewer do not tell by how much they scatter; a machine warms up and cools down within a
+/// Least data for a trend. Fewer values do not show their scatter; a machine warms up and cools down within a
 /// day, and its backlash with it.
 constexpr std::size_t kFewestTimes = 10;
 constexpr double kShortestSpan = 86400;  // s

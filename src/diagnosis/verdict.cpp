@@ -45,7 +45,8 @@ bool sharper(const Estimates& all, int a, int b) {
   return a < b;
 }
 
-/// Whether set `a` is the better one to stand on: larger, or as large with the sharper members. Both sorted.
+/// Whether the verdict should use set `a` instead of set `b`: it is larger, or equally large with narrower
+/// intervals. Both sorted.
 bool better(const Estimates& all, const Set& a, const Set& b) {
   if (a.size() != b.size()) return a.size() > b.size();
   for (std::size_t i = 0; i < a.size(); ++i)

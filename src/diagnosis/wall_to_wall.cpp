@@ -23,7 +23,7 @@ constexpr double kSwitchedRinging = 0.25;
 constexpr double kSettling = 0.3;
 constexpr double kRampedRinging = 4.0;
 
-// What the travel still lacks while ringing dies out.
+// Extrapolation of the travel to the end of the ringing.
 double settling(const std::vector<WallReading>& readings) {
   const double before = median_of(readings, &WallReading::earlier_spread);
   if (!(before > 0)) return 0;

@@ -44,7 +44,7 @@ CaseRecord case_record(const Record& record, const Rig& declared) {
   return r;
 }
 
-/// A record with a gap or a hole does not spoil the others; it is an error where there is no other.
+/// A record that cannot be used is left out with a warning; it is an error only if no record is left.
 void read_records(const std::vector<Record>& records, const Rig& declared, IdentificationCase& c) {
   for (const Record& record : records) {
     try {
@@ -74,7 +74,7 @@ void refine_gap_map(IdentificationCase& c) {
   if (gap_varies(c.declared)) c.result.rig = with_gap_map(c.result.rig, *c.result.gap_map, GapUse::variation);
 }
 
-/// Both directions declared alike, and the friction lines say otherwise.
+/// The rig declares equal friction in both directions, and the friction lines contradict it.
 void warn_of_asymmetry(IdentificationCase& c) {
   for (const FrictionDetail& d : c.result.friction) {
     if (d.lines.size() != 2) continue;

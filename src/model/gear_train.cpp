@@ -10,8 +10,7 @@
 namespace backlash {
 namespace {
 
-constexpr double kWithinReach =
-    0.1;  // of half a gap, from which a flank that moves less than that cannot touch
+constexpr double kWithinReach = 0.1;  // share of the half gap; a flank that moves by less cannot touch
 
 /// A load with rigid couplings behind a mesh that gives way: node 0 is the motor, node 1 the load.
 constexpr TrainLayout kFollowingLoad(false, true, false, true);

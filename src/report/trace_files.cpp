@@ -24,7 +24,7 @@ const char* const kScript = "trace_report.py";
   throw CannotWrite(printable(path, 4096) + ": cannot be written: " + reason);
 }
 
-/// The command that traces the same again; what was asked of an action as well.
+/// The command that repeats the trace, also where an action asked for it.
 Provenance provenance_of(const Trace& trace, const RigFile& declared, const TraceInputs& inputs,
                          const std::string& folder) {
   Provenance p;

@@ -290,7 +290,8 @@ void DiagnoserNode::set_baseline(Joint& joint, backlash_diagnosis::SetBaseline::
   const RigFile& rig = monitor.rig();
   const Baseline baseline = baseline_of(diagnosis, rig.rig.name, rig.digest);
   const std::string& path = monitor.baseline_path();
-  if (!path.empty()) write_baseline(baseline, path);  // first: what is not kept is not used either
+  if (!path.empty())
+    write_baseline(baseline, path);  // first, so that a baseline that could not be written is not used either
   monitor.set_baseline(baseline);
   if (joint.history) joint.history->take_baseline(stamp.toSec(), diagnosis);
   response.success = true;

@@ -41,7 +41,7 @@ void JointHistory::take(double stamp, const Diagnosis& diagnosis) {
     ++state_.left_out;
     return;
   }
-  // Stamps are seconds since 1970 in doubles: a microsecond is what they can tell.
+  // Stamps are seconds since 1970 as doubles, with a resolution of about a microsecond.
   if (last_ && stamp < *last_ + settings_.interval - 1e-6) return;
   add(history_entry(stamp, diagnosis, settings_.rig_digest));
 }

@@ -6,7 +6,7 @@
 
 namespace backlash {
 
-std::vector<std::pair<double, double>> not_positive(double a, double b, double c) {
+std::vector<std::pair<double, double>> quadratic_at_most_zero(double a, double b, double c) {
   std::vector<double> cuts = {0, 1};
   const double root = std::sqrt(b * b - 4 * a * c);  // NaN: no roots
   const double q = -0.5 * (b + std::copysign(root, b));

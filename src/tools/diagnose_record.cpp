@@ -128,7 +128,7 @@ void keep_last_periods(Inputs& in, std::uint64_t count) {
   in.last_periods = std::move(window);
 }
 
-/// A curve for this very record, where the rig file tells how.
+/// Builds a curve at the sampling rate of the record, where the rig file declares an APD.
 void build_own_curve(Inputs& in) {
   const double interval = in.record.sampling_interval();
   if (!in.settings.apd || (!in.method.empty() && !needs_curve(in.method))) return;

@@ -46,7 +46,7 @@ TEST(FamilyMatch, BestAndIntervalInClosedForm) {
   const double reach = 0.02 / (kWider * std::sqrt((1 - 1e-4) / 3));
   EXPECT_NEAR(match.lower, (3.4 - reach) * step, 1e-9);
   EXPECT_NEAR(match.upper, (3.4 + reach) * step, 1e-9);
-  EXPECT_FALSE(match.touches_end || match.alien());
+  EXPECT_FALSE(match.touches_end || match.fits_no_member());
 }
 
 TEST(FamilyMatch, BeyondTheCurveIsSeen) {
@@ -62,10 +62,10 @@ TEST(FamilyMatch, WhatResemblesNoMemberIsAlien) {
   const MonitoringCurve curve = curve_with_family(1, 0.05);
   std::vector<double> shifted = samples_at(5);
   for (double& v : shifted) v += 0.09;  // less than twice the usual misfit of 0.05
-  EXPECT_FALSE(match_family(curve, shifted, {0, 0}).alien());
+  EXPECT_FALSE(match_family(curve, shifted, {0, 0}).fits_no_member());
   for (double& v : shifted) v += 0.03;
   const FamilyMatch match = match_family(curve, shifted, {0, 0});
-  EXPECT_TRUE(match.alien());
+  EXPECT_TRUE(match.fits_no_member());
   EXPECT_NEAR(match.misfit, 0.12, 1e-6);  // a shift is what no width can mend
 }
 

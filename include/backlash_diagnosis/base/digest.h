@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Short names for contents: whether two files are the same, not whether somebody meant them to look the same.
+// Digests of file contents, to see whether two files are the same. Not cryptographic.
 #pragma once
 
 #include <string>

@@ -12,8 +12,8 @@ namespace backlash {
 /// May be called from worker threads, never from two at the same time.
 using Progress = std::function<bool(double fraction, const std::string& phase)>;
 
-/// Told in a few words what long work has so far, whenever that changes; maybe from a
-/// worker thread, never from two at the same time.
+/// Called with a short text on the best result so far whenever that changes; possibly from a worker thread,
+/// never from two at once.
 using BestSoFar = std::function<void(const std::string& best)>;
 
 }  // namespace backlash

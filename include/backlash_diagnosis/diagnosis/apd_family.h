@@ -79,12 +79,12 @@ class NoisyFamilies {
   std::shared_ptr<const NoisyFamily> at(const ApdFamily& family, double sigma);
 
  private:
-  struct Kept {
+  struct CachedFamily {
     long level;
     std::shared_ptr<const NoisyFamily> family;
   };
   std::mutex mutex_;
-  std::list<Kept> kept_;  // the last that was asked for first
+  std::list<CachedFamily> cached_;  // the last that was asked for first
 };
 
 /// Distance of one observed distribution from all members, over backlash. Positions are segment + share: the

@@ -21,8 +21,9 @@ struct Baseline {
   double skewness = kNaN;                                                // of the APD
 };
 
-/// What the verdict stands on, as a baseline of the rig with this name and digest. Throws BadData, naming the
-/// rig and the reason, where the verdict is no value with an interval or its estimates contradict each other.
+/// The combined value of the verdict, as a baseline of the rig with this name and digest. Throws BadData,
+/// naming the rig and the reason, where the verdict is no value with an interval or its estimates contradict
+/// each other.
 Baseline baseline_of(const Diagnosis& diagnosis, const std::string& rig, const std::string& rig_digest);
 
 /// The content of a file. There is no date in it: the same machine gives the same file.

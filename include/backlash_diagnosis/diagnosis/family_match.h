@@ -15,7 +15,7 @@ struct FamilyMatch {
 
   /// Whether the record is farther from the whole family than chance explains: the machine does something
   /// that the rig does not contain.
-  bool alien() const { return misfit > 2 * usual_misfit; }
+  bool fits_no_member() const { return misfit > 2 * usual_misfit; }
 };
 
 /// Compares samples of whole periods with the curve's family (which must be there), at any noise of a range

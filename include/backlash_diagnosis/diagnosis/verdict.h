@@ -17,11 +17,11 @@ const char* to_string(Grade grade);
 
 struct Verdict {
   Grade grade = Grade::cannot_tell;
-  int estimate = -1;         // index of the sharpest estimate of those that the verdict stands on; -1: none
-  std::string agreement;     // "none", "single", "agree", or "disagree: ..." with the names
-  std::vector<int> members;  // indices of the estimates that the verdict stands on
-  std::vector<int> dissenters;                         // of the sound ones that contradict them
-  double backlash = kNaN, lower = kNaN, upper = kNaN;  // m, 95 % interval; NaN end: open
+  int estimate = -1;            // index of the member with the narrowest interval; -1: none
+  std::string agreement;        // "none", "single", "agree", or "disagree: ..." with the names
+  std::vector<int> members;     // indices of the estimates that the verdict stands on
+  std::vector<int> dissenters;  // of the sound ones that contradict them
+  double backlash = kNaN, lower = kNaN, upper = kNaN;                    // m, 95 % interval; NaN end: open
   double backlash_angle = kNaN, angle_lower = kNaN, angle_upper = kNaN;  // rad, axis of motor_position
   double growth = kNaN, growth_lower = kNaN, growth_upper = kNaN;  // since the baseline, unit of the limits
   std::string message;

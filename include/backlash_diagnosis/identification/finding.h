@@ -12,7 +12,7 @@
 
 namespace backlash {
 
-/// Relative standard error of what a rig file declares, where findings tell only a sum with it.
+/// Relative standard error of a declared value, used where a finding determines only its sum with another.
 constexpr double kDeclaredUncertainty = 0.4;
 
 /// sum of factor * parameter = measured; parameters are those of servo_parameters(). A system's friction is

@@ -21,7 +21,7 @@ struct PowerContact {
   double damping = 0;          // N s/m
 };
 
-/// What a rig file says of a law: so that it can be made again with other values.
+/// Name and parameters of a law, to create it again with other values.
 struct ContactSpec {
   std::string law;
   ParameterValues values;

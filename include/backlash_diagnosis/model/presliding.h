@@ -20,7 +20,7 @@
 
 namespace backlash {
 
-/// What friction remembers: where the body turned last, and what it was there.
+/// State of presliding friction: position of the last reversal, and the friction there.
 class Presliding {
  public:
   explicit Presliding(double position = 0, double friction = 0) : position_(position), friction_(friction) {}

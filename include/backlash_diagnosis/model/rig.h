@@ -96,7 +96,7 @@ Rig load_side(const Rig& rig);
 /// file, line, key, value and limit.
 Rig read_rig(const YamlReader& yaml);
 
-/// The driver alone, taken out of mesh: its teeth never touch, whatever the positions.
+/// The driver alone: the teeth never touch.
 Rig without_load(Rig rig);
 
 }  // namespace backlash

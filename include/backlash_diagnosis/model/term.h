@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// An effect is a term of the model: an extra torque on the motor or on the load, dry friction, another shape
-// or another stiffness of the flanks, or a sensor that does not show what it should.
+// An effect is a term of the model: a torque on the motor or the load, dry friction, a change of the shape or
+// stiffness of the flanks, or an error of a sensor.
 //
 // A new effect: one file in src/model/terms/ with its equation, and one line in term.cpp. Where it says what
 // to try (TermSearch), the search for what a model lacks tries it with all the others.
@@ -42,14 +42,15 @@ struct FrictionLimits {
   double backward = 0;
   // rad, over which friction builds up after a reversal (Presliding), the same at all times; 0: at once
   double presliding = 0;
-  double presliding_damping = 0;  // N m s/rad, of what it builds up with (Presliding)
+  double presliding_damping =
+      0;  // N m s/rad, damping of the presliding friction, sigma_1 of LuGre (see Presliding)
 };
 
 struct EndFriction {
   FrictionLimits motor, load;
 };
 
-/// How far a flank is from where the rig file has it, as an angle at the load.
+/// Displacement of a flank from its position in the rig file, as an angle at the load.
 struct FlankShift {
   double opening = 0;      // rad, > 0: farther away
   double motor_slope = 0;  // d opening / d motor position
@@ -189,7 +190,7 @@ const TermType& term_type_that(bool (*can)(const TermType&));
 const std::vector<TermType>& term_types();
 
 /// One term from its values, which must be all that its type names. Throws InvalidParameter for another id,
-/// for values out of range and for such as do not go together.
+/// for values that are out of range or contradict each other.
 std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values);
 
 /// The errors of sensors and drive of all terms together.

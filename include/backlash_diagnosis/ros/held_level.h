@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A level of alarm that does not flap where a value moves about a limit.
+// An alarm level with hysteresis in time: it rises at once and falls after a hold time.
 #pragma once
 
 namespace backlash {

@@ -34,7 +34,7 @@ struct MonitorSettings {
   double job_memory = kJobMemory;        // GB, of the process that builds a curve
 };
 
-/// What the outside hears of a completed period.
+/// What is published when a period is complete.
 struct PeriodReport {
   PeriodResult period;
   double period_length = 0;  // s

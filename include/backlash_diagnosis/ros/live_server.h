@@ -35,7 +35,7 @@ class LiveServer {
     server_.setCallback([this](Config& wanted, std::uint32_t) { take(wanted); });
   }
 
-  /// Tells that another way has changed what is in force.
+  /// Publishes values that were changed in another way than by dynamic_reconfigure.
   void update(const Config& in_force) {
     const boost::recursive_mutex::scoped_lock lock(mutex_);
     in_force_ = in_force;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the simulator node is told by its private parameters.
+// Private parameters of the simulator node.
 #pragma once
 
 #include <ros/node_handle.h>

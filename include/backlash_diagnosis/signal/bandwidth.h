@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How far up in frequency a recorded motion says something, and the noise above it.
+// Bandwidth of a recorded motion, and the white noise above it.
 #pragma once
 
 #include <vector>
 
 namespace backlash {
 
-/// Standard deviation of the white part of a signal: the smaller of two figures, which noise raises alike and
-/// motion differently. From the median of its periodogram (Hann window) in the upper three tenths of the
-/// frequencies, where machines no longer move; from third differences without the largest tenth, which jumps
-/// of a commanded torque do not reach. Coloured noise counts as white with the density that it has there.
-/// `values` of a position may drift and travel. Throws InvalidParameter for fewer than 64 values.
+/// Standard deviation of the white noise of a signal: the smaller of two estimates, which noise raises
+/// equally and motion differently. From the median of its periodogram (Hann window) in the upper three tenths
+/// of the frequencies, where machines no longer move; from third differences without the largest tenth, which
+/// jumps of a commanded torque do not reach. Coloured noise counts as white with the density that it has
+/// there. `values` of a position may drift and travel. Throws InvalidParameter for fewer than 64 values.
 double white_noise(const std::vector<double>& values);
 
 /// The same of a position, but with the largest density in bands above a tenth of the sampling rate: stamps

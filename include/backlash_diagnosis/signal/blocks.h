@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Standard errors where neighbouring samples share their error: everything in blocks longer than that
-// sharing.
+// Standard errors of correlated samples: statistics over blocks that are longer than the correlation.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How much less successive values tell of a line than independent ones would: temperature and load come and
-// go slowly, and errors that hang together look like a trend.
+// Correlation of successive values, and how much larger it makes the standard error of a line: temperature
+// and load come and go slowly, and errors that hang together look like a trend.
 #pragma once
 
 #include <vector>

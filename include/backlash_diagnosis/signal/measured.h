@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A number from data is nothing without its error.
+// A value from data, with its standard error.
 #pragma once
 
 #include <limits>
@@ -14,8 +14,8 @@ struct Measured {
   double standard_error = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// What a procedure throws that the record cannot support; the message says why in one sentence and with
-/// figures.
+/// Thrown by a procedure where the record does not contain the information it needs; the message says why in
+/// one sentence and with figures.
 class CannotIdentify : public Error {
  public:
   using Error::Error;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Statistics that few wrong values cannot spoil.
+// Robust statistics: a minority of wrong values has little influence.
 #pragma once
 
 #include <cstddef>

@@ -13,9 +13,10 @@ struct RobustMean : Measured {
 };
 
 /// Huber's location (fit_robust) of values with standard errors s_i >= 0; a value counts as if its error were
-/// sqrt(s_i^2 + median(s)^2), so that one which claims to be far better than the others does not rule alone.
-/// The standard error is that of the scatter, but never below what the s_i allow. Where one is NaN all count
-/// alike and the scatter decides. A single value is returned as it is. Throws CannotIdentify without values.
+/// sqrt(s_i^2 + median(s)^2), so that a value with a very small stated error does not determine the mean
+/// alone. The standard error is that of the scatter, but never below what the s_i allow. Where one is NaN all
+/// count alike and the scatter decides. A single value is returned as it is. Throws CannotIdentify without
+/// values.
 RobustMean robust_mean(const std::vector<Measured>& values);
 
 }  // namespace backlash

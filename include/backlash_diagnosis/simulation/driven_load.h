@@ -58,8 +58,8 @@ bool load_moves_freely(const Rig& rig);
 DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion,
                                 double feedback = kLoadFeedback);
 
-/// Whether the loads of both rigs move alike with the same motor. False where any member of Rig differs but
-/// those that are known to act on the motor or on what is shown only.
+/// Whether the loads of both rigs move equally when the motor moves equally. False where any member of Rig
+/// differs but those that are known to act on the motor or on what is shown only.
 bool moves_same_load(const Rig& a, const Rig& b);
 
 /// Beside a load that has been simulated with this motion, by a rig that may differ in what does not move the

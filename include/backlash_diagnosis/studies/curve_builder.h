@@ -32,7 +32,7 @@ double nominal_sampling_rate(double interval);
 MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request,
                             const Progress& progress = nullptr);
 
-/// What is to be said of a curve from a file that is used with a rig: nothing, or that it was made from
+/// Warning about a curve that is used with a rig: empty, or that it was made from
 /// another version of the rig file. Throws BadData naming `source` where it contradicts the geometry of the
 /// rig.
 std::string check_curve(const MonitoringCurve& curve, const RigFile& rig, const std::string& source);

@@ -80,7 +80,8 @@ struct CurveFit {
 CurveFit fit_of(const RigFile& file, const CurveTarget& target);
 
 struct SearchResult {
-  std::string rig_text;             // the rig file found, without head; its comments tell what was searched
+  std::string rig_text;  // the rig file found, without its head comment; comments mark the parameters that
+                         // were searched
   std::vector<std::string> values;  // of the parameters, in their order
   std::vector<bool> at_bound;       // within 1 % of the way between the bounds
   CurveFit fit;

@@ -6,8 +6,9 @@
 // of the undisturbed machine. The change of skewness that the disturbance alone causes is also told as the
 // backlash that would cause it:
 //   equivalent = (skewness(backlash, level) - skewness(backlash, none)) / slope
-// slope: of the whole curve, by least squares. It is what a user errs by who reads the bare curve, as Sarkar,
-// Ellis and Moore (1997, Section 9.1) do; the methods also check whether the record can be of this machine.
+// slope: of the whole curve, by least squares. It is the error of a user who reads backlash from the bare
+// curve, as Sarkar, Ellis and Moore (1997, Section 9.1) do; the methods also check whether the record can be
+// of this machine.
 #pragma once
 
 #include <cstdint>

@@ -40,7 +40,7 @@ struct StudyTrial {
 std::vector<StudyTrial> run_study(const RigFile& file, const MonitoringCurve& curve,
                                   const StudyRequest& request, const Progress& progress = nullptr);
 
-/// What a method made of a group of trials.
+/// Results of a method over a group of trials.
 struct StudyRow {
   std::string method;
   int trials = 0, told = 0;                      // told: status ok

@@ -19,8 +19,8 @@ struct Candidate {
   double smoothness = 0;  // of a learned map, see learned.h
 };
 
-/// The best candidate of each kind and choice, best first. `fit` is the machine as it is fitted now, with the
-/// sensitivities of its residuals; whatever those explain no candidate gets credit for.
+/// The best candidate of each kind and choice, best first. `fit` is the present fit with its sensitivities.
+/// What a change of the fitted parameters explains is not counted as a gain of a candidate.
 std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range,
                               const ScreenSettings& settings);
 

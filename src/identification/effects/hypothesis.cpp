@@ -18,7 +18,8 @@ bool has(const std::vector<Effect>& effects, bool (*is)(const std::string& id)) 
   return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return is(e.candidate.id); });
 }
 
-/// A map over the recorded torque may take it away, and all inertia with it: no residual, less than noise.
+/// A map over the recorded torque can cancel that torque together with the inertia; the residual is then
+/// smaller than the noise.
 bool takes_noise_away(const std::vector<Effect>& effects, const Misfit& misfit, const MapSettings& settings) {
   return misfit.torque < settings.less_than_noise &&
          std::any_of(effects.begin(), effects.end(), [](const Effect& e) {

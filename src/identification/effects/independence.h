@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Whether a residual still knows the input: a model that has everything leaves noise that follows nothing.
+// Test whether the residual correlates with the input: a complete model leaves independent noise.
 #pragma once
 
 #include <vector>

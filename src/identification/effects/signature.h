@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a residual that nothing explains looks like: which channel, how large, what it follows.
+// Description of an unexplained residual: channel, size, and the coordinate that it follows.
 #pragma once
 
 #include <optional>

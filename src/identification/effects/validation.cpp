@@ -25,7 +25,7 @@ std::vector<Eigen::Index> rows_where(const RecordSet& records, const Wanted& wan
   return rows;
 }
 
-/// The fit's values had these rows not been there, linear about them.
+/// Fitted values without these rows, by a linear step from the fit.
 Eigen::VectorXd without(const LeastSquaresFit& fit, const Eigen::MatrixXd& normal,
                         const std::vector<Eigen::Index>& rows) {
   const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
@@ -98,8 +98,8 @@ HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& r
   return out;
 }
 
-// A block that alone tells a parameter may be predicted arbitrarily badly without it, before or after; then
-// the gain seems larger than that of the fit itself, which it never is.
+// Where one block alone determines a parameter, its prediction from the others is arbitrarily bad, and so is
+// the gain. It is therefore limited to the gain of the fit itself.
 Gain compare(const HeldOut& a, const HeldOut& b) {
   Gain g;
   const Squares torque = all_but_worst(a.torque, b.torque),

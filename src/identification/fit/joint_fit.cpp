@@ -11,7 +11,8 @@
 namespace backlash {
 namespace {
 
-constexpr double kFarthest = 30;    // choice: times the start or a part of it: approached, never reached
+constexpr double kFarthest = 30;  // choice: factor by which a positive parameter may differ from its start; a
+                                  // bound that is approached and never reached
 constexpr double kWideStep = 1e-2;  // simulation: relative, of the differences that the errors are taken from
 constexpr double kNegligible = 2e-3;  // choice: of a signal: no floor is lower, no model need be better
 constexpr double kVague = 30;  // choice: times the scale: standard deviation of the prior of a parameter

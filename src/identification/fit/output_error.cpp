@@ -16,7 +16,7 @@ std::function<double(const Rig&)> prior_row(const Finding& finding) {
   };
 }
 
-Machine machine_of(const Rig& rig, std::size_t records, const OutputErrorSettings& settings) {
+Machine start_machine(const Rig& rig, std::size_t records, const OutputErrorSettings& settings) {
   Machine machine;
   machine.rig = rig;
   machine.calibrations.resize(records);
@@ -31,7 +31,7 @@ Machine machine_of(const Rig& rig, std::size_t records, const OutputErrorSetting
 OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& asked) {
   const FitSettings settings = with_bands(asked.fit, start, records);
-  BandFit fitted = fit_to_records(records, machine_of(start, records.size(), asked), settings);
+  BandFit fitted = fit_to_records(records, start_machine(start, records.size(), asked), settings);
   judge_errors(fitted.fit, fitted.start, fitted.records);
   const Machine& machine = fitted.fit.machine;
   OutputError result;

@@ -82,7 +82,8 @@ double rate_of_noise(double cutoff, double interval) {
   return 2 * M_PI * cutoff * std::sqrt(2 * cutoff * interval / 3);
 }
 
-/// In bands ever narrower, because of a machine that mostly stands the rate is itself noise.
+/// Repeats with narrower bands: where the machine stands most of the time, the root mean square of the rate
+/// is mostly noise.
 void smooth_slow_motion(ServoData& data) {
   if (data.rate_noise <= kClear * root_mean_square(data.motor_rate)) return;
   const double position = data.rate_noise * data.interval / kRateNoise;

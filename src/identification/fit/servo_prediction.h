@@ -23,8 +23,8 @@ struct PreparedServo {
 
   /// What a second difference of the motor position sees of the motor's torque [N m].
   std::vector<double> acting_torque(const Rig& rig, const Calibration& calibration) const;
-  /// Safe to call from several threads. The last loads are kept: where a rig differs from one of them only in
-  /// what moves no load, nothing is simulated.
+  /// Safe to call from several threads. Simulated loads are cached: a rig that differs only in parameters
+  /// that do not move the load is not simulated again.
   ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
 
   const ServoData& data() const { return *data_; }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the terms share that act on one end of the gear train and are tried on both: `body: motor | load`.
+// Common to the terms that act on one end of the gear train (`body: motor | load`); the search tries both
+// ends.
 #pragma once
 
 #include "backlash_diagnosis/model/term.h"

@@ -8,7 +8,7 @@
 
 namespace backlash {
 
-/// Clear beside a torque noise of a percent, small beside what moves the machine.
+/// Large compared with a torque noise of 1 %, small compared with the torque that moves the machine.
 inline double clear_torque(const MotionRange& range) {
   return 0.05 * range.torque;
 }

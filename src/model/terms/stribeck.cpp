@@ -25,7 +25,7 @@ class Stribeck : public EndFrictionTerm {
   double torque_, speed_, exponent_;
 };
 
-/// Between what stiction would be and what is friction at every speed.
+/// Speeds tried: from so slow that the effect acts at rest only to so fast that it acts at all speeds.
 std::vector<double> speeds(const MotionRange& range) {
   std::vector<double> all;
   for (double share = 0.01; share < 1; share *= 2) all.push_back(share * range.speed);

@@ -3,9 +3,9 @@
 //
 // The declared rig is fitted to the training records; then every term that says how it is sought
 // (model/term.h) is tried on what is left, and the best is fitted with all parameters of the machine
-// together. An effect is accepted where it makes blocks of the record that the fit has not seen, and the
-// later part of it, better predicted. That is repeated until the residual is at the floor that noise alone
-// leaves, or nothing helps. Then a learned map may say what no named effect does.
+// together. An effect is accepted where the prediction improves on blocks of the record that the fit has not
+// seen, and on the later part of the record. That is repeated until the residual is at the floor that noise
+// alone leaves, or nothing helps. Then a learned map may say what no named effect does.
 //
 // Three kinds of rig: two inertias with a mesh between them and two encoders (the load is simulated, driven
 // by the recorded motor; residuals of torque and deflection), one inertia (mesh: rigid) and a locked link
@@ -25,9 +25,10 @@
 namespace backlash {
 
 struct TraceSettings {
-  double cutoff = 0;                // Hz, low-pass of all residuals; 0: that of the machine (fit_settings.h)
-  double least_gain = 0.03;         // of a residual that an effect brings near its floor
-  double least_gain_unclear = 0.1;  // of one that stays far above its floor, as on real machines
+  double cutoff = 0;         // Hz, low-pass of all residuals; 0: that of the machine (fit_settings.h)
+  double least_gain = 0.03;  // smallest relative gain, where the residual comes near its noise floor
+  double least_gain_unclear =
+      0.1;  // the same, where the residual stays far above its noise floor, as on real machines
   std::size_t most_effects = 6;
   BestSoFar best_so_far;  // effects in the model and what they leave; may be empty
 };

@@ -29,8 +29,8 @@ Record load_side(const Record& record, const Rig& rig);
 /// s: duration of a record over one more than how often the motor turns round, beyond the noise of its speed.
 double time_between_reversals(const ServoData& data);
 
-/// A machine with one inertia or a locked link may move so slowly that its speed drowns in the resolution of
-/// the encoder, and the direction of friction with it. Where the noise of the rate is more than a fiftieth of
+/// A machine with one inertia or a locked link may move so slowly that the resolution of the encoder hides
+/// its speed, and with it the direction of friction. Where the noise of the rate is more than a fiftieth of
 /// its root mean square the motor position is low-passed, in the widest band in which it is not. With two
 /// inertias the position stays as it is: there it drives a load.
 ///

@@ -37,7 +37,7 @@ struct OneInertia {
 
 /// Left out: both ends (one period of the cutoff) and standstill, where friction takes any value between its
 /// bounds: speed below four standard deviations of its noise for longer than a quarter of the filter's memory
-/// 1 / (2 cutoff), widened by that memory. A passage through zero stays: its sign is known (from the speed in
+/// 1 / (2 cutoff), widened by that memory. A reversal is kept: the direction is known (from the speed in
 /// the widest band in which its noise is a thousandth of it, but at least four times the cutoff). The delay
 /// is an unknown like the others; where it is vague (standard error beyond one interval, or at the edge of
 /// the search), it is taken as 0, its error is NaN and a warning tells; standard errors by leaving out
