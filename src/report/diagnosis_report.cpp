@@ -15,28 +15,22 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
-/// Null where neither end is known; one null end is an open one.
-Json interval(double lower, double upper) {
-  if (!std::isfinite(lower) && !std::isfinite(upper)) return nullptr;
-  return Json::array({number(lower), number(upper)});
-}
-
 Json estimate_json(const Estimate& e) {
   Json json;
   json["method"] = e.method;
   json["status"] = to_string(e.status);
-  json["backlash"] = number(e.backlash);
-  json["backlash_angle"] = number(e.backlash_angle);
-  json["interval"] = interval(e.lower, e.upper);
-  json["interval_angle"] = interval(e.angle_lower, e.angle_upper);
-  json["skewness"] = number(e.skewness);
+  json["backlash"] = json_number(e.backlash);
+  json["backlash_angle"] = json_number(e.backlash_angle);
+  json["interval"] = json_interval(e.lower, e.upper);
+  json["interval_angle"] = json_interval(e.angle_lower, e.angle_upper);
+  json["skewness"] = json_number(e.skewness);
   json["message"] = e.message;
   if (e.components) {
     Json& parts = json["components"];
-    parts["gap"] = number(e.components->gap);
-    parts["compliance"] = number(e.components->compliance);
-    parts["coulomb"] = number(e.components->coulomb);
-    parts["at_torque"] = number(e.components->at_torque);
+    parts["gap"] = json_number(e.components->gap);
+    parts["compliance"] = json_number(e.components->compliance);
+    parts["coulomb"] = json_number(e.components->coulomb);
+    parts["at_torque"] = json_number(e.components->at_torque);
   }
   return json;
 }
@@ -52,11 +46,11 @@ Json coherence_json(const CoherenceDetection& d) {
   json["detector"] = "coherence";
   json["status"] = to_string(d.status);
   json["nonlinear"] = d.nonlinear ? Json(*d.nonlinear) : Json(nullptr);
-  json["loss"] = number(d.loss);
-  json["deviation"] = number(d.deviation);
-  json["index"] = number(d.index);
-  json["index_interval"] = interval(d.index_lower, d.index_upper);
-  json["band"] = interval(d.lower, d.upper);
+  json["loss"] = json_number(d.loss);
+  json["deviation"] = json_number(d.deviation);
+  json["index"] = json_number(d.index);
+  json["index_interval"] = json_interval(d.index_lower, d.index_upper);
+  json["band"] = json_interval(d.lower, d.upper);
   json["message"] = d.message;
   return json;
 }
@@ -68,12 +62,12 @@ Json verdict_json(const Verdict& verdict, const std::vector<Estimate>& estimates
   json["agreement"] = verdict.agreement;
   json["members"] = methods_json(estimates, verdict.members);
   json["dissenters"] = methods_json(estimates, verdict.dissenters);
-  json["backlash"] = number(verdict.backlash);
-  json["interval"] = interval(verdict.lower, verdict.upper);
-  json["backlash_angle"] = number(verdict.backlash_angle);
-  json["angle_interval"] = interval(verdict.angle_lower, verdict.angle_upper);
-  json["growth"] = number(verdict.growth);
-  json["growth_interval"] = interval(verdict.growth_lower, verdict.growth_upper);
+  json["backlash"] = json_number(verdict.backlash);
+  json["interval"] = json_interval(verdict.lower, verdict.upper);
+  json["backlash_angle"] = json_number(verdict.backlash_angle);
+  json["angle_interval"] = json_interval(verdict.angle_lower, verdict.angle_upper);
+  json["growth"] = json_number(verdict.growth);
+  json["growth_interval"] = json_interval(verdict.growth_lower, verdict.growth_upper);
   json["message"] = verdict.message;
   return json;
 }
@@ -92,11 +86,11 @@ Json apd_json(const ApdResult& apd, const ApdSettings& settings) {
   json["incomplete"] = apd.incomplete;
   json["settling_periods"] = settings.settling_periods;
   json["period"] = apd.period > 0 ? Json(apd.period) : Json(nullptr);
-  json["skewness"] = number(apd.skewness);
-  json["kurtosis"] = number(apd.total.kurtosis());
-  json["noise"] = number(apd.noise);
+  json["skewness"] = json_number(apd.skewness);
+  json["kurtosis"] = json_number(apd.total.kurtosis());
+  json["noise"] = json_number(apd.noise);
   Json& each = json["skewness_of_periods"] = Json::array();
-  for (const PeriodResult& period : apd.periods) each.push_back(number(period.apd.skewness()));
+  for (const PeriodResult& period : apd.periods) each.push_back(json_number(period.apd.skewness()));
   return json;
 }
 

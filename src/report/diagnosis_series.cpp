@@ -15,7 +15,7 @@ constexpr std::size_t kMostSamples = 20'000;  // of a plot
 
 Json column(const std::vector<double>& values, std::size_t stride) {
   Json json = Json::array();
-  for (std::size_t k = 0; k < values.size(); k += stride) json.push_back(number(values[k]));
+  for (std::size_t k = 0; k < values.size(); k += stride) json.push_back(json_number(values[k]));
   return json;
 }
 
@@ -40,12 +40,13 @@ Json record_json(const Record& record, double period, bool linear) {
 
 /// The curve at its declared noise, with the 95 % scatter of a single period.
 Json curve_json(const MonitoringCurve& curve) {
-  Json json = {{"angular", curve.conditions.angular}, {"backlash_to_angle", number(curve.backlash_to_angle)}};
+  Json json = {{"angular", curve.conditions.angular},
+               {"backlash_to_angle", json_number(curve.backlash_to_angle)}};
   for (const CurvePoint& point : curve.points) {
     const SkewnessCell& cell = curve.nominal(point);
     json["backlash"].push_back(point.backlash);
-    json["skewness"].push_back(number(cell.mean));
-    json["scatter"].push_back(number(curve.coverage_factor * MonitoringCurve::deviation(cell, 1)));
+    json["skewness"].push_back(json_number(cell.mean));
+    json["scatter"].push_back(json_number(curve.coverage_factor * MonitoringCurve::deviation(cell, 1)));
   }
   return json;
 }

@@ -86,15 +86,16 @@ Json clearance_json(const Clearance& c) {
 }
 
 Json gap_map_json(const GapMap& map) {
-  Json json = {{"mean_gap", measured(map.mean_gap)},   {"mean_separation", measured(map.mean_separation)},
-               {"wind_up", measured(map.wind_up)},     {"varies", map.varies},
-               {"confidence", number(map.confidence)}, {"statement", map.statement}};
+  Json json = {
+      {"mean_gap", measured(map.mean_gap)},        {"mean_separation", measured(map.mean_separation)},
+      {"wind_up", measured(map.wind_up)},          {"varies", map.varies},
+      {"confidence", json_number(map.confidence)}, {"statement", map.statement}};
   for (const Harmonic& h : map.harmonics)
     json["harmonics"].push_back(
         {{"order", h.order}, {"amplitude", measured(h.amplitude)}, {"phase", measured(h.phase)}});
   for (const GapBin& bin : map.bins)
     json["bins"].push_back(
-        {bin.position, bin.separation.value, number(bin.separation.standard_error), bin.centre.value});
+        {bin.position, bin.separation.value, json_number(bin.separation.standard_error), bin.centre.value});
   json["bin_columns"] = {"position", "separation", "standard_error", "centre"};
   return json;
 }
@@ -158,15 +159,15 @@ std::string identification_json(const Identification& found, const std::string& 
     json["procedures"].push_back(
         {{"name", p.name}, {"used", !p.records.empty()}, {"records", p.records}, {"message", p.message}});
   for (const auto& [name, m] : found.parameters)
-    json["parameters"][name] = {{"value", number(m.value)},
+    json["parameters"][name] = {{"value", json_number(m.value)},
                                 {"unit", found.units.at(name)},
-                                {"standard_error", number(m.standard_error)}};
+                                {"standard_error", json_number(m.standard_error)}};
   for (const auto& [name, channel] : found.channels)
-    json["channels"][name] = {{"train", number(channel.error)}, {"floor", number(channel.floor)}};
+    json["channels"][name] = {{"train", json_number(channel.error)}, {"floor", json_number(channel.floor)}};
   if (found.delay)
-    json["torque_delay"] = {{"value", number(found.delay->value)},
+    json["torque_delay"] = {{"value", json_number(found.delay->value)},
                             {"unit", "s"},
-                            {"standard_error", number(found.delay->standard_error)}};
+                            {"standard_error", json_number(found.delay->standard_error)}};
   for (const Finding& f : found.findings) {
     Json entry = {{"procedure", f.procedure}, {"combination", Json::object()}};
     for (const auto& [name, factor] : f.combination) entry["combination"][name] = factor;

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "json.h"
 
-#include "backlash_diagnosis/report/json_number.h"
+#include <cmath>
 
 namespace backlash {
 
-Json number(double value) {
-  return json_number(value);
+Json json_number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json json_interval(double lower, double upper) {
+  if (!std::isfinite(lower) && !std::isfinite(upper)) return nullptr;
+  return Json::array({json_number(lower), json_number(upper)});
 }
 
 Json measured(const Measured& m) {
-  return {{"value", number(m.value)}, {"standard_error", number(m.standard_error)}};
+  return {{"value", json_number(m.value)}, {"standard_error", json_number(m.standard_error)}};
 }
 
 std::string dumped(const Json& json, int indent) {

@@ -11,8 +11,11 @@ namespace backlash {
 
 using Json = nlohmann::ordered_json;
 
-/// Null for what is not finite.
-Json number(double value);
+/// Null for NaN and infinities.
+Json json_number(double value);
+
+/// [lower, upper]: one null is an open end; null where neither end is known.
+Json json_interval(double lower, double upper);
 
 /// value, standard_error
 Json measured(const Measured& m);

@@ -18,7 +18,7 @@ constexpr double kPerCycle = 4;               // samples of a plot per cycle of 
 constexpr std::size_t kMostSamples = 20'000;  // of a plot
 
 Json with_unit(const Measured& m, const std::string& unit) {
-  return {{"value", number(m.value)}, {"unit", unit}, {"standard_error", number(m.standard_error)}};
+  return {{"value", json_number(m.value)}, {"unit", unit}, {"standard_error", json_number(m.standard_error)}};
 }
 
 Json machine_json(const std::map<std::string, Measured>& parameters, const Trace& trace) {
@@ -37,7 +37,7 @@ Json term_json(const Term& term) {
     else if (spec.list)
       json[spec.name] = term.values.list(spec.name);
     else
-      json[spec.name] = number(term.values.at(spec.name));
+      json[spec.name] = json_number(term.values.at(spec.name));
   }
   return json;
 }
@@ -46,12 +46,12 @@ Json step_json(const FoundEffect& e, const Trace& trace) {
   Json json = {{"effect", e.id}, {"channel", e.channel}, {"parameters", Json::object()}};
   for (const EffectParameter& p : e.parameters)
     json["parameters"][p.name] = with_unit(p.measured, axis_unit(p.unit, trace.augmented.linear));
-  json["test_error_before"] = number(e.test_error_before);
-  json["test_error_after"] = number(e.test_error_after);
+  json["test_error_before"] = json_number(e.test_error_before);
+  json["test_error_after"] = json_number(e.test_error_after);
   const Evidence& v = e.evidence;
-  json["evidence"] = {{"gain", number(v.gain)},
-                      {"gain_held_out", number(v.gain_held_out)},
-                      {"gain_forward", number(v.gain_forward)},
+  json["evidence"] = {{"gain", json_number(v.gain)},
+                      {"gain_held_out", json_number(v.gain_held_out)},
+                      {"gain_forward", json_number(v.gain_forward)},
                       {"blocks_better", v.blocks_better},
                       {"blocks", v.blocks}};
   json["equivalent_to"] = e.equivalent_to;
@@ -70,7 +70,7 @@ Json column(const std::vector<double>& values, std::size_t stride,
   Json json = Json::array();
   for (std::size_t k = 0; k < values.size(); k += stride) {
     const std::string text = fmt::format("{:.7g}", values[k]);
-    json.push_back(counts && !(*counts)[k] ? Json(nullptr) : number(std::strtod(text.c_str(), nullptr)));
+    json.push_back(counts && !(*counts)[k] ? Json(nullptr) : json_number(std::strtod(text.c_str(), nullptr)));
   }
   return json;
 }
@@ -101,17 +101,17 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
                {"rig", inputs.rig},
                {"train", inputs.train},
                {"test", inputs.test},
-               {"cutoff", {{"value", number(trace.cutoff)}, {"unit", "Hz"}}},
+               {"cutoff", {{"value", json_number(trace.cutoff)}, {"unit", "Hz"}}},
                {"channels", Json::object()},
                {"steps", Json::array()},
                {"rejected", Json::array()},
                {"unexplained", nullptr}};
   for (const auto& [name, c] : trace.channels)
-    json["channels"][name] = {{"before", number(c.before)},
-                              {"after", number(c.after)},
-                              {"floor", number(c.floor)},
-                              {"train_before", number(c.train_before)},
-                              {"train_after", number(c.train_after)}};
+    json["channels"][name] = {{"before", json_number(c.before)},
+                              {"after", json_number(c.after)},
+                              {"floor", json_number(c.floor)},
+                              {"train_before", json_number(c.train_before)},
+                              {"train_after", json_number(c.train_after)}};
   for (const FoundEffect& e : trace.steps) json["steps"].push_back(step_json(e, trace));
   for (const RejectedEffect& r : trace.rejected)
     json["rejected"].push_back({{"effect", r.id}, {"reason", r.reason}});
@@ -122,8 +122,8 @@ std::string trace_report_json(const Trace& trace, const TraceInputs& inputs) {
   for (const Independence& i : trace.independence)
     json["independence"].push_back({{"channel", i.channel},
                                     {"input", i.input},
-                                    {"before", number(i.before)},
-                                    {"after", number(i.after)}});
+                                    {"before", json_number(i.before)},
+                                    {"after", json_number(i.after)}});
   json["base_parameters"] = machine_json(trace.base_parameters, trace);
   json["parameters"] = machine_json(trace.parameters, trace);
   json["notes"] = trace.notes;

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "backlash_diagnosis/base/version.h"
-#include "backlash_diagnosis/report/json_number.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
+#include "report/json.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/plot.h"

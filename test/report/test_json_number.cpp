@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "backlash_diagnosis/report/json_number.h"
+#include "report/json.h"
 
 namespace backlash {
 namespace {
