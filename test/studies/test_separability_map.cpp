@@ -65,7 +65,11 @@ TEST(SeparabilityMap, NoDisturbanceIsRightAndNoiseBeyondTheCurveIsRefused) {
     for (const SeparabilityCell& cell : cells[1]) {
       EXPECT_EQ(cell.answers[m].refused, 2) << m;
       EXPECT_EQ(cell.answers[m].status, Status::out_of_domain) << m;
-      EXPECT_NE(cell.answers[m].reason.find("noise"), std::string::npos) << cell.answers[m].reason;
+      // The same noise is on motor_torque, whose median it moves beyond the 5 % allowed in some records.
+      const std::string& reason = cell.answers[m].reason;
+      EXPECT_TRUE(reason.find("noise") != std::string::npos ||
+                  reason.find("excitation level") != std::string::npos)
+          << reason;
       EXPECT_TRUE(std::isnan(cell.answers[m].error)) << m;
     }
   }
