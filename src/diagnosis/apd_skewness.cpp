@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
@@ -16,12 +15,6 @@ namespace {
 
 constexpr double kNoiseExcess = 1.2;  // noise estimate over the largest on the curve that may be by chance
 constexpr double kOftenNoise = 1.65;  // standard deviations of noise that a twentieth of the time exceeds
-
-double range_of(const std::vector<double>& x) {
-  if (x.empty()) return 0;
-  const auto [low, high] = std::minmax_element(x.begin(), x.end());
-  return *high - *low;
-}
 
 bool differs(double value, double reference, double tolerance) {
   return !(std::fabs(value - reference) <= tolerance * std::fabs(reference));
@@ -35,7 +28,8 @@ std::string mismatch(const char* what, double value, double reference, const cha
 std::string excitation_mismatch(const Record& record, const CurveConditions& made, double noise) {
   const std::vector<double>& torque = record.column(Channel::motor_torque);
   if (torque.empty()) return {};
-  if (range_of(torque) <= 0.05 * made.amplitude) return "motor_torque is constant: there is no excitation";
+  if (peak_to_peak(torque) <= 0.05 * made.amplitude)
+    return "motor_torque is constant: there is no excitation";
   // A level that a tenth of the time is exceeded stands for the amplitude: a few spikes or noise do not
   // change it.
   if (differs(signal_level(torque), made.excitation_level, 0.05))
@@ -54,7 +48,7 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
 
 std::string motion_mismatch(const Record& record, const MonitoringCurve& curve) {
   if (!curve.conditions.output_locked) return {};
-  const double load = range_of(record.column(Channel::load_position));
+  const double load = peak_to_peak(record.column(Channel::load_position));
   const double travel = travel_of(record.column(Channel::motor_position));
   if (load > 0.05 * curve.conditions.motor_travel)
     return fmt::format("the output moves by {:.4g} rad, the rig says it is locked", load);
@@ -168,7 +162,7 @@ std::optional<Mismatch> out_of_domain(const Record& record, const ApdResult& apd
   const std::vector<double>& signal = record.column(settings.signal);
   std::string reason = kind_mismatch(record, settings, made);
   if (!reason.empty()) return Mismatch{Concern::curve, reason};
-  if (range_of(signal) <= 0.05 * signal_levels(curve).second)
+  if (peak_to_peak(signal) <= 0.05 * signal_levels(curve).second)
     return Mismatch{Concern::signal,
                     "the signal does not move: there is no excitation, or the sensor is dead"};
   reason = excitation_mismatch(record, made, torque_noise(record, made));

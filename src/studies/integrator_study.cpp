@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/restitution.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -52,9 +53,8 @@ void summarise(const std::vector<ToothErrors>& runs, ToothRow& row) {
     std::vector<double> values;
     for (const ToothErrors& run : runs) values.push_back(run.*error);
     const bool known = !values.empty() && !std::isnan(values.front());
-    std::sort(values.begin(), values.end());
-    row.worst.*error = known ? values.back() : kNone;
-    row.median.*error = known ? values[values.size() / 2] : kNone;
+    row.worst.*error = known ? *std::max_element(values.begin(), values.end()) : kNone;
+    row.median.*error = known ? median(values) : kNone;
   }
   row.opposite_runs = static_cast<int>(
       std::count_if(runs.begin(), runs.end(), [](const ToothErrors& run) { return run.opposite > 0; }));

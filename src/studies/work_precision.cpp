@@ -5,6 +5,9 @@
 #include <cmath>
 #include <ctime>
 #include <utility>
+#include <vector>
+
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash {
 namespace {
@@ -48,7 +51,7 @@ double WorkPrecision::error_of(const std::vector<double>& result) const {
 WorkPoint WorkPrecision::measure(const Solve& solve, const std::string& method,
                                  double relative_tolerance) const {
   WorkPoint point{method, relative_tolerance};
-  double times[kRepeats];
+  std::vector<double> times(kRepeats);
   for (double& time : times) {
     IntegratorStatistics statistics;
     const double start = cpu_now();
@@ -57,8 +60,7 @@ WorkPoint WorkPrecision::measure(const Solve& solve, const std::string& method,
     point.evaluations = static_cast<double>(statistics.evaluations);
     point.steps = static_cast<double>(statistics.steps);
   }
-  std::sort(std::begin(times), std::end(times));
-  point.cpu_time = times[kRepeats / 2];
+  point.cpu_time = median(std::move(times));
   return point;
 }
 

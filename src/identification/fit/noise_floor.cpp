@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <unsupported/Eigen/FFT>
 
 #include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 
 namespace backlash {
@@ -42,9 +42,7 @@ std::vector<double> load_noise(const ServoData& data, const std::vector<double>&
     mean += error[k] / double(load.size());
   }
   for (std::size_t k = 0; k < load.size(); ++k) error[k] -= mean;
-  std::vector<Complex> lines;
-  Eigen::FFT<double> fft;
-  fft.fwd(lines, error);
+  const std::vector<Complex> lines = fourier_transform(error);
   for (std::size_t i = 0; i < power.size(); ++i)
     power[i] += 2 * std::norm(lines[i + 1]) / (double(size) * double(load.size()));
   return power;

@@ -97,7 +97,7 @@ Run prepare(const Record& given, RingingSignal signal, double period) {
   run.steps = steps_of(!torque.empty()
                            ? torque
                            : difference(r.column(Channel::motor_position), r.column(Channel::load_position)));
-  if (!torque.empty()) run.torque_travel = quantile(torque, 0.95) - quantile(torque, 0.05);
+  if (!torque.empty()) run.torque_travel = quantile_range(torque, 0.05);
   return run;
 }
 
