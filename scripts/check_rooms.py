@@ -12,6 +12,9 @@ ROOM = re.compile(r"^room\((\w+)((?: KNOWS(?: [a-z_]+)+)?)", re.MULTILINE)
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
+PROGRAMS = ("nodes", "tools")  # may read private headers too: nobody links them
+
+
 def known_rooms(cmake_file):
     """Room -> rooms that it may include, itself among them."""
     known = {}
@@ -19,7 +22,8 @@ def known_rooms(cmake_file):
         known[name] = {name}
         for other in knows.split()[1:]:
             known[name] |= known[other]
-    known["nodes"] = known["tools"] = set(known) | {"nodes", "tools"}
+    for program in PROGRAMS:
+        known[program] = set(known) | {program}
     return known
 
 
@@ -48,7 +52,7 @@ def main(cmake_file, include, src):
                         continue
                     if target[0] not in known[room]:
                         problems.append("%s: %s must not know %s (%s)" % (path, room, target[0], name))
-                    elif target[1] and target[0] != room:
+                    elif target[1] and target[0] != room and room not in PROGRAMS:
                         problems.append("%s: %s is private to %s" % (path, name, target[0]))
     print("\n".join(problems) or "%d rooms know what they may" % len(known))
     return 1 if problems else 0

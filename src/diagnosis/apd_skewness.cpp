@@ -36,6 +36,7 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
     return mismatch("excitation level (median of |motor_torque|)", signal_level(torque),
                     made.excitation_level, "N m");
   std::vector<double> magnitude;
+  magnitude.reserve(torque.size());
   for (const double v : torque) magnitude.push_back(std::fabs(v));
   const double largest = *std::max_element(magnitude.begin(), magnitude.end());
   if (largest < 0.95 * made.amplitude)

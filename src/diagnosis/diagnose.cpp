@@ -20,6 +20,7 @@ Estimate not_served(const std::string& reason) {
 ApdSettings read_apd(const YamlReader& yaml) {
   ApdSettings apd;
   std::vector<std::string> names;
+  names.reserve(kChannels.size());
   for (Channel channel : kChannels) names.push_back(channel_name(channel));
   apd.signal = channel_from_name(yaml.choice("signal", names));
   apd.period = yaml.number_or("period", 0, Range::positive());

@@ -21,6 +21,7 @@ constexpr int kTick = 100;  // ms: a change of level is published so soon
 constexpr int kTicks = 10;  // from one report on /diagnostics to the next without a change
 std::vector<std::string> names_of(const std::vector<MonitorSettings>& joints) {
   std::vector<std::string> names;
+  names.reserve(joints.size());
   for (const MonitorSettings& joint : joints) names.push_back(joint.joint);
   return names;
 }

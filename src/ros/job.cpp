@@ -92,9 +92,9 @@ class Child {
  public:
   explicit Child(const Job& job) : name_(fs::path(job.words.at(0)).filename()) {
     std::vector<std::string> words = job.words;
-    std::vector<char*> arguments;
-    for (std::string& word : words) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
+    std::vector<char*> arguments(words.size() + 1, nullptr);
+    std::transform(words.begin(), words.end(), arguments.begin(),
+                   [](std::string& word) { return word.data(); });
     const pid_t parent = ::getpid();
     const auto memory = static_cast<rlim_t>(1e9 * job.memory);
     id_ = ::fork();

@@ -28,7 +28,8 @@ Command command() {
       {"out", "DIR",
        "folder for report.json, report.html, rig.yaml and series.json; made where it is missing", true},
       {"cutoff", "HZ",
-       "low-pass of all residuals [Hz]; default: 60 for two inertias, else the bandwidth of the motion"},
+       "low-pass of all residuals [Hz]; default: 1.36 times the mesh resonance of two inertias, else the "
+       "bandwidth of the motion"},
       feedback_option(),
   };
   c.notes =

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Jobs with the shell in place of a command of this package.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 
 #include <chrono>
+#include <csignal>
 #include <string>
 #include <vector>
 
@@ -82,7 +83,7 @@ TEST(Job, IsCancelledWithinASecondAlsoWhereItDoesNotListen) {
   const ScratchFolder scratch;
   for (const std::string trap : {"", "trap '' TERM; "}) {
     const std::string file = scratch.path("id");
-    Job job = shell(trap + "echo $$ >" + file + "; while :; do sleep 0.1; done");
+    Job job = shell(fmt::format("{}echo $$ >{}; while :; do sleep 0.1; done", trap, file));
     const auto start = SteadyClock::now();
     SteadyClock::time_point asked;
     job.progress = [&](double, const std::string&) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// From paths to a folder with the report: what the command trace_residual and the action TraceResidual do.
+// From paths to a folder with the report: what the command trace_residual does, which the action
+// TraceResidual runs.
 #pragma once
 
 #include <string>

@@ -92,7 +92,7 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
     if (i >= settings.most || c.gain < worth) {
       all.rejected.push_back(
           {c.id, fmt::format("not fitted: predicted to lessen the residual by {:.2g} %, {}", 100 * c.gain,
-                             i >= settings.most ? "others by more" : "too little")});
+                             c.gain < worth ? "too little" : "others by more")});
       continue;
     }
     context.tell(fmt::format("trying {} (predicted gain {:.3g})", c.id, c.gain));

@@ -7,6 +7,7 @@
 #include <list>
 #include <mutex>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/presliding.h"
@@ -201,6 +202,7 @@ ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calib
 
 ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSettings& settings,
                               const Calibration& calibration) {
+  if (!(settings.cutoff > 0)) throw InvalidParameter("cutoff", settings.cutoff, "must be > 0 Hz");
   const PreparedServo prepared(data, settings.cutoff, settings.feedback);
   ServoResiduals r = prepared.residuals(rig, calibration);
   ServoPrediction p;

@@ -61,7 +61,7 @@ struct ServoPrediction {
   ChannelError torque_error, deflection_error;
 };
 
-/// `settings` have their bands, see with_bands().
+/// `settings` have their bands, see with_bands(); throws InvalidParameter for a cutoff that is not > 0.
 ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSettings& settings,
                               const Calibration& calibration);
 
