@@ -52,21 +52,21 @@ double AmplitudeDistribution::centre(int k) const {
 std::vector<double> AmplitudeDistribution::percentages() const {
   std::vector<double> y(counts_.size(), 0);
   if (samples_ == 0) return y;
-  for (std::size_t k = 0; k < y.size(); ++k) y[k] = 100.0 * counts_[k] / samples_;
+  for (std::size_t k = 0; k < y.size(); ++k) y[k] = 100.0 * double(counts_[k]) / double(samples_);
   return y;
 }
 
 double AmplitudeDistribution::standardised_moment(int order) const {
   // Invariant under scaling, so the counts themselves will do.
-  const double mean = double(samples_ - below_ - above_) / counts_.size();
+  const double mean = double(samples_ - below_ - above_) / double(counts_.size());
   double variance = 0, moment = 0;
   for (const std::size_t count : counts_) {
-    const double d = count - mean;
+    const double d = double(count) - mean;
     variance += d * d;
     moment += order == 3 ? d * d * d : d * d * d * d;
   }
-  variance /= counts_.size();
-  moment /= counts_.size();
+  variance /= double(counts_.size());
+  moment /= double(counts_.size());
   if (!(variance > 0)) return std::numeric_limits<double>::quiet_NaN();
   return moment / (order == 3 ? variance * std::sqrt(variance) : variance * variance);
 }

@@ -84,8 +84,10 @@ class Fitter {
  public:
   Fitter(const FlankWindows& windows, const FlankModel& model)
       : w_(windows), model_(model), n_(windows.size()) {
-    const int common = model.moving ? static_cast<int>(std::min<double>(kCommonKnots, scaled(n_, 40))) : 1;
-    const int gaps = model.moving ? static_cast<int>(std::min<double>(kGapKnots, scaled(n_, 200))) : 1;
+    const int common =
+        model.moving ? static_cast<int>(std::min<double>(kCommonKnots, scaled(double(n_), 40))) : 1;
+    const int gaps =
+        model.moving ? static_cast<int>(std::min<double>(kGapKnots, scaled(double(n_), 200))) : 1;
     common_ = hats(w_.load, common);
     gap_ = hats(w_.load, gaps);
     phi_ = Eigen::Map<const VectorXd>(w_.deflection.data(), n_);

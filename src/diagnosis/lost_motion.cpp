@@ -187,8 +187,8 @@ void require_rest(const WallToWall& play, double deflection) {
 void require_calm_sensor(const LockedMotion& motion, const Walls& walls, const WallToWall& play) {
   const double period = detect_period(motion.time, motion.torque).value_or(0);
   const double cycles = period > 0 ? 2 * (motion.time.back() - motion.time.front()) / period : 0;
-  const bool too_many = cycles > 0 && walls.excursions.size() > kManyExcursions * cycles + 1;
-  if (!too_many && play.outliers <= kManyOutliers * play.passages) return;
+  const bool too_many = cycles > 0 && double(walls.excursions.size()) > kManyExcursions * cycles + 1;
+  if (!too_many && double(play.outliers) <= kManyOutliers * double(play.passages)) return;
   throw Refusal{Status::out_of_domain,
                 "sensor_torque rings where the walls are read (" + std::to_string(walls.excursions.size()) +
                     " excursions, " + std::to_string(play.outliers) + " of " + std::to_string(play.passages) +

@@ -24,7 +24,7 @@ std::vector<double> resample(const std::vector<double>& time, const std::vector<
   std::vector<double> even(count);
   std::size_t i = 0;
   for (std::size_t k = 0; k < count; ++k) {
-    const double t = time.front() + k * interval;
+    const double t = time.front() + double(k) * interval;
     while (i + 2 < time.size() && time[i + 1] < t) ++i;
     const double share = std::clamp((t - time[i]) / (time[i + 1] - time[i]), 0.0, 1.0);
     even[k] = signal[i] + share * (signal[i + 1] - signal[i]);
@@ -60,7 +60,7 @@ bool dies_out(const std::vector<double>& x) {
 std::size_t repetition_lag(std::vector<double> x) {
   const std::size_t n = x.size();
   if (n < 8) return 0;
-  const double mean = std::accumulate(x.begin(), x.end(), 0.0) / n;
+  const double mean = std::accumulate(x.begin(), x.end(), 0.0) / double(n);
   for (double& v : x) v -= mean;
   if (dies_out(x)) return 0;
   const std::size_t longest = n / 2 + 1;  // of a lag: two periods, the last sample of which may be missing
@@ -97,13 +97,13 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
     const auto count = all ? static_cast<std::size_t>(std::lround(samples / stride)) : kMaxSamples;
     const std::size_t lag = repetition_lag(resample(time, signal, stride * interval, count));
     // Unless the excitation began late: then the end of the record shows it at full resolution.
-    if (lag > 0 && stride > 1 && lag * stride < 0.25 * kMaxSamples) {
+    if (lag > 0 && stride > 1 && double(lag) * stride < 0.25 * double(kMaxSamples)) {
       const auto tail = static_cast<std::ptrdiff_t>(std::min(time.size(), kMaxSamples / 2));
       if (const auto fine =
               detect_period({time.end() - tail, time.end()}, {signal.end() - tail, signal.end()}))
         return fine;
     }
-    if (lag > 0) return lag * stride * interval;
+    if (lag > 0) return double(lag) * stride * interval;
     if (all) return std::nullopt;
   }
 }

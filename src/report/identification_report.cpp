@@ -104,7 +104,7 @@ Json gap_map_json(const GapMap& map) {
 Json trace_json(const ChannelTrace& trace) {
   const std::size_t n = trace.measured.size(), stride = n / kMostPoints + 1;
   const auto part = [&](std::size_t from, std::size_t to, std::size_t step) {
-    Json json = {{"start", from * trace.interval}, {"interval", step * trace.interval}};
+    Json json = {{"start", double(from) * trace.interval}, {"interval", double(step) * trace.interval}};
     for (std::size_t k = from; k < to; k += step) {
       const bool counts = trace.counts.empty() || trace.counts[k];  // else a gap in the plot
       json["measured"].push_back(counts ? Json(trace.measured[k]) : Json(nullptr));

@@ -80,7 +80,7 @@ LeastSquaresFit fit_robust(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
     inside += std::fabs(r) <= kHuber * scale;
   }
   const double rows = double(a.rows()), share = std::max(inside / rows, 0.1);
-  const double variance = sum / (rows - a.cols()) / (share * share);
+  const double variance = sum / (rows - double(a.cols())) / (share * share);
   const Eigen::MatrixXd all = solve(a, b, Eigen::VectorXd::Ones(a.rows())).covariance;
   fit.covariance = all * variance;
   fit.deviation = scale;

@@ -42,7 +42,7 @@ std::vector<Stretch> stretches_of(const std::vector<double>& values, Reduce redu
 
 /// Puts the calmest stretches first and returns how many they are; the one after them is at the quantile.
 std::size_t sort_calm(std::vector<Stretch>& stretches) {
-  const auto calm = static_cast<std::size_t>(kCalm * stretches.size());
+  const auto calm = static_cast<std::size_t>(kCalm * double(stretches.size()));
   std::nth_element(stretches.begin(), stretches.begin() + static_cast<std::ptrdiff_t>(calm), stretches.end());
   return calm;
 }
@@ -65,7 +65,8 @@ double white_share(const std::vector<double>& values, const std::vector<Stretch>
 
 /// From period to period; nothing with fewer than two periods.
 std::optional<NoiseRange> between_periods(const std::vector<double>& signal, double samples_per_period) {
-  if (!(samples_per_period >= kStretch && samples_per_period <= 0.5 * signal.size())) return std::nullopt;
+  if (!(samples_per_period >= kStretch && samples_per_period <= 0.5 * double(signal.size())))
+    return std::nullopt;
   const auto lag = static_cast<std::size_t>(std::lround(samples_per_period));
   std::vector<double> change;
   for (std::size_t i = 0; i + lag < signal.size(); ++i) change.push_back(signal[i + lag] - signal[i]);

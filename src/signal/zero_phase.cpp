@@ -37,7 +37,7 @@ Filter butterworth(double interval, double cutoff) {
   Filter filter;
   const double w = std::tan(M_PI * cutoff * interval);
   for (std::size_t i = 0; i < filter.size(); ++i) {
-    const double damping = -2 * std::cos(M_PI * (5 + 2.0 * i) / 8);
+    const double damping = -2 * std::cos(M_PI * (5 + 2.0 * double(i)) / 8);
     const double norm = 1 + damping * w + w * w;
     filter[i] = {w * w / norm, 2 * (w * w - 1) / norm, (1 - damping * w + w * w) / norm};
   }
@@ -63,7 +63,8 @@ std::vector<double> low_pass(const std::vector<double>& values, double interval,
     throw InvalidParameter("cutoff", cutoff, "must be > 0 and below half of the sampling rate");
   if (values.size() < 2) return values;
   const std::size_t n = values.size();
-  const std::size_t pad = std::min<std::size_t>(n - 1, std::ceil(3 / (2 * M_PI * cutoff * interval) * 4));
+  const std::size_t pad =
+      std::min(n - 1, static_cast<std::size_t>(std::ceil(3 / (2 * M_PI * cutoff * interval) * 4)));
   std::vector<double> padded;
   padded.reserve(n + 2 * pad);
   for (std::size_t k = pad; k > 0; --k) padded.push_back(2 * values.front() - values[k]);

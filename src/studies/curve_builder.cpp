@@ -51,13 +51,13 @@ SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
       own.add(s);
     }
     means.add(own.mean());
-    within += own.standard_deviation() * own.standard_deviation() * own.count();
+    within += own.standard_deviation() * own.standard_deviation() * double(own.count());
     freedom += own.count() - 1;
   }
   SkewnessCell cell;
   cell.mean = all.mean();
-  cell.within = freedom > 0 ? std::sqrt(within / freedom) : 0;
-  const double n = runs.front().size(), m = runs.size();
+  cell.within = freedom > 0 ? std::sqrt(within / double(freedom)) : 0;
+  const double n = double(runs.front().size()), m = double(runs.size());
   const double variance = m > 1 ? means.standard_deviation() * means.standard_deviation() * m / (m - 1) : 0;
   cell.between = std::sqrt(std::max(0.0, variance - cell.within * cell.within / n));
   return cell;

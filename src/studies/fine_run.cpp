@@ -60,7 +60,7 @@ void sample_finely(const CurvePlan& plan, Machines& machines, const Take& take, 
   const double rate = plan.request.sampling_rate * plan.phases;
   const long count = std::lround(fine_samples(plan)), periods = plan.run_periods();
   for (long k = 0; k < count; ++k) {
-    machines.advance_to(k / rate);
+    machines.advance_to(double(k) / rate);
     take();
     if ((k + 1) * periods / count > k * periods / count) period();
   }

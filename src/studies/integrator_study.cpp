@@ -205,7 +205,7 @@ WorkPrecision rig_work(const RigFile& file, double half_gap, double duration, Wo
                 {method, tolerance, share * own.position_tolerance, share * own.velocity_tolerance});
     std::vector<double> signal;
     for (long k = 1; k <= samples; ++k) {
-      plant.advance_to(k / rate);
+      plant.advance_to(double(k) / rate);
       const Observation o = plant.observe();
       signal.push_back(rig.input_coupling.rigid ? o.motor_position : o.sensor_torque);
     }

@@ -43,7 +43,7 @@ Signal simulate(const RigFile& file, const CurveTarget& target, double backlash)
   Signal signal;
   signal.reserve(count);
   for (long k = 0; k < count; ++k) {
-    plant.advance_to((first + k) / rate);
+    plant.advance_to(double(first + k) / rate);
     signal.push_back(plant.observe().sensor_torque);
   }
   return signal;
@@ -61,7 +61,7 @@ Point read(const Signal& signal, const CurveTarget& target, const ApdLayout& lay
       for (std::size_t k = phase; k < window; k += target.phases) apd.add(signal[period * window + k]);
       sum += apd.skewness();
       const auto highest = *std::max_element(apd.counts().begin(), apd.counts().end());
-      point.highest_class = std::max(point.highest_class, 100.0 * highest / apd.samples());
+      point.highest_class = std::max(point.highest_class, 100.0 * double(highest) / double(apd.samples()));
     }
     const double mean = sum / target.periods;
     point.skewness += mean / target.phases;
@@ -74,7 +74,7 @@ Point read(const Signal& signal, const CurveTarget& target, const ApdLayout& lay
 double rms_of(const std::vector<Point>& points, const CurveTarget& target) {
   double sum = 0;
   for (std::size_t i = 0; i < points.size(); ++i) sum += std::pow(points[i].skewness - target.skewness[i], 2);
-  return std::sqrt(sum / points.size());
+  return std::sqrt(sum / double(points.size()));
 }
 
 void find_rise(CurveFit& fit) {
@@ -235,7 +235,7 @@ std::string beside(const std::string& path, const std::string& file) {
 
 std::string FreeParameter::value(double u) const {
   if (!choices.empty())
-    return choices[std::min(static_cast<std::size_t>(u * choices.size()), choices.size() - 1)];
+    return choices[std::min(static_cast<std::size_t>(u * double(choices.size())), choices.size() - 1)];
   return fmt::format("{:.4g}",
                      logarithmic ? lower * std::pow(upper / lower, u) : lower + u * (upper - lower));
 }

@@ -60,7 +60,7 @@ ProcedureReport run_frequency_response(IdentificationCase& c) {
   const auto used = on_each(c, &CaseRecord::drive, [&](const CaseRecord& r) {
     ResponseDetail d = respond(r.record);
     const auto share = [](const ResponseDetail& x) {
-      return double(reversing(x.response)) / x.response.points.size();
+      return double(reversing(x.response)) / double(x.response.points.size());
     };
     if (best && share(*best) <= share(d)) throw CannotIdentify("another record reverses less");
     best = std::move(d);
