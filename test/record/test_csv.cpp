@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -164,7 +163,7 @@ TEST(Csv, MalformedRowsAreRefusedWithPlaceColumnAndText) {
       {"0\t1\n", "run.csv:2: separator is '\\t', expected ','"},
       {"0,1\n\n1,2\n", "run.csv:3: an empty line amid the data"},
       {"0,1\n# note\n", "run.csv:3: 1 field in '# note', expected 2: time, motor_torque"},
-      {std::string("0,1\n1,\0002\n", 10), "run.csv:3: contains a NUL byte: not a text file in UTF-8"},
+      {std::string("0,1\n1,\0002\n", 9), "run.csv:3: contains a NUL byte: not a text file in UTF-8"},
       {"0,1\n1,\x1b[31m\xff\n", "run.csv:3: motor_torque = '\\x1b[31m\\xff': not a number"},
       {"0,1\n1," + std::string(2 << 20, '1') + "\n", "run.csv:3: line is longer than 1048576 bytes"},
       {"0,1\n1," + std::string(1000, '1') + "\n",
@@ -185,7 +184,7 @@ TEST(Csv, LinesUpToTheLimitAndAcrossBuffersAreRead) {
   std::string text = kHeader;
   for (int i = 0; i < 5; ++i) {
     const std::string number = std::to_string(i);
-    text += number + "," + std::string(kLongestCsvLine - 10, ' ') + number + "\n";
+    text.append(number).append(",").append(kLongestCsvLine - 10, ' ').append(number).append("\n");
   }
   const Record record = parse(text);
   EXPECT_EQ(record.time, (std::vector<double>{0, 1, 2, 3, 4}));
@@ -195,7 +194,7 @@ TEST(Csv, LinesUpToTheLimitAndAcrossBuffersAreRead) {
   EXPECT_EQ(parse(kHeader + longest).size(), 1u);
   EXPECT_EQ(parse(kHeader + longest + "\n2,2\n").size(), 2u);
   for (const char* end : {"", "\n", "\n2,2\n"}) {
-    EXPECT_EQ(message_of([&] { parse(kHeader + " " + longest + end); }),
+    EXPECT_EQ(message_of([&] { parse(std::string(kHeader).append(" ").append(longest).append(end)); }),
               "run.csv:2: line is longer than 1048576 bytes");
   }
 }
