@@ -10,17 +10,13 @@
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "procedures/procedures.h"
 
 namespace backlash {
 namespace {
 
 constexpr double kMisfit = 1.5;  // times the noise floor, beyond which the model lacks something
-
-double travel(const std::vector<double>& values) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  return *high - *low;
-}
 
 void require_finite(const Record& record) {
   for (const Channel channel : kChannels)
@@ -37,8 +33,8 @@ CaseRecord case_record(const Record& record, const Rig& declared) {
   r.record = evenly_sampled(load_side(record, declared));
   r.has_load = r.record.has(Channel::load_position);
   if (!r.record.has(Channel::motor_position) || !r.has_load) return r;
-  const double motor = travel(r.record.column(Channel::motor_position));
-  const double load = travel(r.record.column(Channel::load_position));
+  const double motor = peak_to_peak(r.record.column(Channel::motor_position));
+  const double load = peak_to_peak(r.record.column(Channel::load_position));
   r.motor_moves = motor > 0.05 * load;
   r.load_moves = load > 0.05 * motor;
   return r;

@@ -189,7 +189,7 @@ class Child {
 };
 
 /// What a job has told last.
-struct Told {
+struct JobProgress {
   double fraction = 0;
   std::string phase = "starting", best;
 
@@ -209,7 +209,7 @@ struct Told {
 void run_job(const Job& job) {
   if (!(job.memory > 0)) throw InvalidParameter("memory", job.memory, "must be > 0 GB");
   Child child(job);
-  Told told;
+  JobProgress told;
   for (bool running = true; running;) {
     running = child.wait();
     const std::string before = told.best;

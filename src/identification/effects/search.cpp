@@ -14,9 +14,9 @@ namespace {
 
 /// What is told on the way: a share that never falls back when effects are taken out again, and the best so
 /// far.
-class Told {
+class SearchProgress {
  public:
-  Told(const SearchSettings& settings, const Progress& progress)
+  SearchProgress(const SearchSettings& settings, const Progress& progress)
       : most_(double(settings.asked.most_effects)),
         best_so_far_(settings.asked.best_so_far),
         progress_(progress) {}
@@ -48,7 +48,7 @@ class Told {
 
 SearchResult search_effects(const Rig& declared, const std::vector<ServoData>& data,
                             const SearchSettings& settings, const Progress& progress) {
-  Told told(settings, progress);
+  SearchProgress told(settings, progress);
   const Interruption interruption([&] { return told.goes_on(); });  // fits of minutes end when asked to
   const SearchContext context{data, motion_range(data), settings,
                               [&](const std::string& p) { told.phase(p); },

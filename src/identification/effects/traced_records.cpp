@@ -8,6 +8,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "candidates.h"
 
@@ -21,11 +22,6 @@ constexpr double kSameRate = 0.01;         // choice: relative difference of the
 constexpr double kBeyond = 0.1;            // choice: of the travel, on either side
 constexpr double kFaster = 1.5;            // choice: times speed or torque
 
-double travel(const std::vector<double>& position) {
-  const auto [low, high] = std::minmax_element(position.begin(), position.end());
-  return *high - *low;
-}
-
 }  // namespace
 
 ServoData traced_data(const Record& record, const Rig& rig) {
@@ -33,7 +29,7 @@ ServoData traced_data(const Record& record, const Rig& rig) {
   if (load_moves_freely(rig)) {
     if (data.load.empty())
       throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");
-    if (travel(data.load) < kLeastLoadTravel * travel(data.motor))
+    if (peak_to_peak(data.load) < kLeastLoadTravel * peak_to_peak(data.motor))
       throw CannotIdentify(record.name +
                            ": the load stands still while the motor moves; the rig file has a link that " +
                            "moves freely (a gearbox with locked output: link: locked)");
