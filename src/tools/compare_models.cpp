@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
-#include "backlash_diagnosis/studies/model_comparison.h"
+#include "backlash_diagnosis/identification/model_comparison.h"
 #include "report/json.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"

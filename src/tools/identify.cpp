@@ -6,7 +6,7 @@
 #include <iostream>
 
 #include "backlash_diagnosis/identification/fitted_rig.h"
-#include "backlash_diagnosis/report/identification_report.h"
+#include "backlash_diagnosis/findings/identification_report.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"

@@ -3,7 +3,10 @@
 #include <filesystem>
 #include <iostream>
 
-#include "backlash_diagnosis/ros/trace_job.h"
+#include "backlash_diagnosis/findings/trace_folder.h"
+#include "backlash_diagnosis/identification/effects/traced_rig.h"
+#include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/ros/bag_record.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/feedback.h"
@@ -50,6 +53,14 @@ Command command() {
   return c;
 }
 
+struct TraceJob {
+  RigFile rig;                     // the declared machine
+  std::vector<std::string> train;  // paths of .csv or .bag
+  std::string test;
+  std::string folder;  // for what comes out
+  TraceSettings settings;
+};
+
 TraceJob job_of(const Arguments& arguments) {
   TraceJob job;
   job.train = arguments.texts("train");
@@ -69,9 +80,35 @@ TraceJob job_of(const Arguments& arguments) {
   return job;
 }
 
+Record read(const std::string& path, const std::string& joint, std::vector<std::string>& warnings) {
+  const std::filesystem::path file(path);
+  Record record = file.extension() == ".bag" ? read_bag(path, joint, "joint_states") : read_csv(path);
+  record.name = file.filename();
+  for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
+  return record;
+}
+
+/// With the readers' warnings. Throws MissingInput, BadData, CannotWrite, CannotIdentify, Cancelled; nothing
+/// is written then.
+Trace run_trace(const TraceJob& job, const Progress& progress) {
+  check_traced_rig_text(job.rig);
+  std::vector<std::string> inputs = job.train, warnings;
+  std::vector<Record> train;
+  for (const std::string& path : job.train) train.push_back(read(path, job.rig.rig.joint, warnings));
+  const Record test = read(job.test, job.rig.rig.joint, warnings);
+  inputs.push_back(job.test);
+  inputs.push_back(job.rig.source);
+  const TraceFolder folder(job.folder, inputs);
+  Trace trace = trace_residual(job.rig.rig, train, test, job.settings, progress);
+  trace.warnings.insert(trace.warnings.begin(), warnings.begin(), warnings.end());
+  if (progress && !progress(1, "writing the report")) throw Cancelled();
+  folder.write(trace, job.rig, {job.rig.source, job.train, job.test});
+  return trace;
+}
+
 int trace(const Arguments& arguments) {
   TraceJob job = job_of(arguments);
-  TraceDone done;
+  Trace done;
   try {
     if (arguments.has("feedback")) {
       FeedbackLines lines;
@@ -85,10 +122,11 @@ int trace(const Arguments& arguments) {
     std::cerr << "trace_residual: " << error.what() << '\n';
     return kBadData;
   }
+  const TraceFiles files = trace_files(job.folder);
   if (!arguments.has("feedback"))
-    std::cout << trace_summary(done.trace) << "\nreport: " << done.files.page << ", " << done.files.report
-              << "\nrig with what was found: " << done.files.rig << '\n';
-  return done.trace.verdict == TraceVerdict::unexplained ? kInconclusive : kHealthy;
+    std::cout << trace_summary(done) << "\nreport: " << files.page << ", " << files.report
+              << "\nrig with what was found: " << files.rig << '\n';
+  return done.verdict == TraceVerdict::unexplained ? kInconclusive : kHealthy;
 }
 
 }  // namespace

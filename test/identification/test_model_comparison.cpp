@@ -3,9 +3,9 @@
 
 #include <cmath>
 
+#include "backlash_diagnosis/identification/model_comparison.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
-#include "backlash_diagnosis/studies/model_comparison.h"
 #include "support/data.h"
 
 namespace backlash {

@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/report/report_page.h"
-#include "backlash_diagnosis/report/trace_files.h"
-#include "html_template.h"
+#include "report/html_template.h"
 #include "value_text.h"
 
 namespace backlash {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/report/trace_report.h"
+#include "backlash_diagnosis/findings/trace_report.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/report/identification_report.h"
+#include "backlash_diagnosis/findings/identification_report.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
-#include "json.h"
+#include "report/json.h"
 
 namespace backlash {
 namespace {

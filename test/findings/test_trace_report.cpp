@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/report/trace_files.h"
-#include "backlash_diagnosis/report/trace_report.h"
+#include "backlash_diagnosis/findings/trace_folder.h"
+#include "backlash_diagnosis/findings/trace_report.h"
 #include "support/data.h"
 
 namespace backlash::test {

@@ -6,9 +6,9 @@
 #include <cstdlib>
 
 #include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/findings/trace_report.h"
 #include "backlash_diagnosis/model/axis_unit.h"
-#include "backlash_diagnosis/report/trace_report.h"
-#include "json.h"
+#include "report/json.h"
 #include "trace_contributions.h"
 
 namespace backlash {

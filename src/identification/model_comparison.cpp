@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/studies/model_comparison.h"
+#include "backlash_diagnosis/identification/model_comparison.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The folder that a search for missing effects leaves behind.
+#pragma once
+
+#include <string>
+
+#include "backlash_diagnosis/findings/trace_report.h"
+#include "backlash_diagnosis/report/trace_files.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
+
+namespace backlash {
+
+/// Makes the folder (and those above it) that the files go to, and takes it away again where the work fails.
+class TraceFolder {
+ public:
+  /// Throws CannotWrite where that is impossible, or a file would replace one of `inputs`.
+  TraceFolder(const std::string& folder, const std::vector<std::string>& inputs);
+  /// Removes the folder where it is new and empty.
+  ~TraceFolder();
+  TraceFolder(const TraceFolder&) = delete;
+  TraceFolder& operator=(const TraceFolder&) = delete;
+
+  const TraceFiles& files() const { return files_; }
+
+  /// Writes all. Plots are drawn by a Python script; where that fails the page says so instead. Throws
+  /// CannotWrite, and BadData as traced_rig_text().
+  void write(const Trace& trace, const RigFile& declared, const TraceInputs& inputs) const;
+
+ private:
+  std::string folder_;
+  TraceFiles files_;
+  bool new_ = false;
+};
+
+/// The page; `plots` is what the script drew, or a sentence on why there is nothing; `provenance` ends it.
+std::string trace_page(const Trace& trace, const TraceInputs& inputs, const std::string& plots,
+                       const std::string& provenance);
+
+}  // namespace backlash
