@@ -28,10 +28,10 @@ class BagFile {
   BagFile() {
     path_ = (std::filesystem::temp_directory_path() / "benchmark_XXXXXX.bag").string();
     close(mkstemps(path_.data(), 4));
-    RigFile file = default_rig_file();
+    rig_file::RigFile file = rig_file::default_rig_file();
     file.rig.mesh.backlash = 8e-5;
     file.simulation.sensors.sampling_rate = kRate;
-    write_bag(simulate_record(file.rig, file.simulation, kDuration), path_, "joint");
+    ros_bridge::write_bag(simulation::simulate_record(file.rig, file.simulation, kDuration), path_, "joint");
   }
   ~BagFile() { std::remove(path_.c_str()); }
   const std::string& path() const { return path_; }
@@ -66,16 +66,17 @@ void bare_view(benchmark::State& state) {
 
 void read(benchmark::State& state) {
   const std::string path = bag();
-  for (auto _ : state) benchmark::DoNotOptimize(read_bag(path, "", "joint_states").size());
+  for (auto _ : state) benchmark::DoNotOptimize(ros_bridge::read_bag(path, "", "joint_states").size());
   rate(state);
 }
 
 void read_and_diagnose(benchmark::State& state) {
   const std::string path = bag();
-  const RigFile file = default_rig_file();
+  const rig_file::RigFile file = rig_file::default_rig_file();
   for (auto _ : state) {
-    const Record record = read_bag(path, "", "joint_states");
-    benchmark::DoNotOptimize(diagnose(record, file.diagnosis, nullptr, std::nullopt).estimates.size());
+    const record::Record record = ros_bridge::read_bag(path, "", "joint_states");
+    benchmark::DoNotOptimize(
+        diagnosis::diagnose(record, file.diagnosis, nullptr, std::nullopt).estimates.size());
   }
   rate(state);
 }

@@ -20,22 +20,22 @@ constexpr double kLargestBacklash = 2e-4;
 constexpr int kMachines = kPoints + (kPoints - 1) + (kPoints - 1) / 2;  // points, between them, beyond them
 
 void curve(benchmark::State& state) {
-  const RigFile file = default_rig_file();
-  CurveRequest request;
+  const rig_file::RigFile file = rig_file::default_rig_file();
+  studies::CurveRequest request;
   request.points = kPoints;
   request.periods = kPeriods;
   request.seeds = kSeeds;
   request.max_backlash = kLargestBacklash;
-  for (auto _ : state) benchmark::DoNotOptimize(build_curve(file, request));
+  for (auto _ : state) benchmark::DoNotOptimize(studies::build_curve(file, request));
 }
 
 void machines_by_boost(benchmark::State& state) {
-  const double period = 1 / default_rig_file().simulation.excitation.frequency;
+  const double period = 1 / rig_file::default_rig_file().simulation.excitation.frequency;
   for (auto _ : state) {
     std::atomic<int> next{0};
     const auto work = [&] {
       for (int i = next++; i < kMachines; i = next++) {
-        RigFile file = default_rig_file();
+        rig_file::RigFile file = rig_file::default_rig_file();
         file.rig.mesh.backlash = kLargestBacklash * 1.5 * i / (kMachines - 1);
         benchmark::DoNotOptimize(
             peer::sensor_torque(file, 1e-6, 1e-8, (kSettling + kPeriods) * period, 16'000));

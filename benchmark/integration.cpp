@@ -16,11 +16,11 @@
 
 namespace {
 
-using backlash::Ensemble;
-using backlash::Plant;
-using backlash::Rig;
-using backlash::RigFile;
-using backlash::SolverSettings;
+using backlash::model::Rig;
+using backlash::rig_file::RigFile;
+using backlash::simulation::Ensemble;
+using backlash::simulation::Plant;
+using backlash::simulation::SolverSettings;
 using Signal = std::vector<double>;
 using Signals = std::vector<Signal>;
 
@@ -28,7 +28,7 @@ constexpr double kRate = 1000, kDuration = 0.5, kShort = 0.1, kHalfGap = 50e-6, 
 constexpr int kRigs = 32;
 
 RigFile file_with(double half_gap) {
-  RigFile file = backlash::default_rig_file();
+  RigFile file = backlash::rig_file::default_rig_file();
   file.rig.mesh.backlash = 2 * half_gap;
   return file;
 }

@@ -55,19 +55,20 @@ double cpu_seconds(const std::string& pid) {
 
 /// Some settled periods of the built-in rig; all joints move alike.
 Messages one_round(double rate, int joints) {
-  RigFile file = default_rig_file();
+  rig_file::RigFile file = rig_file::default_rig_file();
   file.rig.mesh.backlash = 8e-5;
   file.simulation.sensors.sampling_rate = rate;
-  Simulation simulation(file.rig, file.simulation);
+  simulation::Simulation simulation(file.rig, file.simulation);
   const long period = std::lround(rate / file.simulation.excitation.frequency);
   Messages round;
   for (long k = 0; k < (kSettling + kPeriods) * period; ++k) {
-    const Observation seen = simulation.step();
+    const model::Observation seen = simulation.step();
     if (k < kSettling * period) continue;
     round.emplace_back();
     for (int j = 0; j < joints; ++j)
-      add_joint_state(seen, JointNames(joints == 1 ? file.rig.joint : "joint_" + std::to_string(j)),
-                      round.back());
+      ros_bridge::add_joint_state(
+          seen, ros_bridge::JointNames(joints == 1 ? file.rig.joint : "joint_" + std::to_string(j)),
+          round.back());
   }
   return round;
 }

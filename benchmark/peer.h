@@ -16,7 +16,7 @@ namespace peer {
 using State = std::array<double, 6>;  // motor, pinion, gear: angles, then speeds
 
 struct Equations {
-  explicit Equations(const backlash::Rig& rig)
+  explicit Equations(const backlash::model::Rig& rig)
       : motor(1 / rig.motor.inertia),
         pinion(1 / rig.pinion.inertia),
         gear(1 / rig.gear.inertia),
@@ -49,8 +49,8 @@ struct Equations {
 };
 
 /// Sensor torque at `rate` under a square torque, by dopri5 with dense output, started anew at each switch.
-inline std::vector<double> sensor_torque(const backlash::RigFile& file, double tolerance, double absolute,
-                                         double duration, double rate) {
+inline std::vector<double> sensor_torque(const backlash::rig_file::RigFile& file, double tolerance,
+                                         double absolute, double duration, double rate) {
   using namespace boost::numeric::odeint;
   Equations equations(file.rig);
   auto stepper = make_dense_output(absolute, tolerance, runge_kutta_dopri5<State>());

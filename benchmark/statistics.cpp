@@ -22,7 +22,7 @@ using namespace backlash;
 
 constexpr double kRate = 1e4, kPeriod = 0.1;
 constexpr int kSamples = 100'000;
-const ApdLayout kLayout{60, -0.4, 0.4};
+const diagnosis::ApdLayout kLayout{60, -0.4, 0.4};
 
 const std::vector<double>& signal() {
   static const std::vector<double> values = [] {
@@ -40,12 +40,12 @@ void per_sample(benchmark::State& state) {
 }
 
 void period_analyser(benchmark::State& state) {
-  PeriodAnalyser analyser(kPeriod, kLayout);
+  diagnosis::PeriodAnalyser analyser(kPeriod, kLayout);
   long k = 0;
   double sum = 0;
   for (auto _ : state)
     for (const double value : signal())
-      if (const PeriodResult* period = analyser.add(double(k++) / kRate, value))
+      if (const diagnosis::PeriodResult* period = analyser.add(double(k++) / kRate, value))
         sum += period->apd.skewness();
   benchmark::DoNotOptimize(sum);
   per_sample(state);
@@ -74,20 +74,22 @@ void boost_statistics(benchmark::State& state) {
 
 /// All that the diagnoser does with a sample of four channels until its period ends.
 void sample_stream(benchmark::State& state) {
-  StreamSettings settings;
+  diagnosis::StreamSettings settings;
   settings.apd.emplace();
   settings.apd->period = kPeriod;
   settings.apd->layout = kLayout;
-  settings.apd->signal = Channel::sensor_torque;
+  settings.apd->signal = record::Channel::sensor_torque;
   settings.keep = 5;
-  SampleStream stream(settings);
-  ChannelValues values;
+  diagnosis::SampleStream stream(settings);
+  record::ChannelValues values;
   values.fill(std::nan(""));
   long k = 0, periods = 0;
   for (auto _ : state)
     for (const double value : signal()) {
-      values[std::size_t(Channel::motor_torque)] = values[std::size_t(Channel::motor_position)] = value;
-      values[std::size_t(Channel::motor_velocity)] = values[std::size_t(Channel::sensor_torque)] = value;
+      values[std::size_t(record::Channel::motor_torque)] =
+          values[std::size_t(record::Channel::motor_position)] = value;
+      values[std::size_t(record::Channel::motor_velocity)] =
+          values[std::size_t(record::Channel::sensor_torque)] = value;
       periods += stream.add(double(k++) / kRate, values) != nullptr;
     }
   benchmark::DoNotOptimize(periods);

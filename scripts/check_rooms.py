@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that every room includes only headers of rooms that it may know, and private headers of no other room.
+"""Checks that every room is in its namespace, and includes only headers of rooms that it may know and private headers of
+no other room.
 
 What a room may know is what CMakeLists.txt says: room(NAME KNOWS ROOM... [READS_PRIVATE ROOM]), and all that those know.
 """
@@ -12,6 +13,9 @@ ROOM = re.compile(r"^room\((\w+)((?: KNOWS(?: [a-z_]+)+)?)(?: READS_PRIVATE (\w+
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
+NAMESPACE = re.compile(r"^namespace backlash(\S*) \{", re.MULTILINE)
+SHARED = ("base", "nodes")  # in the outer namespace: the words of all rooms, and mains
+OTHER_NAMES = {"ros": "ros_bridge"}  # backlash::ros would hide ::ros
 PROGRAMS = ("nodes", "tools")  # read private headers of all: nobody links them
 
 
@@ -40,6 +44,15 @@ def room_of_include(name, path, include, src):
     return None
 
 
+def misnamed(path, room, text):
+    """What is wrong with the namespace of a file; None if nothing is. A forward declaration may be of an outer one."""
+    wanted = "" if room in SHARED else "::" + OTHER_NAMES.get(room, room)
+    found = [name for name in NAMESPACE.findall(text) if name != ""] or [""]
+    if all(name == wanted or name.startswith(wanted + "::") for name in found) or "namespace backlash" not in text:
+        return None
+    return "%s: is in backlash%s, its room in backlash%s" % (path, found[0], wanted)
+
+
 def main(cmake_file, include, src):
     known, private = known_rooms(cmake_file)
     problems = []
@@ -47,7 +60,9 @@ def main(cmake_file, include, src):
         for folder, _, names in os.walk(root):
             for path in (os.path.join(folder, name) for name in names if name.endswith((".h", ".cpp"))):
                 room = os.path.relpath(path, root).split(os.sep)[0]
-                for name in INCLUDE.findall(open(path).read()):
+                text = open(path).read()
+                problems += filter(None, [misnamed(path, room, text)])
+                for name in INCLUDE.findall(text):
                     target = room_of_include(name, path, include, src)
                     if target is None:
                         continue

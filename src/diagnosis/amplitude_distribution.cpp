@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 ApdLayout read_apd_layout(const YamlReader& yaml) {
   ApdLayout layout;
@@ -84,4 +84,4 @@ double RunningMoments::standard_deviation() const {
   return std::sqrt(std::max(0.0, squares_ / n - mean * mean));
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/quadratic.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr int kCellsPerSigma = 4;  // of the grid on which distributions are summed
@@ -153,9 +153,10 @@ std::vector<std::pair<double, double>> FamilyDistance::within(std::size_t segmen
   for (std::size_t phase = 0; phase < phases_; ++phase) {
     const Parabola& p = parabolas_[segment * phases_ + phase];
     if (p.at(p.lowest()) > limit) continue;  // most
-    for (const auto& interval : quadratic_at_most_zero(p.a, p.b, p.c - limit)) all.push_back(interval);
+    for (const auto& interval : signal::quadratic_at_most_zero(p.a, p.b, p.c - limit))
+      all.push_back(interval);
   }
   return all;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -3,7 +3,7 @@
 
 #include <fmt/core.h>
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 Estimate answer(const FamilyMatch& match, const MonitoringCurve& curve, std::size_t periods) {
@@ -44,4 +44,4 @@ Estimate estimate_apd_shape(const ApdResult& apd, const CurveMatch& match, const
   return estimate;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kNoiseExcess = 1.2;  // noise estimate over the largest on the curve that may be by chance
@@ -25,10 +25,10 @@ std::string mismatch(const char* what, double value, double reference, const cha
 }
 
 /// `noise`: standard deviation of that of motor_torque.
-std::string excitation_mismatch(const Record& record, const CurveConditions& made, double noise) {
-  const std::vector<double>& torque = record.column(Channel::motor_torque);
+std::string excitation_mismatch(const record::Record& record, const CurveConditions& made, double noise) {
+  const std::vector<double>& torque = record.column(record::Channel::motor_torque);
   if (torque.empty()) return {};
-  if (peak_to_peak(torque) <= 0.05 * made.amplitude)
+  if (signal::peak_to_peak(torque) <= 0.05 * made.amplitude)
     return "motor_torque is constant: there is no excitation";
   // A level that a tenth of the time is exceeded stands for the amplitude: a few spikes or noise do not
   // change it.
@@ -41,16 +41,16 @@ std::string excitation_mismatch(const Record& record, const CurveConditions& mad
   const double largest = *std::max_element(magnitude.begin(), magnitude.end());
   if (largest < 0.95 * made.amplitude)
     return mismatch("excitation amplitude", largest, made.amplitude, "N m");
-  const double often = quantile(std::move(magnitude), 0.9);
+  const double often = signal::quantile(std::move(magnitude), 0.9);
   if (often > 1.1 * made.amplitude + kOftenNoise * noise)
     return mismatch("excitation amplitude", often, made.amplitude, "N m");
   return {};
 }
 
-std::string motion_mismatch(const Record& record, const MonitoringCurve& curve) {
+std::string motion_mismatch(const record::Record& record, const MonitoringCurve& curve) {
   if (!curve.conditions.output_locked) return {};
-  const double load = peak_to_peak(record.column(Channel::load_position));
-  const double travel = travel_of(record.column(Channel::motor_position));
+  const double load = signal::peak_to_peak(record.column(record::Channel::load_position));
+  const double travel = travel_of(record.column(record::Channel::motor_position));
   if (load > 0.05 * curve.conditions.motor_travel)
     return fmt::format("the output moves by {:.4g} rad, the rig says it is locked", load);
   if (travel > 1.05 * curve.conditions.motor_travel)
@@ -70,10 +70,11 @@ std::pair<double, double> signal_levels(const MonitoringCurve& curve) {
 }
 
 /// Level of the signal: with the output locked it follows the torque, whether that was recorded or not.
-std::string level_mismatch(const Record& record, const ApdSettings& settings, const MonitoringCurve& curve) {
+std::string level_mismatch(const record::Record& record, const ApdSettings& settings,
+                           const MonitoringCurve& curve) {
   const auto [low, high] = signal_levels(curve);
   const double level = signal_level(record.column(settings.signal));
-  const char* unit = channel_unit(settings.signal);
+  const char* unit = record::channel_unit(settings.signal);
   if (level < 0.88 * low) return mismatch("signal level (median magnitude)", level, low, unit);
   if (level > 1.12 * high) return mismatch("signal level (median magnitude)", level, high, unit);
   return {};
@@ -82,17 +83,18 @@ std::string level_mismatch(const Record& record, const ApdSettings& settings, co
 }  // namespace
 
 double travel_of(const std::vector<double>& position) {
-  return quantile(position, 0.95) - quantile(position, 0.05);
+  return signal::quantile(position, 0.95) - signal::quantile(position, 0.05);
 }
 
-double excitation_period(const Record& record, Channel signal) {
-  const Channel source = record.has(Channel::motor_torque) ? Channel::motor_torque : signal;
+double excitation_period(const record::Record& record, record::Channel signal) {
+  const record::Channel source =
+      record.has(record::Channel::motor_torque) ? record::Channel::motor_torque : signal;
   if (!record.has(source)) return 0;
   return detect_period(record.time, record.column(source)).value_or(0);
 }
 
 ApdResult analyse_apd(const PeriodWindow& window, const ApdSettings& settings) {
-  const Record& record = window.record;
+  const record::Record& record = window.record;
   ApdResult result;
   result.total = AmplitudeDistribution(settings.layout);
   result.period = window.period;
@@ -112,7 +114,7 @@ ApdResult analyse_apd(const PeriodWindow& window, const ApdSettings& settings) {
   const double interval = record.sampling_interval();
   if (interval > 0) {
     const double samples_per_period = result.period / interval;
-    result.noise_range = estimate_noise(record.column(settings.signal), samples_per_period);
+    result.noise_range = signal::estimate_noise(record.column(settings.signal), samples_per_period);
     if (static_cast<double>(record.size()) >= 2 * samples_per_period) result.noise = result.noise_range.upper;
   }
   return result;
@@ -120,8 +122,8 @@ ApdResult analyse_apd(const PeriodWindow& window, const ApdSettings& settings) {
 
 namespace {
 
-std::string frequency_mismatch(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                               const CurveConditions& made) {
+std::string frequency_mismatch(const record::Record& record, const ApdResult& apd,
+                               const ApdSettings& settings, const CurveConditions& made) {
   if (!(made.frequency > 0) || apd.periods.size() < 2) return {};
   const double period = excitation_period(record, settings.signal);
   if (!(period > 0)) return "no excitation period found in the record";
@@ -134,13 +136,15 @@ std::string noise_mismatch(const ApdResult& apd, const ApdSettings& settings, co
   if (!(apd.noise > kNoiseExcess * curve.noise_levels.back())) return {};
   return fmt::format(
       "sensor noise is {0:.4g} {2} (standard deviation), the curve covers noise up to {1:.4g} {2}", apd.noise,
-      curve.noise_levels.back(), channel_unit(settings.signal));
+      curve.noise_levels.back(), record::channel_unit(settings.signal));
 }
 
 /// Whether the record is of the kind that the curve is for.
-std::string kind_mismatch(const Record& record, const ApdSettings& settings, const CurveConditions& made) {
-  if (made.signal != channel_name(settings.signal))
-    return "the curve is for the signal " + made.signal + ", not for " + channel_name(settings.signal);
+std::string kind_mismatch(const record::Record& record, const ApdSettings& settings,
+                          const CurveConditions& made) {
+  if (made.signal != record::channel_name(settings.signal))
+    return "the curve is for the signal " + made.signal + ", not for " +
+           record::channel_name(settings.signal);
   if (!(made.apd == settings.layout)) return "the curve was made with another class layout of the APD";
   const double interval = record.sampling_interval();
   if (!(interval > 0) || differs(1 / interval, made.sampling_rate, 0.02))
@@ -148,22 +152,22 @@ std::string kind_mismatch(const Record& record, const ApdSettings& settings, con
   return {};
 }
 
-double torque_noise(const Record& record, const CurveConditions& made) {
+double torque_noise(const record::Record& record, const CurveConditions& made) {
   const double per_period = made.frequency > 0 ? 1 / (made.frequency * record.sampling_interval()) : 0;
-  const double noise = estimate_noise(record.column(Channel::motor_torque), per_period).lower;
+  const double noise = signal::estimate_noise(record.column(record::Channel::motor_torque), per_period).lower;
   return std::isnan(noise) ? 0 : noise;
 }
 
 }  // namespace
 
-std::optional<Mismatch> out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                                      const MonitoringCurve& curve) {
+std::optional<Mismatch> out_of_domain(const record::Record& record, const ApdResult& apd,
+                                      const ApdSettings& settings, const MonitoringCurve& curve) {
   using Concern = Mismatch::Concern;
   const CurveConditions& made = curve.conditions;
   const std::vector<double>& signal = record.column(settings.signal);
   std::string reason = kind_mismatch(record, settings, made);
   if (!reason.empty()) return Mismatch{Concern::curve, reason};
-  if (peak_to_peak(signal) <= 0.05 * signal_levels(curve).second)
+  if (signal::peak_to_peak(signal) <= 0.05 * signal_levels(curve).second)
     return Mismatch{Concern::signal,
                     "the signal does not move: there is no excitation, or the sensor is dead"};
   reason = excitation_mismatch(record, made, torque_noise(record, made));
@@ -191,10 +195,11 @@ Estimate refuse(Status status, const std::string& reason) {
 }
 
 /// `mismatch` is set where the reason is a condition of the curve.
-std::optional<Estimate> refusal(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                                const MonitoringCurve* curve, std::optional<Mismatch>& mismatch) {
+std::optional<Estimate> refusal(const record::Record& record, const ApdResult& apd,
+                                const ApdSettings& settings, const MonitoringCurve* curve,
+                                std::optional<Mismatch>& mismatch) {
   if (!record.has(settings.signal))
-    return refuse(Status::insufficient_data, "the record has no " + channel_name(settings.signal));
+    return refuse(Status::insufficient_data, "the record has no " + record::channel_name(settings.signal));
   if (!curve) return refuse(Status::insufficient_data, "no monitoring curve");
   const std::string lacking = "no complete excitation period";
   const double expected = curve->conditions.frequency > 0 ? 1 / curve->conditions.frequency : apd.period;
@@ -212,7 +217,7 @@ std::optional<Estimate> refusal(const Record& record, const ApdResult& apd, cons
 }
 
 /// Samples of the complete periods.
-std::vector<double> samples_of(const Record& record, const ApdResult& apd, Channel signal) {
+std::vector<double> samples_of(const record::Record& record, const ApdResult& apd, record::Channel signal) {
   std::vector<double> samples;
   const std::vector<double>& values = record.column(signal);
   std::size_t i = 0;
@@ -226,12 +231,12 @@ std::vector<double> samples_of(const Record& record, const ApdResult& apd, Chann
 
 }  // namespace
 
-CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+CurveMatch match_curve(const record::Record& record, const ApdResult& apd, const ApdSettings& settings,
                        const MonitoringCurve* curve) {
   CurveMatch match;
   match.refused = refusal(record, apd, settings, curve, match.mismatch);
   std::vector<double> samples = samples_of(record, apd, settings.signal);
-  match.noise = with_standard_error(apd.noise_range, samples.size());
+  match.noise = signal::with_standard_error(apd.noise_range, samples.size());
   if (match.refused || !curve->family) return match;
   match.family = match_family(*curve, std::move(samples), match.noise);
   if (match.family->fits_no_member()) {
@@ -260,4 +265,4 @@ Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, co
   return estimate;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

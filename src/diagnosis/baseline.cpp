@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr int kSchema = 1;
@@ -112,4 +112,4 @@ std::string check_baseline(const Baseline& baseline, const std::string& rig, con
   return "the baseline " + printable(source, 4096) + " was taken with another version of the rig file";
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

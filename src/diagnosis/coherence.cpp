@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "refusal.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kFewestAverages = 16;
@@ -37,14 +37,14 @@ void check(const CoherenceSettings& s) {
   require(s.baseline->deviation >= 0, "baseline.deviation", s.baseline->deviation, "must be >= 0");
 }
 
-int differences(Channel channel) {
+int differences(record::Channel channel) {
   switch (channel) {
-    case Channel::motor_position:
-    case Channel::load_position:
-    case Channel::reference_position:
+    case record::Channel::motor_position:
+    case record::Channel::load_position:
+    case record::Channel::reference_position:
       return 2;
-    case Channel::motor_velocity:
-    case Channel::load_velocity:
+    case record::Channel::motor_velocity:
+    case record::Channel::load_velocity:
       return 1;
     default:
       return 0;
@@ -56,13 +56,13 @@ struct Signals {
   double rate = 0;
 };
 
-Signals collect(const Record& record, const CoherenceSettings& settings) {
-  for (const Channel channel : {Channel::motor_torque, settings.response})
+Signals collect(const record::Record& record, const CoherenceSettings& settings) {
+  for (const record::Channel channel : {record::Channel::motor_torque, settings.response})
     if (!record.has(channel))
-      throw Refusal{Status::insufficient_data, "the record has no " + channel_name(channel)};
+      throw Refusal{Status::insufficient_data, "the record has no " + record::channel_name(channel)};
   Signals signals;
   const double interval = record.sampling_interval();
-  signals.torque = record.column(Channel::motor_torque);
+  signals.torque = record.column(record::Channel::motor_torque);
   signals.response = record.column(settings.response);
   for (std::size_t i = 0; i < record.size(); ++i) {
     if (!std::isfinite(signals.torque[i]) || !std::isfinite(signals.response[i]))
@@ -131,8 +131,8 @@ Band excited_band(const CoherenceSpectrum& spectrum, const CoherenceSettings& se
   return band;
 }
 
-void require_random(const Record& record) {
-  const std::vector<double>& torque = record.column(Channel::motor_torque);
+void require_random(const record::Record& record) {
+  const std::vector<double>& torque = record.column(record::Channel::motor_torque);
   const double k = kurtosis(torque);
   if (k < kKurtosisLow || k > kKurtosisHigh)
     throw Refusal{
@@ -154,7 +154,7 @@ void judge(const CoherenceSettings& settings, CoherenceDetection& found) {
     found.message += "; without a baseline of the healthy machine no finding";
     return;
   }
-  const double half = kNormalQuantile975 * std::hypot(found.deviation, settings.baseline->deviation);
+  const double half = signal::kNormalQuantile975 * std::hypot(found.deviation, settings.baseline->deviation);
   found.index = found.loss - settings.baseline->loss;
   found.index_lower = found.index - half;
   found.index_upper = found.index + half;
@@ -169,7 +169,7 @@ void judge(const CoherenceSettings& settings, CoherenceDetection& found) {
   found.message += fmt::format("{:.4g} +- {:.4g}", found.index, half);
 }
 
-void fill(const Record& record, const CoherenceSettings& settings, CoherenceDetection& found) {
+void fill(const record::Record& record, const CoherenceSettings& settings, CoherenceDetection& found) {
   const Signals signals = collect(record, settings);
   require_random(record);
   const auto segment = 2 * static_cast<std::size_t>(std::lround(0.5 * settings.segment * signals.rate));
@@ -192,7 +192,7 @@ void fill(const Record& record, const CoherenceSettings& settings, CoherenceDete
     variance += 2 * (1 - missing) * missing * missing / n / lines;
   }
   found.loss = std::min(1.0, loss);
-  found.deviation = std::sqrt(variance * kHannLines / lines);
+  found.deviation = std::sqrt(variance * signal::kHannLines / lines);
   judge(settings, found);
 }
 
@@ -200,7 +200,7 @@ void fill(const Record& record, const CoherenceSettings& settings, CoherenceDete
 
 CoherenceSpectrum estimate_coherence(const std::vector<double>& x, const std::vector<double>& y, double rate,
                                      std::size_t segment) {
-  const WelchSpectra spectra = welch(x, y, 1 / rate, segment);
+  const signal::WelchSpectra spectra = signal::welch(x, y, 1 / rate, segment);
   CoherenceSpectrum spectrum;
   spectrum.averages = spectra.averages;
   spectrum.significance = 1 - std::pow(0.05, 1 / (spectrum.averages - 1));
@@ -212,7 +212,7 @@ CoherenceSpectrum estimate_coherence(const std::vector<double>& x, const std::ve
   return spectrum;
 }
 
-CoherenceDetection detect_nonlinearity(const Record& record, const CoherenceSettings& settings) {
+CoherenceDetection detect_nonlinearity(const record::Record& record, const CoherenceSettings& settings) {
   check(settings);
   CoherenceDetection found;
   try {
@@ -224,4 +224,4 @@ CoherenceDetection detect_nonlinearity(const Record& record, const CoherenceSett
   return found;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

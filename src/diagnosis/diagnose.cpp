@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/diagnosis/apd_shape.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 Estimate not_served(const std::string& reason) {
@@ -20,9 +20,9 @@ Estimate not_served(const std::string& reason) {
 ApdSettings read_apd(const YamlReader& yaml) {
   ApdSettings apd;
   std::vector<std::string> names;
-  names.reserve(kChannels.size());
-  for (Channel channel : kChannels) names.push_back(channel_name(channel));
-  apd.signal = channel_from_name(yaml.choice("signal", names));
+  names.reserve(record::kChannels.size());
+  for (record::Channel channel : record::kChannels) names.push_back(record::channel_name(channel));
+  apd.signal = record::channel_from_name(yaml.choice("signal", names));
   apd.period = yaml.number_or("period", 0, Range::positive());
   apd.settling_periods = static_cast<int>(yaml.integer("settling_periods", 0, 1'000'000));
   apd.layout = read_apd_layout(yaml);
@@ -61,7 +61,7 @@ Estimate by_momentum_transfer(const DiagnosisInput& in) {
 CoherenceSettings read_coherence(const YamlReader& yaml) {
   CoherenceSettings coherence;
   coherence.segment = yaml.number("segment", Range::positive());
-  coherence.response = channel_from_name(yaml.choice(
+  coherence.response = record::channel_from_name(yaml.choice(
       "response", {"motor_velocity", "motor_position", "load_velocity", "load_position", "acceleration"}));
   coherence.lower = yaml.number_or("lower", kNaN, Range::positive());
   coherence.upper = yaml.number_or("upper", kNaN, Range::positive());
@@ -116,8 +116,9 @@ bool needs_curve(const std::string& method) {
   return false;
 }
 
-Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
-                   const std::optional<Baseline>& baseline, const std::string& method) {
+Diagnosis diagnose(const record::Record& record, const DiagnosisSettings& settings,
+                   const MonitoringCurve* curve, const std::optional<Baseline>& baseline,
+                   const std::string& method) {
   const PeriodWindow window =
       settings.apd ? cut_periods(record, settings.apd) : PeriodWindow{record, 0, 0, {}};
   return diagnose(window, settings, curve, baseline, method);
@@ -126,7 +127,7 @@ Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, cons
 Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings,
                    const MonitoringCurve* curve, const std::optional<Baseline>& baseline,
                    const std::string& method) {
-  const Record& record = window.record;
+  const record::Record& record = window.record;
   const auto& methods = diagnosis_methods();
   if (!method.empty() && std::find(methods.begin(), methods.end(), method) == methods.end())
     throw InvalidParameter("method", method, "must be one of " + joined(methods));
@@ -147,4 +148,4 @@ Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings
   return diagnosis;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

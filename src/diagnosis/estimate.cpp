@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr std::array<std::pair<Status, const char*>, 6> kNames = {
@@ -34,4 +34,4 @@ Status status_from_string(const std::string& text) {
       "status", text, "must be ok, below_range, above_range, out_of_domain, insufficient_data or ambiguous");
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

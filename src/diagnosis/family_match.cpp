@@ -7,13 +7,13 @@
 #include <memory>
 #include <utility>
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr int kMostNoises = 5;       // where only bounds of the noise are known
 constexpr double kNoiseRatio = 1.2;  // of neighbours among them, if that needs no more
 
-std::vector<double> noises_of(const NoiseRange& range, const std::vector<double>& levels) {
+std::vector<double> noises_of(const signal::NoiseRange& range, const std::vector<double>& levels) {
   const double upper = std::min(std::isnan(range.upper) ? levels.back() : range.upper, levels.back());
   const double lower = std::min(range.lower, upper);
   if (lower == upper) return {upper};
@@ -64,7 +64,8 @@ void accept(const MonitoringCurve& curve, const FamilyDistance& fit, double nois
 
 }  // namespace
 
-FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> samples, const NoiseRange& noise) {
+FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> samples,
+                         const signal::NoiseRange& noise) {
   const Quantiles observed = quantiles_of(std::move(samples));
   std::vector<std::pair<double, FamilyDistance>> fits;  // by noise
   std::shared_ptr<const NoisyFamily> family;
@@ -87,4 +88,4 @@ FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> sampl
   return match;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

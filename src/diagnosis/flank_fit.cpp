@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 using Eigen::MatrixXd;
@@ -134,13 +134,13 @@ void Fitter::choose_outermost() {
     MatrixXd line(n_, 2);
     line.col(0).setOnes();
     line.col(1) = Eigen::Map<const VectorXd>(w_.load.data(), n_);
-    x -= line * solve_least_squares(line, phi_).x;
+    x -= line * signal::solve_least_squares(line, phi_).x;
   }
   const std::vector<double> values(x.data(), x.data() + n_);
-  const double middle = 0.5 * (quantile(values, 0.1) + quantile(values, 0.9));
+  const double middle = 0.5 * (signal::quantile(values, 0.1) + signal::quantile(values, 0.9));
   std::vector<double> away;
   for (const double v : values) away.push_back(std::abs(v - middle));
-  const double least = quantile(away, 1 - kOutermost);
+  const double least = signal::quantile(away, 1 - kOutermost);
   use_.assign(n_, 0);
   side_.resize(n_);
   for (Eigen::Index i = 0; i < n_; ++i) {
@@ -182,7 +182,7 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
       Eigen::Map<const Eigen::Array<char, Eigen::Dynamic, 1>>(use_.data(), n_).cast<double>();
   const double count = used.sum();
   used_.noalias() = used.asDiagonal() * a_;
-  MatrixXd normal = transposed_product(used_, a_);
+  MatrixXd normal = signal::transposed_product(used_, a_);
   VectorXd right = used_.transpose() * phi_;
   const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
   // A declaration is worth one window per its own variance times what a correlated record repeats itself.
@@ -201,13 +201,13 @@ void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   // Scaled to unit diagonal: the columns are of different units.
   const VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
   const MatrixXd equal = unit.asDiagonal() * normal * unit.asDiagonal();
-  inverse_ = unit.asDiagonal() * symmetric_inverse(equal) * unit.asDiagonal();
+  inverse_ = unit.asDiagonal() * signal::symmetric_inverse(equal) * unit.asDiagonal();
   p_ = inverse_ * right;
   residual_ = phi_ - a_ * p_;
   std::vector<double> sizes;
   for (Eigen::Index i = 0; i < n_; ++i)
     if (use_[i]) sizes.push_back(std::abs(residual_[i]));
-  sigma_ = kNormalPerMedianDeviation * median(sizes);
+  sigma_ = signal::kNormalPerMedianDeviation * signal::median(sizes);
 }
 
 /// J, d, C for the next linearisation.
@@ -388,4 +388,4 @@ FlankFit fit_flanks(const FlankWindows& windows, const FlankModel& model) {
   return Fitter(windows, model).fit();
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

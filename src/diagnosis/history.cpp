@@ -18,7 +18,7 @@
 #include "history_line.h"
 #include "history_parts.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -184,4 +184,4 @@ void History::append(const HistoryEntry& entry) {
   write(line);
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

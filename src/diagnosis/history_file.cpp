@@ -11,7 +11,7 @@
 #include "history_line.h"
 #include "history_parts.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 std::string content_of(const std::string& path) {
@@ -75,4 +75,4 @@ HistoryFile read_history(const std::string& path) {
   return history;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

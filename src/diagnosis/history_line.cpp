@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/utc.h"
 #include "backlash_diagnosis/diagnosis/verdict.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 const char* const kEstimateEvent = "estimate";
 const char* const kBaselineEvent = "baseline";
@@ -100,4 +100,4 @@ HistoryEntry entry_from_line(std::string_view line, const std::string& where) {
   return entry;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/diagnosis/history.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 extern const std::string kHistoryHeader;  // without newline
 
@@ -17,4 +17,4 @@ std::string to_line(const HistoryEntry& entry);
 /// Throws BadData with `where` in front.
 HistoryEntry entry_from_line(std::string_view line, const std::string& where);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

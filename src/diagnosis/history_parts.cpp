@@ -5,7 +5,7 @@
 #include <charconv>
 #include <filesystem>
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -36,4 +36,4 @@ std::vector<HistoryPart> history_parts(const std::string& path) {
   return parts;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct HistoryPart {
   std::uintmax_t number = 0;
@@ -16,4 +16,4 @@ struct HistoryPart {
 /// By rising number; none where the folder cannot be read.
 std::vector<HistoryPart> history_parts(const std::string& path);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

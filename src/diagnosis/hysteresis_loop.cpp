@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr std::size_t kPositions =
@@ -51,7 +51,7 @@ Characteristic find_characteristic(const LockedMotion& motion, const std::vector
   Characteristic characteristic;
   for (std::size_t i = 0; i < kPositions; ++i) {
     if (up[i].empty() || down[i].empty()) continue;
-    const double rising = median(up[i]), falling = median(down[i]);
+    const double rising = signal::median(up[i]), falling = signal::median(down[i]);
     characteristic.position.push_back(positions[i]);
     characteristic.middle.push_back(0.5 * (rising + falling));
     characteristic.half_width.push_back(0.5 * (rising - falling));
@@ -106,7 +106,7 @@ HysteresisLoop analyse_hysteresis(const LockedMotion& motion, const std::vector<
     loop.missing = "the hysteresis loop is not passed in both directions";
     return loop;
   }
-  loop.components.coulomb = std::max(0.0, median(inner));
+  loop.components.coulomb = std::max(0.0, signal::median(inner));
   const Flank positive = fit_flank(characteristic, 1), negative = fit_flank(characteristic, -1);
   if (std::isnan(positive.start) || std::isnan(negative.start)) {
     loop.missing =
@@ -116,10 +116,10 @@ HysteresisLoop analyse_hysteresis(const LockedMotion& motion, const std::vector<
   }
   std::vector<double> flank_widths = positive.half_width;
   flank_widths.insert(flank_widths.end(), negative.half_width.begin(), negative.half_width.end());
-  loop.flank_friction = std::max(0.0, median(flank_widths));
+  loop.flank_friction = std::max(0.0, signal::median(flank_widths));
   loop.components.compliance = 0.5 * (positive.compliance + negative.compliance);
   loop.components.gap = std::max(0.0, positive.start - negative.start);
   return loop;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 void require_increasing(const Limits& limits) {
   const auto require = [](const char* name, double value, double above, const char* limit) {
@@ -44,4 +44,4 @@ void check_limits(const Limits& limits, bool angular_machine, const std::string&
     throw BadData(source, "a rig without base_radius needs limits of backlash_angle");
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

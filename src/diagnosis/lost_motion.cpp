@@ -18,7 +18,7 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kReached = 0.95;         // torque counts as reached from this fraction of the stated level
@@ -59,13 +59,14 @@ void check(const LostMotionSettings& settings) {
 }
 
 double travel(const std::vector<double>& values) {
-  return quantile_range(values, 0.01);
+  return signal::quantile_range(values, 0.01);
 }
 
-LockedMotion collect(const Record& record, const LostMotionSettings& settings) {
-  const std::vector<double>& position = record.column(Channel::motor_position);
-  const bool motor = record.has(Channel::motor_torque);
-  const std::vector<double>& torque = record.column(motor ? Channel::motor_torque : Channel::sensor_torque);
+LockedMotion collect(const record::Record& record, const LostMotionSettings& settings) {
+  const std::vector<double>& position = record.column(record::Channel::motor_position);
+  const bool motor = record.has(record::Channel::motor_torque);
+  const std::vector<double>& torque =
+      record.column(motor ? record::Channel::motor_torque : record::Channel::sensor_torque);
   if (position.empty()) throw Refusal{Status::insufficient_data, "the record has no motor_position"};
   if (torque.empty())
     throw Refusal{Status::insufficient_data, "the record has neither motor_torque nor sensor_torque"};
@@ -79,7 +80,7 @@ LockedMotion collect(const Record& record, const LostMotionSettings& settings) {
   if (motion.time.empty()) throw Refusal{Status::insufficient_data, "the record has no finite samples"};
 
   std::vector<double> load;
-  for (const double value : record.column(Channel::load_position)) {
+  for (const double value : record.column(record::Channel::load_position)) {
     if (std::isfinite(value)) load.push_back(value);
   }
   if (!load.empty()) {
@@ -105,7 +106,7 @@ struct Walls {
 
 // Torque reached on the negative and on the positive side; the percentile leaves out peaks of noise.
 std::array<double, 2> reached_torque(const LockedMotion& motion, double fraction) {
-  return {-quantile(motion.torque, 1 - fraction), quantile(motion.torque, fraction)};
+  return {-signal::quantile(motion.torque, 1 - fraction), signal::quantile(motion.torque, fraction)};
 }
 
 std::array<std::size_t, 2> count_sides(const std::vector<TorqueExcursion>& excursions) {
@@ -224,7 +225,7 @@ Parts find_parts(LockedMotion motion, const Walls& walls, const LostMotionSettin
   for (const WallReading& reading : walls.readings) {
     positions[reading.side > 0].push_back(reading.position - drift * (reading.time - motion.time[0]));
   }
-  const double lower = median(positions[0]), upper = median(positions[1]);
+  const double lower = signal::median(positions[0]), upper = signal::median(positions[1]);
   if (!(lower < upper)) {
     parts.missing = "the walls scatter more than they are apart, so the hysteresis loop has no parts";
     return parts;
@@ -252,7 +253,7 @@ std::string describe(const Walls& walls, const LostMotionSettings& settings, con
   return message;
 }
 
-void fill(const Record& record, const LostMotionSettings& settings, Estimate& estimate) {
+void fill(const record::Record& record, const LostMotionSettings& settings, Estimate& estimate) {
   const LockedMotion motion = collect(record, settings);
   const Walls walls = read_walls(motion, settings);
   const double torque = median_of(walls.readings, &WallReading::torque);
@@ -264,14 +265,14 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
   }
   const std::vector<double> deflections = deflections_of(walls, settings, exceeds);
   const WallToWall play = measure_wall_to_wall(motion, walls.readings, deflections, walls.switched);
-  require_rest(play, settings.subtract_elastic_deflection ? median(deflections) : 0);
-  if (!record.has(Channel::motor_torque)) require_calm_sensor(motion, walls, play);
+  require_rest(play, settings.subtract_elastic_deflection ? signal::median(deflections) : 0);
+  if (!record.has(record::Channel::motor_torque)) require_calm_sensor(motion, walls, play);
   if (!(play.travel > 0)) {
     throw Refusal{Status::out_of_domain,
                   "positive torque moves the motor to smaller positions, or not at all"};
   }
   const Parts parts = find_parts(motion, walls, settings, play);
-  double elastic = 2 * settings.elastic_uncertainty * std::abs(median(deflections));
+  double elastic = 2 * settings.elastic_uncertainty * std::abs(signal::median(deflections));
   if (settings.subtract_elastic_deflection && parts.flank_friction > 0) {
     // Friction carries part of the torque, so the flank may hold less than the motor gives.
     const double carried = std::max(0.0, torque - parts.flank_friction);
@@ -298,9 +299,9 @@ void fill(const Record& record, const LostMotionSettings& settings, Estimate& es
 
 }  // namespace
 
-Estimate estimate_lost_motion(const Record& record, const LostMotionSettings& settings) {
+Estimate estimate_lost_motion(const record::Record& record, const LostMotionSettings& settings) {
   check(settings);
   return estimate_or_refusal("lost_motion", [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

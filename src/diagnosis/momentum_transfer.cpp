@@ -15,7 +15,7 @@
 #include "backlash_diagnosis/signal/robust.h"
 #include "refusal.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kLockedTravel = 0.05;  // of the motor's travel
@@ -122,13 +122,13 @@ Motor motor_side(std::vector<double> torque, const std::vector<double>& measured
   return motor;
 }
 
-Motor collect(const Record& record, const MomentumTransferSettings& settings) {
+Motor collect(const record::Record& record, const MomentumTransferSettings& settings) {
   const auto refuse = [](const std::string& reason) { throw Refusal{Status::insufficient_data, reason}; };
-  if (!record.has(Channel::motor_torque)) refuse("the record has no motor_torque");
-  const bool tachometer = record.has(Channel::motor_velocity);
-  if (!tachometer && !record.has(Channel::motor_position))
+  if (!record.has(record::Channel::motor_torque)) refuse("the record has no motor_torque");
+  const bool tachometer = record.has(record::Channel::motor_velocity);
+  if (!tachometer && !record.has(record::Channel::motor_position))
     refuse("the record has neither motor_velocity nor motor_position");
-  if (!settings.output_locked && !record.has(Channel::load_position))
+  if (!settings.output_locked && !record.has(record::Channel::load_position))
     refuse("the load is free and the record has no load_position");
   if (record.size() < kFewestSamples)
     refuse("the record has only " + std::to_string(record.size()) + " samples");
@@ -136,12 +136,13 @@ Motor collect(const Record& record, const MomentumTransferSettings& settings) {
   for (std::size_t i = 1; i < record.size(); ++i)
     if (std::abs(record.time[i] - record.time[i - 1] - interval) > 0.5 * interval)
       throw Refusal{Status::out_of_domain, "the samples are not equidistant"};
-  Motor motor = motor_side(record.column(Channel::motor_torque),
-                           record.column(tachometer ? Channel::motor_velocity : Channel::motor_position),
-                           tachometer, interval);
-  if (settings.output_locked && record.has(Channel::load_position)) {
-    const auto travel = [](const std::vector<double>& x) { return quantile_range(x, 0.01); };
-    const double moved = settings.load_ratio * travel(record.column(Channel::load_position));
+  Motor motor = motor_side(
+      record.column(record::Channel::motor_torque),
+      record.column(tachometer ? record::Channel::motor_velocity : record::Channel::motor_position),
+      tachometer, interval);
+  if (settings.output_locked && record.has(record::Channel::load_position)) {
+    const auto travel = [](const std::vector<double>& x) { return signal::quantile_range(x, 0.01); };
+    const double moved = settings.load_ratio * travel(record.column(record::Channel::load_position));
     if (moved > kLockedTravel * travel(motor.position))
       throw Refusal{
           Status::out_of_domain,
@@ -150,7 +151,7 @@ Motor collect(const Record& record, const MomentumTransferSettings& settings) {
   motor.load.assign(record.size(), 0.0);
   if (!settings.output_locked)
     for (std::size_t i = 0; i < record.size(); ++i)
-      motor.load[i] = settings.load_ratio * record.column(Channel::load_position)[i];
+      motor.load[i] = settings.load_ratio * record.column(record::Channel::load_position)[i];
   for (const auto* column : {&motor.torque, &motor.speed, &motor.position, &motor.load})
     for (const double value : *column)
       if (!std::isfinite(value))
@@ -295,17 +296,17 @@ Flank calm_flank(const Motor& motor, bool tachometer, const MomentumTransferSett
   const double dt = motor.interval;
   const double longest =
       flexible(s) ? std::max(2.0, kLongestAverage * internal_cycle(s) / dt) : kRigidAverage;
-  const double torque = noise_from_differences(motor.torque, 4);
+  const double torque = signal::noise_from_differences(motor.torque, 4);
   const std::vector<double>& measured = tachometer ? motor.speed : motor.position;
-  const double motion =
-      std::max(noise_from_differences(measured, 4), smallest_step(measured) / std::sqrt(12.0));
+  const double motion = std::max(signal::noise_from_differences(measured, 4),
+                                 signal::smallest_step(measured) / std::sqrt(12.0));
   Flank flank;
   for (flank.half = 2; static_cast<double>(flank.half) <= longest; ++flank.half) {
     flank.pinion = reconstruct(motor, s, flank.half);
     flank.torque = flank_torque(flank.pinion, inertia_at_flank(s), dt, flank.half);
     std::vector<double> sizes;
     for (const double f : flank.torque) sizes.push_back(std::abs(f));
-    flank.level = median(std::move(sizes));
+    flank.level = signal::median(std::move(sizes));
     flank.noise = std::hypot(torque * noise_gain(true, tachometer, dt, flank.half, s),
                              motion * noise_gain(false, tachometer, dt, flank.half, s));
     if (kNoiseFree * flank.noise < 0.5 * flank.level) return flank;
@@ -315,7 +316,7 @@ Flank calm_flank(const Motor& motor, bool tachometer, const MomentumTransferSett
                                                    flank.level, flank.noise)};
 }
 
-void fill(const Record& record, const MomentumTransferSettings& s, Estimate& estimate) {
+void fill(const record::Record& record, const MomentumTransferSettings& s, Estimate& estimate) {
   const Motor motor = collect(record, s);
   const double cycle = internal_cycle(s);
   if (cycle > 0 && cycle < kSamplesPerCycle * motor.interval)
@@ -323,7 +324,7 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
                   fmt::format("sampled at {:.4g} Hz, but motor and pinion swing against each other at {:.4g} "
                               "Hz: needed are {:.4g} samples per cycle",
                               1 / motor.interval, 1 / cycle, kSamplesPerCycle)};
-  const Flank flank = calm_flank(motor, record.has(Channel::motor_velocity), s);
+  const Flank flank = calm_flank(motor, record.has(record::Channel::motor_velocity), s);
   const double shortness =
       shortness_of_impacts(flank.level, static_cast<double>(flank.half) * motor.interval, s);
   const std::vector<Crossing> crossings = find_crossings(flank.torque, flank.level, flank.half, shortness);
@@ -351,11 +352,12 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
     elastic.push_back(deflection);
     speeds.push_back(std::abs(at(motor.speed, c.impact)));
   }
-  const RobustScale scale = robust_scale(gaps, 0);
-  const double scatter = student_t_quantile(0.975, std::max(1.0, static_cast<double>(gaps.size()) - 1)) *
-                         1.25 * scale.deviation / std::sqrt(static_cast<double>(gaps.size()));
-  const double half = std::sqrt(scatter * scatter + std::pow(median(timing), 2) +
-                                std::pow(kElasticShare * median(elastic), 2));
+  const signal::RobustScale scale = signal::robust_scale(gaps, 0);
+  const double scatter =
+      signal::student_t_quantile(0.975, std::max(1.0, static_cast<double>(gaps.size()) - 1)) * 1.25 *
+      scale.deviation / std::sqrt(static_cast<double>(gaps.size()));
+  const double half = std::sqrt(scatter * scatter + std::pow(signal::median(timing), 2) +
+                                std::pow(kElasticShare * signal::median(elastic), 2));
   const double gap = std::max(0.0, scale.centre);
   estimate.angle_lower = std::max(0.0, scale.centre - half);
   estimate.angle_upper = scale.centre + half;
@@ -372,17 +374,17 @@ void fill(const Record& record, const MomentumTransferSettings& s, Estimate& est
   estimate.upper = s.base_radius * estimate.angle_upper;
   estimate.message =
       fmt::format("median of {} crossings, impacts at {:.4g} rad/s, momentum averaged over +-{:.4g} s",
-                  gaps.size(), median(speeds), static_cast<double>(flank.half) * motor.interval);
+                  gaps.size(), signal::median(speeds), static_cast<double>(flank.half) * motor.interval);
   if (estimate.status == Status::below_range)
     estimate.message += "; contact is lost for no longer than elastic deflection and averaging explain";
 }
 
 }  // namespace
 
-Estimate estimate_momentum_transfer(const Record& record, const MomentumTransferSettings& settings) {
+Estimate estimate_momentum_transfer(const record::Record& record, const MomentumTransferSettings& settings) {
   check(settings);
   return estimate_or_refusal("momentum_transfer",
                              [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

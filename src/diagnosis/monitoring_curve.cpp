@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/quadratic.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kFloor = 1e-6;  // smallest difference of skewness that may count as one
@@ -89,7 +89,7 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
     };
     widen(cell.between, next.between, 1);
     widen(cell.within, next.within, std::max(1, periods));
-    for (const auto& [begin, end] : quadratic_at_most_zero(a, b, c)) {
+    for (const auto& [begin, end] : signal::quadratic_at_most_zero(a, b, c)) {
       if (result.pieces == 0) result.lower = from + begin * span;
       if (result.pieces == 0 || from + begin * span > result.upper) ++result.pieces;
       result.upper = from + end * span;
@@ -110,14 +110,14 @@ Accepted accept(const MonitoringCurve& curve, double skewness, int periods, doub
 }
 
 /// The part of a range that the curve covers.
-NoiseRange within(const NoiseRange& noise, const std::vector<double>& levels) {
+signal::NoiseRange within(const signal::NoiseRange& noise, const std::vector<double>& levels) {
   const double upper = std::isnan(noise.upper) ? levels.back() : noise.upper;
   return {std::clamp(noise.lower, levels.front(), levels.back()),
           std::clamp(upper, levels.front(), levels.back())};
 }
 
 /// The same at any noise of a range, in steps as fine as an eighth of the distance of the curve's levels.
-Accepted accept(const MonitoringCurve& curve, double skewness, int periods, const NoiseRange& noise) {
+Accepted accept(const MonitoringCurve& curve, double skewness, int periods, const signal::NoiseRange& noise) {
   Accepted result = accept(curve, skewness, periods, noise.upper);
   if (!(noise.lower < noise.upper)) return result;
   std::vector<double> others = {noise.lower};
@@ -205,7 +205,7 @@ void MonitoringCurve::finish(const std::vector<std::vector<SkewnessCell>>& middl
   for (std::size_t i = 0; i < points.size(); ++i) points[i].cells = std::move(finished[i]);
 }
 
-Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange& range) const {
+Estimate MonitoringCurve::invert(double skewness, int periods, const signal::NoiseRange& range) const {
   Estimate estimate;
   estimate.method = "apd_skewness";
   estimate.skewness = skewness;
@@ -217,7 +217,7 @@ Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange&
     estimate.lower = points.front().backlash;
     return with_angle(estimate, *this);
   }
-  const NoiseRange noise = within(range, noise_levels);
+  const signal::NoiseRange noise = within(range, noise_levels);
   const Accepted found = accept(*this, skewness, periods, noise);
   if (found.pieces == 0) {
     const double first = at(points.front().backlash, noise.lower).mean,
@@ -248,4 +248,4 @@ Estimate MonitoringCurve::invert(double skewness, int periods, const NoiseRange&
   return with_angle(estimate, *this);
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

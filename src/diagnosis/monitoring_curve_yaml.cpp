@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr long kSchema = 1;
@@ -100,7 +100,7 @@ CurveConditions read_conditions(const YamlReader& yaml) {
   c.rig_digest = yaml.text("rig_digest");
   c.version = yaml.text("version");
   std::vector<std::string> channels;
-  for (const Channel channel : kChannels) channels.push_back(channel_name(channel));
+  for (const record::Channel channel : record::kChannels) channels.push_back(record::channel_name(channel));
   c.signal = yaml.choice("signal", channels);
   c.excitation = yaml.text("excitation");
   c.amplitude = yaml.number("amplitude", Range::not_negative());
@@ -226,4 +226,4 @@ void write_curve(const MonitoringCurve& curve, const std::string& path) {
   write_file(path, curve.to_yaml());
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

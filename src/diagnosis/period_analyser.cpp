@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/time_base.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 long WindowGrid::index(double time) const {
   auto k = static_cast<long>(std::floor((time - origin) / period));
@@ -20,7 +20,7 @@ std::optional<WindowGrid> window_grid(const std::vector<double>& time, double pe
   if (time.size() < kLeadingSamples) return std::nullopt;
   WindowGrid grid;
   grid.period = period;
-  grid.interval = median_interval({time.begin(), time.begin() + kLeadingSamples});
+  grid.interval = record::median_interval({time.begin(), time.begin() + kLeadingSamples});
   grid.origin = time.front() - 0.5 * grid.interval;
   if (!(period >= grid.interval)) return std::nullopt;
   return grid;
@@ -97,4 +97,4 @@ const PeriodResult* PeriodAnalyser::close() {
   return &finished_;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

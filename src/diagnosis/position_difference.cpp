@@ -15,7 +15,7 @@
 #include "backlash_diagnosis/signal/robust.h"
 #include "refusal.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr std::size_t kShortestWindow = 4, kLongestWindow = 64;  // samples, half a window
@@ -50,17 +50,17 @@ void check(const PositionDifferenceSettings& s) {
   require(!(s.base_radius <= 0), "base_radius", s.base_radius, "must be > 0");
 }
 
-TwoEncoders collect(const Record& record, const PositionDifferenceSettings& settings) {
-  for (const Channel channel : {Channel::motor_position, Channel::load_position})
+TwoEncoders collect(const record::Record& record, const PositionDifferenceSettings& settings) {
+  for (const record::Channel channel : {record::Channel::motor_position, record::Channel::load_position})
     if (!record.has(channel))
-      throw Refusal{Status::insufficient_data, "the record has no " + channel_name(channel)};
-  const bool motor = record.has(Channel::motor_torque);
-  const auto& torque = record.column(motor ? Channel::motor_torque : Channel::sensor_torque);
+      throw Refusal{Status::insufficient_data, "the record has no " + record::channel_name(channel)};
+  const bool motor = record.has(record::Channel::motor_torque);
+  const auto& torque = record.column(motor ? record::Channel::motor_torque : record::Channel::sensor_torque);
   if (torque.empty())
     throw Refusal{Status::insufficient_data,
                   "the record has neither motor_torque nor sensor_torque to tell the flanks apart"};
-  const auto &q_motor = record.column(Channel::motor_position),
-             &q_load = record.column(Channel::load_position);
+  const auto &q_motor = record.column(record::Channel::motor_position),
+             &q_load = record.column(record::Channel::load_position);
   TwoEncoders motion;
   motion.interval = record.sampling_interval();
   double last = -INFINITY;
@@ -79,7 +79,7 @@ TwoEncoders collect(const Record& record, const PositionDifferenceSettings& sett
 }
 
 double travel(const std::vector<double>& values) {
-  return quantile_range(values, 0.01);
+  return signal::quantile_range(values, 0.01);
 }
 
 /// A load that travels farther than the deflection varies shows friction with both signs of its speed.
@@ -87,7 +87,7 @@ bool load_moves(const TwoEncoders& motion) {
   std::vector<double> deflection(motion.motor.size());
   for (std::size_t i = 0; i < deflection.size(); ++i) deflection[i] = motion.motor[i] - motion.load[i];
   const double moved = travel(motion.load);
-  return moved > 0.5 * travel(deflection) && moved > 20 * smallest_step(motion.load);
+  return moved > 0.5 * travel(deflection) && moved > 20 * signal::smallest_step(motion.load);
 }
 
 /// Between two walls no torque drives the motor faster than if it pushed over the whole travel. Positions
@@ -99,7 +99,7 @@ void require_possible(const TwoEncoders& motion, double inertia) {
   constexpr std::size_t kOutliers = 6;
   if (!(inertia > 0)) return;
   double torque = 0;
-  for (const double t : {quantile(motion.torque, 0.01), quantile(motion.torque, 0.99)})
+  for (const double t : {signal::quantile(motion.torque, 0.01), signal::quantile(motion.torque, 0.99)})
     torque = std::max(torque, std::abs(t));
   const double moved = travel(motion.motor);
   const double fastest = kSurelyTooFast * std::sqrt(2 * torque * moved / inertia);
@@ -170,7 +170,7 @@ std::string describe(const FlankFit& fit, bool moves) {
   return message;
 }
 
-void fill(const Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
+void fill(const record::Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
   const TwoEncoders motion = collect(record, settings);
   if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
     throw Refusal{Status::out_of_domain,
@@ -186,7 +186,7 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
   require_sound(fit);
 
   const double scatter =
-      student_t_quantile(0.975, std::max(1.0, std::floor(0.5 * static_cast<double>(fit.stays)) - 1)) *
+      signal::student_t_quantile(0.975, std::max(1.0, std::floor(0.5 * static_cast<double>(fit.stays)) - 1)) *
       fit.standard_error;
   const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
   const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
@@ -213,10 +213,11 @@ void fill(const Record& record, const PositionDifferenceSettings& settings, Esti
 
 }  // namespace
 
-Estimate estimate_position_difference(const Record& record, const PositionDifferenceSettings& settings) {
+Estimate estimate_position_difference(const record::Record& record,
+                                      const PositionDifferenceSettings& settings) {
   check(settings);
   return estimate_or_refusal("position_difference",
                              [&](Estimate& estimate) { fill(record, settings, estimate); });
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

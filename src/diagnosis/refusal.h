@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/diagnosis/estimate.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct Refusal {
   Status status;
@@ -27,4 +27,4 @@ Estimate estimate_or_refusal(const char* method, Fill fill) {
   return estimate;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

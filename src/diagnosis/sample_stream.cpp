@@ -7,21 +7,21 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kKeepPeriods = 3;  // at least, whatever `keep` says; a choice: two tell noise, one is open
 constexpr std::size_t kRecent = 1000;  // samples from which the present rate is told; a choice
 constexpr double kForever = std::numeric_limits<double>::infinity();  // s
 
-double get(const ChannelValues& values, Channel channel) {
+double get(const record::ChannelValues& values, record::Channel channel) {
   return values[static_cast<std::size_t>(channel)];
 }
 
 /// A bit for each channel that has a finite value.
-unsigned present(const ChannelValues& values) {
+unsigned present(const record::ChannelValues& values) {
   unsigned bits = 0;
-  for (std::size_t i = 0; i < kChannelCount; ++i)
+  for (std::size_t i = 0; i < record::kChannelCount; ++i)
     bits |= static_cast<unsigned>(std::isfinite(values[i])) << i;
   return bits;
 }
@@ -36,8 +36,8 @@ SampleStream::SampleStream(const StreamSettings& settings) : settings_(settings)
 
 void SampleStream::restart() {
   ++counters_.restarts;
-  stamps_ = StampChecker();
-  record_ = Record();
+  stamps_ = record::StampChecker();
+  record_ = record::Record();
   channels_.clear();
   analyser_.reset();
   result_count_ = 0;
@@ -52,58 +52,59 @@ double SampleStream::jump_limit() const {
 }
 
 /// Without it there is nothing to diagnose.
-Channel SampleStream::needed() const {
-  return settings_.apd ? settings_.apd->signal : Channel::motor_torque;
+record::Channel SampleStream::needed() const {
+  return settings_.apd ? settings_.apd->signal : record::Channel::motor_torque;
 }
 
 /// A run has the channels of its first sample: every later one must have them, and one that has more begins a
 /// new run.
-SampleStream::Fit SampleStream::fit(const ChannelValues& values) {
+SampleStream::Fit SampleStream::fit(const record::ChannelValues& values) {
   if (!channels_.empty() && present(values) == present_) return Fit::take;
   if (channels_.empty() && !settings_.of_record && !std::isfinite(get(values, needed()))) {
-    counters_.last_problem = channel_name(needed()) + " is absent or not a number";
+    counters_.last_problem = record::channel_name(needed()) + " is absent or not a number";
     return Fit::drop;
   }
-  for (const Channel channel : channels_)
+  for (const record::Channel channel : channels_)
     if (!std::isfinite(get(values, channel))) {
-      counters_.last_problem = channel_name(channel) + " is not a number";
+      counters_.last_problem = record::channel_name(channel) + " is not a number";
       return Fit::drop;
     }
   if (channels_.empty()) return Fit::begin;
-  for (const Channel channel : kChannels)
+  for (const record::Channel channel : record::kChannels)
     if (std::isfinite(get(values, channel)) &&
         std::find(channels_.begin(), channels_.end(), channel) == channels_.end()) {
-      counters_.last_problem = channel_name(channel) + " appeared";
+      counters_.last_problem = record::channel_name(channel) + " appeared";
       return Fit::restart;
     }
   return Fit::take;
 }
 
 /// Whether a channel that the run began with has stopped for good.
-bool SampleStream::has_lost_channel(double time, const ChannelValues& values) const {
+bool SampleStream::has_lost_channel(double time, const record::ChannelValues& values) const {
   return !record_.time.empty() && std::isfinite(get(values, needed())) &&
          time - record_.time.back() > jump_limit();
 }
 
 /// Whether a stamp continues the run; if not, says why.
 SampleStream::Fit SampleStream::fit(double time) {
-  const StampVerdict verdict = stamps_.next(time);
-  if (verdict == StampVerdict::repeated) {
+  const record::StampVerdict verdict = stamps_.next(time);
+  if (verdict == record::StampVerdict::repeated) {
     counters_.last_problem = "repeated stamp";
     return Fit::drop;
   }
   if (record_.time.empty()) return Fit::begin;
   const double last = record_.time.back();
-  if (verdict == StampVerdict::backwards)
-    counters_.last_problem = "stamps went back from " + time_text(last) + " s to " + time_text(time) + " s";
+  if (verdict == record::StampVerdict::backwards)
+    counters_.last_problem =
+        "stamps went back from " + record::time_text(last) + " s to " + record::time_text(time) + " s";
   else if (time - last > jump_limit())
-    counters_.last_problem = "stamps jumped forward by " + time_text(time - last) + " s";
+    counters_.last_problem = "stamps jumped forward by " + record::time_text(time - last) + " s";
   else
     return Fit::take;
   return Fit::restart;
 }
 
-const PeriodResult* SampleStream::add(double time, const ChannelValues& values) {
+const PeriodResult* SampleStream::add(double time, const record::ChannelValues& values) {
   const Fit channels = fit(values);
   const bool lost = channels == Fit::drop && has_lost_channel(time, values);
   if (channels == Fit::drop && !lost) {
@@ -123,13 +124,13 @@ const PeriodResult* SampleStream::add(double time, const ChannelValues& values) 
   }
   if (record_.time.empty()) {
     start_ = time;
-    for (const Channel channel : kChannels)
+    for (const record::Channel channel : record::kChannels)
       if (std::isfinite(get(values, channel))) channels_.push_back(channel);
     present_ = present(values);
   }
   ++counters_.accepted;
   record_.time.push_back(time);
-  for (const Channel channel : channels_) record_.column(channel).push_back(get(values, channel));
+  for (const record::Channel channel : channels_) record_.column(channel).push_back(get(values, channel));
   if (!(period_ > 0)) find_period();
   const PeriodResult* finished = nullptr;
   if (!grid_)
@@ -192,7 +193,8 @@ void SampleStream::forget_results() {
 
 double SampleStream::sampling_interval() const {
   const std::size_t count = std::min(kRecent, record_.size());
-  return median_interval({record_.time.end() - static_cast<std::ptrdiff_t>(count), record_.time.end()});
+  return record::median_interval(
+      {record_.time.end() - static_cast<std::ptrdiff_t>(count), record_.time.end()});
 }
 
 SampleStream::Windows SampleStream::windows() const {
@@ -239,19 +241,19 @@ PeriodWindow SampleStream::searched_now(long count) const {
   if (!(settings.apd->period > 0)) return {record_, 0, 0, {}};
   SampleStream again(settings);
   again.add(record_);
-  return again.grid_ ? again.latest(count) : PeriodWindow{Record(), settings.apd->period, 0, {}};
+  return again.grid_ ? again.latest(count) : PeriodWindow{record::Record(), settings.apd->period, 0, {}};
 }
 
-void SampleStream::add(const Record& record) {
-  ChannelValues values;
+void SampleStream::add(const record::Record& record) {
+  record::ChannelValues values;
   for (std::size_t i = 0; i < record.size(); ++i) {
-    for (const Channel channel : kChannels)
+    for (const record::Channel channel : record::kChannels)
       values[static_cast<std::size_t>(channel)] = record.has(channel) ? record.column(channel)[i] : kNaN;
     add(record.time[i], values);
   }
 }
 
-PeriodWindow cut_periods(const Record& record, const std::optional<ApdSettings>& apd, long last) {
+PeriodWindow cut_periods(const record::Record& record, const std::optional<ApdSettings>& apd, long last) {
   StreamSettings settings;
   settings.apd = apd;
   settings.keep = kForever;
@@ -264,4 +266,4 @@ PeriodWindow cut_periods(const Record& record, const std::optional<ApdSettings>&
   return window;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

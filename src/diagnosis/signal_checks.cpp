@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/spectrum.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr std::size_t kMaxSamples = 1 << 16;  // per search; a longer record is searched in growing stretches
@@ -38,7 +38,7 @@ std::vector<double> autocorrelation(const std::vector<double>& x, std::size_t la
   const std::size_t n = x.size();
   std::vector<double> power(n + 1, 0.0);  // of the first samples
   for (std::size_t i = 0; i < n; ++i) power[i + 1] = power[i] + x[i] * x[i];
-  const std::vector<double> product = lagged_products(x, lags);
+  const std::vector<double> product = signal::lagged_products(x, lags);
   std::vector<double> r(lags + 1, 0.0);
   for (std::size_t lag = 0; lag <= lags; ++lag) {
     const double early = power[n - lag], late = power[n] - power[lag];
@@ -87,7 +87,7 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
     if (!std::isfinite(v)) return std::nullopt;
   const auto [low, high] = std::minmax_element(signal.begin(), signal.end());
   if (!(*high - *low > 1e-9 * (std::fabs(*high) + std::fabs(*low)))) return std::nullopt;  // constant
-  const double interval = median_interval(time), span = time.back() - time.front();
+  const double interval = record::median_interval(time), span = time.back() - time.front();
   if (!(interval > 0)) return std::nullopt;
   const double samples = span / interval + 1;
   // A long record is first searched in its beginning, at full resolution, then in stretches of twice the
@@ -111,7 +111,7 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
 double signal_level(std::vector<double> signal) {
   signal.erase(std::remove_if(signal.begin(), signal.end(), [](double v) { return std::isnan(v); }),
                signal.end());
-  return signal.empty() ? 0 : median_magnitude(std::move(signal));
+  return signal.empty() ? 0 : signal::median_magnitude(std::move(signal));
 }
 
 namespace {
@@ -151,7 +151,7 @@ bool looks_saturated(const std::vector<double>& signal) {
   if (signal.size() < 8) return false;
   const auto [low, high] = std::minmax_element(signal.begin(), signal.end());
   if (*low == *high) return false;
-  const double step = smallest_step(signal);
+  const double step = signal::smallest_step(signal);
   for (const double extreme : {*low, *high}) {
     const Runs runs = runs_at(signal, extreme, step);
     // Some runs begin slowly also with a saturated sensor, where the signal happens to turn near its limit.
@@ -160,4 +160,4 @@ bool looks_saturated(const std::vector<double>& signal) {
   return false;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/signal/sen_slope.h"
 #include "trend_message.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr std::size_t kStretches = 400;
@@ -47,7 +47,8 @@ std::vector<TrendPoint> thinned(const std::vector<TrendPoint>& points) {
       times.push_back(points[i].time);
       values.push_back(points[i].value);
     }
-    if (!times.empty()) medians.push_back({median(std::move(times)), median(std::move(values))});
+    if (!times.empty())
+      medians.push_back({signal::median(std::move(times)), signal::median(std::move(values))});
   }
   return medians;
 }
@@ -67,7 +68,7 @@ Line fit(const std::vector<TrendPoint>& points) {
   Line line;
   for (const double time : times) line.middle += (time - times.front()) / static_cast<double>(times.size());
   line.middle += times.front();
-  const SenSlope slope(times, values);
+  const signal::SenSlope slope(times, values);
   line.rate = slope.value();
   std::vector<double> residuals;
   double largest = 0;
@@ -75,18 +76,18 @@ Line fit(const std::vector<TrendPoint>& points) {
     residuals.push_back(values[i] - line.rate * (times[i] - line.middle));
     largest = std::max(largest, std::abs(values[i]));
   }
-  const RobustScale scale = robust_scale(residuals, smallest_step(values));
+  const signal::RobustScale scale = signal::robust_scale(residuals, signal::smallest_step(values));
   line.level = scale.centre;
-  ErrorMemory memory;
+  signal::ErrorMemory memory;
   if (scale.deviation > 1e-12 * largest) {  // else on a line but for rounding
     for (double& r : residuals) r = std::clamp(r - scale.centre, -scale.clip, scale.clip);
-    memory = error_memory(times, residuals);
+    memory = signal::error_memory(times, residuals);
   }
-  const SenSlope::Interval interval = slope.interval(memory.slope);
+  const signal::SenSlope::Interval interval = slope.interval(memory.slope);
   line.lower = interval.lower;
   line.upper = interval.upper;
   // Variance of a median of normal errors: pi / 2 of that of the mean.
-  line.level_error = kNormalQuantile975 * scale.deviation *
+  line.level_error = signal::kNormalQuantile975 * scale.deviation *
                      std::sqrt(0.5 * M_PI * memory.level / static_cast<double>(times.size()));
   return line;
 }
@@ -135,7 +136,7 @@ Trend find_trend(std::vector<TrendPoint> points, std::optional<double> limit, bo
   } else {
     std::vector<double> values;
     for (const TrendPoint& p : few) values.push_back(p.value);
-    trend.level = median(std::move(values));
+    trend.level = signal::median(std::move(values));
   }
   trend.exceeded = limit && trend.level >= *limit;
   if (trend.exceeded && !trend.grows) trend.reaches = Trend::Crossing{kNaN, kNaN, trend.time};
@@ -155,4 +156,4 @@ std::vector<TrendPoint> trend_points(const std::vector<HistoryEntry>& entries, b
   return points;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

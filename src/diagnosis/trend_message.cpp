@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/utc.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kDay = 86400, kYear = 365.25 * kDay;
@@ -71,4 +71,4 @@ std::string trend_message(const Trend& t, std::size_t times, std::optional<doubl
          (t.exceeded ? " since " : " on ") + date(*t.reaches);
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

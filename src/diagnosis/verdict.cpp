@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -300,4 +300,4 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
   return verdict;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

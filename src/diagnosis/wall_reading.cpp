@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/signal/noise.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 struct Line {
@@ -75,7 +75,7 @@ TorqueExcursion largest_stretch(const std::vector<double>& torque, int side, dou
 
 std::vector<TorqueExcursion> find_excursions(const std::vector<double>& torque, double level) {
   // The sum over an excursion must stand out of the noise: 8 standard deviations of one sample.
-  const double least_sum = torque.size() < 3 ? 0 : 8 * noise_from_differences(torque, 2);
+  const double least_sum = torque.size() < 3 ? 0 : 8 * signal::noise_from_differences(torque, 2);
   std::vector<TorqueExcursion> excursions;
   int side = 0;
   std::size_t begin = 0;
@@ -127,4 +127,4 @@ WallReading read_wall(const LockedMotion& motion, const TorqueExcursion& excursi
   return reading;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

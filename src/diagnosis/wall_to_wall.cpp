@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kSwitchTime = 0.1;    // passage between the sides over length of an excursion
@@ -31,7 +31,7 @@ double settling(const std::vector<WallReading>& readings) {
   std::vector<double> changes;
   changes.reserve(readings.size());
   for (const WallReading& r : readings) changes.push_back(r.side * (r.position - r.earlier_position));
-  return 2 * median(changes) * decay / (1 - decay);
+  return 2 * signal::median(changes) * decay / (1 - decay);
 }
 
 }  // namespace
@@ -40,7 +40,7 @@ double median_of(const std::vector<WallReading>& readings, double WallReading::*
   std::vector<double> values;
   values.reserve(readings.size());
   for (const WallReading& reading : readings) values.push_back(reading.*member);
-  return median(std::move(values));
+  return signal::median(std::move(values));
 }
 
 bool is_switched(const std::vector<TorqueExcursion>& excursions, const std::vector<WallReading>& readings) {
@@ -52,7 +52,7 @@ bool is_switched(const std::vector<TorqueExcursion>& excursions, const std::vect
   }
   const double torque = median_of(readings, &WallReading::torque);
   const double change = median_of(readings, &WallReading::torque_change);
-  return median(passage) < kSwitchTime * median(length) && change < kSwitchChange * torque;
+  return signal::median(passage) < kSwitchTime * signal::median(length) && change < kSwitchChange * torque;
 }
 
 double drift_rate(const std::vector<WallReading>& readings) {
@@ -67,7 +67,7 @@ double drift_rate(const std::vector<WallReading>& readings) {
       slopes.push_back((same[i]->position - same[i - lag]->position) / (same[i]->time - same[i - lag]->time));
     }
   }
-  return slopes.empty() ? 0 : median(std::move(slopes));
+  return slopes.empty() ? 0 : signal::median(std::move(slopes));
 }
 
 double WallToWall::half_interval() const {
@@ -85,11 +85,12 @@ WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<Wa
     plays.push_back(travels.back() - deflections[i] - deflections[i - 1]);
   }
   WallToWall result;
-  result.step = smallest_step(motion.position);
-  const RobustScale scale = robust_scale(plays, 2 * result.step);  // each wall may be off by one step
+  result.step = signal::smallest_step(motion.position);
+  const signal::RobustScale scale =
+      signal::robust_scale(plays, 2 * result.step);  // each wall may be off by one step
   const double extrapolation = switched ? settling(readings) : 0;
   result.value = scale.centre + extrapolation;
-  result.travel = median(travels);
+  result.travel = signal::median(travels);
   result.ringing = median_of(readings, &WallReading::ringing);
   result.motion =
       std::hypot(kSettling * extrapolation, (switched ? kSwitchedRinging : kRampedRinging) * result.ringing);
@@ -99,8 +100,8 @@ WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<Wa
   // times as much as a mean; two walls and the drift are fitted.
   const double n = static_cast<double>(readings.size());
   const double standard_error = 1.25 * scale.deviation * std::sqrt(2 / n);
-  result.scatter = student_t_quantile(0.975, std::max(1.0, n - 3)) * standard_error;
+  result.scatter = signal::student_t_quantile(0.975, std::max(1.0, n - 3)) * standard_error;
   return result;
 }
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

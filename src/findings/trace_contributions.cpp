@@ -5,22 +5,22 @@
 
 #include "backlash_diagnosis/model/axis_unit.h"
 
-namespace backlash {
+namespace backlash::findings {
 namespace {
 
 /// Torque of dry friction at this speed.
-double friction(const FrictionLimits& limits, double speed) {
+double friction(const model::FrictionLimits& limits, double speed) {
   if (speed == 0) return 0;
   return speed > 0 ? -limits.forward : limits.backward;
 }
 
-double opening(const Term& term, const Motion& m, double half_gap, int side) {
-  FlankShift shift;
+double opening(const model::Term& term, const model::Motion& m, double half_gap, int side) {
+  model::FlankShift shift;
   term.shape({m.motor_position, m.load_position, half_gap, m.mesh_torque, side}, shift);
   return shift.opening;
 }
 
-Motion motion(const TraceSeries& s, std::size_t k) {
+model::Motion motion(const identification::TraceSeries& s, std::size_t k) {
   return {s.time[k],          s.motor_position[k], s.motor_velocity[k], s.load_position[k],
           s.load_velocity[k], s.mesh_torque[k],    s.motor_torque[k]};
 }
@@ -31,11 +31,11 @@ bool changes(const Contribution& c) {
 
 }  // namespace
 
-std::vector<Contribution> contributions(const Rig& augmented, const std::vector<std::size_t>& terms,
-                                        const TraceSeries& series) {
+std::vector<Contribution> contributions(const model::Rig& augmented, const std::vector<std::size_t>& terms,
+                                        const identification::TraceSeries& series) {
   const bool linear = augmented.linear;
-  const std::string torque = linear ? "force" : "torque", unit = axis_unit("N m", linear),
-                    angle = axis_unit("rad", linear);
+  const std::string torque = linear ? "force" : "torque", unit = model::axis_unit("N m", linear),
+                    angle = model::axis_unit("rad", linear);
   std::vector<Contribution> all = {{torque + " on the motor", unit, {}},
                                    {torque + " on the load", unit, {}},
                                    {"opening of the forward flank", angle, {}},
@@ -43,12 +43,12 @@ std::vector<Contribution> contributions(const Rig& augmented, const std::vector<
   if (series.load_position.empty() || series.load_velocity.empty() || series.mesh_torque.empty()) return {};
   const double half_gap = augmented.mesh.rigid ? 0 : 0.5 * augmented.mesh.backlash / augmented.mesh.lever();
   for (std::size_t k = 0; k < series.time.size(); ++k) {
-    const Motion m = motion(series, k);
+    const model::Motion m = motion(series, k);
     double sum[4] = {};
     for (const std::size_t place : terms) {
-      const Term& term = *augmented.terms.at(place);
-      EndTorques ends;
-      EndFriction dry;
+      const model::Term& term = *augmented.terms.at(place);
+      model::EndTorques ends;
+      model::EndFriction dry;
       term.add(m, ends);
       term.add_friction(m, dry);
       sum[0] += ends.motor + friction(dry.motor, m.motor_velocity);
@@ -64,4 +64,4 @@ std::vector<Contribution> contributions(const Rig& augmented, const std::vector<
   return all;
 }
 
-}  // namespace backlash
+}  // namespace backlash::findings

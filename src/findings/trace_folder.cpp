@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/identification/effects/traced_rig.h"
 #include "backlash_diagnosis/report/report_page.h"
 
-namespace backlash {
+namespace backlash::findings {
 namespace {
 
 namespace fs = std::filesystem;
@@ -25,9 +25,9 @@ const char* const kScript = "trace_report.py";
 }
 
 /// The command that repeats the trace, also where an action asked for it.
-Provenance provenance_of(const Trace& trace, const RigFile& declared, const TraceInputs& inputs,
-                         const std::string& folder) {
-  Provenance p;
+report::Provenance provenance_of(const identification::Trace& trace, const rig_file::RigFile& declared,
+                                 const TraceInputs& inputs, const std::string& folder) {
+  report::Provenance p;
   p.command = {"trace_residual", "--rig", inputs.rig, "--train"};
   p.command.insert(p.command.end(), inputs.train.begin(), inputs.train.end());
   p.command.insert(p.command.end(),
@@ -43,7 +43,7 @@ Provenance provenance_of(const Trace& trace, const RigFile& declared, const Trac
 }  // namespace
 
 TraceFolder::TraceFolder(const std::string& folder, const std::vector<std::string>& inputs)
-    : folder_(folder), files_(trace_files(folder)) {
+    : folder_(folder), files_(report::trace_files(folder)) {
   std::error_code error;
   for (const std::string& file : {files_.report, files_.series, files_.rig, files_.page}) {
     for (const std::string& input : inputs)
@@ -60,13 +60,14 @@ TraceFolder::~TraceFolder() {
   if (new_) ::rmdir(folder_.c_str());  // refuses where there is something in it
 }
 
-void TraceFolder::write(const Trace& trace, const RigFile& declared, const TraceInputs& inputs) const {
+void TraceFolder::write(const identification::Trace& trace, const rig_file::RigFile& declared,
+                        const TraceInputs& inputs) const {
   write_file(files_.report, trace_report_json(trace, inputs));
   write_file(files_.series, trace_series_json(trace));
-  write_file(files_.rig, traced_rig_text(declared, trace));
-  const std::string plots = drawn_figures(kScript, {"--series", files_.series, "--", files_.report});
-  const std::string provenance = provenance_sections(provenance_of(trace, declared, inputs, folder_));
+  write_file(files_.rig, identification::traced_rig_text(declared, trace));
+  const std::string plots = report::drawn_figures(kScript, {"--series", files_.series, "--", files_.report});
+  const std::string provenance = report::provenance_sections(provenance_of(trace, declared, inputs, folder_));
   write_file(files_.page, trace_page(trace, inputs, plots, provenance));
 }
 
-}  // namespace backlash
+}  // namespace backlash::findings

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "value_text.h"
 
-namespace backlash {
+namespace backlash::findings {
 namespace {
 
 /// "a, b and c"
@@ -21,14 +21,15 @@ std::string listed(const std::vector<std::string>& parts) {
   return text;
 }
 
-std::string effect_text(const FoundEffect& e, bool linear) {
+std::string effect_text(const identification::FoundEffect& e, bool linear) {
   std::string text = "  " + e.id;
   for (const auto& [name, word] : e.words) text += " (" + name + ": " + word + ")";
   text += ", " + e.channel + " error " + percent(e.test_error_before) + " -> " + percent(e.test_error_after) +
           "\n";
-  for (const EffectParameter& p : e.parameters)
-    text += fmt::format("    {:<24} {} {}\n", p.name, with_error(p.measured), axis_unit(p.unit, linear));
-  const Evidence& v = e.evidence;
+  for (const identification::EffectParameter& p : e.parameters)
+    text +=
+        fmt::format("    {:<24} {} {}\n", p.name, with_error(p.measured), model::axis_unit(p.unit, linear));
+  const identification::Evidence& v = e.evidence;
   text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
           percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
           " of " + std::to_string(v.blocks) + " better), " + percent(v.gain_forward) + " on the last part\n";
@@ -39,8 +40,8 @@ std::string effect_text(const FoundEffect& e, bool linear) {
 
 }  // namespace
 
-std::string effect_name(const FoundEffect& e) {
-  const TermType& type = term_type(e.id);
+std::string effect_name(const identification::FoundEffect& e) {
+  const model::TermType& type = model::term_type(e.id);
   if (!type.map) return e.id;
   const auto coordinate = e.words.find(type.map->coordinate);
   if (coordinate == e.words.end()) return e.id;
@@ -51,7 +52,7 @@ std::string percent(double share) {
   return std::isfinite(share) ? fmt::format("{:.3g} %", 100 * share) : "unknown";
 }
 
-ValueText value_text(const Measured& m) {
+ValueText value_text(const signal::Measured& m) {
   if (!(m.standard_error > 0) || !std::isfinite(m.standard_error))
     return {fmt::format("{:.6g}", m.value), ""};
   // As many digits as the error leaves, which has two.
@@ -60,26 +61,26 @@ ValueText value_text(const Measured& m) {
   return {fmt::format("{:.{}g}", m.value, std::min(digits, 9)), fmt::format("{:.2g}", m.standard_error)};
 }
 
-std::string with_error(const Measured& m) {
+std::string with_error(const signal::Measured& m) {
   const ValueText text = value_text(m);
   return text.error.empty() ? text.value : text.value + " +- " + text.error;
 }
 
-std::string to_string(TraceVerdict verdict) {
+std::string to_string(identification::TraceVerdict verdict) {
   switch (verdict) {
-    case TraceVerdict::effect_found:
+    case identification::TraceVerdict::effect_found:
       return "effect_found";
-    case TraceVerdict::nothing_missing:
+    case identification::TraceVerdict::nothing_missing:
       return "nothing_missing";
-    case TraceVerdict::unexplained:
+    case identification::TraceVerdict::unexplained:
       break;
   }
   return "unexplained";
 }
 
-std::string verdict_sentence(const Trace& trace) {
+std::string verdict_sentence(const identification::Trace& trace) {
   std::vector<std::string> effects, errors;
-  for (const FoundEffect& e : trace.steps) effects.push_back(effect_name(e));
+  for (const identification::FoundEffect& e : trace.steps) effects.push_back(effect_name(e));
   for (const auto& [name, c] : trace.channels)
     errors.push_back(name +
                      (effects.empty() ? " " + percent(c.after)
@@ -89,10 +90,10 @@ std::string verdict_sentence(const Trace& trace) {
   if (!effects.empty())
     text = "The declared model lacks " + listed(effects) + ". With " + (effects.size() == 1 ? "it" : "them") +
            " the error on the test record falls: " + listed(errors) + ".";
-  if (trace.verdict == TraceVerdict::nothing_missing)
+  if (trace.verdict == identification::TraceVerdict::nothing_missing)
     text = "Nothing is missing: the declared model, fitted, has these errors on the test record: " +
            listed(errors) + ".";
-  if (trace.verdict == TraceVerdict::unexplained || trace.unexplained) {
+  if (trace.verdict == identification::TraceVerdict::unexplained || trace.unexplained) {
     text += effects.empty() ? "Something is missing" : " Something more is missing";
     text += " that no effect explains";
     if (trace.unexplained) text += ", in " + trace.unexplained->channel + ": " + trace.unexplained->signature;
@@ -101,7 +102,7 @@ std::string verdict_sentence(const Trace& trace) {
   return text;
 }
 
-std::string trace_summary(const Trace& trace) {
+std::string trace_summary(const identification::Trace& trace) {
   const bool linear = trace.augmented.linear;
   std::string text = verdict_sentence(trace) + "\n\nrelative error on the test record, low-passed at " +
                      to_text(std::round(trace.cutoff * 1000) / 1000) + " Hz\n";
@@ -113,10 +114,10 @@ std::string trace_summary(const Trace& trace) {
   if (!trace.independence.empty())
     text += "\nshare of lags at which the residual still follows an input (0.01 by chance)\n" +
             fmt::format(inputs, "channel", "input", "before", "after");
-  for (const Independence& i : trace.independence)
+  for (const identification::Independence& i : trace.independence)
     text += fmt::format(inputs, i.channel, i.input, percent(i.before), percent(i.after));
   if (!trace.steps.empty()) text += "\neffects that were added\n";
-  for (const FoundEffect& e : trace.steps) text += effect_text(e, linear);
+  for (const identification::FoundEffect& e : trace.steps) text += effect_text(e, linear);
   if (trace.unexplained)
     text += "\nunexplained\n  " + trace.unexplained->channel + ": " + trace.unexplained->signature + "\n";
   text += "\nmachine (load side of the reduction)\n";
@@ -126,11 +127,11 @@ std::string trace_summary(const Trace& trace) {
     const auto before = trace.base_parameters.find(name);
     text +=
         fmt::format(machine, name, before == trace.base_parameters.end() ? "-" : with_error(before->second),
-                    with_error(value), axis_unit(trace.units.at(name), linear));
+                    with_error(value), model::axis_unit(trace.units.at(name), linear));
   }
   for (const std::string& note : trace.notes) text += "note: " + note + "\n";
   for (const std::string& warning : trace.warnings) text += "warning: " + warning + "\n";
   return text;
 }
 
-}  // namespace backlash
+}  // namespace backlash::findings

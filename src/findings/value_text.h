@@ -6,13 +6,13 @@
 
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::findings {
 
 struct ValueText {
   std::string value;  // as many digits as the error leaves
   std::string error;  // two digits; empty: not known, or 0
 };
 
-ValueText value_text(const Measured& m);
+ValueText value_text(const signal::Measured& m);
 
-}  // namespace backlash
+}  // namespace backlash::findings

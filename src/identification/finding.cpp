@@ -8,16 +8,17 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
-std::map<std::string, Measured> combine_findings(const std::vector<Finding>& findings, const Rig& rig,
-                                                 const std::vector<std::string>& names) {
+namespace backlash::identification {
+std::map<std::string, signal::Measured> combine_findings(const std::vector<Finding>& findings,
+                                                         const model::Rig& rig,
+                                                         const std::vector<std::string>& names) {
   const auto index = [&](const std::string& name) {
     return Eigen::Index(std::find(names.begin(), names.end(), name) - names.begin());
   };
   const Eigen::Index n = Eigen::Index(names.size());
   Eigen::VectorXd declared(n), size(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    declared[i] = servo_parameter(names[i]).get(rig);
+    declared[i] = rig_file::servo_parameter(names[i]).get(rig);
     size[i] = declared[i] != 0 ? kDeclaredUncertainty * std::fabs(declared[i]) : 1;
   }
   // Deviations from the declared values in units of what these are uncertain by.
@@ -44,13 +45,13 @@ std::map<std::string, Measured> combine_findings(const std::vector<Finding>& fin
     gradient += row.a * row.b;
     rows.push_back(std::move(row));
   }
-  const Eigen::MatrixXd covariance = symmetric_inverse(information);
+  const Eigen::MatrixXd covariance = signal::symmetric_inverse(information);
   const Eigen::VectorXd deviation = covariance * gradient;
   double chi2 = 0;
   for (const Row& row : rows) chi2 += std::pow(row.b - row.a.dot(deviation), 2);
   const double freedom = double(rows.size()) - double(std::count(told.begin(), told.end(), true));
   const double growth = freedom > 0 ? std::sqrt(std::max(1.0, chi2 / freedom)) : 1;
-  std::map<std::string, Measured> result;
+  std::map<std::string, signal::Measured> result;
   for (Eigen::Index i = 0; i < n; ++i)
     if (told[i])
       result[names[i]] = {declared[i] + size[i] * deviation[i],
@@ -58,4 +59,4 @@ std::map<std::string, Measured> combine_findings(const std::vector<Finding>& fin
   return result;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -5,22 +5,22 @@
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// What belongs to the parameters of a machine of one inertia, by the names of the table.
 template <typename Value>
 std::map<std::string, Value> by_table(const std::map<std::string, Value>& one_inertia) {
   std::map<std::string, Value> all;
-  for (const RigParameter& p : servo_parameters())
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters())
     if (const auto at = one_inertia.find(p.one_inertia); at != one_inertia.end()) all[p.name] = at->second;
   return all;
 }
 
 }  // namespace
 
-std::string fitted_rig_text(const RigFile& declared, const Identification& found) {
-  RigDocument document(declared);
+std::string fitted_rig_text(const rig_file::RigFile& declared, const Identification& found) {
+  rig_file::RigDocument document(declared);
   const double ratio = declared.rig.motor_axis_ratio();
   if (declared.rig.mesh.rigid)
     document.set_fitted({found.rig, ratio, by_table(found.parameters), by_table(found.units)});
@@ -32,4 +32,4 @@ std::string fitted_rig_text(const RigFile& declared, const Identification& found
   return document.text();
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -13,36 +13,37 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "procedures/procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kMisfit = 1.5;  // times the noise floor, beyond which the model lacks something
 
-void require_finite(const Record& record) {
-  for (const Channel channel : kChannels)
+void require_finite(const record::Record& record) {
+  for (const record::Channel channel : record::kChannels)
     for (std::size_t k = 0; k < record.column(channel).size(); ++k)
       if (!std::isfinite(record.column(channel)[k]))
-        throw BadData(record.name,
-                      channel_name(channel) + " has no value at t = " + time_text(record.time[k]) + " s");
+        throw BadData(record.name, record::channel_name(channel) +
+                                       " has no value at t = " + record::time_text(record.time[k]) + " s");
 }
 
 /// A body stands where it moves less than a twentieth of what the other does.
-CaseRecord case_record(const Record& record, const Rig& declared) {
+CaseRecord case_record(const record::Record& record, const model::Rig& declared) {
   CaseRecord r;
   require_finite(record);
-  r.record = evenly_sampled(load_side(record, declared));
-  r.has_load = r.record.has(Channel::load_position);
-  if (!r.record.has(Channel::motor_position) || !r.has_load) return r;
-  const double motor = peak_to_peak(r.record.column(Channel::motor_position));
-  const double load = peak_to_peak(r.record.column(Channel::load_position));
+  r.record = record::evenly_sampled(load_side(record, declared));
+  r.has_load = r.record.has(record::Channel::load_position);
+  if (!r.record.has(record::Channel::motor_position) || !r.has_load) return r;
+  const double motor = signal::peak_to_peak(r.record.column(record::Channel::motor_position));
+  const double load = signal::peak_to_peak(r.record.column(record::Channel::load_position));
   r.motor_moves = motor > 0.05 * load;
   r.load_moves = load > 0.05 * motor;
   return r;
 }
 
 /// A record that cannot be used is left out with a warning; it is an error only if no record is left.
-void read_records(const std::vector<Record>& records, const Rig& declared, IdentificationCase& c) {
-  for (const Record& record : records) {
+void read_records(const std::vector<record::Record>& records, const model::Rig& declared,
+                  IdentificationCase& c) {
+  for (const record::Record& record : records) {
     try {
       c.records.push_back(case_record(record, declared));
     } catch (const BadData& error) {
@@ -55,10 +56,10 @@ void read_records(const std::vector<Record>& records, const Rig& declared, Ident
 }
 
 /// What can be fitted: all that the rig declares. Asymmetries only where it declares directions apart.
-std::vector<std::string> parameter_names(const Rig& rig) {
+std::vector<std::string> parameter_names(const model::Rig& rig) {
   std::vector<std::string> names;
-  for (const RigParameter& p : servo_parameters()) {
-    if (p.kind == ParameterKind::start_in_gap) continue;
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
+    if (p.kind == rig_file::ParameterKind::start_in_gap) continue;
     if (p.get(rig) != 0) names.push_back(p.name);
   }
   return names;
@@ -74,7 +75,7 @@ void refine_gap_map(IdentificationCase& c) {
 void warn_of_asymmetry(IdentificationCase& c) {
   for (const FrictionDetail& d : c.result.friction) {
     if (d.lines.size() != 2) continue;
-    const Measured &forward = d.lines[0].coulomb, &backward = d.lines[1].coulomb;
+    const signal::Measured &forward = d.lines[0].coulomb, &backward = d.lines[1].coulomb;
     const double difference = forward.value + backward.value;  // the backward one is negative
     const double error = std::hypot(forward.standard_error, backward.standard_error);
     const bool declared = c.declared.motor.coulomb_asymmetry != 0 || c.declared.link.coulomb_asymmetry != 0;
@@ -94,7 +95,7 @@ void warn_of_misfit(Identification& result) {
           " %: the machine has an effect that the rig file lacks");
 }
 
-void require_servo(const Rig& rig) {
+void require_servo(const model::Rig& rig) {
   if (!rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.link_locked)
     throw CannotIdentify(
         "identify knows machines of one inertia (mesh: rigid) and of two (rigid couplings, free link); "
@@ -107,19 +108,21 @@ void require_servo(const Rig& rig) {
 
 }  // namespace
 
-IdentificationCase identification_case(const Rig& declared, const std::vector<Record>& records) {
+IdentificationCase identification_case(const model::Rig& declared,
+                                       const std::vector<record::Record>& records) {
   IdentificationCase c;
-  c.declared = load_side(declared);
+  c.declared = model::load_side(declared);
   c.result.rig = c.declared;
   read_records(records, declared, c);
   if (declared.mesh.rigid) return c;
   require_servo(declared);
   c.names = parameter_names(c.declared);
-  for (const std::string& name : c.names) c.result.units[name] = servo_parameter(name).unit;
+  for (const std::string& name : c.names) c.result.units[name] = rig_file::servo_parameter(name).unit;
   return c;
 }
 
-Identification identify(const Rig& declared, const std::vector<Record>& records, const Progress& progress) {
+Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
+                        const Progress& progress) {
   IdentificationCase c = identification_case(declared, records);
   std::vector<Procedure> procedures = {{"one_inertia", run_one_inertia}};
   if (!declared.mesh.rigid) procedures = servo_procedures();
@@ -149,4 +152,4 @@ Identification identify(const Rig& declared, const std::vector<Record>& records,
   return c.result;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

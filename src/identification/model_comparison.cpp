@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/identification/procedures/ringing.h"
 #include "backlash_diagnosis/record/resampling.h"
@@ -13,7 +14,7 @@
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "backlash_diagnosis/simulation/plant.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using Values = std::vector<double>;
@@ -32,13 +33,13 @@ Values difference(const Values& a, const Values& b) {
 double median_of_finite(Values values) {
   values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
                values.end());
-  return median(std::move(values));
+  return signal::median(std::move(values));
 }
 
 /// Flank changes: the deflection comes from one side of its range and reaches the other.
 std::vector<Engagement> find_engagements(const ComparedRecord& r, const ComparisonSettings& s) {
-  const double low = quantile(r.raw_deflection, kBeyondRange),
-               high = quantile(r.raw_deflection, 1 - kBeyondRange);
+  const double low = signal::quantile(r.raw_deflection, kBeyondRange),
+               high = signal::quantile(r.raw_deflection, 1 - kBeyondRange);
   const double middle = 0.5 * (low + high), margin = kHysteresis * (high - low);
   const auto samples = [&](double seconds) { return std::lround(seconds / r.data.interval); };
   const long n = long(r.data.size()), before = samples(s.before), after = samples(s.after);
@@ -94,10 +95,10 @@ ChannelComparison compare(const Values& measured, const Values& predicted, const
 /// The machine through the engagements, driven by the torque of the record.
 class FreeRuns {
  public:
-  FreeRuns(const Rig& rig, const ComparedRecord& record, const DrivenLoad& followed,
+  FreeRuns(const model::Rig& rig, const ComparedRecord& record, const simulation::DrivenLoad& followed,
            const Calibration& calibration)
       : plant_(rig, topic(), {}), record_(record), followed_(followed) {
-    torque_ = delayed(record.data.torque, calibration.torque_delay);
+    torque_ = signal::delayed(record.data.torque, calibration.torque_delay);
     if (!calibration.held)  // of the moment: its mean between samples
       for (std::size_t k = 0; k + 1 < torque_.size(); ++k) torque_[k] = 0.5 * (torque_[k] + torque_[k + 1]);
     for (Values* column : {&motor_speed, &deflection, &speed_difference})
@@ -110,7 +111,7 @@ class FreeRuns {
     plant_.set_state({record_.data.motor[e.from], followed_.load[e.from], record_.data.motor_rate[e.from],
                       followed_.load_rate[e.from]});
     for (std::size_t k = e.from; k < e.to; ++k) {
-      const Plant::State& s = plant_.state();
+      const simulation::Plant::State& s = plant_.state();
       motor_speed[k] = s[2];
       deflection[k] = s[0] - s[1] - offset_;
       speed_difference[k] = s[2] - s[3];
@@ -122,14 +123,14 @@ class FreeRuns {
   Values motor_speed, deflection, speed_difference;  // NaN between engagements
 
  private:
-  static ExcitationSettings topic() {
-    ExcitationSettings settings;
+  static simulation::ExcitationSettings topic() {
+    simulation::ExcitationSettings settings;
     settings.type = "topic";
     return settings;
   }
-  Plant plant_;
+  simulation::Plant plant_;
   const ComparedRecord& record_;
-  const DrivenLoad& followed_;
+  const simulation::DrivenLoad& followed_;
   Values torque_;
   double offset_;
 };
@@ -172,10 +173,10 @@ EngagementPeak compare_peaks(const ComparedRecord& record, const Values& predict
   return p;
 }
 
-double natural_frequency(const Rig& rig) {
+double natural_frequency(const model::Rig& rig) {
   if (!rig.mesh.contact_spec.values.has("stiffness"))
     throw InvalidParameter("contact.law", rig.mesh.contact_spec.law, "needs a stiffness to be compared");
-  const GearTrain train(rig);
+  const model::GearTrain train(rig);
   const double m = train.motor_inertia(), l = train.load_inertia();
   return std::sqrt(rig.mesh.contact_spec.values.at("stiffness") * (m + l) / (m * l));
 }
@@ -186,11 +187,11 @@ void compare_followed(const ServoPrediction& p, const ComparedRecord& record, Mo
   // The motor is the recorded one in both.
   result.followed["speed_difference"] =
       compare(record.speed_difference, difference(record.motor_speed, p.load.load_rate), "rad/s",
-              white_noise(record.load_speed));
+              signal::white_noise(record.load_speed));
   result.traces.deflection = p.deflection;
 }
 
-void compare_free(const Rig& rig, const ComparedRecord& record, const DrivenLoad& followed,
+void compare_free(const model::Rig& rig, const ComparedRecord& record, const simulation::DrivenLoad& followed,
                   ModelComparison& result) {
   result.peak_ratio = result.frequency_ratio = result.damping_ratio = kNaN;
   if (record.engagements.empty()) return;
@@ -214,38 +215,41 @@ void compare_free(const Rig& rig, const ComparedRecord& record, const DrivenLoad
                        double noise) {
     result.free[name] = compare(measured, predicted, unit, noise, counts);
   };
-  add("motor_speed", record.motor_speed, runs.motor_speed, "rad/s", white_noise(record.motor_speed));
+  add("motor_speed", record.motor_speed, runs.motor_speed, "rad/s", signal::white_noise(record.motor_speed));
   add("speed_difference", record.speed_difference, runs.speed_difference, "rad/s",
-      white_noise(record.speed_difference));
-  add("deflection", record.raw_deflection, runs.deflection, "rad", white_noise(record.raw_deflection));
+      signal::white_noise(record.speed_difference));
+  add("deflection", record.raw_deflection, runs.deflection, "rad",
+      signal::white_noise(record.raw_deflection));
   result.traces.free_deflection = std::move(runs.deflection);
   result.traces.free_speed_difference = std::move(runs.speed_difference);
 }
 
 }  // namespace
 
-ComparedRecord compared_record(const Record& given, const Rig& rig, const ComparisonSettings& settings) {
+ComparedRecord compared_record(const record::Record& given, const model::Rig& rig,
+                               const ComparisonSettings& settings) {
   ComparedRecord r;
   r.data = servo_data(given, rig);
   if (r.data.load.empty()) throw CannotIdentify(given.name + ": a comparison needs load_position");
-  const Record record = evenly_sampled(load_side(given, rig));
+  const record::Record record = record::evenly_sampled(load_side(given, rig));
   r.time = record.time;
   r.raw_deflection = difference(r.data.motor, r.data.load);
-  r.deflection = low_pass(r.raw_deflection, r.data.interval, settings.cutoff);
-  const bool speeds = record.has(Channel::motor_velocity) && record.has(Channel::load_velocity);
-  r.motor_speed = speeds ? record.column(Channel::motor_velocity) : r.data.motor_rate;
-  r.load_speed = speeds ? record.column(Channel::load_velocity) : r.data.load_rate;
+  r.deflection = signal::low_pass(r.raw_deflection, r.data.interval, settings.cutoff);
+  const bool speeds =
+      record.has(record::Channel::motor_velocity) && record.has(record::Channel::load_velocity);
+  r.motor_speed = speeds ? record.column(record::Channel::motor_velocity) : r.data.motor_rate;
+  r.load_speed = speeds ? record.column(record::Channel::load_velocity) : r.data.load_rate;
   r.speed_difference = difference(r.motor_speed, r.load_speed);
   r.engagements = find_engagements(r, settings);
   return r;
 }
 
-std::vector<ModelComparison> compare_models(const std::vector<Rig>& rigs, const ComparedRecord& record,
+std::vector<ModelComparison> compare_models(const std::vector<model::Rig>& rigs, const ComparedRecord& record,
                                             const ComparisonSettings& settings, const Progress& progress) {
   if (rigs.empty()) return {};
   FitSettings fit;
   fit.cutoff = settings.cutoff;
-  fit = with_bands(fit, load_side(rigs.front()), {record.data});  // the same bands for all
+  fit = with_bands(fit, model::load_side(rigs.front()), {record.data});  // the same bands for all
   std::vector<ModelComparison> results(rigs.size());
   double done = 0;
   const auto step = [&](const std::string& phase) {
@@ -256,7 +260,7 @@ std::vector<ModelComparison> compare_models(const std::vector<Rig>& rigs, const 
   for (std::size_t i = 0; i < rigs.size(); ++i) {
     step("calibrating to the record");
     Calibration& own = results[i].calibration;
-    const ServoPrediction p = predict_calibrated(load_side(rigs[i]), record.data, fit, own);
+    const ServoPrediction p = predict_calibrated(model::load_side(rigs[i]), record.data, fit, own);
     if (p.torque_error.error < least) best = own;
     least = std::min(least, p.torque_error.error);
   }
@@ -264,7 +268,7 @@ std::vector<ModelComparison> compare_models(const std::vector<Rig>& rigs, const 
     step("comparing");
     results[i].calibration.torque_delay = best.torque_delay;
     results[i].calibration.held = best.held;
-    const Rig rig = load_side(rigs[i]);
+    const model::Rig rig = model::load_side(rigs[i]);
     const ServoPrediction p = predict_servo(rig, record.data, fit, results[i].calibration);
     compare_followed(p, record, results[i]);
     compare_free(rig, record, p.load, results[i]);
@@ -272,4 +276,4 @@ std::vector<ModelComparison> compare_models(const std::vector<Rig>& rigs, const 
   return results;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-namespace backlash {
+namespace backlash::model {
 
 std::string axis_unit(const std::string& rotary, bool linear) {
   std::string unit = rotary;
@@ -17,4 +17,4 @@ std::string axis_unit(const std::string& rotary, bool linear) {
   return unit;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -6,7 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 constexpr double kSteepest = 89 * M_PI / 180;
@@ -49,4 +49,4 @@ double resolution_on_pitch_circle(int teeth, double module, double step) {
   return 0.5 * teeth * module * step;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

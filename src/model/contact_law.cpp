@@ -4,7 +4,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "contact/laws.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 const ContactLawType* find(const std::string& name) {
@@ -49,4 +49,4 @@ std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, cons
   return law;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
@@ -176,4 +176,4 @@ double centre_distance_change_for(GearPair pair, double backlash) {
   return sum / std::cos(inverse_involute(value)) - tight_centre_distance(pair);
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 constexpr double kWithinReach = 0.1;  // share of the half gap; a flank that moves by less cannot touch
@@ -455,4 +455,4 @@ double GearTrain::elastic_deflection(double motor_torque) const {
   return std::copysign(angle * ratio_, motor_torque);
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/model/gear_train.h"
 
-namespace backlash {
+namespace backlash::model {
 
 const FrictionLimits& GearTrain::limits(const DryEnd& end, const EndFriction& friction) const {
   return end.part == kMotor ? friction.motor : friction.load;
@@ -66,4 +66,4 @@ bool GearTrain::any_stuck() const {
   return std::any_of(dry_ends_.begin(), dry_ends_.end(), [](const DryEnd& end) { return end.mode.stuck(); });
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/restitution.h"
 
-namespace backlash {
+namespace backlash::model {
 
 double GearTrain::penetration(const PartMotion& s, Flank flank) const {
   return flank * gap_position(s) - half_gap_ - lever_ * shift(s, flank, 0).opening;
@@ -96,4 +96,4 @@ void GearTrain::touch(Flank flank, double* state) {
   if (contact_->jump_restitution(*restitution * impact_speed_)) enter(kApart);  // else too slow to leave
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

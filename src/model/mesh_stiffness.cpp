@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 using PairStiffness = std::function<double(double life)>;
@@ -152,4 +152,4 @@ int MeshStiffness::pairs(double phase) const {
   return static_cast<int>(std::ceil(geometry_.contact_ratio - (phase - std::floor(phase))));
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 FrictionLimits between(const FrictionLimits& a, const FrictionLimits& b, double part) {
@@ -58,4 +58,4 @@ std::vector<double> presliding_friction(const std::vector<double>& positions,
   return friction;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

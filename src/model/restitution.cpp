@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 /// (x - ln(1 + x)) / x^2 for x > -1: positive, falling, 1/2 at 0.
@@ -112,4 +112,4 @@ ImpactSpeeds speeds_after_impact(double mass1, double mass2, ImpactSpeeds before
   return {before.first - share1 * change, before.second + share2 * change};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/model/rig.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 /// A number for both directions, or a map of `forward` and `backward`; as mean and half difference.
@@ -149,4 +149,4 @@ Rig load_side(const Rig& rig) {
   return out;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/model/rig.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 auto members(const Body& body) {
@@ -64,4 +64,4 @@ bool operator==(const Rig& a, const Rig& b) {
          std::equal(terms.begin(), terms.end(), b.terms.begin(), b.terms.end(), same_term);
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 void require(const std::string& name, double value, const Range& range) {
@@ -35,4 +35,4 @@ double equivalent_radius(double mass, double density) {
   return std::cbrt(3 * mass / (4 * M_PI * density));
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

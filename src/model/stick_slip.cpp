@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 // With presliding a body would swing for ever, in the end by roundings. At rest are speeds far below any that
@@ -72,4 +72,4 @@ bool StickSlip::update(double net, double& speed, const FrictionLimits& limits, 
   return direction_ != before || speed != speed_before;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

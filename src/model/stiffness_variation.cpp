@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 GearPair read_gear_pair(const YamlReader& yaml) {
@@ -72,4 +72,4 @@ std::shared_ptr<const StiffnessVariation> read_stiffness_variation(const YamlRea
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

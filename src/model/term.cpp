@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "terms/terms.h"
 
-namespace backlash {
+namespace backlash::model {
 
 const std::vector<TermType>& term_types() {
   static const std::vector<TermType> types = {asymmetric_coulomb_term(),
@@ -98,4 +98,4 @@ std::shared_ptr<const Term> read_term(const YamlReader& yaml) {
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

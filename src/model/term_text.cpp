@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 std::string value_text(const ParameterSpec& spec, const ParameterValues& values) {
@@ -28,4 +28,4 @@ std::string term_text(const Term& term) {
   return text;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -5,9 +5,10 @@
 
 int main(int argc, char** argv) {
   using namespace backlash;
-  return node_main(argc, argv, "diagnoser", diagnoser_help(), [] {
+  return ros_bridge::node_main(argc, argv, "diagnoser", ros_bridge::diagnoser_help(), [] {
     const ros::NodeHandle handle, private_handle("~");
-    DiagnoserNode(handle, private_handle, load_diagnoser_settings(private_handle)).run();
+    ros_bridge::DiagnoserNode(handle, private_handle, ros_bridge::load_diagnoser_settings(private_handle))
+        .run();
     return 0;
   });
 }

@@ -5,6 +5,7 @@
 
 int main(int argc, char** argv) {
   using namespace backlash;
-  return node_main(argc, argv, "simulator", simulator_help(),
-                   [] { return SimulatorNode(ros::NodeHandle(), ros::NodeHandle("~")).run(); });
+  return ros_bridge::node_main(argc, argv, "simulator", ros_bridge::simulator_help(), [] {
+    return ros_bridge::SimulatorNode(ros::NodeHandle(), ros::NodeHandle("~")).run();
+  });
 }

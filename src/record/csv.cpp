@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/time_base.h"
 
-namespace backlash {
+namespace backlash::record {
 namespace {
 
 const std::string kTimeColumn = "time";
@@ -309,4 +309,4 @@ void write_csv(const Record& record, const std::string& path) {
   write_file(path, content);
 }
 
-}  // namespace backlash
+}  // namespace backlash::record

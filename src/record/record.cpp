@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/time_base.h"
 
-namespace backlash {
+namespace backlash::record {
 namespace {
 
 // In the order of the enumerators.
@@ -97,4 +97,4 @@ Record Record::slice(double from, double to) const {
   return part;
 }
 
-}  // namespace backlash
+}  // namespace backlash::record

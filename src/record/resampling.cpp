@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/time_base.h"
 
-namespace backlash {
+namespace backlash::record {
 
 Record evenly_sampled(const Record& record) {
   const std::size_t n = record.size();
@@ -40,4 +40,4 @@ Record evenly_sampled(const Record& record) {
   return out;
 }
 
-}  // namespace backlash
+}  // namespace backlash::record

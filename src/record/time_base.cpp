@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::record {
 namespace {
 
 std::string seconds(double time) {
@@ -54,7 +54,7 @@ double median_interval(const std::vector<double>& time) {
   if (time.size() < 2) return 0;
   std::vector<double> intervals(time.size() - 1);
   for (std::size_t i = 0; i < intervals.size(); ++i) intervals[i] = time[i + 1] - time[i];
-  return median(std::move(intervals));
+  return signal::median(std::move(intervals));
 }
 
 std::vector<std::string> describe_time_base(const std::vector<double>& time) {
@@ -96,4 +96,4 @@ std::vector<std::string> describe_time_base(const std::vector<double>& time) {
   return warnings;
 }
 
-}  // namespace backlash
+}  // namespace backlash::record

@@ -5,7 +5,7 @@
 #include "backlash_diagnosis/report/diagnosis_report.h"
 #include "json.h"
 
-namespace backlash {
+namespace backlash::report {
 
 /// The report as a value; keys in the order of the documentation.
 Json diagnosis_data(const DiagnosisReport& report);
@@ -13,4 +13,4 @@ Json diagnosis_data(const DiagnosisReport& report);
 /// "79.98"; "?" for what is not finite.
 std::string four_digits(double value);
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -14,7 +14,7 @@
 #include "diagnosis_data.h"
 #include "html_template.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
@@ -38,7 +38,7 @@ Json cells(const Answer& a, bool linear) {
                       cell(a.backlash_angle, a.angle_lower, a.angle_upper, kDegree)});
 }
 
-std::string parts_text(const PlayComponents& parts) {
+std::string parts_text(const diagnosis::PlayComponents& parts) {
   std::vector<std::string> known;
   const auto add = [&known](const char* name, double value, const char* unit) {
     if (std::isfinite(value)) known.push_back(std::string(name) + " " + four_digits(value) + " " + unit);
@@ -51,37 +51,37 @@ std::string parts_text(const PlayComponents& parts) {
 }
 
 /// "Good: 79.98 um of backlash, 95 % interval 77.93 to 82.17 um."; empty where that is not known.
-std::string headline(const Verdict& v, bool linear) {
+std::string headline(const diagnosis::Verdict& v, bool linear) {
   const bool angle = linear || (!std::isfinite(v.backlash) && !std::isfinite(v.lower));
   const double value = angle ? v.backlash_angle : v.backlash;
   if (!std::isfinite(value)) return "";
   const double lower = angle ? v.angle_lower : v.lower, upper = angle ? v.angle_upper : v.upper;
   const bool degrees = angle && !linear;
   const double scale = degrees ? kDegree : kMicrometre;
-  std::string grade = to_string(v.grade);
+  std::string grade = diagnosis::to_string(v.grade);
   grade[0] = char(std::toupper(grade[0]));
   return fmt::format("{}: {} {unit} of backlash, 95 % interval {} to {} {unit}.", grade,
                      four_digits(value / scale), four_digits(lower / scale), four_digits(upper / scale),
                      fmt::arg("unit", degrees ? "deg" : "\u00b5m"));
 }
 
-Json estimates(const Diagnosis& diagnosis, bool linear) {
+Json estimates(const diagnosis::Diagnosis& diagnosis, bool linear) {
   Json rows = Json::array();
-  for (const Estimate& e : diagnosis.estimates) {
+  for (const diagnosis::Estimate& e : diagnosis.estimates) {
     std::string how = e.message;
     if (std::isfinite(e.skewness) && e.message.find("skewness") == std::string::npos)
       how = "skewness " + four_digits(e.skewness) + (how.empty() ? "" : "; ") + how;
     rows.push_back({{"method", e.method},
-                    {"status", to_string(e.status)},
+                    {"status", diagnosis::to_string(e.status)},
                     {"together", false},
                     {"cells", cells(e, linear)},
                     {"how", how},
                     {"parts", e.components ? parts_text(*e.components) : ""}});
   }
-  const Verdict& v = diagnosis.verdict;
+  const diagnosis::Verdict& v = diagnosis.verdict;
   if (!v.members.empty())
     rows.push_back({{"method", "together"},
-                    {"status", to_string(v.grade)},
+                    {"status", diagnosis::to_string(v.grade)},
                     {"together", true},
                     {"cells", cells(v, linear)},
                     {"how", v.agreement},
@@ -90,11 +90,11 @@ Json estimates(const Diagnosis& diagnosis, bool linear) {
 }
 
 Json facts(const DiagnosisReport& report) {
-  const Record& record = *report.record;
+  const record::Record& record = *report.record;
   const double interval = record.sampling_interval();
   std::vector<std::string> channels;
-  for (const Channel channel : kChannels)
-    if (record.has(channel)) channels.push_back(channel_name(channel));
+  for (const record::Channel channel : record::kChannels)
+    if (record.has(channel)) channels.push_back(record::channel_name(channel));
   Json rows = Json::array();
   const auto row = [&rows](const char* name, const std::string& value) {
     rows.push_back({{"name", name}, {"value", value}});
@@ -105,7 +105,7 @@ Json facts(const DiagnosisReport& report) {
   row("rate", interval > 0 ? four_digits(1 / interval) + " Hz" : "?");
   row("channels", joined(channels));
   if (report.diagnosis.apd && report.apd_settings) {
-    const ApdResult& apd = *report.diagnosis.apd;
+    const diagnosis::ApdResult& apd = *report.diagnosis.apd;
     row("excitation periods", fmt::format("{} used, of {} s, {} left out", apd.periods.size(),
                                           four_digits(apd.period), apd.incomplete));
   }
@@ -117,7 +117,7 @@ Json facts(const DiagnosisReport& report) {
   return rows;
 }
 
-std::string plots_of(const DiagnosisReport& report, const RigFile* rig) {
+std::string plots_of(const DiagnosisReport& report, const rig_file::RigFile* rig) {
   try {
     const ScratchFolder scratch;
     write_file(scratch.path("series.json"), diagnosis_series(report, rig));
@@ -129,11 +129,12 @@ std::string plots_of(const DiagnosisReport& report, const RigFile* rig) {
 
 }  // namespace
 
-std::string diagnosis_page(const DiagnosisReport& report, const RigFile* rig, const Provenance& provenance) {
+std::string diagnosis_page(const DiagnosisReport& report, const rig_file::RigFile* rig,
+                           const Provenance& provenance) {
   const bool linear = rig && rig->rig.linear;
   const std::string of = report.rig.empty() ? report.record->name : report.rig + ", " + report.record->name;
-  const Verdict& verdict = report.diagnosis.verdict;
-  const Json data = {{"grade", to_string(verdict.grade)},
+  const diagnosis::Verdict& verdict = report.diagnosis.verdict;
+  const Json data = {{"grade", diagnosis::to_string(verdict.grade)},
                      {"headline", headline(verdict, linear)},
                      {"message", verdict.message},
                      {"linear", linear},
@@ -146,4 +147,4 @@ std::string diagnosis_page(const DiagnosisReport& report, const RigFile* rig, co
   return report_page("Backlash of " + of, filled(kDiagnosisTemplate, data));
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -10,15 +10,15 @@
 #include "backlash_diagnosis/base/version.h"
 #include "diagnosis_data.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
-Json estimate_json(const Estimate& e) {
+Json estimate_json(const diagnosis::Estimate& e) {
   Json json;
   json["method"] = e.method;
-  json["status"] = to_string(e.status);
+  json["status"] = diagnosis::to_string(e.status);
   json["backlash"] = json_number(e.backlash);
   json["backlash_angle"] = json_number(e.backlash_angle);
   json["interval"] = json_interval(e.lower, e.upper);
@@ -35,16 +35,16 @@ Json estimate_json(const Estimate& e) {
   return json;
 }
 
-Json methods_json(const std::vector<Estimate>& estimates, const std::vector<int>& chosen) {
+Json methods_json(const std::vector<diagnosis::Estimate>& estimates, const std::vector<int>& chosen) {
   Json names = Json::array();
   for (const int i : chosen) names.push_back(estimates[i].method);
   return names;
 }
 
-Json coherence_json(const CoherenceDetection& d) {
+Json coherence_json(const diagnosis::CoherenceDetection& d) {
   Json json;
   json["detector"] = "coherence";
-  json["status"] = to_string(d.status);
+  json["status"] = diagnosis::to_string(d.status);
   json["nonlinear"] = d.nonlinear ? Json(*d.nonlinear) : Json(nullptr);
   json["loss"] = json_number(d.loss);
   json["deviation"] = json_number(d.deviation);
@@ -55,9 +55,9 @@ Json coherence_json(const CoherenceDetection& d) {
   return json;
 }
 
-Json verdict_json(const Verdict& verdict, const std::vector<Estimate>& estimates) {
+Json verdict_json(const diagnosis::Verdict& verdict, const std::vector<diagnosis::Estimate>& estimates) {
   Json json;
-  json["grade"] = to_string(verdict.grade);
+  json["grade"] = diagnosis::to_string(verdict.grade);
   json["estimate"] = verdict.estimate < 0 ? Json(nullptr) : Json(verdict.estimate);
   json["agreement"] = verdict.agreement;
   json["members"] = methods_json(estimates, verdict.members);
@@ -72,9 +72,9 @@ Json verdict_json(const Verdict& verdict, const std::vector<Estimate>& estimates
   return json;
 }
 
-Json apd_json(const ApdResult& apd, const ApdSettings& settings) {
+Json apd_json(const diagnosis::ApdResult& apd, const diagnosis::ApdSettings& settings) {
   Json json;
-  json["signal"] = channel_name(settings.signal);
+  json["signal"] = record::channel_name(settings.signal);
   json["classes"] = settings.layout.classes;
   json["lower"] = settings.layout.lower;
   json["upper"] = settings.layout.upper;
@@ -90,12 +90,13 @@ Json apd_json(const ApdResult& apd, const ApdSettings& settings) {
   json["kurtosis"] = json_number(apd.total.kurtosis());
   json["noise"] = json_number(apd.noise);
   Json& each = json["skewness_of_periods"] = Json::array();
-  for (const PeriodResult& period : apd.periods) each.push_back(json_number(period.apd.skewness()));
+  for (const diagnosis::PeriodResult& period : apd.periods)
+    each.push_back(json_number(period.apd.skewness()));
   return json;
 }
 
-Json curve_json(const MonitoringCurve& curve, const std::string& source) {
-  const CurveConditions& c = curve.conditions;
+Json curve_json(const diagnosis::MonitoringCurve& curve, const std::string& source) {
+  const diagnosis::CurveConditions& c = curve.conditions;
   Json json;
   json["source"] = source;
   json["rig"] = c.rig;
@@ -123,8 +124,8 @@ std::string with_interval(double value, double lower, double upper, double unit)
   return text;
 }
 
-void print_estimate(const Estimate& e, std::ostream& out) {
-  out << e.method << ": " << to_string(e.status) << '\n';
+void print_estimate(const diagnosis::Estimate& e, std::ostream& out) {
+  out << e.method << ": " << diagnosis::to_string(e.status) << '\n';
   if (std::isfinite(e.backlash) || std::isfinite(e.lower))
     out << "  backlash        " << with_interval(e.backlash, e.lower, e.upper, 1) << " m\n";
   if (std::isfinite(e.backlash_angle) || std::isfinite(e.angle_lower))
@@ -146,7 +147,8 @@ Json diagnosis_data(const DiagnosisReport& report) {
   json["schema_version"] = 1;
   json["record"] = report.record->name;
   json["estimates"] = Json::array();
-  for (const Estimate& e : report.diagnosis.estimates) json["estimates"].push_back(estimate_json(e));
+  for (const diagnosis::Estimate& e : report.diagnosis.estimates)
+    json["estimates"].push_back(estimate_json(e));
   if (report.diagnosis.coherence)
     json["detectors"] = Json::array({coherence_json(*report.diagnosis.coherence)});
   json["verdict"] = verdict_json(report.diagnosis.verdict, report.diagnosis.estimates);
@@ -168,15 +170,15 @@ std::string four_digits(double value) {
 }
 
 void print_summary(const DiagnosisReport& report, std::ostream& out) {
-  const Record& record = *report.record;
+  const record::Record& record = *report.record;
   const double interval = record.sampling_interval();
   out << record.name << ": " << record.size() << " samples, "
       << four_digits(record.time.back() - record.time.front()) << " s";
   if (interval > 0) out << ", " << four_digits(1 / interval) << " Hz";
   out << '\n';
   for (const std::string& warning : report.warnings) out << "warning: " << warning << '\n';
-  for (const Estimate& e : report.diagnosis.estimates) print_estimate(e, out);
+  for (const diagnosis::Estimate& e : report.diagnosis.estimates) print_estimate(e, out);
   out << "verdict: " << report.diagnosis.verdict.message << '\n';
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

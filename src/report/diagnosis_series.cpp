@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "diagnosis_data.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 constexpr int kPeriods = 3;
@@ -22,31 +22,33 @@ Json column(const std::vector<double>& values, std::size_t stride) {
 /// Of the excitation; 0 where it does not repeat.
 double period_of(const DiagnosisReport& report) {
   if (report.diagnosis.apd && report.diagnosis.apd->period > 0) return report.diagnosis.apd->period;
-  return excitation_period(*report.record, Channel::motor_torque);
+  return diagnosis::excitation_period(*report.record, record::Channel::motor_torque);
 }
 
-Json record_json(const Record& record, double period, bool linear) {
+Json record_json(const record::Record& record, double period, bool linear) {
   const double end = record.time.back(), from = period > 0 ? end - kPeriods * period : record.time.front();
-  const Record part = record.slice(from, std::nextafter(end, end + 1));
+  const record::Record part = record.slice(from, std::nextafter(end, end + 1));
   const std::size_t stride = part.size() / kMostSamples + 1;
   Json json = {{"period", period > 0 ? Json(period) : Json(nullptr)}, {"time", column(part.time, stride)}};
   json["channels"] = Json::object();
-  for (const Channel channel : kChannels)
+  for (const record::Channel channel : record::kChannels)
     if (part.has(channel))
-      json["channels"][channel_name(channel)] = {{"unit", axis_unit(channel_unit(channel), linear)},
-                                                 {"values", column(part.column(channel), stride)}};
+      json["channels"][record::channel_name(channel)] = {
+          {"unit", model::axis_unit(record::channel_unit(channel), linear)},
+          {"values", column(part.column(channel), stride)}};
   return json;
 }
 
 /// The curve at its declared noise, with the 95 % scatter of a single period.
-Json curve_json(const MonitoringCurve& curve) {
+Json curve_json(const diagnosis::MonitoringCurve& curve) {
   Json json = {{"angular", curve.conditions.angular},
                {"backlash_to_angle", json_number(curve.backlash_to_angle)}};
-  for (const CurvePoint& point : curve.points) {
-    const SkewnessCell& cell = curve.nominal(point);
+  for (const diagnosis::CurvePoint& point : curve.points) {
+    const diagnosis::SkewnessCell& cell = curve.nominal(point);
     json["backlash"].push_back(point.backlash);
     json["skewness"].push_back(json_number(cell.mean));
-    json["scatter"].push_back(json_number(curve.coverage_factor * MonitoringCurve::deviation(cell, 1)));
+    json["scatter"].push_back(
+        json_number(curve.coverage_factor * diagnosis::MonitoringCurve::deviation(cell, 1)));
   }
   return json;
 }
@@ -54,7 +56,7 @@ Json curve_json(const MonitoringCurve& curve) {
 /// Null where there are none, or where they hold for the growth.
 Json limits_json(const DiagnosisReport& report) {
   if (!report.limits || std::isfinite(report.diagnosis.verdict.growth)) return nullptr;
-  const Limits& limits = *report.limits;
+  const diagnosis::Limits& limits = *report.limits;
   return {{"angular", limits.angular},
           {"watch", limits.watch},
           {"service", limits.service},
@@ -63,7 +65,7 @@ Json limits_json(const DiagnosisReport& report) {
 
 }  // namespace
 
-std::string diagnosis_series(const DiagnosisReport& report, const RigFile* rig) {
+std::string diagnosis_series(const DiagnosisReport& report, const rig_file::RigFile* rig) {
   const bool linear = rig && rig->rig.linear;
   const bool locked = rig ? rig->rig.link_locked : report.curve && report.curve->conditions.output_locked;
   const Json json = {{"schema_version", 1},
@@ -77,4 +79,4 @@ std::string diagnosis_series(const DiagnosisReport& report, const RigFile* rig) 
   return dumped(json, -1);
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 std::string escaped(const std::string& text) {
@@ -114,4 +114,4 @@ std::string filled(const std::string& html_template, const Json& data) {
   return Filling(data).of(html_template);
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -17,7 +17,7 @@
 
 #include "json.h"
 
-namespace backlash {
+namespace backlash::report {
 
 /// In the library by CMake, from src/report/templates.
 extern const char* const kPageTemplate;
@@ -29,4 +29,4 @@ extern const char* const kDiagnosisTemplate;
 /// Throws Error for a tag that does not end, or a text that the data does not have.
 std::string filled(const std::string& html_template, const Json& data);
 
-}  // namespace backlash
+}  // namespace backlash::report

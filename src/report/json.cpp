@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace backlash {
+namespace backlash::report {
 
 Json json_number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -14,7 +14,7 @@ Json json_interval(double lower, double upper) {
   return Json::array({json_number(lower), json_number(upper)});
 }
 
-Json measured(const Measured& m) {
+Json measured(const signal::Measured& m) {
   return {{"value", json_number(m.value)}, {"standard_error", json_number(m.standard_error)}};
 }
 
@@ -22,4 +22,4 @@ std::string dumped(const Json& json, int indent) {
   return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::report {
 
 using Json = nlohmann::ordered_json;
 
@@ -18,9 +18,9 @@ Json json_number(double value);
 Json json_interval(double lower, double upper);
 
 /// value, standard_error
-Json measured(const Measured& m);
+Json measured(const signal::Measured& m);
 
 /// With a newline at the end; `indent` -1: on one line.
 std::string dumped(const Json& json, int indent);
 
-}  // namespace backlash
+}  // namespace backlash::report

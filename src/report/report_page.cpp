@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/report/script.h"
 #include "html_template.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 /// So that a shell reads it as one word.
@@ -86,4 +86,4 @@ std::string report_page(const std::string& title, const std::string& body) {
   return filled(kPageTemplate, {{"title", title}, {"body", body}});
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

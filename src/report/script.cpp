@@ -11,7 +11,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 namespace fs = std::filesystem;
@@ -43,4 +43,4 @@ int run_script(const std::string& name, const std::vector<std::string>& argument
   return run(std::move(words));
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

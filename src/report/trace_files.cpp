@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-namespace backlash {
+namespace backlash::report {
 
 TraceFiles trace_files(const std::string& folder) {
   const std::filesystem::path in(folder);
@@ -11,4 +11,4 @@ TraceFiles trace_files(const std::string& folder) {
           (in / "report.html").string()};
 }
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -2,8 +2,8 @@
 // The text of config/sarkar_1997.yaml, put into the library by CMake.
 #pragma once
 
-namespace backlash {
+namespace backlash::rig_file {
 
 extern const char* const kDefaultRig;
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

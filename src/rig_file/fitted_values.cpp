@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 /// "kg m^2, fitted +- 0.02", of a value that the file has divided by `divisor`.
@@ -25,7 +25,7 @@ const YamlNode& part_of(const YamlTree& tree, const std::string& part) {
 }  // namespace
 
 void RigDocument::set_fitted(const FittedValues& found) {
-  const Rig& rig = found.rig;
+  const model::Rig& rig = found.rig;
   for (const RigParameter& p : servo_parameters()) {
     if (found.parameters.count(p.name) == 0 || p.key.empty()) continue;
     const double divisor = std::pow(found.motor_axis_ratio, p.ratio_power);
@@ -56,7 +56,7 @@ void RigDocument::set_directional(const std::string& key, double mean, double as
   }
 }
 
-void RigDocument::set_backlash(const Rig& rig, const std::string& comment) {
+void RigDocument::set_backlash(const model::Rig& rig, const std::string& comment) {
   const YamlTree read = tree();
   const YamlNode& mesh = part_of(read, "mesh");
   const double backlash = rig.mesh.backlash;
@@ -71,4 +71,4 @@ void RigDocument::set_backlash(const Rig& rig, const std::string& comment) {
   if (start.get(rig) != 0) set(start.key, start.get(rig), start.unit + ", fitted");
 }
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

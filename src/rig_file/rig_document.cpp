@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 constexpr std::size_t kCommentColumn = 34;  // as in the files of config/ (choice)
@@ -120,7 +120,7 @@ void RigDocument::set(const std::string& key, double value, const std::string& c
   set(key, fmt::format("{:.6g}", value), comment);
 }
 
-void RigDocument::set_contact_law(const ContactSpec& contact) {
+void RigDocument::set_contact_law(const model::ContactSpec& contact) {
   const YamlTree read = tree();
   const YamlNode& declared =
       *read.root->entries.at("gear_train").value->entries.at("mesh").value->entries.at("contact").value;
@@ -129,7 +129,7 @@ void RigDocument::set_contact_law(const ContactSpec& contact) {
     if (key != "law" && !contact.values.has(key)) dropped.insert(entry.line);
   for (const int line : dropped) lines_.erase(lines_.begin() + line - 1);
   set("gear_train.mesh.contact.law", contact.law);
-  for (const ContactLawType& type : contact_laws()) {
+  for (const model::ContactLawType& type : model::contact_laws()) {
     if (type.name != contact.law) continue;
     for (const ParameterSpec& spec : type.parameters)
       set("gear_train.mesh.contact." + spec.name, contact.values.at(spec.name), spec.unit);
@@ -207,4 +207,4 @@ void RigDocument::drop_head() {
   lines_.erase(lines_.begin(), std::find_if_not(lines_.begin(), lines_.end(), is_head));
 }
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

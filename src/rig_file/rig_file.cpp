@@ -9,27 +9,27 @@
 #include "backlash_diagnosis/base/yaml_tree.h"
 #include "default_rig.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 /// What the estimators need to know of the rig.
-void fill_from_rig(const Rig& rig, DiagnosisSettings& settings) {
-  const auto train = std::make_shared<GearTrain>(rig);  // refuses what cannot move
-  if (rig.mesh.rigid) return;                           // nothing that could have play
+void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings) {
+  const auto train = std::make_shared<model::GearTrain>(rig);  // refuses what cannot move
+  if (rig.mesh.rigid) return;                                  // nothing that could have play
   const auto deflection = [train](double torque) { return train->elastic_deflection(torque); };
   const double base_radius = rig.mesh.angular() ? kNaN : 1 / rig.backlash_angle(1);
   if (settings.lost_motion) {
     settings.lost_motion->elastic_deflection = deflection;
     settings.lost_motion->base_radius = base_radius;
   }
-  const Coupling& coupling = rig.input_coupling;
+  const model::Coupling& coupling = rig.input_coupling;
   const double motor = rig.motor.inertia + 0.5 * coupling.inertia;
   const double pinion = rig.pinion.inertia + 0.5 * coupling.inertia;
-  PositionDifferenceSettings& difference = settings.position_difference.emplace();
+  diagnosis::PositionDifferenceSettings& difference = settings.position_difference.emplace();
   difference.elastic_deflection = deflection;
   if (settings.stiffness_uncertainty > 0) difference.elastic_uncertainty = 2 * settings.stiffness_uncertainty;
   difference.motor_inertia = coupling.rigid ? motor + pinion : motor;
-  MomentumTransferSettings& momentum = settings.momentum_transfer.emplace();
+  diagnosis::MomentumTransferSettings& momentum = settings.momentum_transfer.emplace();
   momentum.motor_inertia = difference.motor_inertia;
   momentum.motor_damping = rig.motor.viscous_damping;
   difference.output_locked = momentum.output_locked = rig.link_locked;
@@ -55,15 +55,16 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   file.text = text;
   file.digest = digest_of(text);
   yaml.integer("schema_version", 1, 1);
-  file.rig = read_rig(yaml);
-  file.simulation = read_simulation_settings(yaml);
+  file.rig = model::read_rig(yaml);
+  file.simulation = simulation::read_simulation_settings(yaml);
   check_excitation(yaml.map("excitation"), file.simulation.excitation, file.rig);
   file.test_runs = read_test_runs(yaml, file.rig);
-  file.diagnosis = read_diagnosis_settings(yaml.map("diagnosis"));
+  file.diagnosis = diagnosis::read_diagnosis_settings(yaml.map("diagnosis"));
   yaml.finish();
   if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())
     yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");
-  if (file.simulation.sensors.of(Channel::motor_current).declared && std::isnan(file.rig.torque_constant))
+  if (file.simulation.sensors.of(record::Channel::motor_current).declared &&
+      std::isnan(file.rig.torque_constant))
     yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
   fill_from_rig(file.rig, file.diagnosis);
   return file;
@@ -77,4 +78,4 @@ RigFile default_rig_file() {
   return rig_file_from_text(kDefaultRig, "built-in sarkar_1997");
 }
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

@@ -3,28 +3,28 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 using Kind = ParameterKind;
 
-void set_contact(Rig& rig, const char* name, double value) {
-  Mesh& mesh = rig.mesh;
+void set_contact(model::Rig& rig, const char* name, double value) {
+  model::Mesh& mesh = rig.mesh;
   mesh.contact_spec.values[name] = value;
-  mesh.contact = make_contact_law(mesh.contact_spec.law, mesh.contact_spec.values);
+  mesh.contact = model::make_contact_law(mesh.contact_spec.law, mesh.contact_spec.values);
 }
 
-double contact_value(const Rig& rig, const char* name) {
+double contact_value(const model::Rig& rig, const char* name) {
   const ParameterValues& values = rig.mesh.contact_spec.values;
   return values.has(name) ? values.at(name) : 0;  // no law has all of them
 }
 
-// How a Rig holds a number: as a member, or among the values of its contact law.
+// How a model::Rig holds a number: as a member, or among the values of its contact law.
 #define BACKLASH_FIELD(member) \
-  [](const Rig& rig) { return rig.member; }, [](Rig& rig, double value) { rig.member = value; }
-#define BACKLASH_CONTACT(name)                             \
-  [](const Rig& rig) { return contact_value(rig, name); }, \
-      [](Rig& rig, double value) { set_contact(rig, name, value); }
+  [](const model::Rig& rig) { return rig.member; }, [](model::Rig& rig, double value) { rig.member = value; }
+#define BACKLASH_CONTACT(name)                                    \
+  [](const model::Rig& rig) { return contact_value(rig, name); }, \
+      [](model::Rig& rig, double value) { set_contact(rig, name, value); }
 
 /// Of one part, in this order: unlike a body's, the parameters of a mesh are no affair of the reduction.
 std::vector<RigParameter> inertias_and_mesh() {
@@ -40,8 +40,9 @@ std::vector<RigParameter> inertias_and_mesh() {
       {"mesh_alpha", RigPart::mesh, Kind::damping_factor, "s/rad", "gear_train.mesh.contact.alpha",
        Range::positive(), 0, "alpha", "", "", BACKLASH_CONTACT("alpha")},
       {"backlash_angle", RigPart::mesh, Kind::backlash, "rad", "gear_train.mesh.backlash_angle",
-       Range::positive(), 0, "", "", "", [](const Rig& rig) { return rig.mesh.backlash / rig.mesh.lever(); },
-       [](Rig& rig, double value) { rig.mesh.backlash = value * rig.mesh.lever(); }},
+       Range::positive(), 0, "", "", "",
+       [](const model::Rig& rig) { return rig.mesh.backlash / rig.mesh.lever(); },
+       [](model::Rig& rig, double value) { rig.mesh.backlash = value * rig.mesh.lever(); }},
   };
 }
 
@@ -80,7 +81,7 @@ std::vector<RigParameter> make_parameters() {
 
 }  // namespace
 
-bool RigParameter::known_to(const Rig& rig) const {
+bool RigParameter::known_to(const model::Rig& rig) const {
   if (part != RigPart::mesh) return true;
   return !rig.mesh.rigid && (contact.empty() || rig.mesh.contact_spec.values.has(contact));
 }
@@ -108,4 +109,4 @@ const RigParameter* asymmetry_of(const RigParameter& mean) {
   return nullptr;
 }
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

@@ -22,7 +22,7 @@
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "bag_structure.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 const std::string kInfoTopic = "/record_info";
@@ -108,17 +108,17 @@ class JointRun {
   void take(const JointStateReader& reader, std::size_t place, const ros::Time& stamp, std::size_t index) {
     if (!reader.problem(place).empty()) fail_at(index, reader.problem(place));
     if (!accept_stamp(stamp, index)) return;
-    for (const Channel channel : kChannels)
+    for (const record::Channel channel : record::kChannels)
       add(channel, reader.values(place)[static_cast<std::size_t>(channel)], stamp, index);
   }
 
-  Record finished() {
+  record::Record finished() {
     if (record_.time.empty())
       throw BadData(path_, "no message of joint '" + printable(joint_) + "' on " + printable(topic_));
     drop_absent_channels();
     const std::string repeated = stamps_.describe("topic " + topic_);
     if (!repeated.empty()) record_.warnings.push_back(repeated);
-    for (std::string& warning : describe_time_base(record_.time))
+    for (std::string& warning : record::describe_time_base(record_.time))
       record_.warnings.push_back(std::move(warning));
     return std::move(record_);
   }
@@ -137,11 +137,11 @@ class JointRun {
       clock_.seconds(origin_.value_or(stamp));  // time 0
     }
     switch (stamps_.next(since_first_.seconds(stamp))) {
-      case StampVerdict::accept:
+      case record::StampVerdict::accept:
         break;
-      case StampVerdict::repeated:
+      case record::StampVerdict::repeated:
         return false;
-      case StampVerdict::backwards:
+      case record::StampVerdict::backwards:
         fail_at(index, "header.stamp = " + stamp_text(stamp) + " s is before " + stamp_text(last_stamp_) +
                            " s of the message before: a looped or merged recording, or a clock that jumped");
     }
@@ -151,10 +151,10 @@ class JointRun {
   }
 
   /// A channel is there in all messages or in none.
-  void add(Channel channel, double value, const ros::Time& stamp, std::size_t index) {
+  void add(record::Channel channel, double value, const ros::Time& stamp, std::size_t index) {
     std::vector<double>& column = record_.column(channel);
     if (!column.empty() && std::isnan(column.front()) != std::isnan(value))
-      fail_at(index, channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
+      fail_at(index, record::channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
                          stamp_text(stamp) + " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
                          ", unlike in the messages before");
     column.push_back(value);
@@ -162,10 +162,10 @@ class JointRun {
 
   void drop_absent_channels() {
     std::vector<std::string> present;
-    for (const Channel channel : kChannels) {
+    for (const record::Channel channel : record::kChannels) {
       std::vector<double>& column = record_.column(channel);
       if (!column.empty() && std::isnan(column.front())) column.clear();
-      if (!column.empty()) present.push_back(channel_name(channel));
+      if (!column.empty()) present.push_back(record::channel_name(channel));
     }
     if (!record_.can_show_backlash())
       throw BadData(path_, "joint '" + printable(joint_) + "' on " + printable(topic_) +
@@ -177,8 +177,8 @@ class JointRun {
   std::optional<ros::Time> origin_;
   ros::Time last_stamp_;
   StampClock clock_, since_first_;
-  StampChecker stamps_;
-  Record record_;
+  record::StampChecker stamps_;
+  record::Record record_;
 };
 
 /// All joints of a topic, as their names turn up.
@@ -196,7 +196,7 @@ class Reader {
   Reader(const std::string& path, const std::string& joint, const std::string& topic)
       : path_(path), joint_(joint), wanted_topic_(topic) {}
 
-  Record read() {
+  record::Record read() {
     check_bag_structure(path_);
     try {
       bag_.open(path_, rosbag::bagmode::Read);
@@ -334,8 +334,8 @@ class Reader {
 
 const ros::Time kBagTimeOrigin(1'000'000'000, 0);
 
-Record read_bag(const std::string& path, const std::string& joint, const std::string& topic) {
+record::Record read_bag(const std::string& path, const std::string& joint, const std::string& topic) {
   return Reader(path, joint, topic).read();
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -19,7 +19,7 @@
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "backlash_diagnosis/ros/joint_state.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 const std::string kInfoTopic = "/record_info";
@@ -69,24 +69,25 @@ class TemporaryFile {
   bool kept_ = false;
 };
 
-void check_writable(const Record& record) {
+void check_writable(const record::Record& record) {
   const auto fail = [&record](const std::string& reason) { throw BadData(record.name, reason); };
   if (record.time.empty()) fail("a record without samples cannot be written");
   if (!record.can_show_backlash())
     fail("a record needs a torque, position, current or acceleration to be written");
-  for (const Channel channel : kChannels) {
+  for (const record::Channel channel : record::kChannels) {
     const std::vector<double>& column = record.column(channel);
     if (column.empty()) continue;
     if (column.size() != record.size())
-      fail(fmt::format("{} has {} values, time has {}", channel_name(channel), column.size(), record.size()));
+      fail(fmt::format("{} has {} values, time has {}", record::channel_name(channel), column.size(),
+                       record.size()));
     for (std::size_t i = 0; i < column.size(); ++i)
       if (!std::isfinite(column[i]))
-        fail(fmt::format("{} in sample {} is not a finite number", channel_name(channel), i));
+        fail(fmt::format("{} in sample {} is not a finite number", record::channel_name(channel), i));
   }
 }
 
 /// Stamps to the nanosecond, increasing and within what ROS can hold.
-std::vector<ros::Time> stamps_of(const Record& record, const ros::Time& origin) {
+std::vector<ros::Time> stamps_of(const record::Record& record, const ros::Time& origin) {
   std::vector<ros::Time> stamps;
   stamps.reserve(record.size());
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -109,7 +110,7 @@ std::vector<ros::Time> stamps_of(const Record& record, const ros::Time& origin) 
   return stamps;
 }
 
-std_msgs::String info_message(const Record& record, const ros::Time& origin) {
+std_msgs::String info_message(const record::Record& record, const ros::Time& origin) {
   std::string name;
   for (const char c : printable(record.name, 4096)) {
     if (c == '"' || c == '\\') name += '\\';
@@ -121,7 +122,7 @@ std_msgs::String info_message(const Record& record, const ros::Time& origin) {
   return message;
 }
 
-void write_messages(rosbag::Bag& bag, const Record& record, const std::vector<ros::Time>& stamps,
+void write_messages(rosbag::Bag& bag, const record::Record& record, const std::vector<ros::Time>& stamps,
                     const JointNames& names, const ros::Time& origin) {
   using Info = ros::message_traits::DataType<std_msgs::String>;
   const auto latched = boost::make_shared<ros::M_string>();
@@ -141,7 +142,7 @@ void write_messages(rosbag::Bag& bag, const Record& record, const std::vector<ro
 
 }  // namespace
 
-void write_bag(const Record& record, const std::string& path, const std::string& joint,
+void write_bag(const record::Record& record, const std::string& path, const std::string& joint,
                const ros::Time& origin) {
   if (joint.empty()) throw InvalidParameter("joint", "''", "must not be empty");
   check_writable(record);
@@ -162,4 +163,4 @@ void write_bag(const Record& record, const std::string& path, const std::string&
   file.keep();
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

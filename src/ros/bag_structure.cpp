@@ -18,7 +18,7 @@
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 const std::string kMagic = "#ROSBAG V";
@@ -265,4 +265,4 @@ void check_bag_structure(const std::string& path) {
   Checker(path).check();
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// Walks over all records of a bag (format 2.0, wiki.ros.org/Bags/Format/2.0): lengths within the file,
 /// chunks that unpack to the stated size and are filled with whole records, indexes that point to records.
@@ -13,4 +13,4 @@ namespace backlash {
 /// not indexed.
 void check_bag_structure(const std::string& path);
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

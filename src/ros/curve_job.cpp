@@ -9,10 +9,11 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/ros/job.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
-MonitoringCurve build_curve_as_job(const RigFile& rig, const CurveRequest& request, double memory,
-                                   const Progress& progress) {
+diagnosis::MonitoringCurve build_curve_as_job(const rig_file::RigFile& rig,
+                                              const studies::CurveRequest& request, double memory,
+                                              const Progress& progress) {
   if (!(request.max_backlash > 0) || !std::isfinite(request.max_backlash))
     throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
   if (!(request.sampling_rate >= 0) || !std::isfinite(request.sampling_rate))
@@ -34,7 +35,7 @@ MonitoringCurve build_curve_as_job(const RigFile& rig, const CurveRequest& reque
   job.progress = progress;
   job.best_so_far = request.best_so_far;
   run_job(job);
-  return read_curve(out);
+  return diagnosis::read_curve(out);
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/ros/messages.h"
 #include "backlash_diagnosis/ros/parameters.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 constexpr int kTick = 100;  // ms: a change of level is published so soon
@@ -63,7 +63,7 @@ DiagnoserNode::~DiagnoserNode() {
 
 void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings& common) {
   Joint joint;
-  const Mesh& mesh = settings.rig.rig.mesh;
+  const model::Mesh& mesh = settings.rig.rig.mesh;
   const auto& limits = settings.rig.diagnosis.limits;
   if (!common.history.empty())
     joint.history = std::make_unique<JointHistory>(
@@ -72,7 +72,7 @@ void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings&
   settings.job_memory = common.job_memory;
   joint.monitor = std::make_unique<JointMonitor>(
       std::move(settings),
-      [this, place = joints_.size()](const ros::Time& stamp, const Diagnosis& diagnosis) {
+      [this, place = joints_.size()](const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis) {
         publish(joints_[place], stamp, diagnosis);
       });
   joint.diagnostics =
@@ -122,12 +122,12 @@ void DiagnoserNode::apply(Joint& joint, const JointLive& wanted) {
     return;
   }
   const auto& declared = joint.monitor->rig().diagnosis.limits;
-  Limits limits;
+  diagnosis::Limits limits;
   limits.angular = declared ? declared->angular : joint.monitor->rig().rig.mesh.angular();
   limits.watch = wanted.watch;
   limits.service = wanted.service;
   limits.stop = wanted.stop;
-  require_increasing(limits);
+  diagnosis::require_increasing(limits);
   joint.monitor->set_limits(limits);
 }
 
@@ -143,7 +143,7 @@ void DiagnoserNode::advertise() {
   curve_server_->start();
   trace_server_ = std::make_unique<TraceServer>(
       private_handle_, "trace_residual",
-      [this](const std::string& joint, std::string& why) -> const RigFile* {
+      [this](const std::string& joint, std::string& why) -> const rig_file::RigFile* {
         const JointMonitor* monitor = find_monitor(joint, why);
         return monitor ? &monitor->rig() : nullptr;
       },
@@ -197,9 +197,10 @@ void DiagnoserNode::publish(const Joint& joint, const PeriodReport& report) {
 }
 
 /// In the thread of the joint.
-void DiagnoserNode::publish(const Joint& joint, const ros::Time& stamp, const Diagnosis& diagnosis) {
+void DiagnoserNode::publish(const Joint& joint, const ros::Time& stamp,
+                            const diagnosis::Diagnosis& diagnosis) {
   if (joint.history) joint.history->take(stamp.toSec(), diagnosis);
-  for (const Estimate& estimate : diagnosis.estimates) {
+  for (const diagnosis::Estimate& estimate : diagnosis.estimates) {
     auto m = to_message(estimate);
     m.header.stamp = stamp;
     m.joint = joint.monitor->joint();
@@ -226,7 +227,7 @@ JointMonitor* DiagnoserNode::find_monitor(const std::string& name, std::string& 
 
 bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
                                 backlash_diagnosis::Diagnose::Response& response) {
-  response.verdict = to_message(Verdict(), {});
+  response.verdict = to_message(diagnosis::Verdict(), {});
   JointMonitor* monitor = find_monitor(request.joint, response.message);
   if (!monitor) return true;
   if (!(request.timeout >= 0) || request.timeout > 1e6) {
@@ -235,9 +236,9 @@ bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
   }
   std::string note;
   ros::Time stamp;
-  const Diagnosis diagnosis = monitor->diagnose(request.periods, request.timeout, note, stamp);
+  const diagnosis::Diagnosis diagnosis = monitor->diagnose(request.periods, request.timeout, note, stamp);
   response.verdict = to_message(diagnosis.verdict, diagnosis.estimates);
-  for (const Estimate& estimate : diagnosis.estimates) {
+  for (const diagnosis::Estimate& estimate : diagnosis.estimates) {
     response.estimates.push_back(to_message(estimate));
     response.estimates.back().header.stamp = stamp;
     response.estimates.back().joint = monitor->joint();
@@ -282,16 +283,17 @@ void DiagnoserNode::set_baseline(Joint& joint, backlash_diagnosis::SetBaseline::
   JointMonitor& monitor = *joint.monitor;
   std::string note;
   ros::Time stamp;
-  const Diagnosis diagnosis = monitor.diagnose(0, 0, note, stamp);
+  const diagnosis::Diagnosis diagnosis = monitor.diagnose(0, 0, note, stamp);
   if (!note.empty()) {
     response.message = "no baseline set: " + note;
     return;
   }
-  const RigFile& rig = monitor.rig();
-  const Baseline baseline = baseline_of(diagnosis, rig.rig.name, rig.digest);
+  const rig_file::RigFile& rig = monitor.rig();
+  const diagnosis::Baseline baseline = diagnosis::baseline_of(diagnosis, rig.rig.name, rig.digest);
   const std::string& path = monitor.baseline_path();
   if (!path.empty())
-    write_baseline(baseline, path);  // first, so that a baseline that could not be written is not used either
+    diagnosis::write_baseline(
+        baseline, path);  // first, so that a baseline that could not be written is not used either
   monitor.set_baseline(baseline);
   if (joint.history) joint.history->take_baseline(stamp.toSec(), diagnosis);
   response.success = true;
@@ -314,9 +316,9 @@ bool DiagnoserNode::on_get_curve(backlash_diagnosis::GetCurve::Request& request,
   return true;
 }
 
-MonitoringCurve DiagnoserNode::built_curve(const backlash_diagnosis::BuildCurveGoal& goal,
-                                           JointMonitor& monitor) {
-  CurveRequest request;
+diagnosis::MonitoringCurve DiagnoserNode::built_curve(const backlash_diagnosis::BuildCurveGoal& goal,
+                                                      JointMonitor& monitor) {
+  studies::CurveRequest request;
   if (goal.points > 0) request.points = static_cast<int>(goal.points);
   if (goal.max_backlash != 0) request.max_backlash = goal.max_backlash;
   if (goal.periods > 0) request.periods = static_cast<int>(goal.periods);
@@ -334,10 +336,10 @@ MonitoringCurve DiagnoserNode::built_curve(const backlash_diagnosis::BuildCurveG
     curve_server_->publishFeedback(feedback);
     return ros::ok() && !curve_server_->isPreemptRequested();
   };
-  MonitoringCurve curve = build_curve_as_job(monitor.rig(), request, job_memory_, progress);
+  diagnosis::MonitoringCurve curve = build_curve_as_job(monitor.rig(), request, job_memory_, progress);
   if (!path.empty()) {
     folder_.create();
-    write_curve(curve, path);
+    diagnosis::write_curve(curve, path);
   }
   monitor.set_curve(curve);
   return curve;
@@ -351,7 +353,7 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
     return;
   }
   try {
-    const MonitoringCurve curve = built_curve(*goal, *monitor);
+    const diagnosis::MonitoringCurve curve = built_curve(*goal, *monitor);
     result.success = true;
     result.message = fmt::format("built with {} points", curve.points.size());
     result.curve = to_message(curve);
@@ -365,4 +367,4 @@ void DiagnoserNode::on_build_curve(const backlash_diagnosis::BuildCurveGoalConst
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

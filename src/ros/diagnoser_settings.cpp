@@ -7,17 +7,17 @@
 #include "backlash_diagnosis/ros/diagnoser_node.h"
 #include "backlash_diagnosis/ros/parameters.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
-RigFile rig_from(const std::string& path) {
-  return path.empty() ? default_rig_file() : load_rig_file(path);
+rig_file::RigFile rig_from(const std::string& path) {
+  return path.empty() ? rig_file::default_rig_file() : rig_file::load_rig_file(path);
 }
 
 void use_limits(MonitorSettings& monitor, const std::string& path) {
   if (path.empty()) return;
-  const Limits limits = read_limits_file(path);
-  check_limits(limits, monitor.rig.rig.mesh.angular(), path);
+  const diagnosis::Limits limits = diagnosis::read_limits_file(path);
+  diagnosis::check_limits(limits, monitor.rig.rig.mesh.angular(), path);
   monitor.rig.diagnosis.limits = limits;
 }
 
@@ -29,8 +29,8 @@ void use_baseline(MonitorSettings& monitor, const std::string& path) {
   if (!folder.empty() && !std::filesystem::is_directory(folder))
     throw InvalidParameter("~baseline", path, "is in a folder that does not exist");
   if (!std::filesystem::exists(path)) return;
-  monitor.baseline = read_baseline(path);
-  check_baseline(*monitor.baseline, monitor.rig.rig.name, monitor.rig.digest, path);
+  monitor.baseline = diagnosis::read_baseline(path);
+  diagnosis::check_baseline(*monitor.baseline, monitor.rig.rig.name, monitor.rig.digest, path);
 }
 
 std::string read_history_folder(Parameters& parameters) {
@@ -100,7 +100,7 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   DiagnoserSettings settings;
   const std::string rig = parameters.text("rig", "");
   const std::string curve = parameters.text("curve", "");
-  const RigFile common = rig_from(rig);
+  const rig_file::RigFile common = rig_from(rig);
   MonitorSettings defaults;
   defaults.window = static_cast<int>(parameters.integer("window", 5, 1, 1'000'000));
   defaults.estimate_interval = parameters.number("estimate_interval", 0.25, Range::not_negative());
@@ -129,10 +129,10 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
     parameters.allow(joint + "/live");
     const std::string own_rig = parameters.text(joint + "/rig", "");
     const std::string own_curve = parameters.text(joint + "/curve", curve);
-    monitor.rig = own_rig.empty() ? common : load_rig_file(own_rig);
+    monitor.rig = own_rig.empty() ? common : rig_file::load_rig_file(own_rig);
     if (!own_curve.empty()) {
-      monitor.curve = read_curve(own_curve);
-      monitor.curve_warning = check_curve(*monitor.curve, monitor.rig, own_curve);
+      monitor.curve = diagnosis::read_curve(own_curve);
+      monitor.curve_warning = studies::check_curve(*monitor.curve, monitor.rig, own_curve);
     }
     use_limits(monitor, parameters.text(joint + "/limits", limits));
     use_baseline(monitor, parameters.text(joint + "/baseline", baseline));
@@ -142,4 +142,4 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   return settings;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -9,7 +9,7 @@
 #include <exception>
 #include <utility>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 constexpr std::size_t kMostWaiting = 8;  // tasks; a choice: two seconds of estimates at the default interval
@@ -77,4 +77,4 @@ void DiagnosisWorker::run() {
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

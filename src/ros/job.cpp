@@ -23,7 +23,7 @@
 #include "backlash_diagnosis/base/scratch_folder.h"
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 namespace fs = std::filesystem;
@@ -230,7 +230,7 @@ std::string command_path(const std::string& name) {
   return path;
 }
 
-std::string file_of(const RigFile& rig, const ScratchFolder& scratch) {
+std::string file_of(const rig_file::RigFile& rig, const ScratchFolder& scratch) {
   try {
     if (read_start(rig.source, rig.text.size() + 1) == rig.text) return rig.source;
   } catch (const MissingInput&) {  // built in, or gone since
@@ -240,4 +240,4 @@ std::string file_of(const RigFile& rig, const ScratchFolder& scratch) {
   return copy;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus;
@@ -16,16 +16,16 @@ using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus;
 constexpr double kSecondsPerYear = 365.25 * 86400;
 constexpr double kAnotherTime = 3600;  // s: stamps so old or new are of a recording, not late
 
-unsigned char level_of(Grade grade) {
+unsigned char level_of(diagnosis::Grade grade) {
   switch (grade) {
-    case Grade::good:
+    case diagnosis::Grade::good:
       return DiagnosticStatus::OK;
-    case Grade::watch:
+    case diagnosis::Grade::watch:
       return DiagnosticStatus::WARN;
-    case Grade::service:
-    case Grade::stop:
+    case diagnosis::Grade::service:
+    case diagnosis::Grade::stop:
       return DiagnosticStatus::ERROR;
-    case Grade::cannot_tell:
+    case diagnosis::Grade::cannot_tell:
       break;
   }
   return DiagnosticStatus::WARN;
@@ -39,7 +39,7 @@ double age_of(const MonitorState& state) {
   return state.any_sample ? now() - state.last_arrival.toSec() : 0;
 }
 
-const Mismatch* mismatch_of(const MonitorState& state, Mismatch::Concern concern) {
+const diagnosis::Mismatch* mismatch_of(const MonitorState& state, diagnosis::Mismatch::Concern concern) {
   if (!state.latest || !state.latest->mismatch) return nullptr;
   return state.latest->mismatch->concern == concern ? &*state.latest->mismatch : nullptr;
 }
@@ -106,15 +106,15 @@ void JointDiagnostics::describe_backlash(const MonitorState& state, Status& stat
   status.add("Whole periods kept", state.periods);
   if (!state.baseline_warning.empty()) status.add("Warning", state.baseline_warning);
   if (state.latest) {
-    const Verdict& verdict = state.latest->verdict;
-    status.add("Grade", to_string(verdict.grade));
+    const diagnosis::Verdict& verdict = state.latest->verdict;
+    status.add("Grade", diagnosis::to_string(verdict.grade));
     status.add("Agreement", verdict.agreement);
     status.add("Backlash (m)", verdict.backlash);
     status.add("Backlash lower (m)", verdict.lower);
     status.add("Backlash upper (m)", verdict.upper);
     status.add("Backlash angle (rad)", verdict.backlash_angle);
-    for (const Estimate& e : state.latest->estimates) {
-      status.add(e.method + " status", to_string(e.status));
+    for (const diagnosis::Estimate& e : state.latest->estimates) {
+      status.add(e.method + " status", diagnosis::to_string(e.status));
       status.add(e.method + " backlash (m)", e.backlash);
       status.add(e.method + " backlash angle (rad)", e.backlash_angle);
     }
@@ -134,7 +134,7 @@ void JointDiagnostics::add_history(Status& status) const {
   status.add("History entries waiting", history.waiting);
   status.add("History entries left out", history.left_out);
   status.add("History entries lost", history.lost);
-  const Trend& trend = history.trend;
+  const diagnosis::Trend& trend = history.trend;
   status.add("Trend", trend.message);
   const std::string unit = monitor_.rig().rig.mesh.angular() ? "rad/year" : "m/year";
   status.add("Trend rate (" + unit + ")", trend.rate * kSecondsPerYear);
@@ -144,7 +144,7 @@ void JointDiagnostics::add_history(Status& status) const {
 }
 
 void JointDiagnostics::describe_input(const MonitorState& state, Status& status) {
-  const StreamCounters& c = state.counters;
+  const diagnosis::StreamCounters& c = state.counters;
   const double age = age_of(state);
   summarise_input(state, age, status);
   problems_ = state.bad_messages + c.repeated + c.restarts;
@@ -162,7 +162,7 @@ void JointDiagnostics::describe_input(const MonitorState& state, Status& status)
 }
 
 void JointDiagnostics::summarise_input(const MonitorState& state, double age, Status& status) {
-  const StreamCounters& c = state.counters;
+  const diagnosis::StreamCounters& c = state.counters;
   if (!state.any_sample && state.bad_messages + c.not_a_number == 0)
     status.summary(DiagnosticStatus::WARN,
                    "no message on " + topic_ + " has named " + monitor_.joint() + " yet");
@@ -193,8 +193,8 @@ void JointDiagnostics::describe_excitation(const MonitorState& state, Status& st
     status.add("Excitation level of the curve (N m)", curve->conditions.excitation_level);
   }
   const bool settled =
-      state.rate > 0 && double(state.counters.accepted) > 2 * state.rate * kFirstPeriodSearch;
-  if (const Mismatch* mismatch = mismatch_of(state, Mismatch::Concern::excitation))
+      state.rate > 0 && double(state.counters.accepted) > 2 * state.rate * diagnosis::kFirstPeriodSearch;
+  if (const diagnosis::Mismatch* mismatch = mismatch_of(state, diagnosis::Mismatch::Concern::excitation))
     status.summary(DiagnosticStatus::WARN, mismatch->reason);
   else if (!apd)
     status.summary(DiagnosticStatus::OK, "not judged: the rig file declares no diagnosis.apd");
@@ -209,7 +209,7 @@ void JointDiagnostics::describe_excitation(const MonitorState& state, Status& st
 void JointDiagnostics::describe_signal(const MonitorState& state, Status& status) {
   const bool fresh_nan = state.counters.not_a_number > not_a_number_;
   not_a_number_ = state.counters.not_a_number;
-  if (const Mismatch* mismatch = mismatch_of(state, Mismatch::Concern::signal))
+  if (const diagnosis::Mismatch* mismatch = mismatch_of(state, diagnosis::Mismatch::Concern::signal))
     status.summary(DiagnosticStatus::WARN, mismatch->reason);
   else if (fresh_nan)
     status.summary(DiagnosticStatus::WARN, "samples hold NaN; last: " + state.last_problem);
@@ -219,9 +219,9 @@ void JointDiagnostics::describe_signal(const MonitorState& state, Status& status
     status.summary(DiagnosticStatus::OK, state.latest ? "sound" : "waiting for samples");
   status.add("Samples with NaN", state.counters.not_a_number);
   if (!state.latest || !state.latest->apd) return;
-  const ApdResult& apd = *state.latest->apd;
-  const std::string unit = channel_unit(monitor_.rig().diagnosis.apd->signal);
-  status.add("Signal", channel_name(monitor_.rig().diagnosis.apd->signal));
+  const diagnosis::ApdResult& apd = *state.latest->apd;
+  const std::string unit = record::channel_unit(monitor_.rig().diagnosis.apd->signal);
+  status.add("Signal", record::channel_name(monitor_.rig().diagnosis.apd->signal));
   status.add("Noise, standard deviation (" + unit + ")", apd.noise);
   status.add("Periods with gaps", apd.incomplete);
   status.add("Skewness", apd.skewness);
@@ -240,7 +240,7 @@ void JointDiagnostics::describe_curve(const MonitorState& state, Status& status)
   else if (!curve)
     status.summary(state.building_curve || !state.any_sample ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
                    state.curve_state);
-  else if (const Mismatch* mismatch = mismatch_of(state, Mismatch::Concern::curve))
+  else if (const diagnosis::Mismatch* mismatch = mismatch_of(state, diagnosis::Mismatch::Concern::curve))
     status.summary(DiagnosticStatus::WARN, mismatch->reason);
   else if (!state.curve_warning.empty())
     status.summary(DiagnosticStatus::WARN, state.curve_warning);
@@ -248,9 +248,9 @@ void JointDiagnostics::describe_curve(const MonitorState& state, Status& status)
     status.summary(DiagnosticStatus::OK,
                    state.latest ? "the record is as the curve needs it" : "waiting for samples");
   if (!state.latest || !curve) return;
-  for (const Estimate& e : state.latest->estimates)
-    if (e.status == backlash::Status::above_range && needs_curve(e.method))
+  for (const diagnosis::Estimate& e : state.latest->estimates)
+    if (e.status == backlash::diagnosis::Status::above_range && diagnosis::needs_curve(e.method))
       status.mergeSummary(DiagnosticStatus::WARN, e.method + ": beyond the end of the curve");
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

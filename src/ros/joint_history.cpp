@@ -10,14 +10,14 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 constexpr std::size_t kMostWaiting = 100'000;  // entries: two months of a minute each
 constexpr std::size_t kMostPoints = 100'000;   // of the trend, which finds medians of far fewer stretches
 
 /// Every second one; the trend does not see the difference.
-void thin(std::vector<TrendPoint>& points) {
+void thin(std::vector<diagnosis::TrendPoint>& points) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < points.size(); i += 2) points[kept++] = points[i];
   points.resize(kept);
@@ -26,15 +26,16 @@ void thin(std::vector<TrendPoint>& points) {
 }  // namespace
 
 JointHistory::JointHistory(const Settings& settings)
-    : settings_(settings), history_(History::Settings{settings.path}) {
+    : settings_(settings), history_(diagnosis::History::Settings{settings.path}) {
   state_.path = settings.path;
-  const HistoryFile file = read_history(settings.path);
+  const diagnosis::HistoryFile file = diagnosis::read_history(settings.path);
   for (const std::string& warning : file.warnings) ROS_WARN("%s", warning.c_str());
-  for (const HistoryEntry& entry : file.entries) last_ = std::max(last_.value_or(entry.time), entry.time);
+  for (const diagnosis::HistoryEntry& entry : file.entries)
+    last_ = std::max(last_.value_or(entry.time), entry.time);
   add_points(file.entries);
 }
 
-void JointHistory::take(double stamp, const Diagnosis& diagnosis) {
+void JointHistory::take(double stamp, const diagnosis::Diagnosis& diagnosis) {
   const std::lock_guard<std::mutex> lock(mutex_);
   state_.behind = last_ && stamp < *last_ - settings_.interval;
   if (state_.behind) {
@@ -43,18 +44,18 @@ void JointHistory::take(double stamp, const Diagnosis& diagnosis) {
   }
   // Stamps are seconds since 1970 as doubles, with a resolution of about a microsecond.
   if (last_ && stamp < *last_ + settings_.interval - 1e-6) return;
-  add(history_entry(stamp, diagnosis, settings_.rig_digest));
+  add(diagnosis::history_entry(stamp, diagnosis, settings_.rig_digest));
 }
 
-void JointHistory::take_baseline(double stamp, const Diagnosis& diagnosis) {
+void JointHistory::take_baseline(double stamp, const diagnosis::Diagnosis& diagnosis) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  HistoryEntry entry = history_entry(stamp, diagnosis, settings_.rig_digest);
-  entry.event = kBaselineEvent;
+  diagnosis::HistoryEntry entry = diagnosis::history_entry(stamp, diagnosis, settings_.rig_digest);
+  entry.event = diagnosis::kBaselineEvent;
   add(std::move(entry));
 }
 
 /// Called with the lock held.
-void JointHistory::add(HistoryEntry entry) {
+void JointHistory::add(diagnosis::HistoryEntry entry) {
   last_ = std::max(last_.value_or(entry.time), entry.time);
   if (waiting_.size() >= kMostWaiting) {
     waiting_.pop_front();
@@ -63,21 +64,22 @@ void JointHistory::add(HistoryEntry entry) {
   waiting_.push_back(std::move(entry));
 }
 
-void JointHistory::add_points(const std::vector<HistoryEntry>& entries) {
-  const auto baseline = std::find_if(entries.rbegin(), entries.rend(),
-                                     [](const HistoryEntry& entry) { return entry.event == kBaselineEvent; });
+void JointHistory::add_points(const std::vector<diagnosis::HistoryEntry>& entries) {
+  const auto baseline = std::find_if(
+      entries.rbegin(), entries.rend(),
+      [](const diagnosis::HistoryEntry& entry) { return entry.event == diagnosis::kBaselineEvent; });
   if (baseline != entries.rend()) points_.clear();
-  const auto fresh = trend_points(entries, settings_.angular, settings_.rig_digest);
+  const auto fresh = diagnosis::trend_points(entries, settings_.angular, settings_.rig_digest);
   points_.insert(points_.end(), fresh.begin(), fresh.end());
   while (points_.size() > kMostPoints) thin(points_);
   stale_trend_ = true;
 }
 
 void JointHistory::flush(std::optional<double> limit) {
-  std::vector<HistoryEntry> written;
+  std::vector<diagnosis::HistoryEntry> written;
   std::string problem;
   for (;;) {
-    HistoryEntry entry;
+    diagnosis::HistoryEntry entry;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (waiting_.empty()) break;
@@ -94,8 +96,8 @@ void JointHistory::flush(std::optional<double> limit) {
     waiting_.pop_front();
   }
   if (!written.empty()) add_points(written);
-  std::optional<Trend> trend;
-  if (stale_trend_ || limit != limit_) trend = find_trend(points_, limit, settings_.angular);
+  std::optional<diagnosis::Trend> trend;
+  if (stale_trend_ || limit != limit_) trend = diagnosis::find_trend(points_, limit, settings_.angular);
   stale_trend_ = false;
   limit_ = limit;
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -112,4 +114,4 @@ JointHistory::State JointHistory::state() const {
   return state;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -9,11 +9,11 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/ros/curve_job.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
-StreamSettings stream_settings(const MonitorSettings& settings) {
-  StreamSettings stream;
+diagnosis::StreamSettings stream_settings(const MonitorSettings& settings) {
+  diagnosis::StreamSettings stream;
   stream.apd = settings.rig.diagnosis.apd;
   stream.keep = settings.keep;
   return stream;
@@ -38,7 +38,7 @@ JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis)
   if (settings_.curve) {
     curve_warning_ = settings_.curve_warning;
     if (!curve_warning_.empty()) ROS_WARN("%s: %s", settings_.joint.c_str(), curve_warning_.c_str());
-    curve_ = std::make_shared<MonitoringCurve>(*settings_.curve);
+    curve_ = std::make_shared<diagnosis::MonitoringCurve>(*settings_.curve);
     curve_state_ = "loaded";
   } else if (!settings_.rig.diagnosis.apd) {
     curve_state_ = "none: the rig file declares no diagnosis.apd";
@@ -57,7 +57,7 @@ JointMonitor::~JointMonitor() {
   if (builder_.joinable()) builder_.join();
 }
 
-std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const ChannelValues& values,
+std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const record::ChannelValues& values,
                                                const std::string& problem, const std::string& topic) {
   const std::lock_guard<std::mutex> lock(mutex_);
   last_arrival_ = ros::WallTime::now();
@@ -69,7 +69,7 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const Cha
   latency_ = (ros::Time::now() - stamp).toSec();
   const long restarts = stream_.counters().restarts;
   const double time = clock_.seconds(stamp);
-  const PeriodResult* period = stream_.add(time, values);
+  const diagnosis::PeriodResult* period = stream_.add(time, values);
   if (stream_.counters().restarts != restarts) {
     reported_periods_ = 0;
     estimated_.reset();
@@ -82,7 +82,7 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const Cha
   reported_periods_ = periods;
   if (!curve_ && !build_tried_ && settings_.rig.diagnosis.apd)
     if (const double interval = stream_.sampling_interval(); interval > 0)
-      start_building(nominal_sampling_rate(interval));
+      start_building(studies::nominal_sampling_rate(interval));
   ros::Time last = clock_.stamp(time);
   if (auto next = due(time)) {
     last = next->stamp;
@@ -117,7 +117,7 @@ DiagnosisTask JointMonitor::task(long periods) const {
 
 /// In the worker's thread.
 void JointMonitor::work(const DiagnosisTask& task) {
-  const auto diagnosis = std::make_shared<const Diagnosis>(task.compute());
+  const auto diagnosis = std::make_shared<const diagnosis::Diagnosis>(task.compute());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     latest_ = diagnosis;
@@ -125,7 +125,8 @@ void JointMonitor::work(const DiagnosisTask& task) {
   if (on_diagnosis_) on_diagnosis_(task.stamp, *diagnosis);
 }
 
-Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note, ros::Time& stamp) {
+diagnosis::Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note,
+                                            ros::Time& stamp) {
   std::unique_lock<std::mutex> lock(mutex_);
   const auto ready = [&] { return stop_ || (stream_.periods() >= wanted_periods(periods) && !building_); };
   changed_.wait_for(lock, std::chrono::duration<double>(timeout), ready);
@@ -139,9 +140,9 @@ Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note
   const std::string curve_state = curve_state_;
   stamp = asked.stamp;
   lock.unlock();  // the subscriber goes on while this computes
-  Diagnosis diagnosis = asked.compute();
-  for (Estimate& estimate : diagnosis.estimates)
-    if (needs_curve(estimate.method) && !asked.curve) estimate.message += " (" + curve_state + ")";
+  diagnosis::Diagnosis diagnosis = asked.compute();
+  for (diagnosis::Estimate& estimate : diagnosis.estimates)
+    if (diagnosis::needs_curve(estimate.method) && !asked.curve) estimate.message += " (" + curve_state + ")";
   return diagnosis;
 }
 
@@ -153,7 +154,7 @@ void JointMonitor::start_building(double rate) {
 }
 
 void JointMonitor::build(double rate) {
-  CurveRequest request;
+  studies::CurveRequest request;
   request.sampling_rate = rate;
   std::string failure;
   try {
@@ -162,7 +163,8 @@ void JointMonitor::build(double rate) {
       curve_state_ = fmt::format("building, {:.0f} %", 100 * fraction);
       return !stop_;
     };
-    MonitoringCurve built = build_curve_as_job(settings_.rig, request, settings_.job_memory, progress);
+    diagnosis::MonitoringCurve built =
+        build_curve_as_job(settings_.rig, request, settings_.job_memory, progress);
     ROS_INFO("%s: built the monitoring curve for %g Hz from %s", settings_.joint.c_str(),
              built.conditions.sampling_rate, settings_.rig.source.c_str());
     set_curve(std::move(built));
@@ -178,19 +180,19 @@ void JointMonitor::build(double rate) {
   changed_.notify_all();
 }
 
-void JointMonitor::set_baseline(const std::optional<Baseline>& baseline) {
+void JointMonitor::set_baseline(const std::optional<diagnosis::Baseline>& baseline) {
   const std::lock_guard<std::mutex> lock(mutex_);
   baseline_ = baseline;
   baseline_warning_.clear();
   if (!baseline) return;
-  baseline_warning_ =
-      check_baseline(*baseline, settings_.rig.rig.name, settings_.rig.digest, settings_.baseline_path);
+  baseline_warning_ = diagnosis::check_baseline(*baseline, settings_.rig.rig.name, settings_.rig.digest,
+                                                settings_.baseline_path);
   if (!baseline_warning_.empty()) ROS_WARN("%s: %s", settings_.joint.c_str(), baseline_warning_.c_str());
 }
 
-void JointMonitor::set_curve(MonitoringCurve curve) {
+void JointMonitor::set_curve(diagnosis::MonitoringCurve curve) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  curve_ = std::make_shared<MonitoringCurve>(std::move(curve));
+  curve_ = std::make_shared<diagnosis::MonitoringCurve>(std::move(curve));
   curve_state_ = "built";
   curve_warning_.clear();
   changed_.notify_all();
@@ -202,22 +204,22 @@ void JointMonitor::set_window(int periods, double estimate_interval) {
   settings_.estimate_interval = estimate_interval;
 }
 
-void JointMonitor::set_limits(const std::optional<Limits>& limits) {
+void JointMonitor::set_limits(const std::optional<diagnosis::Limits>& limits) {
   const std::lock_guard<std::mutex> lock(mutex_);
   diagnosis_settings_.limits = limits;
 }
 
-std::optional<Limits> JointMonitor::limits() const {
+std::optional<diagnosis::Limits> JointMonitor::limits() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return diagnosis_settings_.limits;
 }
 
-std::optional<Baseline> JointMonitor::baseline() const {
+std::optional<diagnosis::Baseline> JointMonitor::baseline() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return baseline_;
 }
 
-std::shared_ptr<const MonitoringCurve> JointMonitor::curve() const {
+std::shared_ptr<const diagnosis::MonitoringCurve> JointMonitor::curve() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return curve_;
 }
@@ -245,4 +247,4 @@ MonitorState JointMonitor::state() const {
   return state;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -10,12 +10,12 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
-double& at(ChannelValues& values, Channel channel) {
+double& at(record::ChannelValues& values, record::Channel channel) {
   return values[static_cast<std::size_t>(channel)];
 }
 
@@ -118,41 +118,41 @@ void JointStateReader::take(const sensor_msgs::JointState& m, std::size_t i, int
   };
   const double position = value(m.position, "position"), velocity = value(m.velocity, "velocity"),
                effort = value(m.effort, "effort");
-  ChannelValues& values = reading.values;
+  record::ChannelValues& values = reading.values;
   switch (part) {
     case kMotor:
-      at(values, Channel::motor_position) = position;
-      at(values, Channel::motor_velocity) = velocity;
-      at(values, Channel::motor_torque) = effort;
+      at(values, record::Channel::motor_position) = position;
+      at(values, record::Channel::motor_velocity) = velocity;
+      at(values, record::Channel::motor_torque) = effort;
       break;
     case kSensor:
-      at(values, Channel::sensor_torque) = effort;
+      at(values, record::Channel::sensor_torque) = effort;
       break;
     case kLoad:
-      at(values, Channel::load_position) = position;
-      at(values, Channel::load_velocity) = velocity;
+      at(values, record::Channel::load_position) = position;
+      at(values, record::Channel::load_velocity) = velocity;
       break;
     case kReference:
-      at(values, Channel::reference_position) = position;
+      at(values, record::Channel::reference_position) = position;
       break;
     case kCurrent:
-      at(values, Channel::motor_current) = effort;
+      at(values, record::Channel::motor_current) = effort;
       break;
     case kAccelerometer:
-      at(values, Channel::acceleration) = effort;
+      at(values, record::Channel::acceleration) = effort;
       break;
   }
 }
 
-ChannelValues read_joint_state(const sensor_msgs::JointState& m, const std::string& joint,
-                               const std::string& topic) {
+record::ChannelValues read_joint_state(const sensor_msgs::JointState& m, const std::string& joint,
+                                       const std::string& topic) {
   JointStateReader reader({joint});
   reader.read(m);
   if (!reader.problem(0).empty()) throw BadData(topic, reader.problem(0));
   return reader.values(0);
 }
 
-void add_joint_state(const Observation& o, const JointNames& names, sensor_msgs::JointState& m) {
+void add_joint_state(const model::Observation& o, const JointNames& names, sensor_msgs::JointState& m) {
   add(m, names.motor, o.motor_position, o.motor_velocity, o.motor_torque);
   add(m, names.sensor, o.sensor_twist, o.sensor_twist_rate, o.sensor_torque);
   add(m, names.load, o.load_position, o.load_velocity, o.load_torque);
@@ -160,27 +160,29 @@ void add_joint_state(const Observation& o, const JointNames& names, sensor_msgs:
   add(m, names.accelerometer, kAbsent, kAbsent, o.acceleration);
 }
 
-sensor_msgs::JointState make_joint_state(const Observation& o, const JointNames& names) {
+sensor_msgs::JointState make_joint_state(const model::Observation& o, const JointNames& names) {
   sensor_msgs::JointState m;
   add_joint_state(o, names, m);
   return m;
 }
 
-sensor_msgs::JointState make_joint_state(const Record& record, std::size_t i, const JointNames& names) {
-  const auto get = [&record, i](Channel channel) {
+sensor_msgs::JointState make_joint_state(const record::Record& record, std::size_t i,
+                                         const JointNames& names) {
+  const auto get = [&record, i](record::Channel channel) {
     return record.has(channel) ? record.column(channel)[i] : kAbsent;
   };
   sensor_msgs::JointState m;
-  add(m, names.motor, get(Channel::motor_position), get(Channel::motor_velocity), get(Channel::motor_torque));
-  add(m, names.sensor, kAbsent, kAbsent, get(Channel::sensor_torque));
-  add(m, names.load, get(Channel::load_position), get(Channel::load_velocity), kAbsent);
-  add(m, names.reference, get(Channel::reference_position), kAbsent, kAbsent);
-  add(m, names.current, kAbsent, kAbsent, get(Channel::motor_current));
-  add(m, names.accelerometer, kAbsent, kAbsent, get(Channel::acceleration));
+  add(m, names.motor, get(record::Channel::motor_position), get(record::Channel::motor_velocity),
+      get(record::Channel::motor_torque));
+  add(m, names.sensor, kAbsent, kAbsent, get(record::Channel::sensor_torque));
+  add(m, names.load, get(record::Channel::load_position), get(record::Channel::load_velocity), kAbsent);
+  add(m, names.reference, get(record::Channel::reference_position), kAbsent, kAbsent);
+  add(m, names.current, kAbsent, kAbsent, get(record::Channel::motor_current));
+  add(m, names.accelerometer, kAbsent, kAbsent, get(record::Channel::acceleration));
   empty_if_absent(m.position);
   empty_if_absent(m.velocity);
   empty_if_absent(m.effort);
   return m;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

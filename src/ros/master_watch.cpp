@@ -15,7 +15,7 @@
 
 #include <chrono>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using XmlRpc::XmlRpcValue;
@@ -137,4 +137,4 @@ void MasterWatch::look() {
     ROS_ERROR("the ROS master does not know this node any more and refuses a part of what it is told");
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -3,15 +3,15 @@
 
 #include <cmath>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using EstimateMessage = backlash_diagnosis::BacklashEstimate;
 
-backlash_diagnosis::AmplitudeDistribution distribution(const AmplitudeDistribution& apd,
-                                                       const ApdSettings& settings) {
+backlash_diagnosis::AmplitudeDistribution distribution(const diagnosis::AmplitudeDistribution& apd,
+                                                       const diagnosis::ApdSettings& settings) {
   backlash_diagnosis::AmplitudeDistribution m;
-  m.signal = channel_name(settings.signal);
+  m.signal = record::channel_name(settings.signal);
   m.lower = apd.layout().lower;
   m.upper = apd.layout().upper;
   m.percentage = apd.percentages();
@@ -23,19 +23,19 @@ backlash_diagnosis::AmplitudeDistribution distribution(const AmplitudeDistributi
   return m;
 }
 
-std::uint8_t code(Status status) {
+std::uint8_t code(diagnosis::Status status) {
   switch (status) {
-    case Status::ok:
+    case diagnosis::Status::ok:
       return EstimateMessage::OK;
-    case Status::below_range:
+    case diagnosis::Status::below_range:
       return EstimateMessage::BELOW_RANGE;
-    case Status::above_range:
+    case diagnosis::Status::above_range:
       return EstimateMessage::ABOVE_RANGE;
-    case Status::out_of_domain:
+    case diagnosis::Status::out_of_domain:
       return EstimateMessage::OUT_OF_DOMAIN;
-    case Status::insufficient_data:
+    case diagnosis::Status::insufficient_data:
       return EstimateMessage::INSUFFICIENT_DATA;
-    case Status::ambiguous:
+    case diagnosis::Status::ambiguous:
       break;
   }
   return EstimateMessage::AMBIGUOUS;
@@ -43,7 +43,8 @@ std::uint8_t code(Status status) {
 
 }  // namespace
 
-backlash_diagnosis::AmplitudeDistribution to_message(const PeriodResult& period, const ApdSettings& settings,
+backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::PeriodResult& period,
+                                                     const diagnosis::ApdSettings& settings,
                                                      double period_length) {
   auto m = distribution(period.apd, settings);
   m.mean = period.signal.mean();
@@ -53,13 +54,14 @@ backlash_diagnosis::AmplitudeDistribution to_message(const PeriodResult& period,
   return m;
 }
 
-backlash_diagnosis::AmplitudeDistribution to_message(const ApdResult& apd, const ApdSettings& settings) {
+backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::ApdResult& apd,
+                                                     const diagnosis::ApdSettings& settings) {
   auto m = distribution(apd.total, settings);
   m.skewness = apd.skewness;
   m.period = apd.period;
   m.periods = static_cast<std::uint32_t>(apd.periods.size());
   double sum = 0, squares = 0;  // of equally long periods
-  for (const PeriodResult& period : apd.periods) {
+  for (const diagnosis::PeriodResult& period : apd.periods) {
     sum += period.signal.mean();
     squares += std::pow(period.signal.mean(), 2) + std::pow(period.signal.standard_deviation(), 2);
   }
@@ -69,11 +71,11 @@ backlash_diagnosis::AmplitudeDistribution to_message(const ApdResult& apd, const
   return m;
 }
 
-backlash_diagnosis::BacklashEstimate to_message(const Estimate& e) {
+backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& e) {
   EstimateMessage m;
   m.method = e.method;
   m.status = code(e.status);
-  m.status_name = to_string(e.status);
+  m.status_name = diagnosis::to_string(e.status);
   m.backlash = e.backlash;
   m.lower = e.lower;
   m.upper = e.upper;
@@ -81,7 +83,7 @@ backlash_diagnosis::BacklashEstimate to_message(const Estimate& e) {
   m.angle_lower = e.angle_lower;
   m.angle_upper = e.angle_upper;
   m.skewness = e.skewness;
-  const PlayComponents parts = e.components.value_or(PlayComponents{});
+  const diagnosis::PlayComponents parts = e.components.value_or(diagnosis::PlayComponents{});
   m.gap = parts.gap;
   m.compliance = parts.compliance;
   m.coulomb = parts.coulomb;
@@ -90,9 +92,10 @@ backlash_diagnosis::BacklashEstimate to_message(const Estimate& e) {
   return m;
 }
 
-backlash_diagnosis::Verdict to_message(const Verdict& verdict, const std::vector<Estimate>& estimates) {
+backlash_diagnosis::Verdict to_message(const diagnosis::Verdict& verdict,
+                                       const std::vector<diagnosis::Estimate>& estimates) {
   backlash_diagnosis::Verdict m;
-  m.grade = to_string(verdict.grade);
+  m.grade = diagnosis::to_string(verdict.grade);
   m.estimate = verdict.estimate;
   m.agreement = verdict.agreement;
   for (const int i : verdict.members) m.members.push_back(estimates[i].method);
@@ -110,8 +113,8 @@ backlash_diagnosis::Verdict to_message(const Verdict& verdict, const std::vector
   return m;
 }
 
-backlash_diagnosis::MonitoringCurve to_message(const MonitoringCurve& curve) {
-  const CurveConditions& c = curve.conditions;
+backlash_diagnosis::MonitoringCurve to_message(const diagnosis::MonitoringCurve& curve) {
+  const diagnosis::CurveConditions& c = curve.conditions;
   backlash_diagnosis::MonitoringCurve m;
   m.rig = c.rig;
   m.version = c.version;
@@ -126,7 +129,7 @@ backlash_diagnosis::MonitoringCurve to_message(const MonitoringCurve& curve) {
   m.periods = static_cast<std::uint32_t>(c.periods);
   m.seeds = static_cast<std::uint32_t>(c.seeds);
   m.noise = c.noise;
-  for (const CurvePoint& point : curve.points) {
+  for (const diagnosis::CurvePoint& point : curve.points) {
     backlash_diagnosis::MonitoringCurvePoint p;
     p.backlash = point.backlash;
     p.skewness = curve.nominal(point).mean;
@@ -137,4 +140,4 @@ backlash_diagnosis::MonitoringCurve to_message(const MonitoringCurve& curve) {
   return m;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/ros/master_watch.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 // As in sysexits.h, like the offline commands.
@@ -60,4 +60,4 @@ int node_main(int argc, char** argv, const std::string& name, const char* help,
   return guarded(run);
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 using std::chrono::nanoseconds;
 
@@ -24,4 +24,4 @@ nanoseconds Pacer::wait(long k, nanoseconds elapsed) const {
   return rate_ == 0 ? nanoseconds(0) : std::max(nanoseconds(0), sample_time(k, rate_) - elapsed);
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

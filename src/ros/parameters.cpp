@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 std::string shown(XmlRpc::XmlRpcValue value) {
@@ -118,4 +118,4 @@ void Parameters::finish() const {
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

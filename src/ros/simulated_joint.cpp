@@ -9,23 +9,23 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 constexpr std::chrono::seconds kWarningInterval{1};
 
 struct LiveNoise {
-  Channel channel;
+  record::Channel channel;
   double backlash_diagnosis::SimulatedJointLiveConfig::*value;
 };
 
 using Config = backlash_diagnosis::SimulatedJointLiveConfig;
-const LiveNoise kLiveNoise[] = {{Channel::motor_torque, &Config::noise_motor_torque},
-                                {Channel::motor_position, &Config::noise_motor_position},
-                                {Channel::motor_velocity, &Config::noise_motor_velocity},
-                                {Channel::sensor_torque, &Config::noise_sensor_torque},
-                                {Channel::load_position, &Config::noise_load_position},
-                                {Channel::load_velocity, &Config::noise_load_velocity}};
+const LiveNoise kLiveNoise[] = {{record::Channel::motor_torque, &Config::noise_motor_torque},
+                                {record::Channel::motor_position, &Config::noise_motor_position},
+                                {record::Channel::motor_velocity, &Config::noise_motor_velocity},
+                                {record::Channel::sensor_torque, &Config::noise_sensor_torque},
+                                {record::Channel::load_position, &Config::noise_load_position},
+                                {record::Channel::load_velocity, &Config::noise_load_velocity}};
 
 void require_not_negative(const std::string& name, double value) {
   if (!std::isfinite(value) || value < 0)
@@ -104,7 +104,7 @@ SimulatedJoint::Live SimulatedJoint::live() const {
 
 void SimulatedJoint::apply(const Live& wanted) {
   for (const LiveNoise& noise : kLiveNoise)
-    require_not_negative("noise_" + std::string(channel_name(noise.channel)), wanted.*noise.value);
+    require_not_negative("noise_" + std::string(record::channel_name(noise.channel)), wanted.*noise.value);
   change_backlash(wanted.backlash);
   for (const LiveNoise& noise : kLiveNoise)
     simulation_.sensors().set_noise(noise.channel, wanted.*noise.value);
@@ -122,4 +122,4 @@ void SimulatedJoint::set_torque(const std_msgs::Float64& message) {
                   << ": torque = " << message.data << " refused: must be finite; the last one is held");
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

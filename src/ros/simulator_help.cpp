@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/simulator_settings.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 const char* simulator_help() {
   return R"(Simulates a gear train with backlash and publishes what its sensors measure.
@@ -51,4 +51,4 @@ wrong rig file or one whose machine cannot be integrated, 66 for a missing one.
 )";
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

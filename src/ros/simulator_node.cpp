@@ -11,7 +11,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using namespace std::chrono_literals;
@@ -134,7 +134,7 @@ void SimulatorNode::start() {
                            : factor == 0     ? "as fast as possible"
                                              : to_text(factor) + " times real time";
   for (std::size_t i = 0; i < joints_.size(); ++i) {
-    const RigFile& file = settings_.joints[i].file;
+    const rig_file::RigFile& file = settings_.joints[i].file;
     ROS_INFO_STREAM(file.rig.joint << ": simulating " << file.rig.name << " (" << file.source << ") at "
                                    << sampling_rate_ << " Hz with a backlash of "
                                    << joints_[i]->true_backlash() << ", " << pace);
@@ -216,9 +216,9 @@ void SimulatorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   const auto now = WallClock::now();
   const double wall = seconds(now - last_report_);
   const double simulated = (published_ - reported_) / sampling_rate_;
-  IntegratorStatistics statistics;
+  simulation::IntegratorStatistics statistics;
   for (const auto& joint : joints_) {
-    const IntegratorStatistics one = joint->simulation().plant().statistics();
+    const simulation::IntegratorStatistics one = joint->simulation().plant().statistics();
     statistics.steps += one.steps;
     statistics.evaluations += one.evaluations;
     statistics.error_test_failures += one.error_test_failures;
@@ -245,4 +245,4 @@ bool SimulatorNode::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Respon
   return true;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/ros/parameters.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 constexpr double kSlowest = 1e-3;  // real time factor
@@ -24,7 +24,7 @@ constexpr double kLongest = 1e9;  // s, keeps sample numbers and nanoseconds far
 /// "JOINT/") of one joint.
 class Overrides {
  public:
-  Overrides(Parameters& parameters, RigFile& file) : parameters_(parameters), file_(file) {}
+  Overrides(Parameters& parameters, rig_file::RigFile& file) : parameters_(parameters), file_(file) {}
 
   void apply(const std::string& scope) {
     scope_ = scope;
@@ -73,7 +73,7 @@ class Overrides {
     if (!given("run")) return;
     const std::string name = parameters_.text(scope_ + "run", "");
     try {
-      apply_test_run(find_test_run(file_.test_runs, name), file_);
+      rig_file::apply_test_run(rig_file::find_test_run(file_.test_runs, name), file_);
     } catch (const InvalidParameter& e) {
       throw InvalidParameter("~" + scope_ + "run", e.value(), e.limit());
     }
@@ -93,7 +93,7 @@ class Overrides {
   }
 
   void sensors() {
-    SensorsSettings& sensors = file_.simulation.sensors;
+    simulation::SensorsSettings& sensors = file_.simulation.sensors;
     const Range rates = Range::between(1e-3, 1e6);
     if (scope_.empty())
       number("sampling_rate", rates, sensors.sampling_rate);  // one message holds all joints
@@ -114,19 +114,20 @@ class Overrides {
   }
 
   Parameters& parameters_;
-  RigFile& file_;
+  rig_file::RigFile& file_;
   std::string scope_;
   std::vector<std::string> given_;
 };
 
-RigFile read_rig_parameter(Parameters& parameters, const std::string& name, const RigFile& absent) {
+rig_file::RigFile read_rig_parameter(Parameters& parameters, const std::string& name,
+                                     const rig_file::RigFile& absent) {
   if (!parameters.has(name)) {
     parameters.allow(name);
     return absent;
   }
   const std::string path = parameters.text(name, "");
   try {
-    return load_rig_file(path);
+    return rig_file::load_rig_file(path);
   } catch (const MissingInput& e) {
     throw MissingInput("~" + name + ": " + e.what());
   } catch (const Error& e) {
@@ -134,7 +135,7 @@ RigFile read_rig_parameter(Parameters& parameters, const std::string& name, cons
   }
 }
 
-JointSettings read_joint(Parameters& parameters, const RigFile& common) {
+JointSettings read_joint(Parameters& parameters, const rig_file::RigFile& common) {
   JointSettings joint{common, {}};
   Overrides overrides(parameters, joint.file);
   overrides.apply("");
@@ -149,7 +150,7 @@ void require_topic_name(const std::string& joint) {
     throw InvalidParameter("~joints", printable(joint), "must be names of topics, without '/'");
 }
 
-std::vector<JointSettings> read_joints(Parameters& parameters, const RigFile& common) {
+std::vector<JointSettings> read_joints(Parameters& parameters, const rig_file::RigFile& common) {
   if (parameters.has("joint"))
     throw InvalidParameter("~joint", "given", "cannot be given together with ~joints");
   std::vector<JointSettings> joints;
@@ -194,7 +195,7 @@ SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle)
   Parameters parameters(private_handle);
   parameters.allow("live");
   SimulatorSettings settings;
-  const RigFile common = read_rig_parameter(parameters, "rig", default_rig_file());
+  const rig_file::RigFile common = read_rig_parameter(parameters, "rig", rig_file::default_rig_file());
   parameters.allow("joints");
   settings.named_joints = parameters.has("joints");
   if (settings.named_joints)
@@ -210,4 +211,4 @@ SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle)
   return settings;
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

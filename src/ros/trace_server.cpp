@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/report/trace_files.h"
 #include "backlash_diagnosis/ros/job.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using Result = backlash_diagnosis::TraceResidualResult;
@@ -24,7 +24,7 @@ double number(const nlohmann::json& json) {
 }
 
 /// What the command has left behind.
-Result read_result(const TraceFiles& files) {
+Result read_result(const report::TraceFiles& files) {
   nlohmann::json report;
   open_input(files.report) >> report;
   Result result;
@@ -97,14 +97,14 @@ Result TraceServer::trace(const backlash_diagnosis::TraceResidualGoal& goal) {
     return ros::ok() && !server_->isPreemptRequested();
   };
   run_job(job);
-  return read_result(trace_files(out));
+  return read_result(report::trace_files(out));
 }
 
 std::string TraceServer::rig_path(const backlash_diagnosis::TraceResidualGoal& goal,
                                   const ScratchFolder& scratch) const {
   if (!goal.rig.empty()) return folder_.inside("rig", goal.rig);
   std::string why;
-  const RigFile* rig = find_rig_(goal.joint, why);
+  const rig_file::RigFile* rig = find_rig_(goal.joint, why);
   if (!rig) throw InvalidParameter("joint", goal.joint, why);
   return file_of(*rig, scratch);
 }
@@ -123,4 +123,4 @@ void TraceServer::execute(const backlash_diagnosis::TraceResidualGoalConstPtr& g
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

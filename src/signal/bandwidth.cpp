@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/measured.h"
 #include "backlash_diagnosis/signal/noise.h"
@@ -12,7 +13,7 @@
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr double kShare = 0.99;
@@ -148,4 +149,4 @@ double noise_after_low_pass(double interval, double cutoff) {
   return std::sqrt(std::inner_product(response.begin(), response.end(), response.begin(), 0.0));
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -7,10 +7,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr std::size_t kBatches = 10;
@@ -95,4 +96,4 @@ double jackknife_error(const Eigen::VectorXd& changes) {
   return std::sqrt(changes.squaredNorm() * double(changes.size() - 1) / double(changes.size()));
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

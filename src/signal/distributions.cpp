@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 // Without this each number would be computed in long double, for a digit that nobody needs.
@@ -50,4 +50,4 @@ double chi_square_probability(double x, double degrees) {
   return std::isinf(x) ? 1 : boost::math::cdf(ChiSquare(degrees), x);
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr std::array<double, 5> kIndependentShares = {0.02, 0.25, 0.5, 0.75, 0.9};  // and 1
@@ -99,4 +99,4 @@ ErrorMemory error_memory(const std::vector<double>& times, const std::vector<dou
   return {mean.slope / weights, mean.level / weights};
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

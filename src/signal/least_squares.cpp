@@ -6,12 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/interruption.h"
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr double kWorstCondition = 1e10;
@@ -230,4 +231,4 @@ Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block,
   return unit.asDiagonal() * product(product(inverse, outer), inverse) * unit.asDiagonal();
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

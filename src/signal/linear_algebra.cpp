@@ -4,7 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 using Eigen::MatrixXd;
@@ -45,4 +45,4 @@ Eigen::MatrixXd solve_square(const MatrixView& a, const MatrixView& b) {
   return square.partialPivLu().solve(right);
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

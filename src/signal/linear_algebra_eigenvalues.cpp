@@ -3,11 +3,11 @@
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
+namespace backlash::signal {
 
 Eigen::VectorXd symmetric_eigenvalues(const MatrixView& a) {
   const Eigen::MatrixXd matrix = a;
   return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

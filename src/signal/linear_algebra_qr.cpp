@@ -3,7 +3,7 @@
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
+namespace backlash::signal {
 
 QrSolution solve_least_squares(const MatrixView& a, const Eigen::Ref<const Eigen::VectorXd>& b) {
   const Eigen::MatrixXd columns = a;
@@ -28,4 +28,4 @@ Eigen::MatrixXd orthonormal_basis(const MatrixView& a) {
   return basis;
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr int kStretch = 10;   // samples
@@ -130,4 +130,4 @@ NoiseRange with_standard_error(const NoiseRange& range, std::size_t samples) {
   return {range.lower * (1 - relative), range.upper * (1 + relative)};
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

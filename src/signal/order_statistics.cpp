@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/base/not_a_number.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 /// Values of the place `rank` [0, n - 1] and, where that is no whole number, between it and the next.
@@ -57,4 +57,4 @@ double smallest_step(const std::vector<double>& values, double rounding) {
   return smallest;
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

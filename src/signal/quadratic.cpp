@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace backlash {
+namespace backlash::signal {
 
 std::vector<std::pair<double, double>> quadratic_at_most_zero(double a, double b, double c) {
   std::vector<double> cuts = {0, 1};
@@ -25,4 +25,4 @@ std::vector<std::pair<double, double>> quadratic_at_most_zero(double a, double b
   return intervals;
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr double kClip = 3.5;  // choice: standard deviations; of normal values one in 2000 lies beyond
@@ -29,4 +29,4 @@ RobustScale robust_scale(const std::vector<double>& values, double floor) {
   return scale;
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

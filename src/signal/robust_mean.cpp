@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr double kOutlier = 3;  // standard deviations
@@ -51,4 +52,4 @@ RobustMean robust_mean(const std::vector<Measured>& values) {
   return mean;
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

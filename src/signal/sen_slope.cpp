@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 double term(double count) {
@@ -45,4 +45,4 @@ SenSlope::Interval SenSlope::interval(double inflation) const {
   return {slopes_[place - 1], slopes_[slopes_.size() - place]};
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -8,7 +8,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 using Complex = std::complex<double>;
@@ -122,4 +122,4 @@ WelchSpectra welch(const std::vector<double>& x, const std::vector<double>& y, d
   return sum;
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

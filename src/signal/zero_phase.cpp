@@ -8,7 +8,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 /// A section b (1 + z^-1)^2 / (1 + a1 z^-1 + a2 z^-2), gain 1 at rest.
@@ -102,4 +102,4 @@ std::vector<double> delayed(const std::vector<double>& values, double samples) {
   return out;
 }
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/stick_slip.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr double kFarthest = 1e3;  // rad/s, beyond which the load has run away
@@ -71,7 +71,7 @@ struct Halves {
 };
 
 /// Whether terms push the load, which may follow the torque of the motor; flanks do not.
-bool pushed(const Rig& rig) {
+bool pushed(const model::Rig& rig) {
   return std::any_of(rig.terms.begin(), rig.terms.end(), [](const auto& term) {
     return term->moves_load() && !term->shapes_flanks() && !term->loads_flanks();
   });
@@ -79,7 +79,7 @@ bool pushed(const Rig& rig) {
 
 class Load {
  public:
-  Load(const Rig& rig, double feedback)
+  Load(const model::Rig& rig, double feedback)
       : train_(rig),
         inertia_(train_.load_inertia()),
         feedback_(feedback),
@@ -112,9 +112,9 @@ class Load {
  private:
   static constexpr int kMostPieces = 30;
   static constexpr int kHalvings = 10;  // of a sample, that place an event
-  using Flanks = std::optional<GearTrain::Flanks>;
-  struct Forces : GearTrain::LoadForces {  // net with what draws the load
-    double position, rate;                 // rad, rad/s, of the load
+  using Flanks = std::optional<model::GearTrain::Flanks>;
+  struct Forces : model::GearTrain::LoadForces {  // net with what draws the load
+    double position, rate;                        // rad, rad/s, of the load
     int side() const { return (mesh_torque > 0) - (mesh_torque < 0); }
   };
   struct Move {
@@ -132,7 +132,7 @@ class Load {
 
   /// `flanks`: where they are at nearly this position, if known.
   Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
-    const Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque};
+    const model::Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque};
     Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position, rate};
     f.net += inertia_ * feedback_ * (m.load_rate - rate);
     return f;
@@ -234,10 +234,10 @@ class Load {
     sum.add(before, after, mean, mean, mean);
   }
 
-  GearTrain train_;
+  model::GearTrain train_;
   double inertia_, feedback_;
   bool rubs_, may_follow_torque_, shaped_;
-  StickSlip mode_;
+  model::StickSlip mode_;
   Forces last_{};  // at the end of the sample before
   Flanks flanks_;  // there, if known
 };
@@ -245,27 +245,27 @@ class Load {
 /// A load that stands.
 class LockedLoad {
  public:
-  explicit LockedLoad(const Rig& rig) : train_(rig) {}
+  explicit LockedLoad(const model::Rig& rig) : train_(rig) {}
 
   double q = 0, w = 0;
 
   double begin(const Segment& s) { return forces(s.at(0)).mesh_torque; }
 
   double step(const Segment& s, Halves& sum) {
-    const GearTrain::LoadForces end = forces(s.at(1));
+    const model::GearTrain::LoadForces end = forces(s.at(1));
     sum.add(0, 1, forces(s.at(0)).mesh_on_motor, forces(s.at(0.5)).mesh_on_motor, end.mesh_on_motor);
     return end.mesh_torque;
   }
 
  private:
-  GearTrain::LoadForces forces(const Moment& m) const {
+  model::GearTrain::LoadForces forces(const Moment& m) const {
     return train_.load_forces({m.time, m.motor, m.motor_rate, 0, 0, 0, m.motor_torque});
   }
 
-  GearTrain train_;
+  model::GearTrain train_;
 };
 
-void check(const Rig& rig) {
+void check(const model::Rig& rig) {
   if (!rig.input_coupling.rigid || !rig.output_coupling.rigid)
     throw InvalidParameter("coupling", "flexible",
                            "a load that follows the recorded motor needs rigid couplings");
@@ -308,8 +308,8 @@ DrivenLoad follow(Body& load, const RecordedMotion& motion) {
 
 /// A rig reduced to what acts on its load. What is taken away here is all that does not: a new member of Rig
 /// counts until it is named.
-Rig acting_on_load(Rig rig) {
-  const Rig none;
+model::Rig acting_on_load(model::Rig rig) {
+  const model::Rig none;
   rig.name = none.name;
   rig.joint = none.joint;
   rig.reduction_ratio = none.reduction_ratio;
@@ -320,22 +320,22 @@ Rig acting_on_load(Rig rig) {
   rig.torque_constant = none.torque_constant;
   rig.sensor_with_damper = none.sensor_with_damper;
   if (rig.input_coupling.rigid) rig.input_coupling = none.input_coupling;
-  const auto idle = [](const std::shared_ptr<const Term>& term) { return !term->moves_load(); };
+  const auto idle = [](const std::shared_ptr<const model::Term>& term) { return !term->moves_load(); };
   rig.terms.erase(std::remove_if(rig.terms.begin(), rig.terms.end(), idle), rig.terms.end());
   return rig;
 }
 
 }  // namespace
 
-bool moves_same_load(const Rig& a, const Rig& b) {
+bool moves_same_load(const model::Rig& a, const model::Rig& b) {
   return acting_on_load(a) == acting_on_load(b);
 }
 
-bool load_moves_freely(const Rig& rig) {
+bool load_moves_freely(const model::Rig& rig) {
   return !rig.mesh.rigid && !rig.link_locked;
 }
 
-DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, double feedback) {
+DrivenLoad simulate_driven_load(const model::Rig& rig, const RecordedMotion& motion, double feedback) {
   check(rig);
   if (rig.mesh.rigid) {
     const std::vector<double> none(motion.motor->size(), 0.0);
@@ -351,8 +351,8 @@ DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion, do
   return follow(load, motion);
 }
 
-MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const DrivenLoad& load) {
-  const GearTrain train(rig);
+MotorTorques motor_torques(const model::Rig& rig, const RecordedMotion& motion, const DrivenLoad& load) {
+  const model::GearTrain train(rig);
   const std::size_t n = motion.motor->size();
   const auto held = [&](std::size_t k) { return motion.motor_torque ? (*motion.motor_torque)[k] : 0.0; };
   const auto forces = [&](std::size_t k, double torque) {
@@ -360,13 +360,13 @@ MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const D
     return train.motor_forces({double(k) * motion.interval, (*motion.motor)[k], (*motion.motor_rate)[k],
                                load.load[k], load.load_rate[k], mesh_torque, torque});
   };
-  MotorTorques out{load.mesh_on_motor, std::vector<FrictionLimits>(n)};
+  MotorTorques out{load.mesh_on_motor, std::vector<model::FrictionLimits>(n)};
   // Of each sample with the torque held before it and after it. Each interval's triangular weights give 1/2
   // of the mean, by Simpson's weights (1 + 5) / 12 if what is held does not jump within.
   for (std::size_t k = 0; k < n; ++k) {
     const double first = held(k == 0 ? 0 : k - 1), second = held(k);
-    const GearTrain::MotorForces after = forces(k, second);
-    const GearTrain::MotorForces before = first == second ? after : forces(k, first);
+    const model::GearTrain::MotorForces after = forces(k, second);
+    const model::GearTrain::MotorForces before = first == second ? after : forces(k, first);
     out.mean[k] += 5.0 / 12 * (before.net + after.net);
     out.mean[k == 0 ? 0 : k - 1] += before.net / 12;
     out.mean[k + 1 == n ? k : k + 1] += after.net / 12;
@@ -377,4 +377,4 @@ MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const D
   return out;
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

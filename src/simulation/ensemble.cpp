@@ -13,12 +13,12 @@
 #include "tsitouras.h"
 #include "work_limit.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 using namespace tsitouras;
 
-constexpr int kMaxStates = GearTrain::kMaxStates;
+constexpr int kMaxStates = model::GearTrain::kMaxStates;
 constexpr double kSafety = 0.9, kShrink = 0.2, kGrow = 8;
 constexpr double kFirst = 0.01;       // of the time in which the state would change by itself
 constexpr double kLeastFirst = 1e-7;  // s, of a first step from rest
@@ -59,7 +59,7 @@ struct LaneTolerance {
 
 /// One attempt at a step; all that it reads and writes.
 struct Attempt {
-  const EquationsOfMotion<Lanes>& train;
+  const model::EquationsOfMotion<Lanes>& train;
   const LaneContact& contact;
   const LaneTolerance* tolerances;
   double relative;
@@ -74,7 +74,7 @@ struct Attempt {
 
 template <int Number>
 BACKLASH_LANES void attempt(Attempt& a) {
-  static constexpr TrainLayout layout = TrainLayout::numbered(Number);
+  static constexpr model::TrainLayout layout = model::TrainLayout::numbered(Number);
   constexpr int kStates = 2 * layout.dof;
   Lanes(*const k)[kMaxStates] = a.rates;
   const auto force = [&](const Lanes& x, const Lanes& v) __attribute__((always_inline)) {
@@ -139,16 +139,17 @@ AttemptFunction attempt_of() {
 }
 #endif
 
-AttemptFunction attempt_of(const TrainLayout& layout) {
-  return with_constant_number(layout, [](auto number) { return attempt_of<decltype(number)::value>(); });
+AttemptFunction attempt_of(const model::TrainLayout& layout) {
+  return model::with_constant_number(layout,
+                                     [](auto number) { return attempt_of<decltype(number)::value>(); });
 }
 
 }  // namespace
 
 /// Rigs that share their steps.
 struct alignas(sizeof(Lanes)) Ensemble::Group {
-  TrainLayout layout;
-  EquationsOfMotion<Lanes> train;
+  model::TrainLayout layout;
+  model::EquationsOfMotion<Lanes> train;
   LaneContact contact;
   LaneTolerance tolerances[kMaxStates];
   double relative;
@@ -163,7 +164,7 @@ struct alignas(sizeof(Lanes)) Ensemble::Group {
   Lanes rates[kStages][kMaxStates];                    // of the last step; its last stage begins the next
   Lanes state[kMaxStates] = {};                        // where they were moved to
 
-  Group(const GearTrain* trains, std::size_t count, const SolverSettings& solver, bool at_load);
+  Group(const model::GearTrain* trains, std::size_t count, const SolverSettings& solver, bool at_load);
   void restart(double t, double torque);
   void advance_to(double t, double stop, const Excitation& excitation, long segment);
   void take_step(double stop, const Excitation& excitation, long segment);
@@ -171,15 +172,16 @@ struct alignas(sizeof(Lanes)) Ensemble::Group {
 };
 
 /// A group that is not full moves its last rig several times.
-Ensemble::Group::Group(const GearTrain* trains, std::size_t count, const SolverSettings& solver, bool at_load)
+Ensemble::Group::Group(const model::GearTrain* trains, std::size_t count, const SolverSettings& solver,
+                       bool at_load)
     : layout(trains[0].layout()),
       relative(solver.relative_tolerance),
       attempt(attempt_of(layout)),
       states(2 * layout.dof) {
   for (int lane = 0; lane < kLanes; ++lane) {
-    const GearTrain& rig = trains[std::min<std::size_t>(lane, count - 1)];
-    const EquationsOfMotion<double>& one = rig.equations();
-    for (int part = 0; part < TrainParts::kPartCount; ++part) {
+    const model::GearTrain& rig = trains[std::min<std::size_t>(lane, count - 1)];
+    const model::EquationsOfMotion<double>& one = rig.equations();
+    for (int part = 0; part < model::TrainParts::kPartCount; ++part) {
       train.damping[part][lane] = one.damping[part];
       train.asymmetry[part][lane] = one.asymmetry[part];
       train.inverse_inertia[part][lane] = one.inverse_inertia[part];
@@ -190,7 +192,7 @@ Ensemble::Group::Group(const GearTrain* trains, std::size_t count, const SolverS
     train.output_damping[lane] = one.output_damping;
     train.lever[lane] = one.lever;
     train.start[lane] = one.start;
-    const PowerContact law = *rig.power_contact();
+    const model::PowerContact law = *rig.power_contact();
     contact.exponent = law.exponent;
     contact.stiffness[lane] = law.stiffness;
     contact.loss[lane] = law.loss;
@@ -269,14 +271,14 @@ void Ensemble::Group::advance_to(double t, double stop, const Excitation& excita
   interpolate(t);
 }
 
-bool Ensemble::takes(const std::vector<Rig>& rigs, const ExcitationSettings& excitation) {
+bool Ensemble::takes(const std::vector<model::Rig>& rigs, const ExcitationSettings& excitation) {
   if (rigs.empty() || excitation.is_speed_loop() || excitation.type == "topic" || excitation.motor_brake)
     return false;
   std::optional<int> layout;
   std::optional<double> exponent;
-  for (const Rig& rig : rigs) {
-    const GearTrain train(rig);
-    const std::optional<PowerContact> contact = train.power_contact();
+  for (const model::Rig& rig : rigs) {
+    const model::GearTrain train(rig);
+    const std::optional<model::PowerContact> contact = train.power_contact();
     if (!train.smooth() || !contact) return false;
     if (layout && *layout != train.layout().number()) return false;
     if (exponent && *exponent != contact->exponent) return false;
@@ -286,14 +288,14 @@ bool Ensemble::takes(const std::vector<Rig>& rigs, const ExcitationSettings& exc
   return true;
 }
 
-Ensemble::Ensemble(const std::vector<Rig>& rigs, const ExcitationSettings& excitation,
+Ensemble::Ensemble(const std::vector<model::Rig>& rigs, const ExcitationSettings& excitation,
                    const SolverSettings& solver)
     : at_load_(excitation.at_load), excitation_(excitation.create()) {
   if (!takes(rigs, excitation))
     throw InvalidParameter("rigs", double(rigs.size()), "cannot be moved at once");
   if (at_load_ && rigs.front().link_locked)
     throw InvalidParameter("excitation.at", "load", "the link is locked");
-  for (const Rig& rig : rigs) trains_.emplace_back(rig);
+  for (const model::Rig& rig : rigs) trains_.emplace_back(rig);
   for (std::size_t first = 0; first < trains_.size(); first += kLanes)
     groups_.emplace_back(&trains_[first], trains_.size() - first, solver, at_load_);
   for (Group& group : groups_) group.restart(0, excitation_->torque(0, 0));
@@ -324,10 +326,10 @@ std::vector<double> Ensemble::state(std::size_t rig) const {
   return numbers;
 }
 
-Observation Ensemble::observe(std::size_t rig) const {
+model::Observation Ensemble::observe(std::size_t rig) const {
   const double torque = excitation_->torque(time_, segment_);
-  return trains_.at(rig).observe(state(rig).data(),
-                                 at_load_ ? AppliedTorque(0, torque) : AppliedTorque(torque, 0), time_);
+  return trains_.at(rig).observe(
+      state(rig).data(), at_load_ ? model::AppliedTorque(0, torque) : model::AppliedTorque(torque, 0), time_);
 }
 
 long Ensemble::steps() const {
@@ -336,4 +338,4 @@ long Ensemble::steps() const {
   return sum;
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "excitation/limits.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 const std::vector<std::string> kTypes = {"square",   "sine",  "chirp",        "multi_sine",     "random",
@@ -123,4 +123,4 @@ ExcitationSettings read_excitation(const YamlReader& yaml) {
   return settings;
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

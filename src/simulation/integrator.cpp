@@ -21,7 +21,7 @@
 #include "tsitouras.h"
 #include "work_limit.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 // A trial step may reach where the derivative overflows, and a shorter one mends that; more than a few of
@@ -405,4 +405,4 @@ IntegratorStatistics Integrator::statistics() const {
   return impl_->memory ? impl_->before_restart + impl_->since_restart() : impl_->before_restart;
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

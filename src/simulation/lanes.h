@@ -9,7 +9,7 @@
 #include <emmintrin.h>
 #endif
 
-namespace backlash {
+namespace backlash::simulation {
 
 constexpr int kLanes = 4;
 using Lanes = double __attribute__((vector_size(8 * kLanes)));
@@ -41,4 +41,4 @@ BACKLASH_LANES Lanes root(const Lanes& a) {
 #endif
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -8,21 +8,21 @@
 #include "backlash_diagnosis/base/error.h"
 #include "tolerances.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr long kMaxChangesPerCall = 100'000;
 
-GearTrain gear_train_of(const Rig& rig, const ExcitationSettings& excitation) {
+model::GearTrain gear_train_of(const model::Rig& rig, const ExcitationSettings& excitation) {
   if (excitation.at_load && rig.link_locked)
     throw InvalidParameter("excitation.at", "load", "the link is locked");
-  GearTrain train(rig);
+  model::GearTrain train(rig);
   if (excitation.motor_brake) train.brake_motor();
   return train;
 }
 
-int event_count(const GearTrain& train) {
-  return (train.needs_touches() ? GearTrain::kContactEvents : 0) + train.friction_event_count();
+int event_count(const model::GearTrain& train) {
+  return (train.needs_touches() ? model::GearTrain::kContactEvents : 0) + train.friction_event_count();
 }
 
 /// A sample k / rate and a switch n / (2 f) that are meant to coincide may differ by this much.
@@ -32,7 +32,7 @@ double rounding(double t) {
 
 }  // namespace
 
-Plant::Plant(const Rig& rig, const ExcitationSettings& excitation, const SolverSettings& solver)
+Plant::Plant(const model::Rig& rig, const ExcitationSettings& excitation, const SolverSettings& solver)
     : gear_train_(gear_train_of(rig, excitation)),
       excitation_settings_(excitation),
       excitation_(excitation.create()),
@@ -50,14 +50,14 @@ void Plant::reset() {
   state_.fill(0);
   time_ = 0;
   segment_ = 0;
-  gear_train_.begin_friction(time_, state_.data(), AppliedTorque());
-  excitation_->begin_segment(segment_, gear_train_.observe(state_.data(), AppliedTorque()));
+  gear_train_.begin_friction(time_, state_.data(), model::AppliedTorque());
+  excitation_->begin_segment(segment_, gear_train_.observe(state_.data(), model::AppliedTorque()));
   begin();
 }
 
-AppliedTorque Plant::applied_torque(double t) const {
+model::AppliedTorque Plant::applied_torque(double t) const {
   const double torque = excitation_->torque(t, segment_);
-  return excitation_settings_.at_load ? AppliedTorque(0, torque) : AppliedTorque(torque, 0);
+  return excitation_settings_.at_load ? model::AppliedTorque(0, torque) : model::AppliedTorque(torque, 0);
 }
 
 /// Seen by the solver a body that sticks moves by roundings between its steps; by everybody else it does not.
@@ -80,14 +80,14 @@ void Plant::events(double t, const double* solved, double* values) const {
   const double* const state = now.data();
   if (gear_train_.needs_touches()) {
     gear_train_.contact_events(state, values);
-    values += GearTrain::kContactEvents;
+    values += model::GearTrain::kContactEvents;
   }
   gear_train_.friction_events(t, state, applied_torque(t), values);
 }
 
 /// True where contact or friction has changed.
 bool Plant::update_modes(int event) {
-  const bool touch = gear_train_.needs_touches() && event < GearTrain::kContactEvents;
+  const bool touch = gear_train_.needs_touches() && event < model::GearTrain::kContactEvents;
   const bool touched = touch && gear_train_.update_contact(state_.data());
   return gear_train_.update_friction(time_, state_.data(), applied_torque()) || touched;
 }
@@ -137,7 +137,7 @@ void Plant::advance_to(double t) {
   for (double end = excitation_->segment_end(segment_); end <= reach;
        end = excitation_->segment_end(segment_)) {
     integrate_to(end);
-    const Observation machine = observe();
+    const model::Observation machine = observe();
     excitation_->begin_segment(++segment_, machine);
     gear_train_.update_friction(time_, state_.data(), applied_torque());
     restart();
@@ -163,4 +163,4 @@ void Plant::set_state(const State& state) {
   begin();
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

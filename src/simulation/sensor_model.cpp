@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 SensorSettings read_sensor(const YamlReader& yaml) {
@@ -25,8 +25,8 @@ SensorsSettings read_sensors(const YamlReader& yaml) {
   SensorsSettings settings;
   settings.sampling_rate = yaml.number("sampling_rate", Range::positive());
   settings.seed = static_cast<std::uint64_t>(yaml.integer("seed", 0, 1L << 53));
-  for (Channel channel : kChannels)
-    if (const auto sensor = yaml.optional_map(channel_name(channel)))
+  for (record::Channel channel : record::kChannels)
+    if (const auto sensor = yaml.optional_map(record::channel_name(channel)))
       settings.of(channel) = read_sensor(*sensor);
   return settings;
 }
@@ -36,7 +36,7 @@ SensorModel::SensorModel(const SensorsSettings& settings) : settings_(settings) 
 }
 
 void SensorModel::reset() {
-  for (std::size_t i = 0; i < kChannelCount; ++i)
+  for (std::size_t i = 0; i < record::kChannelCount; ++i)
     if (settings_.channels[i].noise > 0) seed(i);
 }
 
@@ -44,16 +44,16 @@ void SensorModel::seed(std::size_t channel) {
   noise_[channel].emplace(settings_.seed, static_cast<std::uint32_t>(channel));
 }
 
-void SensorModel::set_noise(Channel channel, double noise) {
+void SensorModel::set_noise(record::Channel channel, double noise) {
   const Range range = Range::not_negative();
   if (!std::isfinite(noise) || !range.contains(noise))
-    throw InvalidParameter(channel_name(channel) + " noise", noise, range.text());
+    throw InvalidParameter(record::channel_name(channel) + " noise", noise, range.text());
   double& present = settings_.of(channel).noise;
   if (present == 0 && noise > 0) seed(static_cast<std::size_t>(channel));
   present = noise;
 }
 
-double SensorModel::measure(Channel channel, double exact) {
+double SensorModel::measure(record::Channel channel, double exact) {
   const std::size_t i = static_cast<std::size_t>(channel);
   const SensorSettings& sensor = settings_.channels[i];
   double value = exact + sensor.offset;
@@ -63,20 +63,20 @@ double SensorModel::measure(Channel channel, double exact) {
   return std::isnan(exact) ? exact : value;
 }
 
-Observation SensorModel::measure(const Observation& exact) {
-  Observation measured = exact;  // the twist and the load torque have no sensor of their own
-  measured.motor_torque = measure(Channel::motor_torque, exact.motor_torque);
-  measured.motor_position = measure(Channel::motor_position, exact.motor_position);
-  measured.motor_velocity = measure(Channel::motor_velocity, exact.motor_velocity);
-  measured.sensor_torque = measure(Channel::sensor_torque, exact.sensor_torque);
-  measured.load_position = measure(Channel::load_position, exact.load_position);
-  measured.load_velocity = measure(Channel::load_velocity, exact.load_velocity);
-  const auto if_declared = [this](Channel channel, double value) {
+model::Observation SensorModel::measure(const model::Observation& exact) {
+  model::Observation measured = exact;  // the twist and the load torque have no sensor of their own
+  measured.motor_torque = measure(record::Channel::motor_torque, exact.motor_torque);
+  measured.motor_position = measure(record::Channel::motor_position, exact.motor_position);
+  measured.motor_velocity = measure(record::Channel::motor_velocity, exact.motor_velocity);
+  measured.sensor_torque = measure(record::Channel::sensor_torque, exact.sensor_torque);
+  measured.load_position = measure(record::Channel::load_position, exact.load_position);
+  measured.load_velocity = measure(record::Channel::load_velocity, exact.load_velocity);
+  const auto if_declared = [this](record::Channel channel, double value) {
     return settings_.of(channel).declared ? measure(channel, value) : std::nan("");
   };
-  measured.motor_current = if_declared(Channel::motor_current, exact.motor_current);
-  measured.acceleration = if_declared(Channel::acceleration, exact.acceleration);
+  measured.motor_current = if_declared(record::Channel::motor_current, exact.motor_current);
+  measured.acceleration = if_declared(record::Channel::acceleration, exact.acceleration);
   return measured;
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 // Two numbers at once: what every processor of this kind has, so that no other binary is needed. Compilers
@@ -98,4 +98,4 @@ N_Vector new_small_vector(sunindextype length, SUNContext context) {
   return v;
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -5,9 +5,9 @@
 
 #include <nvector/nvector_serial.h>
 
-namespace backlash {
+namespace backlash::simulation {
 
 /// A vector of `length` zeros; its clones are alike. Null where memory is short.
 N_Vector new_small_vector(sunindextype length, SUNContext context);
 
-}  // namespace backlash
+}  // namespace backlash::simulation

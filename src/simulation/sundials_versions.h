@@ -10,7 +10,7 @@
 #include <cvode/cvode.h>
 #include <sundials/sundials_context.h>
 
-namespace backlash::sundials {
+namespace backlash::simulation::sundials {
 
 // Errors are reported through return codes; the library's own printing would only repeat them.
 #if SUNDIALS_VERSION_MAJOR >= 7
@@ -41,4 +41,4 @@ inline int silence_multistep(void* memory) {
 
 #endif
 
-}  // namespace backlash::sundials
+}  // namespace backlash::simulation::sundials

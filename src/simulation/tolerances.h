@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/simulation/integrator.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 /// Elastic deflections and play are differences of angles and far below this; beyond it no angle says more
 /// about them.
@@ -20,4 +20,4 @@ inline std::vector<StateTolerance> state_tolerances(int dof, const SolverSetting
   return tolerances;
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -5,7 +5,7 @@
 // weight in the error.
 #pragma once
 
-namespace backlash {
+namespace backlash::simulation {
 namespace tsitouras {
 
 constexpr int kStages = 7;
@@ -42,4 +42,4 @@ inline void interpolant(double u, double* weights) {
 }
 
 }  // namespace tsitouras
-}  // namespace backlash
+}  // namespace backlash::simulation

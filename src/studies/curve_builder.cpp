@@ -17,22 +17,22 @@
 #include "family_builder.h"
 #include "fine_run.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 /// What one backlash value contributes.
 struct Cell {
-  CurvePoint point;
-  std::vector<Quantiles> members;
+  diagnosis::CurvePoint point;
+  std::vector<diagnosis::Quantiles> members;
   double motor_travel = 0, amplitude = 0, excitation_level = 0;
 };
 
 /// Skewness of each period of one sampled run.
 std::vector<double> skewness_of(const CurvePlan& plan, const std::vector<double>& samples) {
-  PeriodAnalyser analyser(plan.apd.period, plan.apd.layout);
+  diagnosis::PeriodAnalyser analyser(plan.apd.period, plan.apd.layout);
   std::vector<double> skewness;
   for (std::size_t k = 0; k < samples.size(); ++k) {
-    const PeriodResult* period =
+    const diagnosis::PeriodResult* period =
         analyser.add(static_cast<double>(k) / plan.request.sampling_rate, samples[k]);
     if (period && period->index >= plan.apd.settling_periods) skewness.push_back(period->apd.skewness());
   }
@@ -40,12 +40,12 @@ std::vector<double> skewness_of(const CurvePlan& plan, const std::vector<double>
 }
 
 /// Mean over all, scatter inside the runs, scatter of the runs' means beyond that.
-SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
-  RunningMoments all, means;
+diagnosis::SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
+  diagnosis::RunningMoments all, means;
   double within = 0;
   std::size_t freedom = 0;
   for (const auto& run : runs) {
-    RunningMoments own;
+    diagnosis::RunningMoments own;
     for (double s : run) {
       all.add(s);
       own.add(s);
@@ -54,7 +54,7 @@ SkewnessCell summarise(const std::vector<std::vector<double>>& runs) {
     within += own.standard_deviation() * own.standard_deviation() * double(own.count());
     freedom += own.count() - 1;
   }
-  SkewnessCell cell;
+  diagnosis::SkewnessCell cell;
   cell.mean = all.mean();
   cell.within = freedom > 0 ? std::sqrt(within / double(freedom)) : 0;
   const double n = double(runs.front().size()), m = double(runs.size());
@@ -69,9 +69,9 @@ double mean_of(const std::vector<double>& values) {
 
 /// Skewness at each noise level, and the level of the signal at the declared one. `means` (may be null)
 /// becomes the mean skewness by level and seed.
-CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash,
-                      std::vector<std::vector<double>>* means = nullptr) {
-  CurvePoint point;
+diagnosis::CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash,
+                                 std::vector<std::vector<double>>* means = nullptr) {
+  diagnosis::CurvePoint point;
   point.backlash = backlash;
   for (const double noise : plan.noise_levels) {
     std::vector<std::vector<double>> skewness;
@@ -79,7 +79,7 @@ CurvePoint make_point(const CurvePlan& plan, const FineRun& run, double backlash
       auto samples = sample(plan, run, plan.phase_of(seed), seed, noise);
       skewness.push_back(skewness_of(plan, samples));
       if (noise == plan.file.simulation.sensors.of(plan.apd.signal).noise)
-        point.signal_level = signal_level(std::move(samples));
+        point.signal_level = diagnosis::signal_level(std::move(samples));
     }
     point.cells.push_back(summarise(skewness));
     if (means) {
@@ -97,16 +97,16 @@ Cell make_cell(const CurvePlan& plan, double backlash, const FineRun& run) {
   Cell cell;
   cell.point = make_point(plan, run, backlash);
   cell.members = family_members(plan, run);
-  cell.motor_travel = travel_of(run.position);
+  cell.motor_travel = diagnosis::travel_of(run.position);
   for (double torque : run.torque) cell.amplitude = std::max(cell.amplitude, std::fabs(torque));
-  cell.excitation_level = signal_level(run.torque);
+  cell.excitation_level = diagnosis::signal_level(run.torque);
   return cell;
 }
 
 /// What lies in the middle between two points, to learn how well the curve and its family hold there.
 struct Middle {
   std::vector<double> backlash;
-  std::vector<std::vector<SkewnessCell>> cells;
+  std::vector<std::vector<diagnosis::SkewnessCell>> cells;
   std::vector<std::vector<std::vector<double>>> means;  // of skewness, by noise level and seed
   std::vector<FineRun> runs;                            // of use: the signal
 };
@@ -114,7 +114,7 @@ struct Middle {
 struct Cells {
   std::vector<Cell> points;
   Middle middle;
-  std::vector<std::vector<Quantiles>> beyond;  // members of the family beyond the end of the curve
+  std::vector<std::vector<diagnosis::Quantiles>> beyond;  // members of the family beyond the end of the curve
 };
 
 constexpr double kBeyond = 0.5;  // of the curve's length
@@ -125,10 +125,10 @@ int count_beyond(const CurvePlan& plan) {
 
 /// All machines that are run, by backlash: those of the points, those in the middle between two points, which
 /// are as far from the file as a real one may be, and those beyond the end of the curve.
-std::vector<Rig> machines_of(const CurvePlan& plan) {
+std::vector<model::Rig> machines_of(const CurvePlan& plan) {
   const int count = plan.request.points;
   const double step = plan.request.max_backlash / (count - 1);
-  std::vector<Rig> machines;
+  std::vector<model::Rig> machines;
   for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
   for (int i = 0; i + 1 < count; ++i)
     machines.push_back(
@@ -159,7 +159,7 @@ class PointsDone {
  public:
   explicit PointsDone(const CurveRequest& request) : request_(request) {}
 
-  void add(const CurvePoint& point) {
+  void add(const diagnosis::CurvePoint& point) {
     if (!request_.best_so_far) return;
     const std::lock_guard<std::mutex> lock(mutex_);
     lowest_ = std::min(lowest_, point.cells.front().mean);
@@ -185,7 +185,7 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   all.middle.means.resize(count - 1);
   all.middle.runs.resize(count - 1);
   all.beyond.resize(count_beyond(plan));
-  const std::vector<Rig> machines = machines_of(plan);
+  const std::vector<model::Rig> machines = machines_of(plan);
   PointsDone points(plan.request);
   const std::size_t chunks = (machines.size() + kTogether - 1) / kTogether;
   for_each_in_parallel(static_cast<int>(chunks), ticker, [&](int chunk) {
@@ -200,13 +200,13 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
 }
 
 /// Share of the runs between the points whose interval holds their own backlash, of those that get one.
-double coverage(const MonitoringCurve& curve, const Middle& middle) {
+double coverage(const diagnosis::MonitoringCurve& curve, const Middle& middle) {
   int told = 0, held = 0;
   for (std::size_t i = 0; i < middle.means.size(); ++i)
     for (std::size_t level = 0; level < middle.means[i].size(); ++level)
       for (const double mean : middle.means[i][level]) {
-        const Estimate e = curve.invert(mean, curve.conditions.periods, curve.noise_levels[level]);
-        if (e.status != Status::ok) continue;
+        const diagnosis::Estimate e = curve.invert(mean, curve.conditions.periods, curve.noise_levels[level]);
+        if (e.status != diagnosis::Status::ok) continue;
         ++told;
         held += e.lower <= middle.backlash[i] && middle.backlash[i] <= e.upper;
       }
@@ -215,18 +215,18 @@ double coverage(const MonitoringCurve& curve, const Middle& middle) {
 
 /// The smallest factor with which 95 % of the intervals hold, not below that of a normal distribution: the
 /// same runs also set the scatter.
-double calibrated_factor(MonitoringCurve curve, const Middle& middle) {
+double calibrated_factor(diagnosis::MonitoringCurve curve, const Middle& middle) {
   for (; curve.coverage_factor < 5; curve.coverage_factor += 0.1)
     if (coverage(curve, middle) >= 0.95) break;
   return curve.coverage_factor;
 }
 
-CurveConditions conditions_of(const CurvePlan& plan) {
-  CurveConditions c;
+diagnosis::CurveConditions conditions_of(const CurvePlan& plan) {
+  diagnosis::CurveConditions c;
   c.rig = plan.file.rig.name;
   c.rig_digest = plan.file.digest;
   c.version = version();
-  c.signal = channel_name(plan.apd.signal);
+  c.signal = record::channel_name(plan.apd.signal);
   c.excitation = plan.file.simulation.excitation.type;
   c.frequency = 1 / plan.apd.period;
   c.sampling_rate = plan.request.sampling_rate;
@@ -248,19 +248,20 @@ double nominal_sampling_rate(double interval) {
   return std::round(scale / interval) / scale;
 }
 
-MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, const Progress& progress) {
+diagnosis::MonitoringCurve build_curve(const rig_file::RigFile& file, const CurveRequest& request,
+                                       const Progress& progress) {
   const CurvePlan plan = plan_curve(file, request);
   const long runs = 2L * plan.request.points - 1 + count_beyond(plan);
   const long calibration = (plan.request.points - 1L) * static_cast<long>(plan.noise_levels.size() + 1);
   Ticker ticker(progress, runs * plan.run_periods() + calibration, "building the curve");
   Cells all = make_cells(plan, ticker);
-  MonitoringCurve curve;
+  diagnosis::MonitoringCurve curve;
   curve.conditions = conditions_of(plan);
   curve.noise_levels = plan.noise_levels;
   curve.backlash_to_angle = file.rig.backlash_angle(1);
   curve.family.emplace();
   for (Cell& cell : all.points) {
-    CurveConditions& c = curve.conditions;
+    diagnosis::CurveConditions& c = curve.conditions;
     c.motor_travel = std::max(c.motor_travel, cell.motor_travel);
     c.amplitude = std::max(c.amplitude, cell.amplitude);
     c.excitation_level = cell.excitation_level;
@@ -274,7 +275,8 @@ MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request, co
   return curve;
 }
 
-std::string check_curve(const MonitoringCurve& curve, const RigFile& rig, const std::string& source) {
+std::string check_curve(const diagnosis::MonitoringCurve& curve, const rig_file::RigFile& rig,
+                        const std::string& source) {
   constexpr double kSameGeometry = 0.01;  // a base radius may be stated with three digits
   const double expected = rig.rig.backlash_angle(1);
   if (!(std::fabs(curve.backlash_to_angle / expected - 1) < kSameGeometry))
@@ -285,4 +287,4 @@ std::string check_curve(const MonitoringCurve& curve, const RigFile& rig, const 
   return "the curve was made from another version of the rig file; build it again";
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -5,14 +5,14 @@
 
 #include "backlash_diagnosis/base/random.h"
 
-namespace backlash {
+namespace backlash::studies {
 
-Rig draw_machine(const RigFile& file, std::uint64_t seed) {
-  Rig rig = file.rig;
+model::Rig draw_machine(const rig_file::RigFile& file, std::uint64_t seed) {
+  model::Rig rig = file.rig;
   Random random(seed);
-  for (Coupling* coupling : {&rig.input_coupling, &rig.output_coupling})
+  for (model::Coupling* coupling : {&rig.input_coupling, &rig.output_coupling})
     coupling->stiffness *= 1 + file.diagnosis.stiffness_uncertainty * std::clamp(random.normal(), -3.0, 3.0);
   return rig;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -6,10 +6,10 @@
 
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 /// The rig with the stiffness of its couplings drawn about the declared values (normal, relative standard
 /// deviation diagnosis.stiffness_uncertainty, at most three of them). Deterministic for a seed.
-Rig draw_machine(const RigFile& file, std::uint64_t seed);
+model::Rig draw_machine(const rig_file::RigFile& file, std::uint64_t seed);
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 /// A record before it is simulated.
 struct Draw {
@@ -19,13 +19,13 @@ struct Draw {
 /// The machine that a rig file describes (draw_machine, by d.seed) with the backlash of a draw: exact motion
 /// for `duration` [s], several times finer than the sampling, so that a recorder can begin between two
 /// samples.
-Record simulate_fine(RigFile file, const Draw& d, double duration);
+record::Record simulate_fine(rig_file::RigFile file, const Draw& d, double duration);
 
 /// What the rig's sensors give of a fine record from d.start on: settling and d.periods, with noise on the
 /// signal of the APD and on motor_torque, saturated where the signal's sensor is.
-Record recorded(const Record& fine, const RigFile& file, const Draw& d);
+record::Record recorded(const record::Record& fine, const rig_file::RigFile& file, const Draw& d);
 
 /// Both.
-Record simulate_draw(const RigFile& file, const Draw& d);
+record::Record simulate_draw(const rig_file::RigFile& file, const Draw& d);
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 constexpr int kTrials = 16;       // records per segment and noise level
@@ -40,8 +40,8 @@ struct Trial {
 
 using Trials = std::vector<Trial>;
 
-Trials run_trials(const CurvePlan& plan, const FineRun& run, const NoisyFamily& members, std::size_t segment,
-                  double noise) {
+Trials run_trials(const CurvePlan& plan, const FineRun& run, const diagnosis::NoisyFamily& members,
+                  std::size_t segment, double noise) {
   const long all = std::min(plan.request.periods, kMostPeriods);
   const long lengths[] = {std::max(1L, all / 5), std::max(1L, all / 2), all, all};
   Trials trials;
@@ -50,7 +50,7 @@ Trials run_trials(const CurvePlan& plan, const FineRun& run, const NoisyFamily& 
     Random random(static_cast<std::uint64_t>(seed));
     const int phase = static_cast<int>(random.below(static_cast<std::size_t>(plan.phases)));
     const auto samples = settled(plan, sample(plan, run, phase, seed, noise), lengths[k % 4]);
-    const FamilyDistance distance(members, quantiles_of(samples));
+    const diagnosis::FamilyDistance distance(members, diagnosis::quantiles_of(samples));
     trials.push_back({distance.smallest().distance, distance.at(segment, 0.5)});
   }
   return trials;
@@ -68,22 +68,23 @@ std::vector<double> pooled(const std::vector<Trials>& trials, std::size_t segmen
 
 }  // namespace
 
-std::vector<Quantiles> family_members(const CurvePlan& plan, const FineRun& run) {
-  std::vector<Quantiles> members;
+std::vector<diagnosis::Quantiles> family_members(const CurvePlan& plan, const FineRun& run) {
+  std::vector<diagnosis::Quantiles> members;
   for (int phase = 0; phase < plan.phases; ++phase) {
-    members.push_back(quantiles_of(settled(plan, sample(plan, run, phase, 0, 0), plan.request.periods)));
+    members.push_back(
+        diagnosis::quantiles_of(settled(plan, sample(plan, run, phase, 0, 0), plan.request.periods)));
     for (double& value : members.back()) value = rounded(value);
   }
   return members;
 }
 
 void calibrate_family(const CurvePlan& plan, const std::vector<FineRun>& between, Ticker& ticker,
-                      ApdFamily& family) {
+                      diagnosis::ApdFamily& family) {
   const std::size_t segments = between.size();
   family.segments.assign(segments, {});
   std::vector<Trials> trials(segments);
   const auto run_all = [&](double noise) {
-    const NoisyFamily members(family, noise);
+    const diagnosis::NoisyFamily members(family, noise);
     for_each_in_parallel(static_cast<int>(segments), ticker, [&](int i) {
       trials[i] = run_trials(plan, between[i], members, i, noise);
       ticker.tick();
@@ -91,21 +92,22 @@ void calibrate_family(const CurvePlan& plan, const std::vector<FineRun>& between
   };
   run_all(0);
   for (std::size_t i = 0; i < segments; ++i)
-    family.segments[i].floor = rounded(median(pooled(trials, i, [](const Trial& t) { return t.smallest; })));
+    family.segments[i].floor =
+        rounded(signal::median(pooled(trials, i, [](const Trial& t) { return t.smallest; })));
   for (const double noise : plan.noise_levels) {
     run_all(noise);
     for (std::size_t i = 0; i < segments; ++i) {
-      FamilySegment& segment = family.segments[i];
+      diagnosis::FamilySegment& segment = family.segments[i];
       const double floor = segment.floor;
       const auto excess = [floor](const Trial& t) {
         const double scale = std::max({t.smallest, floor, 1e-300});
         return (t.own - t.smallest) / scale;
       };
       const auto misfit = pooled(trials, i, [](const Trial& t) { return std::sqrt(t.smallest); });
-      segment.threshold.push_back(rounded(quantile(pooled(trials, i, excess), kShare)));
+      segment.threshold.push_back(rounded(signal::quantile(pooled(trials, i, excess), kShare)));
       segment.misfit.push_back(rounded(*std::max_element(misfit.begin(), misfit.end())));
     }
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

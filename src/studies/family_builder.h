@@ -5,14 +5,14 @@
 #include "backlash_diagnosis/diagnosis/apd_family.h"
 #include "fine_run.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 /// Members of one backlash value, one per phase, free of noise.
-std::vector<Quantiles> family_members(const CurvePlan& plan, const FineRun& run);
+std::vector<diagnosis::Quantiles> family_members(const CurvePlan& plan, const FineRun& run);
 
 /// Fills the segments of a family whose members are there: `between[i]` is a run with the backlash in the
 /// middle of segment i, which the family does not know.
 void calibrate_family(const CurvePlan& plan, const std::vector<FineRun>& between, Ticker& ticker,
-                      ApdFamily& family);
+                      diagnosis::ApdFamily& family);
 
-}  // namespace backlash
+}  // namespace backlash::studies

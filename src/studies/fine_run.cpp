@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/simulation/ensemble.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 constexpr double kRelativeNoise[] = {0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3};  // of the signal's scale
@@ -18,31 +18,31 @@ constexpr int kMostPhases = 16;
 constexpr double kFewestPerPeriod = 16;  // samples
 constexpr double kMostSamples = 5e7;     // of one run, about 1 GB
 
-double signal_of(const Observation& o, Channel channel) {
+double signal_of(const model::Observation& o, record::Channel channel) {
   switch (channel) {
-    case Channel::motor_torque:
+    case record::Channel::motor_torque:
       return o.motor_torque;
-    case Channel::motor_position:
+    case record::Channel::motor_position:
       return o.motor_position;
-    case Channel::motor_velocity:
+    case record::Channel::motor_velocity:
       return o.motor_velocity;
-    case Channel::load_position:
+    case record::Channel::load_position:
       return o.load_position;
-    case Channel::load_velocity:
+    case record::Channel::load_velocity:
       return o.load_velocity;
-    case Channel::sensor_torque:
+    case record::Channel::sensor_torque:
       return o.sensor_torque;
-    case Channel::motor_current:
+    case record::Channel::motor_current:
       return o.motor_current;
-    case Channel::acceleration:
+    case record::Channel::acceleration:
       return o.acceleration;
-    case Channel::reference_position:
+    case record::Channel::reference_position:
       break;
   }
   return kNaN;
 }
 
-void append(const CurvePlan& plan, const Observation& o, FineRun& run) {
+void append(const CurvePlan& plan, const model::Observation& o, FineRun& run) {
   run.signal.push_back(signal_of(o, plan.apd.signal));
   run.torque.push_back(o.motor_torque);
   run.position.push_back(o.motor_position);
@@ -76,17 +76,17 @@ void check(const CurveRequest& request) {
     throw InvalidParameter("sample_rate", request.sampling_rate, "must be > 0 Hz and finite");
 }
 
-double largest_torque(const ExcitationSettings& excitation) {
+double largest_torque(const simulation::ExcitationSettings& excitation) {
   double largest = excitation.amplitude;
-  for (const SineLine& line : excitation.lines) largest += line.amplitude;
+  for (const simulation::SineLine& line : excitation.lines) largest += line.amplitude;
   return largest;
 }
 
-void check_signal(const RigFile& file, Channel signal) {
-  if (file.rig.input_coupling.rigid && signal == Channel::sensor_torque)
+void check_signal(const rig_file::RigFile& file, record::Channel signal) {
+  if (file.rig.input_coupling.rigid && signal == record::Channel::sensor_torque)
     throw InvalidParameter("diagnosis.apd.signal", "sensor_torque",
                            "the rig's input coupling is rigid: no sensor");
-  if (std::isnan(file.rig.torque_constant) && signal == Channel::motor_current)
+  if (std::isnan(file.rig.torque_constant) && signal == record::Channel::motor_current)
     throw InvalidParameter("diagnosis.apd.signal", "motor_current",
                            "needs gear_train.motor.torque_constant (N m/A)");
 }
@@ -94,7 +94,8 @@ void check_signal(const RigFile& file, Channel signal) {
 /// What noise is counted by, in the unit of the signal: for a torque the largest that the motor applies, for
 /// another signal its own rms value at the largest backlash.
 double signal_scale(CurvePlan plan) {
-  if (std::string(channel_unit(plan.apd.signal)) == channel_unit(Channel::motor_torque))
+  if (std::string(record::channel_unit(plan.apd.signal)) ==
+      record::channel_unit(record::Channel::motor_torque))
     return largest_torque(plan.file.simulation.excitation);
   plan.request.periods = 1;
   const Progress nobody;
@@ -108,7 +109,7 @@ double signal_scale(CurvePlan plan) {
 
 }  // namespace
 
-CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
+CurvePlan plan_curve(const rig_file::RigFile& file, CurveRequest request) {
   if (!file.diagnosis.apd)
     throw InvalidParameter("diagnosis.apd", "absent", "a curve needs the layout of its APD");
   if (request.sampling_rate == 0) request.sampling_rate = file.simulation.sensors.sampling_rate;
@@ -136,16 +137,17 @@ CurvePlan plan_curve(const RigFile& file, CurveRequest request) {
   return plan;
 }
 
-Rig with_backlash(Rig rig, double backlash) {
+model::Rig with_backlash(model::Rig rig, double backlash) {
   rig.mesh.backlash = backlash;
   return rig;
 }
 
-std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Rig>& machines, Ticker& ticker) {
-  const SimulationSettings& how = plan.file.simulation;
+std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<model::Rig>& machines,
+                              Ticker& ticker) {
+  const simulation::SimulationSettings& how = plan.file.simulation;
   std::vector<FineRun> runs(machines.size());
-  if (Ensemble::takes(machines, how.excitation)) {
-    Ensemble ensemble(machines, how.excitation, how.solver);
+  if (simulation::Ensemble::takes(machines, how.excitation)) {
+    simulation::Ensemble ensemble(machines, how.excitation, how.solver);
     sample_finely(
         plan, ensemble,
         [&] {
@@ -157,7 +159,7 @@ std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Rig>& mac
     return runs;
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    Plant plant(machines[i], how.excitation, how.solver);
+    simulation::Plant plant(machines[i], how.excitation, how.solver);
     sample_finely(
         plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
   }
@@ -165,14 +167,14 @@ std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Rig>& mac
 }
 
 std::vector<double> sample(const CurvePlan& plan, const FineRun& run, int phase, int seed, double noise) {
-  SensorsSettings sensors = plan.file.simulation.sensors;
+  simulation::SensorsSettings sensors = plan.file.simulation.sensors;
   sensors.seed += static_cast<std::uint64_t>(seed);
   sensors.of(plan.apd.signal).noise = noise;
-  SensorModel sensor(sensors);
+  simulation::SensorModel sensor(sensors);
   std::vector<double> values;
   for (std::size_t i = phase; i < run.signal.size(); i += plan.phases)
     values.push_back(sensor.measure(plan.apd.signal, run.signal[i]));
   return values;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

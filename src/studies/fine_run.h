@@ -7,13 +7,13 @@
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 /// Everything that is the same for all backlash values of a curve.
 struct CurvePlan {
-  const RigFile& file;
+  const rig_file::RigFile& file;
   CurveRequest request;
-  ApdSettings apd;
+  diagnosis::ApdSettings apd;
   int phases;  // samplings of a fine run, each a fraction of a sample later than the one before
   std::vector<double> noise_levels;
 
@@ -23,21 +23,21 @@ struct CurvePlan {
 };
 
 /// Throws InvalidParameter for a request or rig that no curve can be made of.
-CurvePlan plan_curve(const RigFile& file, CurveRequest request);
+CurvePlan plan_curve(const rig_file::RigFile& file, CurveRequest request);
 
 /// The exact signal, `phases` times finer than the sampling, from rest.
 struct FineRun {
   std::vector<double> signal, torque, position;
 };
 /// One for each machine; at once where they differ in numbers only. A tick for every period of each.
-std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Rig>& machines, Ticker& ticker);
+std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<model::Rig>& machines, Ticker& ticker);
 /// Machines that are worth moving at once.
 constexpr std::size_t kTogether = 8;
 
-Rig with_backlash(Rig rig, double backlash);
+model::Rig with_backlash(model::Rig rig, double backlash);
 
 /// What the sensor reads of a fine run at one phase; `seed` is that of its noise (standard deviation, unit of
 /// the signal).
 std::vector<double> sample(const CurvePlan& plan, const FineRun& run, int phase, int seed, double noise);
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/model/restitution.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 const double kNone = std::nan("");
@@ -24,7 +24,7 @@ Tooth started(const Tooth& tooth, int start, int starts) {
 
 /// Of the first touch; NaN under a force, which has no closed form.
 double exact_restitution(const Tooth& tooth) {
-  return tooth.force == 0 ? hunt_crossley_restitution(tooth.alpha * tooth.impact_speed()) : kNone;
+  return tooth.force == 0 ? model::hunt_crossley_restitution(tooth.alpha * tooth.impact_speed()) : kNone;
 }
 
 double largest_difference(const Tooth& tooth, const ToothMotion& a, const ToothMotion& b) {
@@ -54,7 +54,7 @@ void summarise(const std::vector<ToothErrors>& runs, ToothRow& row) {
     for (const ToothErrors& run : runs) values.push_back(run.*error);
     const bool known = !values.empty() && !std::isnan(values.front());
     row.worst.*error = known ? *std::max_element(values.begin(), values.end()) : kNone;
-    row.median.*error = known ? median(values) : kNone;
+    row.median.*error = known ? signal::median(values) : kNone;
   }
   row.opposite_runs = static_cast<int>(
       std::count_if(runs.begin(), runs.end(), [](const ToothErrors& run) { return run.opposite > 0; }));
@@ -120,7 +120,7 @@ std::vector<DrawnMotion> draw(const std::vector<Tooth>& teeth, int samples) {
   return drawn;
 }
 
-void accumulate(IntegratorStatistics& sum, const IntegratorStatistics& part) {
+void accumulate(simulation::IntegratorStatistics& sum, const simulation::IntegratorStatistics& part) {
   sum.steps += part.steps;
   sum.evaluations += part.evaluations;
   sum.error_test_failures += part.error_test_failures;
@@ -176,7 +176,8 @@ void study_tooth(const Tooth& tooth, const IntegratorStudySettings& settings, In
 }
 
 WorkPrecision impact_work(const Tooth& tooth, int starts, const std::function<void()>& tick) {
-  const auto solve = [&](const std::string& method, double tolerance, IntegratorStatistics& statistics) {
+  const auto solve = [&](const std::string& method, double tolerance,
+                         simulation::IntegratorStatistics& statistics) {
     std::vector<double> ends;
     for (int k = 0; k < starts; ++k) {
       const Tooth moved = started(tooth, k, starts);
@@ -191,22 +192,24 @@ WorkPrecision impact_work(const Tooth& tooth, int starts, const std::function<vo
   return WorkPrecision("impact", solve, tick);
 }
 
-WorkPrecision rig_work(const RigFile& file, double half_gap, double duration, WorkPoint& declared,
+WorkPrecision rig_work(const rig_file::RigFile& file, double half_gap, double duration, WorkPoint& declared,
                        const std::function<void()>& tick, const std::vector<std::string>& methods) {
-  Rig rig = file.rig;
+  model::Rig rig = file.rig;
   rig.mesh.backlash = 2 * half_gap;
-  const SolverSettings& own = file.simulation.solver;
+  const simulation::SolverSettings& own = file.simulation.solver;
   const double rate = file.simulation.sensors.sampling_rate;
   const long samples = std::lround(duration * rate);
   if (samples < 1) throw InvalidParameter("rig.duration", duration, "must hold at least one sample");
-  const auto solve = [&](const std::string& method, double tolerance, IntegratorStatistics& statistics) {
+  const auto solve = [&](const std::string& method, double tolerance,
+                         simulation::IntegratorStatistics& statistics) {
     const double share = tolerance / own.relative_tolerance;
-    Plant plant(rig, file.simulation.excitation,
-                {method, tolerance, share * own.position_tolerance, share * own.velocity_tolerance});
+    simulation::Plant plant(
+        rig, file.simulation.excitation,
+        {method, tolerance, share * own.position_tolerance, share * own.velocity_tolerance});
     std::vector<double> signal;
     for (long k = 1; k <= samples; ++k) {
       plant.advance_to(double(k) / rate);
-      const Observation o = plant.observe();
+      const model::Observation o = plant.observe();
       signal.push_back(rig.input_coupling.rigid ? o.motor_position : o.sensor_torque);
     }
     accumulate(statistics, plant.statistics());
@@ -217,9 +220,10 @@ WorkPrecision rig_work(const RigFile& file, double half_gap, double duration, Wo
   return work;
 }
 
-IntegratorStudy study_integrators(const RigFile& file, const IntegratorStudySettings& settings,
+IntegratorStudy study_integrators(const rig_file::RigFile& file, const IntegratorStudySettings& settings,
                                   const Progress& progress) {
-  const double total = static_cast<double>((settings.teeth.size() + 2) * integrator_methods().size());
+  const double total =
+      static_cast<double>((settings.teeth.size() + 2) * simulation::integrator_methods().size());
   int done = 0;
   std::string phase;
   const auto tick = [&] {
@@ -238,4 +242,4 @@ IntegratorStudy study_integrators(const RigFile& file, const IntegratorStudySett
   return study;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

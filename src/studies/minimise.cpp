@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/base/random.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 using Point = std::vector<double>;
@@ -140,4 +140,4 @@ MinimiseResult minimise(const Function& function, std::size_t dimensions, const 
   return result;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

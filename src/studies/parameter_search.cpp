@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -20,25 +20,25 @@ constexpr std::size_t kLayoutsOnGrid = 4;  // of a promising motion, the best on
 using Signal = std::vector<double>;  // sensor torque, `phases` times finer than the sampling, after settling
 using Point = CurveFit::Point;
 
-const ApdSettings& apd_of(const RigFile& file) {
+const diagnosis::ApdSettings& apd_of(const rig_file::RigFile& file) {
   if (!file.diagnosis.apd)
     throw InvalidParameter("diagnosis.apd", "absent", "a curve needs the layout of its APD");
-  if (file.diagnosis.apd->signal != Channel::sensor_torque)
-    throw InvalidParameter("diagnosis.apd.signal", channel_name(file.diagnosis.apd->signal),
+  if (file.diagnosis.apd->signal != record::Channel::sensor_torque)
+    throw InvalidParameter("diagnosis.apd.signal", record::channel_name(file.diagnosis.apd->signal),
                            "must be sensor_torque");
   return *file.diagnosis.apd;
 }
 
 /// Samples per period.
-long period_samples(const RigFile& file) {
+long period_samples(const rig_file::RigFile& file) {
   return std::lround(file.simulation.sensors.sampling_rate * apd_of(file).period);
 }
 
-Signal simulate(const RigFile& file, const CurveTarget& target, double backlash) {
+Signal simulate(const rig_file::RigFile& file, const CurveTarget& target, double backlash) {
   const long period = period_samples(file) * target.phases;
   const long first = apd_of(file).settling_periods * period, count = target.periods * period;
   const double rate = file.simulation.sensors.sampling_rate * target.phases;
-  Plant plant(file.rig, file.simulation.excitation, file.simulation.solver);
+  simulation::Plant plant(file.rig, file.simulation.excitation, file.simulation.solver);
   plant.set_backlash(backlash);
   Signal signal;
   signal.reserve(count);
@@ -49,8 +49,9 @@ Signal simulate(const RigFile& file, const CurveTarget& target, double backlash)
   return signal;
 }
 
-Point read(const Signal& signal, const CurveTarget& target, const ApdLayout& layout, double backlash) {
-  AmplitudeDistribution apd(layout);
+Point read(const Signal& signal, const CurveTarget& target, const diagnosis::ApdLayout& layout,
+           double backlash) {
+  diagnosis::AmplitudeDistribution apd(layout);
   Point point{backlash, 0, kInfinity, -kInfinity, 0, 0};
   for (const double torque : signal) point.largest_torque = std::max(point.largest_torque, std::fabs(torque));
   const std::size_t window = signal.size() / target.periods;
@@ -95,24 +96,24 @@ double grid_backlash(const CurveTarget& target, int i) {
 
 /// The best reading of one motion.
 struct Candidate {
-  ApdLayout layout;
+  diagnosis::ApdLayout layout;
   double value = kInfinity;
 };
 
-std::vector<ApdLayout> layouts_of(const SearchFile& search) {
-  std::vector<ApdLayout> layouts;
+std::vector<diagnosis::ApdLayout> layouts_of(const SearchFile& search) {
+  std::vector<diagnosis::ApdLayout> layouts;
   for (int classes = search.fewest_classes; classes <= search.most_classes; ++classes)
     for (const double half_range : search.half_ranges) layouts.push_back({classes, -half_range, half_range});
   return layouts;
 }
 
 /// All layouts by their rms at the published values, the best first.
-std::vector<Candidate> read_published(const SearchFile& search, const RigFile& file) {
+std::vector<Candidate> read_published(const SearchFile& search, const rig_file::RigFile& file) {
   std::vector<Signal> signals;
   for (const double backlash : search.target.backlash)
     signals.push_back(simulate(file, search.target, backlash));
   std::vector<Candidate> candidates;
-  for (const ApdLayout& layout : layouts_of(search)) {
+  for (const diagnosis::ApdLayout& layout : layouts_of(search)) {
     std::vector<Point> points;
     for (std::size_t i = 0; i < signals.size(); ++i)
       points.push_back(read(signals[i], search.target, layout, search.target.backlash[i]));
@@ -124,7 +125,7 @@ std::vector<Candidate> read_published(const SearchFile& search, const RigFile& f
   return candidates;
 }
 
-Candidate judge(const SearchFile& search, const RigFile& file) {
+Candidate judge(const SearchFile& search, const rig_file::RigFile& file) {
   std::vector<Candidate> candidates = read_published(search, file);
   if (!(candidates.front().value <= search.promising)) return candidates.front();
   candidates.resize(std::min(candidates.size(), kLayoutsOnGrid));
@@ -167,15 +168,15 @@ std::string comment_of(const FreeParameter& p) {
   return p.comment + " [" + how + "]";
 }
 
-RigDocument rig_with(const SearchFile& search, const std::vector<double>& x) {
-  RigDocument rig(search.rig_text, search.source + ": rig");
+rig_file::RigDocument rig_with(const SearchFile& search, const std::vector<double>& x) {
+  rig_file::RigDocument rig(search.rig_text, search.source + ": rig");
   const std::vector<std::string> values = values_at(search, x);
   for (std::size_t i = 0; i < values.size(); ++i)
     rig.set(search.parameters[i].key, values[i], comment_of(search.parameters[i]));
   return rig;
 }
 
-void set_layout(RigDocument& rig, const ApdLayout& layout) {
+void set_layout(rig_file::RigDocument& rig, const diagnosis::ApdLayout& layout) {
   const std::string how = "[searched]";
   rig.set("diagnosis.apd.classes", std::to_string(layout.classes), how);
   rig.set("diagnosis.apd.lower", to_text(layout.lower), "N m " + how);
@@ -246,7 +247,7 @@ SearchFile load_search_file(const std::string& path) {
   search.source = path;
   yaml.integer("schema_version", 1, 1);
   search.rig_source = beside(path, yaml.text("rig"));
-  search.rig_text = load_rig_file(search.rig_source).text;
+  search.rig_text = rig_file::load_rig_file(search.rig_source).text;
   read_budget(yaml.map("search"), search);
   search.target = read_target(yaml.map("target"));
   for (const YamlReader& p : yaml.maps("parameters")) search.parameters.push_back(read_parameter(p));
@@ -277,8 +278,8 @@ void set_parameter(SearchFile& search, const std::string& key, const std::string
   place->logarithmic = true;
 }
 
-CurveFit fit_of(const RigFile& file, const CurveTarget& target) {
-  const ApdLayout& layout = apd_of(file).layout;
+CurveFit fit_of(const rig_file::RigFile& file, const CurveTarget& target) {
+  const diagnosis::ApdLayout& layout = apd_of(file).layout;
   CurveFit fit;
   for (const double backlash : target.backlash)
     fit.published.push_back(read(simulate(file, target, backlash), target, layout, backlash));
@@ -304,7 +305,7 @@ SearchResult search_parameters(const SearchFile& search, const Progress& progres
                                         [](const FreeParameter& p) { return !p.fixed(); });
   const MinimiseResult found = minimise(objective, dimensions, search.minimise, progress);
   SearchResult result;
-  RigDocument best = rig_with(search, found.x);
+  rig_file::RigDocument best = rig_with(search, found.x);
   best.drop_head();  // it tells of the rig that the search began with
   set_layout(best, judged(found.x).layout);
   result.rig_text = best.text();
@@ -318,4 +319,4 @@ SearchResult search_parameters(const SearchFile& search, const Progress& progres
   return result;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

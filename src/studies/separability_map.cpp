@@ -11,15 +11,15 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "drawn_record.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
-void check(const RigFile& file, const MonitoringCurve& curve, const std::vector<Disturbance>& disturbances,
-           const SeparabilityRequest& request) {
+void check(const rig_file::RigFile& file, const diagnosis::MonitoringCurve& curve,
+           const std::vector<Disturbance>& disturbances, const SeparabilityRequest& request) {
   if (!file.diagnosis.apd) throw InvalidParameter("diagnosis.apd", "absent", "the map needs its signal");
   if (!(file.diagnosis.apd->period > 0))
     throw InvalidParameter("diagnosis.apd.period", "absent", "the map counts in periods");
-  if (curve.conditions.signal != channel_name(file.diagnosis.apd->signal))
+  if (curve.conditions.signal != record::channel_name(file.diagnosis.apd->signal))
     throw InvalidParameter("curve.signal", curve.conditions.signal, "must be that of the rig file");
   if (!(curve.conditions.apd == file.diagnosis.apd->layout))
     throw InvalidParameter("curve.apd", "other classes", "must be those of the rig file");
@@ -45,59 +45,63 @@ Draw draw(const SeparabilityRequest& request, double period, int record) {
 }
 
 /// The motion of a disturbed machine as its sensors see it, before any noise.
-Record simulate_disturbed(DisturbedMachine machine, double amplitude, double backlash, int periods) {
-  const ApdSettings& apd = *machine.file.diagnosis.apd;
+record::Record simulate_disturbed(DisturbedMachine machine, double amplitude, double backlash, int periods) {
+  const diagnosis::ApdSettings& apd = *machine.file.diagnosis.apd;
   const double rate = machine.file.simulation.sensors.sampling_rate;
   machine.file.diagnosis.stiffness_uncertainty = 0;  // nothing is unknown but the disturbance
   const double load = machine.load * amplitude;
   machine.file.simulation.excitation.bias += load;
   Draw d{};
   d.backlash = backlash;
-  Record fine = simulate_fine(machine.file, d, (apd.settling_periods + periods + 1) * apd.period + 2 / rate);
-  for (double& torque : fine.column(Channel::motor_torque)) torque -= load;
-  for (double& current : fine.column(Channel::motor_current))
+  record::Record fine =
+      simulate_fine(machine.file, d, (apd.settling_periods + periods + 1) * apd.period + 2 / rate);
+  for (double& torque : fine.column(record::Channel::motor_torque)) torque -= load;
+  for (double& current : fine.column(record::Channel::motor_current))
     current -= load / machine.file.rig.torque_constant;
   return fine;
 }
 
 /// A claim that can be right or wrong: a value, or that there is more than the curve covers.
-bool claims(const Estimate& e, double truth) {
-  return e.status == Status::ok || (e.status == Status::above_range && e.lower > truth);
+bool claims(const diagnosis::Estimate& e, double truth) {
+  return e.status == diagnosis::Status::ok || (e.status == diagnosis::Status::above_range && e.lower > truth);
 }
 
-SeparabilityAnswer summarise(const std::vector<Estimate>& estimates, double truth) {
+SeparabilityAnswer summarise(const std::vector<diagnosis::Estimate>& estimates, double truth) {
   SeparabilityAnswer answer;
   std::vector<double> errors;
-  std::map<Status, int> statuses;
-  for (const Estimate& e : estimates) {
+  std::map<diagnosis::Status, int> statuses;
+  for (const diagnosis::Estimate& e : estimates) {
     ++statuses[e.status];
     const bool holds = e.lower <= truth && truth <= e.upper;
     ++(!claims(e, truth) ? answer.refused : holds ? answer.right : answer.wrong);
-    if (claims(e, truth)) errors.push_back((e.status == Status::ok ? e.backlash : e.lower) - truth);
+    if (claims(e, truth))
+      errors.push_back((e.status == diagnosis::Status::ok ? e.backlash : e.lower) - truth);
   }
-  if (!errors.empty()) answer.error = median(errors);
+  if (!errors.empty()) answer.error = signal::median(errors);
   answer.status = std::max_element(statuses.begin(), statuses.end(), [](const auto& a, const auto& b) {
                     return a.second < b.second;
                   })->first;
-  if (answer.status == Status::ok) return answer;
-  answer.reason = std::find_if(estimates.begin(), estimates.end(), [&](const Estimate& e) {
+  if (answer.status == diagnosis::Status::ok) return answer;
+  answer.reason = std::find_if(estimates.begin(), estimates.end(), [&](const diagnosis::Estimate& e) {
                     return e.status == answer.status;
                   })->message;
   return answer;
 }
 
-SeparabilityCell make_cell(const DisturbedMachine& machine, const DiagnosisSettings& believed,
-                           const MonitoringCurve& curve, const SeparabilityRequest& request,
+SeparabilityCell make_cell(const DisturbedMachine& machine, const diagnosis::DiagnosisSettings& believed,
+                           const diagnosis::MonitoringCurve& curve, const SeparabilityRequest& request,
                            const std::vector<std::string>& methods, double backlash) {
-  const Record fine = simulate_disturbed(machine, curve.conditions.amplitude, backlash, request.periods);
-  std::vector<std::vector<Estimate>> estimates(methods.size());
+  const record::Record fine =
+      simulate_disturbed(machine, curve.conditions.amplitude, backlash, request.periods);
+  std::vector<std::vector<diagnosis::Estimate>> estimates(methods.size());
   SeparabilityCell cell;
   cell.skewness = 0;
   for (int r = 0; r < request.records; ++r) {
     Draw d = draw(request, believed.apd->period, r);
     d.noise = machine.noise;
-    const Diagnosis diagnosis = diagnose(recorded(fine, machine.file, d), believed, &curve);
-    for (const Estimate& e : diagnosis.estimates)
+    const diagnosis::Diagnosis diagnosis =
+        diagnosis::diagnose(recorded(fine, machine.file, d), believed, &curve);
+    for (const diagnosis::Estimate& e : diagnosis.estimates)
       for (std::size_t m = 0; m < methods.size(); ++m)
         if (e.method == methods[m]) estimates[m].push_back(e);
     cell.skewness += (diagnosis.apd ? diagnosis.apd->skewness : kNaN) / request.records;
@@ -108,9 +112,9 @@ SeparabilityCell make_cell(const DisturbedMachine& machine, const DiagnosisSetti
 
 /// Slope of the curve [1/m] at the declared noise, by least squares over all of it; NaN where it does not
 /// fall.
-double slope_of(const MonitoringCurve& curve) {
+double slope_of(const diagnosis::MonitoringCurve& curve) {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0;
-  for (const CurvePoint& point : curve.points) {
+  for (const diagnosis::CurvePoint& point : curve.points) {
     const double b = point.backlash, s = curve.nominal(point).mean;
     n += 1, x += b, y += s, xx += b * b, xy += b * s;
   }
@@ -128,7 +132,7 @@ void add_equivalents(SeparabilityMap& map, double slope) {
 
 }  // namespace
 
-std::vector<Disturbance> disturbances_of(const RigFile& file) {
+std::vector<Disturbance> disturbances_of(const rig_file::RigFile& file) {
   std::vector<Disturbance> all;
   all.push_back({"sensor_noise",
                  "sensor noise / rms of the signal",
@@ -152,25 +156,25 @@ std::vector<Disturbance> disturbances_of(const RigFile& file) {
                    0,
                    {-0.2, -0.15, -0.1, -0.05, 0, 0.05, 0.1, 0.15, 0.2},
                    [](DisturbedMachine& m, double level) {
-                     for (Coupling* c : {&m.file.rig.input_coupling, &m.file.rig.output_coupling})
+                     for (model::Coupling* c : {&m.file.rig.input_coupling, &m.file.rig.output_coupling})
                        c->stiffness *= 1 + level;
                    }});
   return all;
 }
 
-Separability map_separability(const RigFile& file, const MonitoringCurve& curve,
+Separability map_separability(const rig_file::RigFile& file, const diagnosis::MonitoringCurve& curve,
                               const std::vector<Disturbance>& disturbances,
                               const SeparabilityRequest& request, const Progress& progress) {
   check(file, curve, disturbances, request);
-  DiagnosisSettings believed = file.diagnosis;
+  diagnosis::DiagnosisSettings believed = file.diagnosis;
   believed.lost_motion = std::nullopt;
   Separability all;
   all.slope = slope_of(curve);
   const double first = curve.points.front().backlash, last = curve.points.back().backlash;
   for (int b = 0; b < request.backlash_values; ++b) {
     const double backlash = first + (last - first) * b / (request.backlash_values - 1);
-    const SkewnessCell skewness = curve.at(backlash, curve.conditions.noise);
-    const double deviation = MonitoringCurve::deviation(skewness, request.periods);
+    const diagnosis::SkewnessCell skewness = curve.at(backlash, curve.conditions.noise);
+    const double deviation = diagnosis::MonitoringCurve::deviation(skewness, request.periods);
     all.backlash.push_back(backlash);
     all.resolution.push_back(curve.coverage_factor * deviation / -all.slope);
   }
@@ -197,4 +201,4 @@ Separability map_separability(const RigFile& file, const MonitoringCurve& curve,
   return all;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

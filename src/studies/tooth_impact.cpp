@@ -5,16 +5,17 @@
 #include <cmath>
 #include <limits>
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
-std::vector<StateTolerance> tolerances(const Tooth& tooth, double relative, AbsoluteTolerance kind) {
+std::vector<simulation::StateTolerance> tolerances(const Tooth& tooth, double relative,
+                                                   AbsoluteTolerance kind) {
   if (kind == AbsoluteTolerance::plain) return {relative, relative};
   return {relative * tooth.depth(), relative * tooth.impact_speed()};
 }
 
-SolverSettings solver(const std::string& method, double relative_tolerance) {
-  SolverSettings settings;
+simulation::SolverSettings solver(const std::string& method, double relative_tolerance) {
+  simulation::SolverSettings settings;
   settings.method = method;
   settings.relative_tolerance = relative_tolerance;
   return settings;
@@ -61,7 +62,7 @@ const char* to_string(AbsoluteTolerance kind) {
 ToothSimulator::ToothSimulator(const Tooth& tooth, const std::string& method, double relative_tolerance,
                                AbsoluteTolerance absolute)
     : tooth_(tooth),
-      law_(make_contact_law(
+      law_(model::make_contact_law(
           "hunt_crossley",
           {{"stiffness", tooth.stiffness}, {"exponent", tooth.exponent}, {"alpha", tooth.alpha}})),
       integrator_(
@@ -104,4 +105,4 @@ ToothMotion ToothSimulator::run(int samples) {
   return motion;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "drawn_record.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 constexpr double kMisses = 2;  // widths of an interval beyond which a miss was confident
@@ -28,10 +28,10 @@ Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
   return d;
 }
 
-using Change = std::function<void(RigFile&)>;
+using Change = std::function<void(rig_file::RigFile&)>;
 
-Record signal_alone(const Record& record, Channel signal) {
-  Record alone;
+record::Record signal_alone(const record::Record& record, record::Channel signal) {
+  record::Record alone;
   alone.name = record.name;
   alone.time = record.time;
   alone.column(signal) = record.column(signal);
@@ -39,26 +39,27 @@ Record signal_alone(const Record& record, Channel signal) {
 }
 
 /// The verdict as one more estimate; where its members contradict each other nobody should rely on it.
-Estimate combined(const Verdict& verdict) {
-  Estimate estimate;
+diagnosis::Estimate combined(const diagnosis::Verdict& verdict) {
+  diagnosis::Estimate estimate;
   estimate.method = "combined";
   estimate.backlash = verdict.backlash;
   estimate.lower = verdict.lower;
   estimate.upper = verdict.upper;
   estimate.message = verdict.message;
-  const bool sound = verdict.grade != Grade::cannot_tell && std::isfinite(verdict.backlash);
-  estimate.status = sound ? Status::ok : Status::ambiguous;
+  const bool sound = verdict.grade != diagnosis::Grade::cannot_tell && std::isfinite(verdict.backlash);
+  estimate.status = sound ? diagnosis::Status::ok : diagnosis::Status::ambiguous;
   return estimate;
 }
 
-std::vector<Estimate> estimates_of(const Record& record, const RigFile& file, const MonitoringCurve& curve) {
-  const Diagnosis diagnosis = diagnose(record, file.diagnosis, &curve);
-  std::vector<Estimate> all = diagnosis.estimates;
+std::vector<diagnosis::Estimate> estimates_of(const record::Record& record, const rig_file::RigFile& file,
+                                              const diagnosis::MonitoringCurve& curve) {
+  const diagnosis::Diagnosis diagnosis = diagnosis::diagnose(record, file.diagnosis, &curve);
+  std::vector<diagnosis::Estimate> all = diagnosis.estimates;
   all.push_back(combined(diagnosis.verdict));
   return all;
 }
 
-void check(const RigFile& file, const StudyRequest& request) {
+void check(const rig_file::RigFile& file, const StudyRequest& request) {
   if (!file.diagnosis.apd) throw InvalidParameter("diagnosis.apd", "absent", "the study needs its signal");
   if (!(file.diagnosis.apd->period > 0))
     throw InvalidParameter("diagnosis.apd.period", "absent", "the study counts in periods");
@@ -72,20 +73,20 @@ void check(const RigFile& file, const StudyRequest& request) {
     if (!(level >= 0 && std::isfinite(level))) throw InvalidParameter("noise", level, "must be >= 0");
 }
 
-RigFile at_rate(RigFile file, double rate) {
+rig_file::RigFile at_rate(rig_file::RigFile file, double rate) {
   if (rate > 0) file.simulation.sensors.sampling_rate = rate;
   return file;
 }
 
-double width(const Estimate& e) {
+double width(const diagnosis::Estimate& e) {
   return e.upper - e.lower;
 }
 
-bool holds(const Estimate& e, double truth) {
+bool holds(const diagnosis::Estimate& e, double truth) {
   return truth >= e.lower && truth <= e.upper;
 }
 
-bool confident_miss(const Estimate& e, double truth) {
+bool confident_miss(const diagnosis::Estimate& e, double truth) {
   return std::fabs(e.backlash - truth) > kMisses * width(e);
 }
 
@@ -96,24 +97,24 @@ struct Variant {
   double duration = 0;  // periods after settling; 0: as drawn
 };
 
-std::vector<Variant> variants_of(const RigFile& file) {
+std::vector<Variant> variants_of(const rig_file::RigFile& file) {
   const auto amplitude = [](double factor) {
-    return [factor](RigFile& f) { f.simulation.excitation.amplitude *= factor; };
+    return [factor](rig_file::RigFile& f) { f.simulation.excitation.amplitude *= factor; };
   };
   const auto frequency = [](double factor) {
-    return [factor](RigFile& f) { f.simulation.excitation.frequency *= factor; };
+    return [factor](rig_file::RigFile& f) { f.simulation.excitation.frequency *= factor; };
   };
   const auto sampling = [](double factor) {
-    return [factor](RigFile& f) { f.simulation.sensors.sampling_rate *= factor; };
+    return [factor](rig_file::RigFile& f) { f.simulation.sensors.sampling_rate *= factor; };
   };
   const double torque = file.simulation.excitation.amplitude;
   const auto limit = [torque](double factor) {
-    return [torque, factor](RigFile& f) {
+    return [torque, factor](rig_file::RigFile& f) {
       f.simulation.sensors.of(f.diagnosis.apd->signal).limit = factor * torque;
     };
   };
   const auto free_output = [](double inertia) {
-    return [inertia](RigFile& f) {
+    return [inertia](rig_file::RigFile& f) {
       f.rig.link_locked = false;
       f.rig.link.inertia = inertia;
     };
@@ -128,15 +129,16 @@ std::vector<Variant> variants_of(const RigFile& file) {
           {"saturated at 1.2", limit(1.2)},
           {"output free", free_output(1e-3)},
           {"output free and light", free_output(5e-5)},
-          {"constant torque", [](RigFile& f) { f.simulation.excitation.type = "constant"; }},
-          {"too short", [](RigFile&) {}, 0, -1.2},
-          {"above the range", [](RigFile&) {}, 1.1}};
+          {"constant torque", [](rig_file::RigFile& f) { f.simulation.excitation.type = "constant"; }},
+          {"too short", [](rig_file::RigFile&) {}, 0, -1.2},
+          {"above the range", [](rig_file::RigFile&) {}, 1.1}};
 }
 
-Record simulate_variant(const RigFile& file, const Variant& variant, const Draw& d, int settling) {
-  RigFile machine = file;
+record::Record simulate_variant(const rig_file::RigFile& file, const Variant& variant, const Draw& d,
+                                int settling) {
+  rig_file::RigFile machine = file;
   variant.change(machine);
-  Record record = simulate_draw(machine, d);
+  record::Record record = simulate_draw(machine, d);
   if (variant.duration != 0)
     record = record.slice(0, (settling + variant.duration) * file.diagnosis.apd->period);
   return record;
@@ -144,16 +146,16 @@ Record simulate_variant(const RigFile& file, const Variant& variant, const Draw&
 
 }  // namespace
 
-std::vector<StudyTrial> run_study(const RigFile& rig_file, const MonitoringCurve& curve,
+std::vector<StudyTrial> run_study(const rig_file::RigFile& rig_file, const diagnosis::MonitoringCurve& curve,
                                   const StudyRequest& request, const Progress& progress) {
   check(rig_file, request);
-  const RigFile file = at_rate(rig_file, request.sampling_rate);
-  const ApdSettings& apd = *file.diagnosis.apd;
+  const rig_file::RigFile file = at_rate(rig_file, request.sampling_rate);
+  const diagnosis::ApdSettings& apd = *file.diagnosis.apd;
   std::vector<StudyTrial> trials(2 * static_cast<std::size_t>(request.records));
   Ticker ticker(progress, request.records, "simulating and diagnosing records");
   for_each_in_parallel(request.records, ticker, [&](int i) {
     const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(i));
-    const Record record = simulate_draw(file, d);
+    const record::Record record = simulate_draw(file, d);
     trials[2 * i] = {"", d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
     trials[2 * i + 1] = {"",        d.backlash, d.noise,
                          d.periods, false,      estimates_of(signal_alone(record, apd.signal), file, curve)};
@@ -173,10 +175,10 @@ std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, boo
     for (const StudyTrial& trial : trials) {
       if (trial.position != position || trial.backlash > 2 * max_half_gap) continue;
       if (!std::isnan(noise) && trial.noise != noise) continue;
-      const Estimate& e = trial.estimates[m];
+      const diagnosis::Estimate& e = trial.estimates[m];
       row.method = e.method;
       ++row.trials;
-      if (e.status != Status::ok) continue;
+      if (e.status != diagnosis::Status::ok) continue;
       errors.push_back(std::fabs(e.backlash - trial.backlash));
       widths.push_back(width(e));
       held += holds(e, trial.backlash);
@@ -186,20 +188,21 @@ std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, boo
     if (row.trials > 0) row.cannot_tell = 1 - static_cast<double>(row.told) / row.trials;
     if (row.told > 0) {
       row.coverage = static_cast<double>(held) / row.told;
-      row.p95_error = quantile(errors, 0.95);
-      row.median_error = median(std::move(errors));
-      row.median_width = median(std::move(widths));
+      row.p95_error = signal::quantile(errors, 0.95);
+      row.median_error = signal::median(std::move(errors));
+      row.median_width = signal::median(std::move(widths));
     }
     rows.push_back(row);
   }
   return rows;
 }
 
-std::vector<StudyTrial> run_variants(const RigFile& rig_file, const MonitoringCurve& curve,
-                                     const StudyRequest& request, int records, const Progress& progress) {
+std::vector<StudyTrial> run_variants(const rig_file::RigFile& rig_file,
+                                     const diagnosis::MonitoringCurve& curve, const StudyRequest& request,
+                                     int records, const Progress& progress) {
   check(rig_file, request);
-  const RigFile file = at_rate(rig_file, request.sampling_rate);
-  const ApdSettings& apd = *file.diagnosis.apd;
+  const rig_file::RigFile file = at_rate(rig_file, request.sampling_rate);
+  const diagnosis::ApdSettings& apd = *file.diagnosis.apd;
   const std::vector<Variant> variants = variants_of(file);
   const int count = records * static_cast<int>(variants.size());
   std::vector<StudyTrial> trials(2 * static_cast<std::size_t>(count));
@@ -208,7 +211,7 @@ std::vector<StudyTrial> run_variants(const RigFile& rig_file, const MonitoringCu
     const Variant& variant = variants[i / records];
     Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records + i));
     d.backlash += variant.shortest * request.max_backlash;
-    const Record record = simulate_variant(file, variant, d, apd.settling_periods);
+    const record::Record record = simulate_variant(file, variant, d, apd.settling_periods);
     trials[2 * i] = {variant.name, d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
     trials[2 * i + 1] = {variant.name, d.backlash,
                          d.noise,      d.periods,
@@ -227,13 +230,13 @@ std::vector<VariantRow> summarise_variants(const std::vector<StudyTrial>& trials
     return rows.back();
   };
   for (const StudyTrial& trial : trials)
-    for (const Estimate& e : trial.estimates) {
+    for (const diagnosis::Estimate& e : trial.estimates) {
       VariantRow& row = row_of(trial, e.method);
       const double below = e.lower - trial.backlash, above = trial.backlash - e.upper;
       const bool near = std::max(below, above) <= width(e);
-      ++(e.status != Status::ok ? row.recognised : near ? row.right : row.wrong);
+      ++(e.status != diagnosis::Status::ok ? row.recognised : near ? row.right : row.wrong);
     }
   return rows;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

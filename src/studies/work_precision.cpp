@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 constexpr double kReferenceTolerance = 1e-13;
@@ -29,7 +29,7 @@ double cost_of(const WorkPoint& point, Cost kind) {
 WorkPrecision::WorkPrecision(std::string problem, const Solve& solve, const std::function<void()>& tick,
                              const std::vector<std::string>& methods)
     : problem_(std::move(problem)) {
-  IntegratorStatistics ignored;
+  simulation::IntegratorStatistics ignored;
   reference_ = solve("verner", kReferenceTolerance, ignored);
   agreement_ = error_of(solve("dormand_prince", kReferenceTolerance, ignored));
   for (const std::string& method : methods) {
@@ -53,14 +53,14 @@ WorkPoint WorkPrecision::measure(const Solve& solve, const std::string& method,
   WorkPoint point{method, relative_tolerance};
   std::vector<double> times(kRepeats);
   for (double& time : times) {
-    IntegratorStatistics statistics;
+    simulation::IntegratorStatistics statistics;
     const double start = cpu_now();
     point.error = error_of(solve(method, relative_tolerance, statistics));
     time = cpu_now() - start;
     point.evaluations = static_cast<double>(statistics.evaluations);
     point.steps = static_cast<double>(statistics.steps);
   }
-  point.cpu_time = median(std::move(times));
+  point.cpu_time = signal::median(std::move(times));
   return point;
 }
 
@@ -81,7 +81,7 @@ double WorkPrecision::cost(const std::string& method, double error, Cost kind) c
 std::string WorkPrecision::cheapest(double error, Cost kind) const {
   std::string best;
   double least = 0;
-  for (const std::string& method : integrator_methods()) {
+  for (const std::string& method : simulation::integrator_methods()) {
     const double own = cost(method, error, kind);
     if (std::isnan(own) || (!best.empty() && own >= least)) continue;
     best = method;
@@ -90,4 +90,4 @@ std::string WorkPrecision::cheapest(double error, Cost kind) const {
   return best;
 }
 
-}  // namespace backlash
+}  // namespace backlash::studies

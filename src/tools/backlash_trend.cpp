@@ -64,37 +64,38 @@ Command command() {
 
 /// What the command was given, read.
 struct Inputs {
-  HistoryFile history;
+  diagnosis::HistoryFile history;
   std::string rig, rig_digest;  // name empty where it is not known
   bool angular = false;
   std::optional<double> limit;
   double horizon = 90 * kDay;
 
   const char* unit() const { return angular ? "rad" : "m"; }
-  double value(const HistoryEntry& e) const { return angular ? e.backlash_angle : e.backlash; }
+  double value(const diagnosis::HistoryEntry& e) const { return angular ? e.backlash_angle : e.backlash; }
 };
 
-bool knows_lengths(const std::vector<HistoryEntry>& entries) {
-  return entries.empty() || std::any_of(entries.begin(), entries.end(),
-                                        [](const HistoryEntry& e) { return std::isfinite(e.backlash); });
+bool knows_lengths(const std::vector<diagnosis::HistoryEntry>& entries) {
+  return entries.empty() || std::any_of(entries.begin(), entries.end(), [](const diagnosis::HistoryEntry& e) {
+           return std::isfinite(e.backlash);
+         });
 }
 
 /// The value from which the limits count; 0 without a baseline.
 double baseline_value(Inputs& in, const Arguments& arguments) {
   if (!arguments.has("baseline")) return 0;
   const std::string path = arguments.text("baseline");
-  const Baseline baseline = read_baseline(path);
-  const std::string warning = check_baseline(baseline, in.rig, in.rig_digest, path);
+  const diagnosis::Baseline baseline = diagnosis::read_baseline(path);
+  const std::string warning = diagnosis::check_baseline(baseline, in.rig, in.rig_digest, path);
   if (!warning.empty()) in.history.warnings.push_back(warning);
   const double value = in.angular ? baseline.backlash_angle : baseline.backlash;
   if (!std::isfinite(value)) throw BadData(path, std::string("holds no backlash in ") + in.unit());
   return value;
 }
 
-void read_limit(Inputs& in, const Arguments& arguments, const std::optional<RigFile>& rig) {
-  std::optional<Limits> limits;
+void read_limit(Inputs& in, const Arguments& arguments, const std::optional<rig_file::RigFile>& rig) {
+  std::optional<diagnosis::Limits> limits;
   if (rig) limits = rig->diagnosis.limits;
-  if (arguments.has("limits")) limits = read_limits_file(arguments.text("limits"));
+  if (arguments.has("limits")) limits = diagnosis::read_limits_file(arguments.text("limits"));
   const bool by_hand = arguments.has("limit") || arguments.has("limit-angle");
   in.angular = by_hand  ? arguments.has("limit-angle")
                : limits ? limits->angular
@@ -133,15 +134,16 @@ Inputs read_inputs(const Arguments& arguments) {
   check_options(arguments);
   Inputs in;
   in.horizon = kDay * arguments.number("horizon", 90, Range::positive());
-  std::optional<RigFile> rig;
-  if (arguments.has("rig")) rig = load_rig_file(arguments.text("rig"));
-  in.history = read_history(arguments.positional(0));
+  std::optional<rig_file::RigFile> rig;
+  if (arguments.has("rig")) rig = rig_file::load_rig_file(arguments.text("rig"));
+  in.history = diagnosis::read_history(arguments.positional(0));
   const auto& entries = in.history.entries;
   if (rig) in.rig = rig->rig.name;
   in.rig_digest = rig ? rig->digest : entries.empty() ? "" : entries.back().rig_digest;
   read_limit(in, arguments, rig);
-  const auto others = std::count_if(entries.begin(), entries.end(),
-                                    [&](const HistoryEntry& e) { return e.rig_digest != in.rig_digest; });
+  const auto others = std::count_if(entries.begin(), entries.end(), [&](const diagnosis::HistoryEntry& e) {
+    return e.rig_digest != in.rig_digest;
+  });
   if (others > 0)
     in.history.warnings.push_back(std::to_string(others) +
                                   " entries were made with another version of the rig file and are left out");
@@ -153,13 +155,13 @@ Json date(double time) {
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
-Json crossing_json(const Trend& trend) {
+Json crossing_json(const diagnosis::Trend& trend) {
   if (!trend.reaches) return nullptr;
-  const Trend::Crossing& c = *trend.reaches;
+  const diagnosis::Trend::Crossing& c = *trend.reaches;
   Json json;
-  json["time"] = json_number(c.time);
+  json["time"] = report::json_number(c.time);
   json["date"] = date(c.time);
-  json["interval"] = json_interval(c.earliest, c.latest);
+  json["interval"] = report::json_interval(c.earliest, c.latest);
   json["date_interval"] = Json::array({date(c.earliest), date(c.latest)});
   return json;
 }
@@ -168,24 +170,25 @@ Json crossing_json(const Trend& trend) {
 Json series_json(const Inputs& in) {
   constexpr std::size_t kMost = 2000;
   const auto& all = in.history.entries;
-  const auto baseline =
-      std::find_if(all.rbegin(), all.rend(), [](const HistoryEntry& e) { return e.event == kBaselineEvent; });
-  std::vector<const HistoryEntry*> shown;
+  const auto baseline = std::find_if(all.rbegin(), all.rend(), [](const diagnosis::HistoryEntry& e) {
+    return e.event == diagnosis::kBaselineEvent;
+  });
+  std::vector<const diagnosis::HistoryEntry*> shown;
   for (auto entry = baseline.base(); entry != all.end(); ++entry)
     if (entry->rig_digest == in.rig_digest && std::isfinite(in.value(*entry))) shown.push_back(&*entry);
   Json json = {{"time", Json::array()}, {"value", Json::array()}, {"interval", Json::array()}};
   const std::size_t step = (shown.size() + kMost - 1) / kMost;
   for (std::size_t i = 0; i < shown.size(); i += step) {
-    const HistoryEntry& e = *shown[i];
+    const diagnosis::HistoryEntry& e = *shown[i];
     json["time"].push_back(e.time);
     json["value"].push_back(in.value(e));
-    json["interval"].push_back(in.angular ? json_interval(e.angle_lower, e.angle_upper)
-                                          : json_interval(e.lower, e.upper));
+    json["interval"].push_back(in.angular ? report::json_interval(e.angle_lower, e.angle_upper)
+                                          : report::json_interval(e.lower, e.upper));
   }
   return json;
 }
 
-Json report(const Inputs& in, const Trend& trend, const std::string& path) {
+Json report(const Inputs& in, const diagnosis::Trend& trend, const std::string& path) {
   Json json;
   json["schema_version"] = 1;
   json["version"] = version();
@@ -202,10 +205,10 @@ Json report(const Inputs& in, const Trend& trend, const std::string& path) {
   json["known"] = trend.known;
   json["grows"] = trend.grows;
   json["exceeded"] = trend.exceeded;
-  json["rate"] = json_number(trend.rate);
-  json["rate_interval"] = json_interval(trend.rate_lower, trend.rate_upper);
-  json["level"] = json_number(trend.level);
-  json["time"] = json_number(trend.time);
+  json["rate"] = report::json_number(trend.rate);
+  json["rate_interval"] = report::json_interval(trend.rate_lower, trend.rate_upper);
+  json["level"] = report::json_number(trend.level);
+  json["time"] = report::json_number(trend.time);
   json["date"] = date(trend.time);
   json["reaches"] = crossing_json(trend);
   json["message"] = trend.message;
@@ -214,7 +217,7 @@ Json report(const Inputs& in, const Trend& trend, const std::string& path) {
   return json;
 }
 
-int exit_code(const Inputs& in, const Trend& trend) {
+int exit_code(const Inputs& in, const diagnosis::Trend& trend) {
   if (trend.exceeded) return kFault;
   if (!trend.known) return kInconclusive;
   return trend.reaches && trend.reaches->time - trend.time <= in.horizon ? kWatch : kHealthy;
@@ -222,8 +225,8 @@ int exit_code(const Inputs& in, const Trend& trend) {
 
 int run(const Arguments& arguments) {
   const Inputs in = read_inputs(arguments);
-  const Trend trend =
-      find_trend(trend_points(in.history.entries, in.angular, in.rig_digest), in.limit, in.angular);
+  const diagnosis::Trend trend = diagnosis::find_trend(
+      diagnosis::trend_points(in.history.entries, in.angular, in.rig_digest), in.limit, in.angular);
   const std::string out = arguments.text("json");
   const std::string json =
       report(in, trend, arguments.positional(0)).dump(1, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -21,7 +21,7 @@ namespace {
 constexpr std::uint64_t kMost = 1'000'000;
 
 Command command() {
-  const CurveRequest defaults;
+  const studies::CurveRequest defaults;
   const auto fallback = [](double value) { return "; default: " + to_text(value); };
   Command c;
   c.name = "build_curve";
@@ -49,8 +49,8 @@ Command command() {
   return c;
 }
 
-CurveRequest read_request(const Arguments& arguments) {
-  CurveRequest request;
+studies::CurveRequest read_request(const Arguments& arguments) {
+  studies::CurveRequest request;
   request.points = static_cast<int>(arguments.integer("points", request.points, 2, kMost));
   request.max_backlash = arguments.number("max-backlash", request.max_backlash, Range::positive());
   request.sampling_rate = arguments.number("sample-rate", request.sampling_rate, Range::positive());
@@ -59,9 +59,9 @@ CurveRequest read_request(const Arguments& arguments) {
   return request;
 }
 
-void tell(const MonitoringCurve& curve, const std::string& out) {
+void tell(const diagnosis::MonitoringCurve& curve, const std::string& out) {
   const char* unit = curve.conditions.angular ? " rad" : " m";
-  const CurvePoint &first = curve.points.front(), &last = curve.points.back();
+  const diagnosis::CurvePoint &first = curve.points.front(), &last = curve.points.back();
   std::cout << fmt::format(
       "{0}: skewness {2:.6g} at backlash {3:.6g}{1} to {4:.6g} at {5:.6g}{1}, {6} points, {7:.6g} Hz\n", out,
       unit, curve.nominal(first).mean, first.backlash, curve.nominal(last).mean, last.backlash,
@@ -72,7 +72,7 @@ void tell(const MonitoringCurve& curve, const std::string& out) {
     return;
   }
   std::vector<std::string> rising;
-  for (const CurvePoint& point : curve.points)
+  for (const diagnosis::CurvePoint& point : curve.points)
     if (!point.monotonic) rising.push_back(fmt::format("{:.6g}", point.backlash));
   if (!rising.empty())
     std::cerr << "build_curve: not monotonic, flagged in the curve, at backlash [" << (unit + 1)
@@ -81,22 +81,22 @@ void tell(const MonitoringCurve& curve, const std::string& out) {
 
 int build(const Arguments& arguments) {
   const std::string rig = arguments.positional(0), out = arguments.text("out"), plot = arguments.text("plot");
-  CurveRequest request = read_request(arguments);
-  const RigFile file = load_rig_file(rig);
+  studies::CurveRequest request = read_request(arguments);
+  const rig_file::RigFile file = rig_file::load_rig_file(rig);
   check_output(out, {rig});
   if (!plot.empty()) {
     check_plot_path(plot);
     if (plot == out) throw UsageError("--plot and --out name the same file");
     check_output(plot, {rig});
   }
-  MonitoringCurve curve;
+  diagnosis::MonitoringCurve curve;
   if (arguments.has("feedback")) {
     FeedbackLines lines;
     request.best_so_far = lines.best_so_far();
-    curve = of_file(rig, [&] { return build_curve(file, request, lines.progress()); });
+    curve = of_file(rig, [&] { return studies::build_curve(file, request, lines.progress()); });
   } else {
     ProgressBar bar;
-    curve = of_file(rig, [&] { return build_curve(file, request, bar.progress()); });
+    curve = of_file(rig, [&] { return studies::build_curve(file, request, bar.progress()); });
   }
   write_text(out, curve.to_yaml());
   if (!arguments.has("feedback")) tell(curve, out);

@@ -7,10 +7,11 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
-#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/identification/model_comparison.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "report/json.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -23,10 +24,10 @@ namespace backlash::tools {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Channels = std::map<std::string, ChannelComparison>;
+using Channels = std::map<std::string, identification::ChannelComparison>;
 
 Command command() {
-  const ComparisonSettings defaults;
+  const identification::ComparisonSettings defaults;
   const auto fallback = [](double value) { return "; default: " + to_text(value); };
   Command c;
   c.name = "compare_models";
@@ -57,39 +58,40 @@ Command command() {
 /// Shortest decimals that keep six digits: enough for a plot.
 Json numbers(const std::vector<double>& values) {
   Json list = Json::array();
-  for (const double value : values) list.push_back(json_number(std::stod(fmt::format("{:.6g}", value))));
+  for (const double value : values)
+    list.push_back(report::json_number(std::stod(fmt::format("{:.6g}", value))));
   return list;
 }
 
 Json to_json(const Channels& channels) {
   Json json;
   for (const auto& [name, c] : channels)
-    json[name] = {{"error", json_number(c.error)},
-                  {"floor", json_number(c.floor)},
-                  {"rms", json_number(c.rms)},
-                  {"peak", json_number(c.peak)},
+    json[name] = {{"error", report::json_number(c.error)},
+                  {"floor", report::json_number(c.floor)},
+                  {"rms", report::json_number(c.rms)},
+                  {"peak", report::json_number(c.peak)},
                   {"unit", c.unit}};
   return json;
 }
 
-Json to_json(const ModelComparison& m, const RigFile& file) {
+Json to_json(const identification::ModelComparison& m, const rig_file::RigFile& file) {
   Json peaks = Json::array();
-  for (const EngagementPeak& p : m.peaks)
-    peaks.push_back({{"measured", json_number(p.measured)},
-                     {"predicted", json_number(p.predicted)},
-                     {"measured_frequency", json_number(p.measured_frequency)},
-                     {"predicted_frequency", json_number(p.predicted_frequency)},
-                     {"measured_damping_ratio", json_number(p.measured_damping_ratio)},
-                     {"predicted_damping_ratio", json_number(p.predicted_damping_ratio)}});
+  for (const identification::EngagementPeak& p : m.peaks)
+    peaks.push_back({{"measured", report::json_number(p.measured)},
+                     {"predicted", report::json_number(p.predicted)},
+                     {"measured_frequency", report::json_number(p.measured_frequency)},
+                     {"predicted_frequency", report::json_number(p.predicted_frequency)},
+                     {"measured_damping_ratio", report::json_number(p.measured_damping_ratio)},
+                     {"predicted_damping_ratio", report::json_number(p.predicted_damping_ratio)}});
   return {{"rig", file.source},
           {"name", file.rig.name},
           {"rig_digest", file.digest},
-          {"encoder_offset", json_number(m.calibration.encoder_offset)},
+          {"encoder_offset", report::json_number(m.calibration.encoder_offset)},
           {"followed", to_json(m.followed)},
           {"free", to_json(m.free)},
-          {"peak_ratio", json_number(m.peak_ratio)},
-          {"frequency_ratio", json_number(m.frequency_ratio)},
-          {"damping_ratio", json_number(m.damping_ratio)},
+          {"peak_ratio", report::json_number(m.peak_ratio)},
+          {"frequency_ratio", report::json_number(m.frequency_ratio)},
+          {"damping_ratio", report::json_number(m.damping_ratio)},
           {"peaks", peaks},
           {"traces",
            {{"deflection", numbers(m.traces.deflection)},
@@ -97,9 +99,9 @@ Json to_json(const ModelComparison& m, const RigFile& file) {
             {"free_speed_difference", numbers(m.traces.free_speed_difference)}}}};
 }
 
-Json to_json(const ComparedRecord& record, const std::string& path) {
+Json to_json(const identification::ComparedRecord& record, const std::string& path) {
   Json engagements = Json::array();
-  for (const Engagement& e : record.engagements)
+  for (const identification::Engagement& e : record.engagements)
     engagements.push_back({{"time", e.time}, {"load_position", e.load_position}, {"direction", e.direction}});
   return {{"record", path},
           {"interval", record.data.interval},
@@ -111,10 +113,10 @@ Json to_json(const ComparedRecord& record, const std::string& path) {
             {"speed_difference", numbers(record.speed_difference)}}}};
 }
 
-void tell(const std::vector<RigFile>& files, const std::vector<ModelComparison>& models,
-          std::size_t engagements) {
+void tell(const std::vector<rig_file::RigFile>& files,
+          const std::vector<identification::ModelComparison>& models, std::size_t engagements) {
   std::cout << std::fixed;
-  const auto rows = [&](const char* title, Channels ModelComparison::*channels) {
+  const auto rows = [&](const char* title, Channels identification::ModelComparison::*channels) {
     std::cout << title << '\n';
     for (std::size_t i = 0; i < models.size(); ++i)
       for (const auto& [name, c] : models[i].*channels)
@@ -123,13 +125,13 @@ void tell(const std::vector<RigFile>& files, const std::vector<ModelComparison>&
                   << std::setw(6) << 100 * c.floor << " %), rms " << std::scientific << std::setprecision(2)
                   << c.rms << ", at most " << c.peak << ' ' << c.unit << std::fixed << '\n';
   };
-  rows("Followed: load driven by the recorded motor position", &ModelComparison::followed);
+  rows("Followed: load driven by the recorded motor position", &identification::ModelComparison::followed);
   if (engagements == 0) {
     std::cout << "The teeth do not change flanks in this record: no free runs\n";
     return;
   }
   rows(("Free: driven by the torque through " + std::to_string(engagements) + " engagements").c_str(),
-       &ModelComparison::free);
+       &identification::ModelComparison::free);
   std::cout << "After an engagement, model over measured: first peak of the speed difference, frequency and "
                "damping ratio of the ringing\n"
             << std::setprecision(3);
@@ -148,35 +150,35 @@ void check_outputs(const Arguments& arguments) {
   check_output(plot, arguments.positionals());
 }
 
-std::string joined_sources(const std::vector<RigFile>& files) {
+std::string joined_sources(const std::vector<rig_file::RigFile>& files) {
   std::vector<std::string> names;
-  for (const RigFile& file : files) names.push_back(file.source);
+  for (const rig_file::RigFile& file : files) names.push_back(file.source);
   return joined(names);
 }
 
 int compare(const Arguments& arguments) {
   const std::string path = arguments.positional(0), out = arguments.text("json");
-  ComparisonSettings settings;
+  identification::ComparisonSettings settings;
   settings.cutoff = arguments.number("cutoff", settings.cutoff, Range::positive());
   settings.after = arguments.number("after", settings.after, Range::positive());
   check_record_path(path);
   check_outputs(arguments);
-  std::vector<RigFile> files;
-  std::vector<Rig> rigs;
+  std::vector<rig_file::RigFile> files;
+  std::vector<model::Rig> rigs;
   for (std::size_t i = 1; i < arguments.positionals().size(); ++i) {
-    files.push_back(load_rig_file(arguments.positional(i)));
+    files.push_back(rig_file::load_rig_file(arguments.positional(i)));
     rigs.push_back(files.back().rig);
   }
-  Record given = read_record(path, {rigs.front().joint});
+  record::Record given = read_record(path, {rigs.front().joint});
   given.name = path;
-  ComparedRecord record;
-  std::vector<ModelComparison> models;
+  identification::ComparedRecord record;
+  std::vector<identification::ModelComparison> models;
   try {
     ProgressBar bar;
     record = of_file(path + " with " + files.front().source,
-                     [&] { return compared_record(given, rigs.front(), settings); });
+                     [&] { return identification::compared_record(given, rigs.front(), settings); });
     models = of_file(path + " with " + joined_sources(files),
-                     [&] { return compare_models(rigs, record, settings, bar.progress()); });
+                     [&] { return identification::compare_models(rigs, record, settings, bar.progress()); });
   } catch (const CannotIdentify& error) {
     std::cerr << "compare_models: " << error.what() << '\n';
     return kInconclusive;

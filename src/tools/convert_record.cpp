@@ -39,12 +39,12 @@ int convert(const Arguments& arguments) {
   check_record_path(in);
   check_record_path(out);
   BagPlace place;
-  if (arguments.has("rig")) place.joint = load_rig_file(arguments.text("rig")).rig.joint;
+  if (arguments.has("rig")) place.joint = rig_file::load_rig_file(arguments.text("rig")).rig.joint;
   if (arguments.has("joint")) place.joint = arguments.text("joint");
   if (arguments.has("topic")) place.topic = arguments.text("topic");
   std::vector<std::string> inputs = {in};
   if (arguments.has("rig")) inputs.push_back(arguments.text("rig"));
-  const Record record = read_record(in, place);
+  const record::Record record = read_record(in, place);
   check_output(out, inputs);
   for (const std::string& warning : record.warnings)
     std::cerr << "convert_record: " << in << ": " << warning << '\n';

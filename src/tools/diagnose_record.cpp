@@ -26,7 +26,7 @@ const std::string kStandardOutput = "-";
 /// What each method looks at, for the help text.
 std::string needs_of_methods() {
   std::string text = "Methods and the channels that they need:";
-  for (const DiagnosisMethod& method : diagnosis_method_table())
+  for (const diagnosis::DiagnosisMethod& method : diagnosis::diagnosis_method_table())
     text += (text.back() == ':' ? " " : "; ") + method.name + " - " + method.needs;
   return text + ".";
 }
@@ -49,7 +49,7 @@ Command command() {
        "diagnosis.limits"},
       {"baseline", "BASELINE.yaml", "the healthy machine: the limits then hold for the growth since"},
       {"save-baseline", "BASELINE.yaml", "keep this diagnosis as that of the healthy machine"},
-      {"method", "NAME", "only this method: " + joined(diagnosis_methods())},
+      {"method", "NAME", "only this method: " + joined(diagnosis::diagnosis_methods())},
       {"joint", "NAME", "joint in a bag; default: the rig file's, else the only one"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
       {"periods", "N", "use only the last N whole excitation periods after settling"},
@@ -72,16 +72,16 @@ Command command() {
   return c;
 }
 
-int exit_code(Grade grade) {
+int exit_code(diagnosis::Grade grade) {
   switch (grade) {
-    case Grade::good:
+    case diagnosis::Grade::good:
       return kHealthy;
-    case Grade::watch:
+    case diagnosis::Grade::watch:
       return kWatch;
-    case Grade::service:
-    case Grade::stop:
+    case diagnosis::Grade::service:
+    case diagnosis::Grade::stop:
       return kFault;
-    case Grade::cannot_tell:
+    case diagnosis::Grade::cannot_tell:
       break;
   }
   return kInconclusive;
@@ -90,14 +90,14 @@ int exit_code(Grade grade) {
 /// What the command was given, read.
 struct Inputs {
   std::string method;
-  std::optional<RigFile> rig;
-  std::optional<MonitoringCurve> curve;
+  std::optional<rig_file::RigFile> rig;
+  std::optional<diagnosis::MonitoringCurve> curve;
   std::string curve_source;
   std::string no_curve;  // why the rig file gives none
-  Record record;
-  std::optional<PeriodWindow> last_periods;  // where only those are asked for
-  DiagnosisSettings settings;
-  std::optional<Baseline> baseline;
+  record::Record record;
+  std::optional<diagnosis::PeriodWindow> last_periods;  // where only those are asked for
+  diagnosis::DiagnosisSettings settings;
+  std::optional<diagnosis::Baseline> baseline;
   std::vector<std::string> warnings;  // of the files, not of the record
 
   bool angular() const { return rig ? rig->rig.mesh.angular() : curve && curve->conditions.angular; }
@@ -105,9 +105,9 @@ struct Inputs {
   std::string rig_digest() const { return rig ? rig->digest : curve ? curve->conditions.rig_digest : ""; }
 };
 
-ApdSettings settings_of(const MonitoringCurve& curve) {
-  ApdSettings settings;
-  settings.signal = channel_from_name(curve.conditions.signal);
+diagnosis::ApdSettings settings_of(const diagnosis::MonitoringCurve& curve) {
+  diagnosis::ApdSettings settings;
+  settings.signal = record::channel_from_name(curve.conditions.signal);
   settings.layout = curve.conditions.apd;
   settings.period = curve.conditions.frequency > 0 ? 1 / curve.conditions.frequency : 0;
   settings.settling_periods = curve.conditions.settling_periods;
@@ -116,7 +116,8 @@ ApdSettings settings_of(const MonitoringCurve& curve) {
 
 /// The last `count` whole periods, as the diagnoser's service cuts them.
 void keep_last_periods(Inputs& in, std::uint64_t count) {
-  PeriodWindow window = cut_periods(in.record, in.settings.apd, static_cast<long>(count));
+  diagnosis::PeriodWindow window =
+      diagnosis::cut_periods(in.record, in.settings.apd, static_cast<long>(count));
   if (!(window.period > 0))
     throw BadData(in.record.name, "--periods needs an excitation that repeats, none was found");
   if (window.count < static_cast<long>(count))
@@ -131,15 +132,16 @@ void keep_last_periods(Inputs& in, std::uint64_t count) {
 /// Builds a curve at the sampling rate of the record, where the rig file declares an APD.
 void build_own_curve(Inputs& in) {
   const double interval = in.record.sampling_interval();
-  if (!in.settings.apd || (!in.method.empty() && !needs_curve(in.method))) return;
+  if (!in.settings.apd || (!in.method.empty() && !diagnosis::needs_curve(in.method))) return;
   if (!in.record.has(in.settings.apd->signal) || !(interval > 0)) return;
-  CurveRequest request;
-  request.sampling_rate = nominal_sampling_rate(interval);
+  studies::CurveRequest request;
+  request.sampling_rate = studies::nominal_sampling_rate(interval);
   std::cerr << "diagnose_record: no --curve given, building one from " << in.rig->source << " at "
             << to_text(request.sampling_rate) << " Hz (build_curve keeps one)" << std::endl;
   try {
     ProgressBar bar;
-    in.curve = of_file(in.rig->source, [&] { return build_curve(*in.rig, request, bar.progress()); });
+    in.curve =
+        of_file(in.rig->source, [&] { return studies::build_curve(*in.rig, request, bar.progress()); });
     in.curve_source = "built for this record";
   } catch (const BadData& e) {  // the other methods need no curve
     in.no_curve = e.what();
@@ -150,14 +152,14 @@ void build_own_curve(Inputs& in) {
 void read_machine_files(Inputs& in, const Arguments& arguments) {
   if (arguments.has("limits")) {
     const std::string path = arguments.text("limits");
-    in.settings.limits = read_limits_file(path);
-    check_limits(*in.settings.limits, in.angular(), path);
+    in.settings.limits = diagnosis::read_limits_file(path);
+    diagnosis::check_limits(*in.settings.limits, in.angular(), path);
   }
   if (arguments.has("baseline")) {
     const std::string path = arguments.text("baseline");
     if (!in.rig && !in.curve) throw UsageError("--baseline needs --rig or --curve");
-    in.baseline = read_baseline(path);
-    const std::string warning = check_baseline(*in.baseline, in.rig_name(), in.rig_digest(), path);
+    in.baseline = diagnosis::read_baseline(path);
+    const std::string warning = diagnosis::check_baseline(*in.baseline, in.rig_name(), in.rig_digest(), path);
     if (!warning.empty()) in.warnings.push_back(warning);
   }
 }
@@ -165,7 +167,7 @@ void read_machine_files(Inputs& in, const Arguments& arguments) {
 Inputs read_inputs(const Arguments& arguments) {
   Inputs in;
   in.method = arguments.text("method");
-  const auto& methods = diagnosis_methods();
+  const auto& methods = diagnosis::diagnosis_methods();
   if (arguments.has("method") && std::find(methods.begin(), methods.end(), in.method) == methods.end())
     throw UsageError("--method = '" + printable(in.method) + "': must be one of " + joined(methods));
   const std::uint64_t periods = arguments.integer("periods", 0, 1, 1'000'000'000);
@@ -173,17 +175,18 @@ Inputs read_inputs(const Arguments& arguments) {
   BagPlace place;
   if (arguments.has("topic")) place.topic = arguments.text("topic");
   if (arguments.has("rig")) {
-    in.rig = load_rig_file(arguments.text("rig"));
+    in.rig = rig_file::load_rig_file(arguments.text("rig"));
     in.settings = in.rig->diagnosis;
     place.joint = in.rig->rig.joint;
   }
   if (arguments.has("joint")) place.joint = arguments.text("joint");
   if (arguments.has("curve")) {
     in.curve_source = arguments.text("curve");
-    in.curve = read_curve(in.curve_source);
+    in.curve = diagnosis::read_curve(in.curve_source);
     if (!in.rig)
       in.settings.apd = settings_of(*in.curve);
-    else if (const std::string warning = check_curve(*in.curve, *in.rig, in.curve_source); !warning.empty())
+    else if (const std::string warning = studies::check_curve(*in.curve, *in.rig, in.curve_source);
+             !warning.empty())
       in.warnings.push_back(warning);
   }
   read_machine_files(in, arguments);
@@ -193,15 +196,15 @@ Inputs read_inputs(const Arguments& arguments) {
 }
 
 /// Says what is missing in the words of this command.
-void explain(Diagnosis& diagnosis, const Inputs& in) {
-  for (Estimate& e : diagnosis.estimates) {
-    if (e.status != Status::insufficient_data) continue;
-    const bool by_curve = needs_curve(e.method);
+void explain(diagnosis::Diagnosis& diagnosis, const Inputs& in) {
+  for (diagnosis::Estimate& e : diagnosis.estimates) {
+    if (e.status != diagnosis::Status::insufficient_data) continue;
+    const bool by_curve = diagnosis::needs_curve(e.method);
     if (!in.rig && by_curve && !in.curve) e.message = "needs --rig or --curve";
     if (!in.rig && !by_curve) e.message = "needs --rig";
     if (by_curve && !in.no_curve.empty()) e.message = "no monitoring curve: " + in.no_curve;
   }
-  diagnosis.verdict = combine(diagnosis.estimates, in.settings.limits, in.baseline);
+  diagnosis.verdict = diagnosis::combine(diagnosis.estimates, in.settings.limits, in.baseline);
 }
 
 void check_outputs(const Arguments& arguments) {
@@ -219,8 +222,8 @@ void check_outputs(const Arguments& arguments) {
   if (page == out || page == saved) throw UsageError("--report names the same file as another output");
 }
 
-Provenance provenance_of(const Arguments& arguments, const Inputs& in) {
-  Provenance p;
+report::Provenance provenance_of(const Arguments& arguments, const Inputs& in) {
+  report::Provenance p;
   p.command = {"diagnose_record"};
   p.command.insert(p.command.end(), arguments.words().begin(), arguments.words().end());
   p.files = {{"record", arguments.positional(0)}};
@@ -238,15 +241,15 @@ Provenance provenance_of(const Arguments& arguments, const Inputs& in) {
 }
 
 /// False where this diagnosis is no baseline, which is told.
-bool save_baseline(const Diagnosis& diagnosis, const Inputs& in, const std::string& path) {
-  Baseline baseline;
+bool save_baseline(const diagnosis::Diagnosis& diagnosis, const Inputs& in, const std::string& path) {
+  diagnosis::Baseline baseline;
   try {
-    baseline = baseline_of(diagnosis, in.rig_name(), in.rig_digest());
+    baseline = diagnosis::baseline_of(diagnosis, in.rig_name(), in.rig_digest());
   } catch (const BadData& error) {
     std::cerr << "diagnose_record: " << path << " not written: " << error.what() << '\n';
     return false;
   }
-  write_text(path, to_yaml(baseline));
+  write_text(path, diagnosis::to_yaml(baseline));
   return true;
 }
 
@@ -255,7 +258,7 @@ int diagnose_record(const Arguments& arguments) {
   check_outputs(arguments);
   const std::string out = arguments.text("json");
   if (in.rig && !in.curve) build_own_curve(in);
-  DiagnosisReport report;
+  report::DiagnosisReport report;
   report.record = &in.record;
   report.warnings = in.record.warnings;
   report.warnings.insert(report.warnings.end(), in.warnings.begin(), in.warnings.end());
@@ -266,20 +269,21 @@ int diagnose_record(const Arguments& arguments) {
     report.curve = &*in.curve;
     report.curve_source = in.curve_source;
   }
-  report.diagnosis = in.last_periods
-                         ? diagnose(*in.last_periods, in.settings, report.curve, in.baseline, in.method)
-                         : diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
+  report.diagnosis =
+      in.last_periods
+          ? diagnosis::diagnose(*in.last_periods, in.settings, report.curve, in.baseline, in.method)
+          : diagnosis::diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);
-  const std::string json = diagnosis_json(report);
+  const std::string json = report::diagnosis_json(report);
   if (out == kStandardOutput) {
     std::cout << json;
   } else {
     write_text(out, json);
-    print_summary(report, std::cout);
+    report::print_summary(report, std::cout);
   }
   if (arguments.has("report"))
     write_text(arguments.text("report"),
-               diagnosis_page(report, in.rig ? &*in.rig : nullptr, provenance_of(arguments, in)));
+               report::diagnosis_page(report, in.rig ? &*in.rig : nullptr, provenance_of(arguments, in)));
   if (arguments.has("save-baseline") && !save_baseline(report.diagnosis, in, arguments.text("save-baseline")))
     return kInconclusive;
   return exit_code(report.diagnosis.verdict.grade);

@@ -91,16 +91,16 @@ Command command() {
 }
 
 struct Request {
-  GearPair pair;
-  MeshStiffnessSettings mesh;
+  model::GearPair pair;
+  model::MeshStiffnessSettings mesh;
   bool inverse = false;  // backlash given
   double last = 0;       // m: centre-distance change, or backlash
   int rows = 0;          // 0: one pair
-  std::optional<HingedBracket> bracket;
+  std::optional<model::HingedBracket> bracket;
   double pinion_step = 0;  // rad, of a position sensor; 0: none
 };
 
-std::optional<HingedBracket> read_bracket(const Arguments& a) {
+std::optional<model::HingedBracket> read_bracket(const Arguments& a) {
   const bool lengths = a.has("pivot-to-stop") && a.has("pivot-to-pinion");
   if (!lengths) {
     for (const char* option : {"stop", "pivot-to-stop", "pivot-to-pinion", "mesh-angle-deg"})
@@ -108,7 +108,7 @@ std::optional<HingedBracket> read_bracket(const Arguments& a) {
         throw UsageError(std::string("--") + option + " needs --pivot-to-stop and --pivot-to-pinion");
     return std::nullopt;
   }
-  HingedBracket b;
+  model::HingedBracket b;
   b.pivot_to_stop = a.number("pivot-to-stop", 0, Range::positive());
   b.pivot_to_pinion = a.number("pivot-to-pinion", 0, Range::positive());
   b.angle = a.number("mesh-angle-deg", 0, Range::between(-89, 89)) * kDegree;
@@ -116,14 +116,14 @@ std::optional<HingedBracket> read_bracket(const Arguments& a) {
 }
 
 /// m: the centre-distance change of --stop, or as given.
-double read_change(const Arguments& a, const std::optional<HingedBracket>& bracket) {
-  return a.has("stop") ? centre_distance_change(*bracket, a.number("stop", 0, Range::any()))
+double read_change(const Arguments& a, const std::optional<model::HingedBracket>& bracket) {
+  return a.has("stop") ? model::centre_distance_change(*bracket, a.number("stop", 0, Range::any()))
                        : a.number("centre-distance-change", 0, Range::any());
 }
 
 Request read_request(const Arguments& a) {
   Request r;
-  GearPair& p = r.pair;
+  model::GearPair& p = r.pair;
   p.pinion.teeth = static_cast<int>(a.integer("teeth1", kTeeth, 3, 1'000'000));
   p.gear.teeth = static_cast<int>(a.integer("teeth2", kTeeth, 3, 1'000'000));
   p.module = a.number("module", kModule, Range::positive());
@@ -148,18 +148,18 @@ Request read_request(const Arguments& a) {
 }
 
 /// The pair at a centre-distance change, or at the one that a backlash needs.
-GearPair pair_at(const Request& request, double value) {
-  GearPair pair = request.pair;
-  pair.centre_distance_change = request.inverse ? centre_distance_change_for(pair, value) : value;
+model::GearPair pair_at(const Request& request, double value) {
+  model::GearPair pair = request.pair;
+  pair.centre_distance_change = request.inverse ? model::centre_distance_change_for(pair, value) : value;
   return pair;
 }
 
-double small_change_play(const GearPair& pair) {
-  return small_change_backlash(pair.centre_distance_change, pair.pressure_angle) +
+double small_change_play(const model::GearPair& pair) {
+  return model::small_change_backlash(pair.centre_distance_change, pair.pressure_angle) +
          (pair.pinion.thinning + pair.gear.thinning) * std::cos(pair.pressure_angle);
 }
 
-Json to_json(const GearCircles& c) {
+Json to_json(const model::GearCircles& c) {
   return {{"reference_radius", c.reference_radius},
           {"base_radius", c.base_radius},
           {"tip_radius", c.tip_radius},
@@ -168,7 +168,8 @@ Json to_json(const GearCircles& c) {
           {"tip_thickness", c.tip_thickness}};
 }
 
-Json to_json(const GearPair& pair, const GearGeometry& g, const std::optional<HingedBracket>& bracket) {
+Json to_json(const model::GearPair& pair, const model::GearGeometry& g,
+             const std::optional<model::HingedBracket>& bracket) {
   Json json = {{"centre_distance_change", pair.centre_distance_change},
                {"centre_distance", g.centre_distance},
                {"operating_pressure_angle", g.operating_pressure_angle},
@@ -185,30 +186,30 @@ Json to_json(const GearPair& pair, const GearGeometry& g, const std::optional<Hi
                {"gear", to_json(g.gear)},
                {"faults", g.faults},
                {"remarks", g.remarks}};
-  if (bracket) json["stop"] = stop_setting_for(*bracket, pair.centre_distance_change);
+  if (bracket) json["stop"] = model::stop_setting_for(*bracket, pair.centre_distance_change);
   return json;
 }
 
-Json to_json(const HingedBracket& b) {
+Json to_json(const model::HingedBracket& b) {
   return {{"pivot_to_stop", b.pivot_to_stop}, {"pivot_to_pinion", b.pivot_to_pinion}, {"angle", b.angle}};
 }
 
 /// What one step of the sensor on the pinion's shaft is at the teeth, m.
-Json resolution_to_json(const GearPair& pair, double step) {
-  const double pitch_circle = resolution_on_pitch_circle(pair.pinion.teeth, pair.module, step);
+Json resolution_to_json(const model::GearPair& pair, double step) {
+  const double pitch_circle = model::resolution_on_pitch_circle(pair.pinion.teeth, pair.module, step);
   return {{"pinion_step", step},
           {"pitch_circle", pitch_circle},
           {"line_of_action", pitch_circle * std::cos(pair.pressure_angle)}};
 }
 
 /// Mean and course over two mesh cycles of every law; one that the gears do not suit has the reason instead.
-Json stiffness_to_json(const GearPair& pair, MeshStiffnessSettings settings) {
+Json stiffness_to_json(const model::GearPair& pair, model::MeshStiffnessSettings settings) {
   Json phase = Json::array(), pairs = Json::array(), laws = Json::object();
   for (int i = 0; i < 2 * kCyclePoints; ++i) phase.push_back(static_cast<double>(i) / kCyclePoints);
-  for (const std::string& law : mesh_stiffness_laws()) {
+  for (const std::string& law : model::mesh_stiffness_laws()) {
     settings.law = law;
     try {
-      const MeshStiffness mesh(pair, settings);
+      const model::MeshStiffness mesh(pair, settings);
       Json course = Json::array();
       for (const double p : phase) course.push_back(mesh.stiffness(p));
       laws[law] = {{"mean", mesh.mean()}, {"stiffness", course}};
@@ -242,7 +243,7 @@ void print_rig(const Json& json) {
   one("  line of action [um]", 1e6 * json["resolution"]["line_of_action"].get<double>(), 3);
 }
 
-void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffness) {
+void print_pair(const model::GearPair& pair, const model::GearGeometry& g, const Json& stiffness) {
   line("{:<34}{:>12}{:>12}", "", "pinion", "gear");
   line("{:<34}{:12}{:12}", "teeth", pair.pinion.teeth, pair.gear.teeth);
   const auto both = [](const char* name, double pinion, double gear) {
@@ -280,7 +281,7 @@ void print_pair(const GearPair& pair, const GearGeometry& g, const Json& stiffne
   }
 }
 
-void warn(const GearGeometry& g) {
+void warn(const model::GearGeometry& g) {
   for (const auto* list : {&g.faults, &g.remarks})
     for (const std::string& text : *list) std::cerr << "gear_geometry: " << text << '\n';
 }
@@ -295,8 +296,8 @@ Json report(const Request& request, bool print, bool& faults) {
   if (request.bracket) json["bracket"] = to_json(*request.bracket);
   if (request.pinion_step > 0) json["resolution"] = resolution_to_json(request.pair, request.pinion_step);
   if (request.rows == 0) {
-    const GearPair pair = pair_at(request, request.last);
-    const GearGeometry g = gear_geometry(pair);
+    const model::GearPair pair = pair_at(request, request.last);
+    const model::GearGeometry g = model::gear_geometry(pair);
     json["geometry"] = to_json(pair, g, request.bracket);
     json["mesh_stiffness"] = stiffness_to_json(pair, request.mesh);
     faults = !g.faults.empty();
@@ -312,8 +313,8 @@ Json report(const Request& request, bool print, bool& faults) {
     line("{:>10}{:>13}{:>9}{:>15}{:>19}{:>15}{:>14}", "shim [um]", "angle [deg]", "eps [-]", "backlash [um]",
          "small-change [um]", "pitch c. [um]", "pinion [deg]");
   for (int i = 0; i < request.rows; ++i) {
-    const GearPair pair = pair_at(request, request.last * i / (request.rows - 1));
-    const GearGeometry g = gear_geometry(pair);
+    const model::GearPair pair = pair_at(request, request.last * i / (request.rows - 1));
+    const model::GearGeometry g = model::gear_geometry(pair);
     json["table"].push_back(to_json(pair, g, request.bracket));
     faults = faults || !g.faults.empty();
     if (print)

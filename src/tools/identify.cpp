@@ -5,8 +5,9 @@
 #include <filesystem>
 #include <iostream>
 
-#include "backlash_diagnosis/identification/fitted_rig.h"
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/identification_report.h"
+#include "backlash_diagnosis/identification/fitted_rig.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"
@@ -63,26 +64,26 @@ void check_outputs(const Arguments& arguments) {
 int identify_machine(const Arguments& arguments) {
   for (const std::string& path : arguments.positionals()) check_record_path(path);
   check_outputs(arguments);
-  const RigFile file = load_rig_file(arguments.text("rig"));
-  std::vector<Record> records;
+  const rig_file::RigFile file = rig_file::load_rig_file(arguments.text("rig"));
+  std::vector<record::Record> records;
   for (const std::string& path : arguments.positionals()) {
     records.push_back(read_record(path, {file.rig.joint}));
     records.back().name = std::filesystem::path(path).filename();
   }
-  Identification found;
+  identification::Identification found;
   try {
     ProgressBar bar;
-    found = of_file(file.source, [&] { return identify(file.rig, records, bar.progress()); });
+    found = of_file(file.source, [&] { return identification::identify(file.rig, records, bar.progress()); });
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     return kInconclusive;
   }
-  for (const Record& record : records)
+  for (const record::Record& record : records)
     for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);
-  write_text(arguments.text("out"), fitted_rig_text(file, found));
+  write_text(arguments.text("out"), identification::fitted_rig_text(file, found));
   write_text(arguments.text("json"),
-             identification_json(found, arguments.text("rig"), arguments.positionals()));
-  print_summary(found, std::cout);
+             findings::identification_json(found, arguments.text("rig"), arguments.positionals()));
+  findings::print_summary(found, std::cout);
   std::cout.flush();
   if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
   return kHealthy;

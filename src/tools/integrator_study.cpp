@@ -24,9 +24,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kRight = 0.01;
 constexpr double kLevels[] = {1e-4, 1e-6, 1e-8};
-constexpr AbsoluteTolerance kKinds[] = {AbsoluteTolerance::scaled, AbsoluteTolerance::plain};
-constexpr std::pair<const char*, Cost> kCosts[] = {{"evaluations", Cost::evaluations},
-                                                   {"cpu_time", Cost::cpu_time}};
+constexpr studies::AbsoluteTolerance kKinds[] = {studies::AbsoluteTolerance::scaled,
+                                                 studies::AbsoluteTolerance::plain};
+constexpr std::pair<const char*, studies::Cost> kCosts[] = {{"evaluations", studies::Cost::evaluations},
+                                                            {"cpu_time", studies::Cost::cpu_time}};
 
 Command command() {
   Command c;
@@ -51,36 +52,40 @@ Command command() {
   return c;
 }
 
-Json errors_json(const ToothErrors& e) {
-  return {{"restitution", json_number(e.restitution)}, {"loop_area", json_number(e.loop_area)},
-          {"energy", json_number(e.energy)},           {"energy_gain", json_number(e.energy_gain)},
-          {"opposite", json_number(e.opposite)},       {"motion", json_number(e.motion)}};
+Json errors_json(const studies::ToothErrors& e) {
+  return {{"restitution", report::json_number(e.restitution)},
+          {"loop_area", report::json_number(e.loop_area)},
+          {"energy", report::json_number(e.energy)},
+          {"energy_gain", report::json_number(e.energy_gain)},
+          {"opposite", report::json_number(e.opposite)},
+          {"motion", report::json_number(e.motion)}};
 }
 
-Json tooth_json(const Tooth& tooth, const ToothReference& reference, const IntegratorStudy& study) {
+Json tooth_json(const studies::Tooth& tooth, const studies::ToothReference& reference,
+                const studies::IntegratorStudy& study) {
   Json json = {{"name", tooth.name},
                {"gap", tooth.gap},
                {"duration", tooth.duration},
                {"impact_speed", reference.impact_speed},
                {"depth", reference.depth},
-               {"restitution", json_number(reference.restitution)},
+               {"restitution", report::json_number(reference.restitution)},
                {"reference_agreement", reference.agreement},
-               {"reference_restitution_error", json_number(reference.restitution_error)}};
-  for (const AbsoluteTolerance kind : kKinds)
-    for (const std::string& method : integrator_methods())
-      json["right_from"][to_string(kind)][method] =
-          json_number(study.right_from(tooth.name, method, kind, kRight));
-  for (const ToothRow& row : study.rows)
+               {"reference_restitution_error", report::json_number(reference.restitution_error)}};
+  for (const studies::AbsoluteTolerance kind : kKinds)
+    for (const std::string& method : simulation::integrator_methods())
+      json["right_from"][studies::to_string(kind)][method] =
+          report::json_number(study.right_from(tooth.name, method, kind, kRight));
+  for (const studies::ToothRow& row : study.rows)
     if (row.tooth == tooth.name)
       json["runs"].push_back({{"method", row.method},
-                              {"absolute", to_string(row.absolute)},
+                              {"absolute", studies::to_string(row.absolute)},
                               {"tolerance", row.tolerance},
                               {"worst", errors_json(row.worst)},
                               {"median", errors_json(row.median)},
                               {"opposite_runs", row.opposite_runs},
                               {"failed_runs", row.failed_runs},
                               {"steps", row.steps}});
-  for (const DrawnMotion& d : study.drawn)
+  for (const studies::DrawnMotion& d : study.drawn)
     if (d.tooth == tooth.name)
       json["drawn"].push_back({{"method", d.method},
                                {"tolerance", d.tolerance},
@@ -89,27 +94,28 @@ Json tooth_json(const Tooth& tooth, const ToothReference& reference, const Integ
   return json;
 }
 
-Json point_json(const WorkPoint& p) {
-  return {{"method", p.method},           {"tolerance", p.tolerance}, {"error", json_number(p.error)},
+Json point_json(const studies::WorkPoint& p) {
+  return {{"method", p.method},           {"tolerance", p.tolerance}, {"error", report::json_number(p.error)},
           {"evaluations", p.evaluations}, {"steps", p.steps},         {"cpu_time", p.cpu_time}};
 }
 
-Json work_json(const WorkPrecision& work) {
+Json work_json(const studies::WorkPrecision& work) {
   Json json = {{"problem", work.problem()}, {"reference_agreement", work.agreement()}};
-  for (const WorkPoint& point : work.points()) json["points"].push_back(point_json(point));
+  for (const studies::WorkPoint& point : work.points()) json["points"].push_back(point_json(point));
   for (const double level : kLevels) {
     Json at = {{"error", level}};
     for (const auto& [name, cost] : kCosts) {
       at["cheapest"][name] = work.cheapest(level, cost);
-      for (const std::string& method : integrator_methods())
-        at[name][method] = json_number(work.cost(method, level, cost));
+      for (const std::string& method : simulation::integrator_methods())
+        at[name][method] = report::json_number(work.cost(method, level, cost));
     }
     json["cost"].push_back(at);
   }
   return json;
 }
 
-Json study_json(const IntegratorStudy& study, const IntegratorStudySettings& settings, const RigFile& rig) {
+Json study_json(const studies::IntegratorStudy& study, const studies::IntegratorStudySettings& settings,
+                const rig_file::RigFile& rig) {
   Json json = {{"schema_version", 1},
                {"version", version()},
                {"rig", rig.rig.name},
@@ -119,39 +125,40 @@ Json study_json(const IntegratorStudy& study, const IntegratorStudySettings& set
                {"right_share", kRight}};
   for (std::size_t i = 0; i < settings.teeth.size(); ++i)
     json["teeth"].push_back(tooth_json(settings.teeth[i], study.references[i], study));
-  for (const WorkPrecision& work : study.work) json["work"].push_back(work_json(work));
+  for (const studies::WorkPrecision& work : study.work) json["work"].push_back(work_json(work));
   json["rig_declared"] = point_json(study.rig_declared);
   return json;
 }
 
-void tell_right(const IntegratorStudy& study, const IntegratorStudySettings& settings) {
+void tell_right(const studies::IntegratorStudy& study, const studies::IntegratorStudySettings& settings) {
   std::cout
       << "Loosest tolerance from which on a method is right to 1 % (scaled | plain absolute tolerances):\n"
       << std::setw(18) << "";
-  for (const Tooth& tooth : settings.teeth) std::cout << std::setw(17) << tooth.name;
+  for (const studies::Tooth& tooth : settings.teeth) std::cout << std::setw(17) << tooth.name;
   std::cout << '\n';
   const auto shown = [](double tolerance) { return std::isnan(tolerance) ? "never" : to_text(tolerance); };
-  for (const std::string& method : integrator_methods()) {
+  for (const std::string& method : simulation::integrator_methods()) {
     std::cout << "  " << std::left << std::setw(16) << method << std::right;
-    for (const Tooth& tooth : settings.teeth)
+    for (const studies::Tooth& tooth : settings.teeth)
       std::cout << std::setw(17)
-                << shown(study.right_from(tooth.name, method, AbsoluteTolerance::scaled, kRight)) + " | " +
-                       shown(study.right_from(tooth.name, method, AbsoluteTolerance::plain, kRight));
+                << shown(study.right_from(tooth.name, method, studies::AbsoluteTolerance::scaled, kRight)) +
+                       " | " +
+                       shown(study.right_from(tooth.name, method, studies::AbsoluteTolerance::plain, kRight));
     std::cout << '\n';
   }
 }
 
-void tell_cost(const WorkPrecision& work) {
+void tell_cost(const studies::WorkPrecision& work) {
   std::cout << "Evaluations (CPU time in ms) for an error, " << work.problem() << ":\n"
             << std::setw(18) << "";
   for (const double level : kLevels) std::cout << std::setw(19) << to_text(level);
   std::cout << '\n' << std::fixed;
-  for (const std::string& method : integrator_methods()) {
+  for (const std::string& method : simulation::integrator_methods()) {
     std::cout << "  " << std::left << std::setw(16) << method << std::right;
     for (const double level : kLevels)
-      std::cout << std::setw(10) << std::setprecision(0) << work.cost(method, level, Cost::evaluations)
-                << " (" << std::setw(6) << std::setprecision(2)
-                << 1e3 * work.cost(method, level, Cost::cpu_time) << ')';
+      std::cout << std::setw(10) << std::setprecision(0)
+                << work.cost(method, level, studies::Cost::evaluations) << " (" << std::setw(6)
+                << std::setprecision(2) << 1e3 * work.cost(method, level, studies::Cost::cpu_time) << ')';
     std::cout << '\n';
   }
   std::cout << std::defaultfloat << std::setprecision(6);
@@ -160,20 +167,21 @@ void tell_cost(const WorkPrecision& work) {
 int run_study(const Arguments& arguments) {
   const std::string rig = arguments.positional(0), loop = arguments.text("loop"),
                     out = arguments.text("json"), plot = arguments.text("plot");
-  const RigFile file = load_rig_file(rig);
-  const IntegratorStudySettings settings = load_integrator_study(loop);
+  const rig_file::RigFile file = rig_file::load_rig_file(rig);
+  const studies::IntegratorStudySettings settings = studies::load_integrator_study(loop);
   check_output(out, {rig, loop});
   if (!plot.empty())
     for (const char* picture : {"_loops.png", "_work.png"}) check_output(plot + picture, {rig, loop, out});
-  IntegratorStudy study;
+  studies::IntegratorStudy study;
   {
     ProgressBar bar;
-    study = of_file(loop + " with " + rig, [&] { return study_integrators(file, settings, bar.progress()); });
+    study = of_file(loop + " with " + rig,
+                    [&] { return studies::study_integrators(file, settings, bar.progress()); });
   }
   write_text(out, study_json(study, settings, file).dump() + "\n");
   tell_right(study, settings);
-  for (const WorkPrecision& work : study.work) tell_cost(work);
-  const WorkPoint& own = study.rig_declared;
+  for (const studies::WorkPrecision& work : study.work) tell_cost(work);
+  const studies::WorkPoint& own = study.rig_declared;
   std::cout << "The solver of " << rig << ", " << own.method << " at " << to_text(own.tolerance) << ": error "
             << own.error << ", " << own.evaluations << " evaluations\n";
   if (!plot.empty()) {

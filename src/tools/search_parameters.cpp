@@ -51,37 +51,37 @@ Command command() {
   return c;
 }
 
-Json points_json(const std::vector<CurveFit::Point>& points) {
+Json points_json(const std::vector<studies::CurveFit::Point>& points) {
   Json list = Json::array();
-  for (const CurveFit::Point& p : points)
+  for (const studies::CurveFit::Point& p : points)
     list.push_back({{"backlash", p.backlash},
-                    {"skewness", json_number(p.skewness)},
-                    {"lowest", json_number(p.lowest)},
-                    {"highest", json_number(p.highest)},
-                    {"highest_class", json_number(p.highest_class)},
-                    {"largest_torque", json_number(p.largest_torque)}});
+                    {"skewness", report::json_number(p.skewness)},
+                    {"lowest", report::json_number(p.lowest)},
+                    {"highest", report::json_number(p.highest)},
+                    {"highest_class", report::json_number(p.highest_class)},
+                    {"largest_torque", report::json_number(p.largest_torque)}});
   return list;
 }
 
-Json fit_json(const CurveFit& fit, const CurveTarget& target) {
+Json fit_json(const studies::CurveFit& fit, const studies::CurveTarget& target) {
   Json json;
   json["published"] = points_json(fit.published);
   for (std::size_t i = 0; i < target.skewness.size(); ++i)
     json["published"][i]["published_skewness"] = target.skewness[i];
-  json["rms"] = json_number(fit.rms);
-  json["rise"] = json_number(fit.rise);
+  json["rms"] = report::json_number(fit.rms);
+  json["rise"] = report::json_number(fit.rise);
   json["rise_at"] = fit.rise_at;
   json["curve"] = points_json(fit.curve);
   return json;
 }
 
-Json result_json(const SearchFile& search, const SearchResult& result) {
+Json result_json(const studies::SearchFile& search, const studies::SearchResult& result) {
   Json json;
   json["seed"] = search.minimise.seed;
   json["budget"] = search.minimise.budget;
   json["evaluations"] = result.evaluations;
   for (std::size_t i = 0; i < search.parameters.size(); ++i) {
-    const FreeParameter& p = search.parameters[i];
+    const studies::FreeParameter& p = search.parameters[i];
     Json entry = {{"key", p.key}, {"value", result.values[i]}};
     if (p.choices.empty())
       entry.update({{"lower", p.lower}, {"upper", p.upper}, {"at_bound", bool(result.at_bound[i])}});
@@ -90,21 +90,22 @@ Json result_json(const SearchFile& search, const SearchResult& result) {
     json["parameters"].push_back(entry);
   }
   for (const auto& step : result.history)
-    json["history"].push_back({{"evaluations", step.evaluations}, {"best", json_number(step.value)}});
+    json["history"].push_back({{"evaluations", step.evaluations}, {"best", report::json_number(step.value)}});
   return json;
 }
 
-void set_values(SearchFile& search, const std::string& list) {
+void set_values(studies::SearchFile& search, const std::string& list) {
   std::istringstream stream(list);
   for (std::string item; std::getline(stream, item, ',');) {
     const std::size_t equals = item.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == item.size())
       throw UsageError("--set " + list + ": '" + item + "' is not KEY=VALUE");
-    set_parameter(search, item.substr(0, equals), item.substr(equals + 1));
+    studies::set_parameter(search, item.substr(0, equals), item.substr(equals + 1));
   }
 }
 
-std::string header(const SearchFile& search, const SearchResult& result, const std::string& set) {
+std::string header(const studies::SearchFile& search, const studies::SearchResult& result,
+                   const std::string& set) {
   return "# Found by: search_parameters " + search.source + " --seed " +
          std::to_string(search.minimise.seed) + " --budget " + std::to_string(search.minimise.budget) +
          (set.empty() ? "" : " --set " + set) + "\n# in " + search.rig_source + ": rms " +
@@ -112,10 +113,10 @@ std::string header(const SearchFile& search, const SearchResult& result, const s
          to_text(std::round(1e4 * result.fit.rise) / 1e4) + ".\n";
 }
 
-void tell(const CurveFit& fit, const CurveTarget& target) {
+void tell(const studies::CurveFit& fit, const studies::CurveTarget& target) {
   std::cout << "half gap [um]  published  achieved  highest class [%]  largest torque [N m]\n";
   for (std::size_t i = 0; i < fit.published.size(); ++i) {
-    const CurveFit::Point& p = fit.published[i];
+    const studies::CurveFit::Point& p = fit.published[i];
     std::cout << fmt::format("{:13.1f}  {:9.4f}  {:8.4f}  {:17.1f}  {:20.3f}\n", 0.5e6 * p.backlash,
                              target.skewness[i], p.skewness, p.highest_class, p.largest_torque);
   }
@@ -126,7 +127,7 @@ void tell(const CurveFit& fit, const CurveTarget& target) {
 int search(const Arguments& arguments) {
   const std::string out = arguments.text("out"), json_path = arguments.text("json"),
                     checked = arguments.text("check");
-  SearchFile search = load_search_file(arguments.positional(0));
+  studies::SearchFile search = studies::load_search_file(arguments.positional(0));
   search.minimise.budget = static_cast<int>(
       arguments.integer("budget", search.minimise.budget, search.minimise.population, 10'000'000));
   search.minimise.seed = arguments.integer("seed", search.minimise.seed, 0, std::uint64_t{1} << 53);
@@ -138,15 +139,15 @@ int search(const Arguments& arguments) {
   json["schema_version"] = 1;
   json["version"] = version();
   json["search"] = search.source;
-  CurveFit fit;
+  studies::CurveFit fit;
   if (!checked.empty()) {
     json["rig"] = checked;
-    fit = fit_of(load_rig_file(checked), search.target);
+    fit = studies::fit_of(rig_file::load_rig_file(checked), search.target);
   } else {
-    SearchResult result;
+    studies::SearchResult result;
     {
       ProgressBar bar;
-      result = search_parameters(search, bar.progress());
+      result = studies::search_parameters(search, bar.progress());
     }
     write_text(out, header(search, result, arguments.text("set")) + result.rig_text);
     json["rig"] = out;

@@ -29,7 +29,7 @@ using Json = nlohmann::ordered_json;
 constexpr int kMost = 100'000;
 
 Command command() {
-  const SeparabilityRequest defaults;
+  const studies::SeparabilityRequest defaults;
   const auto fallback = [](double value) { return "; default: " + to_text(value); };
   Command c;
   c.name = "separability_map";
@@ -65,39 +65,40 @@ Command command() {
 
 /// A table [level][backlash] of what `get` takes from a cell.
 template <typename Get>
-Json table(const SeparabilityMap& map, const Get& get) {
+Json table(const studies::SeparabilityMap& map, const Get& get) {
   Json rows = Json::array();
   for (const auto& row : map.cells) {
     Json values = Json::array();
-    for (const SeparabilityCell& cell : row) values.push_back(get(cell));
+    for (const studies::SeparabilityCell& cell : row) values.push_back(get(cell));
     rows.push_back(values);
   }
   return rows;
 }
 
-Json map_json(const SeparabilityMap& map, const std::vector<std::string>& methods) {
-  using Cell = SeparabilityCell;
+Json map_json(const studies::SeparabilityMap& map, const std::vector<std::string>& methods) {
+  using Cell = studies::SeparabilityCell;
   Json json = {{"disturbance", map.disturbance.name},
                {"axis", map.disturbance.axis},
                {"none", map.disturbance.none},
                {"levels", map.disturbance.levels},
-               {"skewness", table(map, [](const Cell& c) { return json_number(c.skewness); })},
-               {"equivalent", table(map, [](const Cell& c) { return json_number(c.equivalent); })}};
+               {"skewness", table(map, [](const Cell& c) { return report::json_number(c.skewness); })},
+               {"equivalent", table(map, [](const Cell& c) { return report::json_number(c.equivalent); })}};
   for (std::size_t m = 0; m < methods.size(); ++m)
     json["methods"][methods[m]] = {
         {"right", table(map, [m](const Cell& c) { return c.answers[m].right; })},
         {"wrong", table(map, [m](const Cell& c) { return c.answers[m].wrong; })},
         {"refused", table(map, [m](const Cell& c) { return c.answers[m].refused; })},
-        {"error", table(map, [m](const Cell& c) { return json_number(c.answers[m].error); })},
-        {"status", table(map, [m](const Cell& c) { return to_string(c.answers[m].status); })},
+        {"error", table(map, [m](const Cell& c) { return report::json_number(c.answers[m].error); })},
+        {"status", table(map, [m](const Cell& c) { return diagnosis::to_string(c.answers[m].status); })},
         {"reason", table(map, [m](const Cell& c) { return c.answers[m].reason; })}};
   return json;
 }
 
-Json to_json(const Separability& all, const RigFile& file, const MonitoringCurve& curve,
-             const std::string& curve_source, const SeparabilityRequest& request) {
+Json to_json(const studies::Separability& all, const rig_file::RigFile& file,
+             const diagnosis::MonitoringCurve& curve, const std::string& curve_source,
+             const studies::SeparabilityRequest& request) {
   Json resolution = Json::array();
-  for (const double r : all.resolution) resolution.push_back(json_number(r));
+  for (const double r : all.resolution) resolution.push_back(report::json_number(r));
   Json json = {{"schema_version", 1},
                {"version", version()},
                {"rig", file.rig.name},
@@ -109,16 +110,16 @@ Json to_json(const Separability& all, const RigFile& file, const MonitoringCurve
                {"records", request.records},
                {"noise", request.noise},
                {"seed", request.seed},
-               {"slope", json_number(all.slope)},
+               {"slope", report::json_number(all.slope)},
                {"backlash", all.backlash},
                {"resolution", resolution}};
-  for (const SeparabilityMap& map : all.maps) json["maps"].push_back(map_json(map, all.methods));
+  for (const studies::SeparabilityMap& map : all.maps) json["maps"].push_back(map_json(map, all.methods));
   return json;
 }
 
-std::string span(const std::vector<SeparabilityCell>& row, double unit) {
+std::string span(const std::vector<studies::SeparabilityCell>& row, double unit) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const SeparabilityCell& cell : row) {
+  for (const studies::SeparabilityCell& cell : row) {
     low = std::fmin(low, cell.equivalent);
     high = std::fmax(high, cell.equivalent);
   }
@@ -127,10 +128,10 @@ std::string span(const std::vector<SeparabilityCell>& row, double unit) {
 }
 
 /// Shares of the records, and the largest error of a cell that was not refused.
-std::string outcome(const std::vector<SeparabilityCell>& row, std::size_t method, double unit) {
+std::string outcome(const std::vector<studies::SeparabilityCell>& row, std::size_t method, double unit) {
   double right = 0, wrong = 0, refused = 0, worst = kNaN;
-  for (const SeparabilityCell& cell : row) {
-    const SeparabilityAnswer& a = cell.answers[method];
+  for (const studies::SeparabilityCell& cell : row) {
+    const studies::SeparabilityAnswer& a = cell.answers[method];
     right += a.right, wrong += a.wrong, refused += a.refused;
     worst = std::fmax(worst, std::fabs(a.error));
   }
@@ -140,10 +141,10 @@ std::string outcome(const std::vector<SeparabilityCell>& row, std::size_t method
                      largest);
 }
 
-void tell(const Separability& all, bool angular) {
+void tell(const studies::Separability& all, bool angular) {
   const double unit = angular ? 1e-3 : 1e-6;
   const std::string name = angular ? "mrad" : "um";
-  for (const SeparabilityMap& map : all.maps) {
+  for (const studies::SeparabilityMap& map : all.maps) {
     std::cout << map.disturbance.axis << '\n'
               << std::setw(8) << "level" << std::setw(22) << "equivalent [" + name + "]";
     for (const std::string& method : all.methods)
@@ -158,8 +159,8 @@ void tell(const Separability& all, bool angular) {
   }
 }
 
-SeparabilityRequest read_request(const Arguments& a) {
-  SeparabilityRequest r;
+studies::SeparabilityRequest read_request(const Arguments& a) {
+  studies::SeparabilityRequest r;
   r.backlash_values = static_cast<int>(a.integer("points", r.backlash_values, 2, kMost));
   r.records = static_cast<int>(a.integer("records", r.records, 1, kMost));
   r.periods = static_cast<int>(a.integer("periods", r.periods, 1, kMost));
@@ -180,16 +181,16 @@ void check_outputs(const Arguments& arguments) {
 }
 
 int map(const Arguments& arguments) {
-  const SeparabilityRequest request = read_request(arguments);
+  const studies::SeparabilityRequest request = read_request(arguments);
   const std::string out = arguments.text("json"), given = arguments.text("curve");
-  const RigFile file = load_rig_file(arguments.positional(0));
+  const rig_file::RigFile file = rig_file::load_rig_file(arguments.positional(0));
   check_outputs(arguments);
-  MonitoringCurve curve;
-  Separability all;
+  diagnosis::MonitoringCurve curve;
+  studies::Separability all;
   {
     ProgressBar bar;
-    curve = given.empty() ? build_curve(file, {}, bar.progress()) : read_curve(given);
-    all = map_separability(file, curve, disturbances_of(file), request, bar.progress());
+    curve = given.empty() ? studies::build_curve(file, {}, bar.progress()) : diagnosis::read_curve(given);
+    all = studies::map_separability(file, curve, studies::disturbances_of(file), request, bar.progress());
   }
   if (curve.conditions.rig_digest != file.digest)
     std::cerr << "separability_map: the curve was made from another version of the rig file\n";

@@ -42,20 +42,20 @@ Command command() {
   return c;
 }
 
-void apply(const Arguments& arguments, RigFile& file) {
+void apply(const Arguments& arguments, rig_file::RigFile& file) {
   if (arguments.has("backlash") && arguments.has("half-gap"))
     throw UsageError("--backlash and --half-gap say the same thing, give one of them");
   double& backlash = file.rig.mesh.backlash;
   backlash = arguments.number("backlash", backlash, Range::not_negative());
   if (arguments.has("half-gap")) backlash = 2 * arguments.number("half-gap", 0, Range::not_negative());
-  SensorsSettings& sensors = file.simulation.sensors;
+  simulation::SensorsSettings& sensors = file.simulation.sensors;
   sensors.seed = arguments.integer("seed", sensors.seed, 0, std::numeric_limits<std::uint64_t>::max());
   sensors.sampling_rate = arguments.number("sample-rate", sensors.sampling_rate, Range::positive());
 }
 
-const TestRun& chosen_run(const Arguments& arguments, const RigFile& file) {
+const rig_file::TestRun& chosen_run(const Arguments& arguments, const rig_file::RigFile& file) {
   try {
-    return find_test_run(file.test_runs, arguments.text("run"));
+    return rig_file::find_test_run(file.test_runs, arguments.text("run"));
   } catch (const InvalidParameter& e) {
     throw UsageError(std::string("--") + e.what());
   }
@@ -64,7 +64,7 @@ const TestRun& chosen_run(const Arguments& arguments, const RigFile& file) {
 int list_runs(const Arguments& arguments) {
   for (const char* option : {"out", "run", "duration"})
     if (arguments.has(option)) throw UsageError(std::string("--list-runs simulates nothing: no --") + option);
-  for (const TestRun& run : load_rig_file(arguments.positional(0)).test_runs)
+  for (const rig_file::TestRun& run : rig_file::load_rig_file(arguments.positional(0)).test_runs)
     std::cout << run.name << ": " << to_text(run.duration) << " s, " << run.excitation.type
               << (run.excitation.at_load ? " at the load" : "")
               << (run.excitation.motor_brake ? ", motor braked" : "")
@@ -80,11 +80,11 @@ int simulate(const Arguments& arguments) {
   const std::string out = arguments.text("out");
   check_record_path(out);
   double duration = arguments.number("duration", 0, Range::positive());
-  RigFile file = load_rig_file(arguments.positional(0));
+  rig_file::RigFile file = rig_file::load_rig_file(arguments.positional(0));
   if (arguments.has("run")) {
-    const TestRun& run = chosen_run(arguments, file);
+    const rig_file::TestRun& run = chosen_run(arguments, file);
     if (!arguments.has("duration")) duration = run.duration;
-    apply_test_run(run, file);
+    rig_file::apply_test_run(run, file);
   }
   apply(arguments, file);
   const double samples = std::round(duration * file.simulation.sensors.sampling_rate);
@@ -94,11 +94,12 @@ int simulate(const Arguments& arguments) {
                      " Hz (--sample-rate, or sensors.sampling_rate of " + file.source +
                      "): must give from 1 to 1e9 samples");
   check_output(out, {arguments.positional(0)});
-  Record record;
+  record::Record record;
   {
     ProgressBar bar;
-    record = of_file(file.source,
-                     [&] { return simulate_record(file.rig, file.simulation, duration, bar.progress()); });
+    record = of_file(file.source, [&] {
+      return simulation::simulate_record(file.rig, file.simulation, duration, bar.progress());
+    });
   }
   write_record(record, out, file.rig.joint);
   std::cout << out << ": " << record.size() << " samples at "

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/identification/effects/traced_rig.h"
 #include "backlash_diagnosis/record/csv.h"
@@ -54,11 +55,11 @@ Command command() {
 }
 
 struct TraceJob {
-  RigFile rig;                     // the declared machine
+  rig_file::RigFile rig;           // the declared machine
   std::vector<std::string> train;  // paths of .csv or .bag
   std::string test;
   std::string folder;  // for what comes out
-  TraceSettings settings;
+  identification::TraceSettings settings;
 };
 
 TraceJob job_of(const Arguments& arguments) {
@@ -72,17 +73,18 @@ TraceJob job_of(const Arguments& arguments) {
   for (const std::string& record : job.train) check_record_path(record);
   check_record_path(job.test);
   if (std::filesystem::is_directory(job.folder)) {
-    const TraceFiles files = trace_files(job.folder);
+    const report::TraceFiles files = report::trace_files(job.folder);
     for (const std::string& file : {files.report, files.series, files.rig, files.page})
       check_output(file, inputs);
   }
-  job.rig = load_rig_file(arguments.text("rig"));
+  job.rig = rig_file::load_rig_file(arguments.text("rig"));
   return job;
 }
 
-Record read(const std::string& path, const std::string& joint, std::vector<std::string>& warnings) {
+record::Record read(const std::string& path, const std::string& joint, std::vector<std::string>& warnings) {
   const std::filesystem::path file(path);
-  Record record = file.extension() == ".bag" ? read_bag(path, joint, "joint_states") : read_csv(path);
+  record::Record record =
+      file.extension() == ".bag" ? ros_bridge::read_bag(path, joint, "joint_states") : record::read_csv(path);
   record.name = file.filename();
   for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
   return record;
@@ -90,16 +92,17 @@ Record read(const std::string& path, const std::string& joint, std::vector<std::
 
 /// With the readers' warnings. Throws MissingInput, BadData, CannotWrite, CannotIdentify, Cancelled; nothing
 /// is written then.
-Trace run_trace(const TraceJob& job, const Progress& progress) {
-  check_traced_rig_text(job.rig);
+identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
+  identification::check_traced_rig_text(job.rig);
   std::vector<std::string> inputs = job.train, warnings;
-  std::vector<Record> train;
+  std::vector<record::Record> train;
   for (const std::string& path : job.train) train.push_back(read(path, job.rig.rig.joint, warnings));
-  const Record test = read(job.test, job.rig.rig.joint, warnings);
+  const record::Record test = read(job.test, job.rig.rig.joint, warnings);
   inputs.push_back(job.test);
   inputs.push_back(job.rig.source);
-  const TraceFolder folder(job.folder, inputs);
-  Trace trace = trace_residual(job.rig.rig, train, test, job.settings, progress);
+  const findings::TraceFolder folder(job.folder, inputs);
+  identification::Trace trace =
+      identification::trace_residual(job.rig.rig, train, test, job.settings, progress);
   trace.warnings.insert(trace.warnings.begin(), warnings.begin(), warnings.end());
   if (progress && !progress(1, "writing the report")) throw Cancelled();
   folder.write(trace, job.rig, {job.rig.source, job.train, job.test});
@@ -108,7 +111,7 @@ Trace run_trace(const TraceJob& job, const Progress& progress) {
 
 int trace(const Arguments& arguments) {
   TraceJob job = job_of(arguments);
-  Trace done;
+  identification::Trace done;
   try {
     if (arguments.has("feedback")) {
       FeedbackLines lines;
@@ -122,11 +125,11 @@ int trace(const Arguments& arguments) {
     std::cerr << "trace_residual: " << error.what() << '\n';
     return kBadData;
   }
-  const TraceFiles files = trace_files(job.folder);
+  const report::TraceFiles files = report::trace_files(job.folder);
   if (!arguments.has("feedback"))
-    std::cout << trace_summary(done) << "\nreport: " << files.page << ", " << files.report
+    std::cout << findings::trace_summary(done) << "\nreport: " << files.page << ", " << files.report
               << "\nrig with what was found: " << files.rig << '\n';
-  return done.verdict == TraceVerdict::unexplained ? kInconclusive : kHealthy;
+  return done.verdict == identification::TraceVerdict::unexplained ? kInconclusive : kHealthy;
 }
 
 }  // namespace

@@ -51,32 +51,34 @@ Command command() {
   return c;
 }
 
-Json row_json(const StudyRow& row) {
+Json row_json(const studies::StudyRow& row) {
   return {{"method", row.method},
           {"records", row.trials},
           {"told", row.told},
-          {"median_error", json_number(row.median_error)},
-          {"p95_error", json_number(row.p95_error)},
-          {"median_width", json_number(row.median_width)},
-          {"coverage", json_number(row.coverage)},
-          {"cannot_tell", json_number(row.cannot_tell)},
+          {"median_error", report::json_number(row.median_error)},
+          {"p95_error", report::json_number(row.p95_error)},
+          {"median_width", report::json_number(row.median_width)},
+          {"coverage", report::json_number(row.coverage)},
+          {"cannot_tell", report::json_number(row.cannot_tell)},
           {"confident_misses", row.confident_misses}};
 }
 
 struct Table {
   bool position;
   double half_gap, noise;  // m, of the signal's rms (NaN: any)
-  std::vector<StudyRow> rows;
+  std::vector<studies::StudyRow> rows;
 };
 
-std::vector<Table> tables_of(const std::vector<StudyTrial>& trials, const StudyRequest& request) {
+std::vector<Table> tables_of(const std::vector<studies::StudyTrial>& trials,
+                             const studies::StudyRequest& request) {
   std::vector<Table> tables;
   const double all = 0.5 * request.max_backlash;
   for (const bool position : {true, false}) {
     std::vector<std::pair<double, double>> groups = {{all, kNaN}, {kHalfGap, kNaN}, {kHalfGap, kNoise}};
     for (const double level : request.noise) groups.emplace_back(all, level);
     for (const auto& [half_gap, noise] : groups)
-      tables.push_back({position, half_gap, noise, summarise_study(trials, position, half_gap, noise)});
+      tables.push_back(
+          {position, half_gap, noise, studies::summarise_study(trials, position, half_gap, noise)});
   }
   return tables;
 }
@@ -90,7 +92,7 @@ void print(const Table& table) {
     std::cout << "noise " << 100 * table.noise << " % of rms\n";
   std::cout
       << "  method               records  error [um] median   95 %   width   coverage  cannot tell  misses\n";
-  for (const StudyRow& row : table.rows) {
+  for (const studies::StudyRow& row : table.rows) {
     std::cout << "  " << std::left << std::setw(22) << row.method << std::right << std::setw(6) << row.trials;
     if (row.told == 0) {
       std::cout << "    -\n";
@@ -104,10 +106,10 @@ void print(const Table& table) {
   }
 }
 
-void print(const std::vector<VariantRow>& rows) {
+void print(const std::vector<studies::VariantRow>& rows) {
   std::cout << "\nwrong conditions: recognised / right although wrong / wrong\n";
   std::string last;
-  for (const VariantRow& row : rows) {
+  for (const studies::VariantRow& row : rows) {
     const std::string title = row.variant + (row.position ? ", all channels" : ", the signal alone");
     if (title != last) std::cout << (last.empty() ? "" : "\n") << "  " << std::left << std::setw(42) << title;
     last = title;
@@ -116,75 +118,77 @@ void print(const std::vector<VariantRow>& rows) {
   std::cout << '\n';
 }
 
-Json trials_json(const std::vector<StudyTrial>& trials) {
+Json trials_json(const std::vector<studies::StudyTrial>& trials) {
   Json all = Json::array();
-  for (const StudyTrial& trial : trials) {
+  for (const studies::StudyTrial& trial : trials) {
     Json json = {{"variant", trial.variant},
                  {"backlash", trial.backlash},
                  {"noise", trial.noise},
                  {"periods", trial.periods},
                  {"position", trial.position}};
-    for (const Estimate& e : trial.estimates)
-      json["estimates"][e.method] = {{"status", to_string(e.status)},
-                                     {"backlash", json_number(e.backlash)},
-                                     {"interval", {json_number(e.lower), json_number(e.upper)}}};
+    for (const diagnosis::Estimate& e : trial.estimates)
+      json["estimates"][e.method] = {
+          {"status", diagnosis::to_string(e.status)},
+          {"backlash", report::json_number(e.backlash)},
+          {"interval", {report::json_number(e.lower), report::json_number(e.upper)}}};
     all.push_back(std::move(json));
   }
   return all;
 }
 
 /// Answers that nobody should have got.
-int misses(const std::vector<Table>& tables, const std::vector<VariantRow>& variants) {
+int misses(const std::vector<Table>& tables, const std::vector<studies::VariantRow>& variants) {
   int count = 0;
   for (const Table& table : tables)
-    for (const StudyRow& row : table.rows) count += row.confident_misses;
-  for (const VariantRow& row : variants) count += row.wrong;
+    for (const studies::StudyRow& row : table.rows) count += row.confident_misses;
+  for (const studies::VariantRow& row : variants) count += row.wrong;
   return count;
 }
 
-MonitoringCurve curve_for(const Arguments& arguments, const RigFile& file, const StudyRequest& request,
-                          const Progress& progress) {
-  if (arguments.has("curve")) return read_curve(arguments.text("curve"));
-  CurveRequest wanted;
+diagnosis::MonitoringCurve curve_for(const Arguments& arguments, const rig_file::RigFile& file,
+                                     const studies::StudyRequest& request, const Progress& progress) {
+  if (arguments.has("curve")) return diagnosis::read_curve(arguments.text("curve"));
+  studies::CurveRequest wanted;
   wanted.max_backlash = request.max_backlash;
   wanted.sampling_rate = request.sampling_rate;
-  return build_curve(file, wanted, progress);
+  return studies::build_curve(file, wanted, progress);
 }
 
 int study(const Arguments& arguments) {
   const std::string rig = arguments.positional(0), out = arguments.text("json"),
                     plot = arguments.text("plot");
-  StudyRequest request;
+  studies::StudyRequest request;
   request.records = static_cast<int>(arguments.integer("records", request.records, 1, 1'000'000));
   request.seed = arguments.integer("seed", request.seed, 0, std::uint64_t{1} << 53);
   request.sampling_rate = arguments.number("sample-rate", request.sampling_rate, Range::positive());
   const int variants = static_cast<int>(arguments.integer("variants", 40, 1, 1'000'000));
-  const RigFile file = load_rig_file(rig);
+  const rig_file::RigFile file = rig_file::load_rig_file(rig);
   check_output(out, {rig});
   if (!plot.empty()) {
     check_plot_path(plot);
     check_output(plot, {rig});
   }
-  std::vector<StudyTrial> trials, wrong;
+  std::vector<studies::StudyTrial> trials, wrong;
   {
     ProgressBar bar;
-    const MonitoringCurve curve = curve_for(arguments, file, request, bar.progress());
+    const diagnosis::MonitoringCurve curve = curve_for(arguments, file, request, bar.progress());
     request.max_backlash = curve.points.back().backlash;
-    trials = run_study(file, curve, request, bar.progress());
-    wrong = run_variants(file, curve, request, variants, bar.progress());
+    trials = studies::run_study(file, curve, request, bar.progress());
+    wrong = studies::run_variants(file, curve, request, variants, bar.progress());
   }
   const std::vector<Table> tables = tables_of(trials, request);
-  const std::vector<VariantRow> rows = summarise_variants(wrong);
+  const std::vector<studies::VariantRow> rows = studies::summarise_variants(wrong);
   Json json = {{"schema_version", 1},  {"version", version()},       {"rig", rig},
                {"seed", request.seed}, {"records", request.records}, {"max_backlash", request.max_backlash}};
   for (const Table& table : tables) {
-    Json entry = {
-        {"position", table.position}, {"half_gap", table.half_gap}, {"noise", json_number(table.noise)}};
-    for (const StudyRow& row : table.rows) entry["rows"].push_back(row_json(row));
+    Json entry = {{"position", table.position},
+                  {"half_gap", table.half_gap},
+                  {"noise", report::json_number(table.noise)}};
+    for (const studies::StudyRow& row : table.rows) entry["rows"].push_back(row_json(row));
     json["tables"].push_back(std::move(entry));
     print(table);
   }
-  for (const VariantRow& row : rows)
+  for (const studies::VariantRow& row : rows)
     json["variants"].push_back({{"variant", row.variant},
                                 {"method", row.method},
                                 {"position", row.position},

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 const double kInfinity = std::numeric_limits<double>::infinity();
@@ -210,4 +210,4 @@ TEST(RunningMoments, LoseNothingToAnOffset) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/apd_family.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 TEST(Quantiles, OfEvenlySpacedSamples) {
@@ -136,4 +136,4 @@ TEST(NoisyFamilies, DistancesAreThoseOfTheExactNoise) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -14,7 +14,7 @@
 #include "support/curve.h"
 #include "support/records.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 using test::linear_curve;
@@ -22,14 +22,15 @@ using test::make_record;
 using test::RecordRecipe;
 
 ApdSettings settings(double period = 0.1, int settling = 0) {
-  return {Channel::sensor_torque, period, settling, {60, -0.4, 0.4}};
+  return {record::Channel::sensor_torque, period, settling, {60, -0.4, 0.4}};
 }
 
-ApdResult apd_of(const Record& record, const ApdSettings& apd) {
+ApdResult apd_of(const record::Record& record, const ApdSettings& apd) {
   return analyse_apd(cut_periods(record, apd), apd);
 }
 
-Estimate estimate(const Record& record, const MonitoringCurve& curve, const ApdSettings& apd = settings()) {
+Estimate estimate(const record::Record& record, const MonitoringCurve& curve,
+                  const ApdSettings& apd = settings()) {
   const ApdResult result = apd_of(record, apd);
   return estimate_apd_skewness(result, match_curve(record, result, apd, &curve), &curve);
 }
@@ -37,12 +38,15 @@ Estimate estimate(const Record& record, const MonitoringCurve& curve, const ApdS
 TEST(AnalyseApd, MeanOverThePeriodsOfASquareRoot) {
   // Two periods with different distributions: n samples in class 0, 100 - n in class 1 of two; skewness of
   // two class values is 0, of three with one empty it has a closed form.
-  Record record;
+  record::Record record;
   for (int i = 0; i < 300; ++i) {
     record.time.push_back(i * 1e-3);
-    record.column(Channel::sensor_torque).push_back(i < 100 ? 0.5 : i < 200 ? (i % 2 ? 0.5 : 1.5) : 2.5);
+    record.column(record::Channel::sensor_torque)
+        .push_back(i < 100   ? 0.5
+                   : i < 200 ? (i % 2 ? 0.5 : 1.5)
+                             : 2.5);
   }
-  const ApdSettings apd = {Channel::sensor_torque, 0.1, 0, {3, 0, 3}};
+  const ApdSettings apd = {record::Channel::sensor_torque, 0.1, 0, {3, 0, 3}};
   const ApdResult result = apd_of(record, apd);
   ASSERT_EQ(result.periods.size(), 3u);
   const double one = 1 / std::sqrt(2.0);   // (M - 2) / sqrt(M - 1) with M = 3
@@ -56,7 +60,7 @@ TEST(AnalyseApd, MeanOverThePeriodsOfASquareRoot) {
 }
 
 TEST(AnalyseApd, LeavesOutSettlingAndWindowsWithGaps) {
-  Record record = make_record({});
+  record::Record record = make_record({});
   EXPECT_EQ(apd_of(record, settings(0.1, 2)).periods.size(), 13u);
   EXPECT_EQ(apd_of(record, settings(0.1, 15)).periods.size(), 0u);
   EXPECT_TRUE(std::isnan(apd_of(record, settings(0.1, 15)).skewness));
@@ -67,16 +71,16 @@ TEST(AnalyseApd, LeavesOutSettlingAndWindowsWithGaps) {
 }
 
 TEST(AnalyseApd, RecordsThatGiveNothing) {
-  EXPECT_TRUE(apd_of(Record(), settings()).periods.empty());
-  Record record = make_record({});
-  record.column(Channel::sensor_torque).clear();
+  EXPECT_TRUE(apd_of(record::Record(), settings()).periods.empty());
+  record::Record record = make_record({});
+  record.column(record::Channel::sensor_torque).clear();
   EXPECT_TRUE(apd_of(record, settings()).periods.empty());
-  Record outside = make_record({});
-  for (double& v : outside.column(Channel::sensor_torque)) v += 7;
+  record::Record outside = make_record({});
+  for (double& v : outside.column(record::Channel::sensor_torque)) v += 7;
   const ApdResult result = apd_of(outside, settings());
   EXPECT_TRUE(result.periods.empty());
   EXPECT_EQ(result.incomplete, 15);  // no sample inside the classes
-  EXPECT_THROW(apd_of(record, {Channel::sensor_torque, 0.1, 0, {1, 0, 1}}), InvalidParameter);
+  EXPECT_THROW(apd_of(record, {record::Channel::sensor_torque, 0.1, 0, {1, 0, 1}}), InvalidParameter);
 }
 
 TEST(AnalyseApd, EstimatesTheNoise) {
@@ -95,27 +99,27 @@ TEST(AnalyseApd, EstimatesTheNoise) {
 }
 
 TEST(ExcitationPeriod, PrefersTheMotorTorque) {
-  Record record = make_record({});
-  EXPECT_NEAR(excitation_period(record, Channel::sensor_torque), 0.1, 1e-12);
-  for (double& v : record.column(Channel::sensor_torque)) v = 0;
-  EXPECT_NEAR(excitation_period(record, Channel::sensor_torque), 0.1, 1e-12);
-  record.column(Channel::motor_torque).clear();
-  EXPECT_EQ(excitation_period(record, Channel::sensor_torque), 0);
-  EXPECT_EQ(excitation_period(Record(), Channel::sensor_torque), 0);
+  record::Record record = make_record({});
+  EXPECT_NEAR(excitation_period(record, record::Channel::sensor_torque), 0.1, 1e-12);
+  for (double& v : record.column(record::Channel::sensor_torque)) v = 0;
+  EXPECT_NEAR(excitation_period(record, record::Channel::sensor_torque), 0.1, 1e-12);
+  record.column(record::Channel::motor_torque).clear();
+  EXPECT_EQ(excitation_period(record, record::Channel::sensor_torque), 0);
+  EXPECT_EQ(excitation_period(record::Record(), record::Channel::sensor_torque), 0);
 }
 
 TEST(CutPeriods, ByThePeriodThatIsFoundFirst) {
-  EXPECT_EQ(cut_periods(Record(), settings(0.3)).period, 0.3);
-  EXPECT_EQ(cut_periods(Record(), settings(0)).period, 0);
+  EXPECT_EQ(cut_periods(record::Record(), settings(0.3)).period, 0.3);
+  EXPECT_EQ(cut_periods(record::Record(), settings(0)).period, 0);
   EXPECT_NEAR(cut_periods(make_record({}), settings(0)).period, 0.1, 1e-12);
   RecordRecipe recipe;  // found before the excitation changes
-  Record record = make_record(recipe);
+  record::Record record = make_record(recipe);
   recipe.frequency = 4;
   recipe.start = 1.5;
   recipe.duration = 20;
-  const Record later = make_record(recipe);
+  const record::Record later = make_record(recipe);
   record.time.insert(record.time.end(), later.time.begin(), later.time.end());
-  for (const Channel channel : kChannels)
+  for (const record::Channel channel : record::kChannels)
     record.column(channel).insert(record.column(channel).end(), later.column(channel).begin(),
                                   later.column(channel).end());
   EXPECT_NEAR(cut_periods(record, settings(0)).period, 0.1, 1e-12);
@@ -128,7 +132,7 @@ TEST(CutPeriods, CutsExactly) {
   recipe.duration = 1.234;
   for (const double start : {0.0, 1.7e9}) {
     recipe.start = start;
-    const Record record = make_record(recipe);
+    const record::Record record = make_record(recipe);
     const PeriodWindow cut = cut_periods(record, settings(0.1, 2));
     EXPECT_EQ(cut.record.size(), 1000u);
     EXPECT_EQ(cut.count, 10);
@@ -145,20 +149,20 @@ TEST(CutPeriods, CutsExactly) {
     EXPECT_EQ(cut_periods(record, settings(0, 2)).record.size(), 1000u);
     EXPECT_EQ(cut_periods(record, std::nullopt, 3).record.time.front(), record.time[900]);  // by motor_torque
   }
-  EXPECT_EQ(cut_periods(Record(), settings()).record.size(), 0u);
-  EXPECT_EQ(cut_periods(Record(), settings(0)).record.size(), 0u);
+  EXPECT_EQ(cut_periods(record::Record(), settings()).record.size(), 0u);
+  EXPECT_EQ(cut_periods(record::Record(), settings(0)).record.size(), 0u);
 }
 
 // What a stream takes for a new run is a hole in a record, and other estimators need not have the signal.
 TEST(CutPeriods, ARecordIsOneRun) {
-  Record record = make_record({});
+  record::Record record = make_record({});
   for (std::size_t i = 850; i < record.size(); ++i) record.time[i] += 30;  // whole periods later
   const PeriodWindow cut = cut_periods(record, settings(0.1, 2));
   EXPECT_EQ(cut.record.size(), 1300u);
   EXPECT_EQ(cut.record.time.front(), record.time[200]);
   EXPECT_EQ(analyse_apd(cut, settings()).periods.size(), 12u);
   EXPECT_EQ(analyse_apd(cut, settings()).incomplete, 2);  // both ends of the hole
-  record.column(Channel::sensor_torque).clear();
+  record.column(record::Channel::sensor_torque).clear();
   const PeriodWindow without = cut_periods(record, settings(0.1, 2));
   EXPECT_EQ(without.record.size(), 1300u);
   EXPECT_TRUE(without.periods.empty());
@@ -176,7 +180,7 @@ TEST(TravelOf, IgnoresThePeaks) {
 TEST(EstimateApdSkewness, InvertsTheMeanSkewness) {
   RecordRecipe recipe;
   recipe.noise = 1e-3;
-  const Record record = make_record(recipe);
+  const record::Record record = make_record(recipe);
   const ApdResult apd = apd_of(record, settings());
   const MonitoringCurve curve = linear_curve();
   const Estimate e = estimate(record, curve), expected = curve.invert(apd.skewness, 15, apd.noise_range);
@@ -207,7 +211,7 @@ TEST(EstimateApdSkewness, OfASinglePeriodAllNoiseThatItMayHoldCounts) {
   const Estimate e = estimate(make_record(recipe), curve), silent = curve.invert(apd.skewness, 1, 0);
   ASSERT_EQ(e.status, Status::ok) << e.message;
   EXPECT_EQ(e.lower, silent.lower);
-  const double noise = with_standard_error(apd.noise_range, 100).upper;
+  const double noise = signal::with_standard_error(apd.noise_range, 100).upper;
   EXPECT_NEAR(e.upper - silent.upper, 100 * noise / -test::kCurveSlope, 1e-12);  // 1 per 0.01 N m
   recipe.noise = 0.02;  // more than the curve covers, and nothing tells it from ringing
   const Estimate noisy = estimate(make_record(recipe), linear_curve());
@@ -217,7 +221,7 @@ TEST(EstimateApdSkewness, OfASinglePeriodAllNoiseThatItMayHoldCounts) {
 
 struct Variant {
   std::string name;
-  std::function<void(Record&)> change;
+  std::function<void(record::Record&)> change;
   Status status;
   std::string reason;  // part of the message
 };
@@ -228,16 +232,17 @@ void scale(std::vector<double>& values, double factor) {
 
 TEST(EstimateApdSkewness, RecordsOutsideTheDomainAreRefusedWithTheReason) {
   const auto remake = [](const std::function<void(RecordRecipe&)>& change) {
-    return [change](Record& record) {
+    return [change](record::Record& record) {
       RecordRecipe recipe;
       change(recipe);
       record = make_record(recipe);
     };
   };
   const auto sine = [](double amplitude) {
-    return [amplitude](Record& record) {
+    return [amplitude](record::Record& record) {
       for (std::size_t i = 0; i < record.size(); ++i)
-        record.column(Channel::motor_torque)[i] = amplitude * std::sin(2 * M_PI * 10 * record.time[i]);
+        record.column(record::Channel::motor_torque)[i] =
+            amplitude * std::sin(2 * M_PI * 10 * record.time[i]);
     };
   };
   const std::vector<Variant> variants = {
@@ -255,37 +260,40 @@ TEST(EstimateApdSkewness, RecordsOutsideTheDomainAreRefusedWithTheReason) {
       {"950 Hz", remake([](auto& r) { r.rate = 950; }), Status::out_of_domain, "sampling rate"},
       {"sine", sine(0.05), Status::out_of_domain, "excitation level"},
       {"sine of the same level", sine(0.05 * std::sqrt(2.0)), Status::out_of_domain, "excitation amplitude"},
-      {"no torque", [](Record& r) { scale(r.column(Channel::motor_torque), 0); }, Status::out_of_domain,
-       "constant"},
-      {"dead sensor", [](Record& r) { scale(r.column(Channel::sensor_torque), 0); }, Status::out_of_domain,
-       "does not move"},
+      {"no torque", [](record::Record& r) { scale(r.column(record::Channel::motor_torque), 0); },
+       Status::out_of_domain, "constant"},
+      {"dead sensor", [](record::Record& r) { scale(r.column(record::Channel::sensor_torque), 0); },
+       Status::out_of_domain, "does not move"},
       {"too noisy", remake([](auto& r) { r.noise = 0.02; }), Status::out_of_domain, "noise"},
       {"saturated",
-       [](Record& r) {
-         for (double& v : r.column(Channel::sensor_torque)) v = std::clamp(v, -0.06, 0.06);
+       [](record::Record& r) {
+         for (double& v : r.column(record::Channel::sensor_torque)) v = std::clamp(v, -0.06, 0.06);
        },
        Status::out_of_domain, "saturated"},
       {"output moves",
-       [](Record& r) {
+       [](record::Record& r) {
          for (std::size_t i = 0; i < r.size(); ++i)
-           r.column(Channel::load_position)[i] = 2e-3 * std::sin(60 * r.time[i]);
+           r.column(record::Channel::load_position)[i] = 2e-3 * std::sin(60 * r.time[i]);
        },
        Status::out_of_domain, "output moves"},
       {"motor travels too far", remake([](auto& r) { r.travel = 0.03; }), Status::out_of_domain,
        "motor travels"},
-      {"no signal", [](Record& r) { r.column(Channel::sensor_torque).clear(); }, Status::insufficient_data,
-       "no sensor_torque"},
-      {"half a period", [](Record& r) { r = r.slice(0, 0.05); }, Status::insufficient_data, "too short"},
-      {"a few samples", [](Record& r) { r = r.slice(0, 0.004); }, Status::insufficient_data, "too short"},
-      {"one sample", [](Record& r) { r = r.slice(0, 0.0005); }, Status::insufficient_data, "too short"},
+      {"no signal", [](record::Record& r) { r.column(record::Channel::sensor_torque).clear(); },
+       Status::insufficient_data, "no sensor_torque"},
+      {"half a period", [](record::Record& r) { r = r.slice(0, 0.05); }, Status::insufficient_data,
+       "too short"},
+      {"a few samples", [](record::Record& r) { r = r.slice(0, 0.004); }, Status::insufficient_data,
+       "too short"},
+      {"one sample", [](record::Record& r) { r = r.slice(0, 0.0005); }, Status::insufficient_data,
+       "too short"},
       {"offset out of the classes",
-       [](Record& r) {
-         for (double& v : r.column(Channel::sensor_torque)) v += 3;
+       [](record::Record& r) {
+         for (double& v : r.column(record::Channel::sensor_torque)) v += 3;
        },
        Status::out_of_domain, "signal level"},
   };
   for (const Variant& variant : variants) {
-    Record record = make_record({});
+    record::Record record = make_record({});
     variant.change(record);
     const Estimate e = estimate(record, linear_curve());
     EXPECT_EQ(e.status, variant.status) << variant.name << ": " << e.message;
@@ -295,7 +303,7 @@ TEST(EstimateApdSkewness, RecordsOutsideTheDomainAreRefusedWithTheReason) {
 }
 
 TEST(EstimateApdSkewness, GapsInEveryPeriod) {
-  Record record = make_record({});
+  record::Record record = make_record({});
   for (int k = 14; k >= 0; --k) test::cut_out(record, 100 * k + 40, 100 * k + 55);
   const Estimate e = estimate(record, linear_curve());
   EXPECT_EQ(e.status, Status::insufficient_data);
@@ -304,8 +312,8 @@ TEST(EstimateApdSkewness, GapsInEveryPeriod) {
 
 TEST(EstimateApdSkewness, WithoutMotorTorqueTheSignalStandsIn) {
   const auto without = [](RecordRecipe recipe) {
-    Record record = make_record(recipe);
-    record.column(Channel::motor_torque).clear();
+    record::Record record = make_record(recipe);
+    record.column(record::Channel::motor_torque).clear();
     return estimate(record, linear_curve());
   };
   EXPECT_EQ(without({}).status, Status::ok) << without({}).message;
@@ -320,7 +328,7 @@ TEST(EstimateApdSkewness, WithoutMotorTorqueTheSignalStandsIn) {
 }
 
 TEST(EstimateApdSkewness, ConditionsOfTheCurve) {
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   MonitoringCurve curve = linear_curve();
   curve.conditions.signal = "motor_velocity";
   EXPECT_NE(estimate(record, curve).message.find("signal motor_velocity"), std::string::npos);
@@ -329,8 +337,8 @@ TEST(EstimateApdSkewness, ConditionsOfTheCurve) {
   EXPECT_NE(estimate(record, curve).message.find("class layout"), std::string::npos);
   curve = linear_curve();
   curve.conditions.output_locked = false;
-  Record moving = record;
-  for (std::size_t i = 0; i < moving.size(); ++i) moving.column(Channel::load_position)[i] = i;
+  record::Record moving = record;
+  for (std::size_t i = 0; i < moving.size(); ++i) moving.column(record::Channel::load_position)[i] = i;
   EXPECT_EQ(estimate(moving, curve).status, Status::ok);
   const ApdResult apd = apd_of(record, settings());
   const Estimate none = estimate_apd_skewness(apd, match_curve(record, apd, settings(), nullptr), nullptr);
@@ -340,19 +348,19 @@ TEST(EstimateApdSkewness, ConditionsOfTheCurve) {
 
 // Spikes and noise on the torque command are no other excitation.
 TEST(EstimateApdSkewness, AFewSpikesOnTheMotorTorqueAreAllowed) {
-  Record record = make_record({});
-  for (const int i : {17, 300, 812, 1400}) record.column(Channel::motor_torque)[i] = 0.5;
+  record::Record record = make_record({});
+  for (const int i : {17, 300, 812, 1400}) record.column(record::Channel::motor_torque)[i] = 0.5;
   EXPECT_EQ(estimate(record, linear_curve()).status, Status::ok) << estimate(record, linear_curve()).message;
 }
 
 TEST(EstimateApdSkewness, SamplesThatAreNotFinite) {
-  Record record = make_record({});
-  record.column(Channel::sensor_torque)[333] = std::nan("");
-  record.column(Channel::sensor_torque)[777] = std::numeric_limits<double>::infinity();
+  record::Record record = make_record({});
+  record.column(record::Channel::sensor_torque)[333] = std::nan("");
+  record.column(record::Channel::sensor_torque)[777] = std::numeric_limits<double>::infinity();
   const Estimate e = estimate(record, linear_curve());  // one sample outside the classes in two of 15 periods
   EXPECT_EQ(e.status, Status::ok) << e.message;
   EXPECT_NEAR(e.backlash, estimate(make_record({}), linear_curve()).backlash, 2e-6);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

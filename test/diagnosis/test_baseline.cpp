@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/baseline.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 const std::string kText =
@@ -108,4 +108,4 @@ TEST(Baseline, OfAnotherRigIsRefusedOfAnotherVersionTold) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 Estimate sound(const std::string& method, double value, double half) {
@@ -82,4 +82,4 @@ TEST(HealthyMachine, NeedsAValueThatNobodyContradicts) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

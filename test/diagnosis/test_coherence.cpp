@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/coherence.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 std::vector<double> white(std::size_t count, unsigned seed) {
@@ -89,21 +89,21 @@ TEST(Coherence, LinesPowerAndLimits) {
 }
 
 /// Torque white up to half of the sampling rate, and a response.
-Record record_of(const std::function<double(double, double)>& response,
-                 std::vector<double> torque = white(20000, 9)) {
-  Record r;
+record::Record record_of(const std::function<double(double, double)>& response,
+                         std::vector<double> torque = white(20000, 9)) {
+  record::Record r;
   const std::vector<double> noise = white(torque.size(), 8);
   for (std::size_t i = 0; i < torque.size(); ++i) {
     r.time.push_back(1e-3 * static_cast<double>(i));
-    r.column(Channel::sensor_torque).push_back(response(torque[i], noise[i]));
+    r.column(record::Channel::sensor_torque).push_back(response(torque[i], noise[i]));
   }
-  r.column(Channel::motor_torque) = std::move(torque);
+  r.column(record::Channel::motor_torque) = std::move(torque);
   return r;
 }
 
 CoherenceSettings settings() {
   CoherenceSettings s;
-  s.response = Channel::sensor_torque;
+  s.response = record::Channel::sensor_torque;
   s.segment = 0.128;
   return s;
 }
@@ -159,17 +159,17 @@ TEST(CoherenceDetector, RefusesTorqueThatIsNotRandomAndBroad) {
 
 TEST(CoherenceDetector, WhatTheRecordLacks) {
   CoherenceSettings s = settings();
-  Record r = record_of(slightly_noisy);
+  record::Record r = record_of(slightly_noisy);
   EXPECT_EQ(detect_nonlinearity(r.slice(0, 1), s).status, Status::insufficient_data);
-  s.response = Channel::load_velocity;
+  s.response = record::Channel::load_velocity;
   EXPECT_EQ(detect_nonlinearity(r, s).status, Status::insufficient_data);
-  s.response = Channel::sensor_torque;
+  s.response = record::Channel::sensor_torque;
   r.time.back() += 1;
   EXPECT_EQ(detect_nonlinearity(r, s).status, Status::out_of_domain);
   const auto refused = [](void (*spoil)(CoherenceSettings&)) {
     CoherenceSettings bad = settings();
     spoil(bad);
-    EXPECT_THROW(detect_nonlinearity(Record(), bad), InvalidParameter);
+    EXPECT_THROW(detect_nonlinearity(record::Record(), bad), InvalidParameter);
   };
   refused([](auto& c) { c.segment = 0; });
   refused([](auto& c) { c.lower = -1; });
@@ -180,4 +180,4 @@ TEST(CoherenceDetector, WhatTheRecordLacks) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

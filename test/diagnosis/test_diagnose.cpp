@@ -12,7 +12,7 @@
 #include "support/estimates.h"
 #include "support/records.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 using test::by;
@@ -21,7 +21,7 @@ using test::make_record;
 
 DiagnosisSettings all_settings() {
   DiagnosisSettings settings;
-  settings.apd = ApdSettings{Channel::sensor_torque, 0.1, 2, {60, -0.4, 0.4}};
+  settings.apd = ApdSettings{record::Channel::sensor_torque, 0.1, 2, {60, -0.4, 0.4}};
   LostMotionSettings lost_motion;
   lost_motion.torque = 0.05;
   lost_motion.base_radius = 0.015;
@@ -114,10 +114,10 @@ TEST(Diagnose, RecordsTooShortForAWholeSettledPeriod) {
 
 TEST(Diagnose, SettlingIsDiscardedForAllMethods) {
   const MonitoringCurve curve = linear_curve();
-  Record record = make_record({});
+  record::Record record = make_record({});
   for (std::size_t i = 0; i < 200; ++i) {  // the first two periods are nonsense
-    record.column(Channel::sensor_torque)[i] = 0.3;
-    record.column(Channel::motor_position)[i] = 9;
+    record.column(record::Channel::sensor_torque)[i] = 0.3;
+    record.column(record::Channel::motor_position)[i] = 9;
   }
   const Diagnosis spoilt = diagnose(record, all_settings(), &curve),
                   clean = diagnose(make_record({}), all_settings(), &curve);
@@ -139,7 +139,7 @@ TEST(DiagnosisSettings, ReadFromARigFile) {
       "lost_motion: {torque: 3.5, elastic_deflection: included}\n"
       "limits: {backlash_angle: {watch: 1, service: 2, stop: 3}}\n");
   ASSERT_TRUE(all.apd && all.lost_motion && all.limits);
-  EXPECT_EQ(all.apd->signal, Channel::motor_velocity);
+  EXPECT_EQ(all.apd->signal, record::Channel::motor_velocity);
   EXPECT_EQ(all.apd->period, 0.2);
   EXPECT_EQ(all.apd->settling_periods, 3);
   EXPECT_TRUE(all.apd->layout == (ApdLayout{40, -1, 2}));
@@ -174,4 +174,4 @@ TEST(DiagnosisSettings, ReadFromARigFile) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

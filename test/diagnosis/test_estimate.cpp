@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/estimate.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 TEST(Status, NamesAreTheEnumerators) {
@@ -30,4 +30,4 @@ TEST(Status, OtherTextIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -6,7 +6,7 @@
 #include "backlash_diagnosis/diagnosis/family_match.h"
 #include "support/curve.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 /// Distributions uniform over [-1, 1] at backlash 0, wider by `kWider` per point; the same beyond the curve.
@@ -78,4 +78,4 @@ TEST(FamilyMatch, UnknownNoiseWidensTheInterval) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -34,7 +34,7 @@ extern "C" int fsync(int descriptor) {
   return on_fsync ? on_fsync(descriptor) : static_cast<int>(::syscall(SYS_fsync, descriptor));
 }
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -455,4 +455,4 @@ TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/limits.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 class LimitsFile : public ::testing::Test {
@@ -55,4 +55,4 @@ TEST(LimitsCheck, LimitsInMetresCannotGradeAnAngle) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

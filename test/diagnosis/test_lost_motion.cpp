@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/diagnosis/lost_motion.h"
 #include "backlash_diagnosis/record/csv.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 const double kPi = std::acos(-1.0);
@@ -59,8 +59,8 @@ struct Experiment {
   unsigned seed = 1;
 };
 
-Record run(Machine machine, const Experiment& e) {
-  Record record;
+record::Record run(Machine machine, const Experiment& e) {
+  record::Record record;
   std::mt19937 generator(e.seed);
   std::normal_distribution<double> normal;
   const auto samples = static_cast<std::size_t>(e.duration * e.rate);
@@ -72,8 +72,8 @@ Record run(Machine machine, const Experiment& e) {
       if (time >= from && time < from + 0.5 / e.frequency) position += size;
     }
     record.time.push_back(time);
-    record.column(Channel::motor_torque).push_back(torque + e.torque_noise * normal(generator));
-    record.column(Channel::motor_position).push_back(position);
+    record.column(record::Channel::motor_torque).push_back(torque + e.torque_noise * normal(generator));
+    record.column(record::Channel::motor_position).push_back(position);
   }
   return record;
 }
@@ -138,8 +138,9 @@ TEST(LostMotionRamp, TorqueNoiseQuantisedPositionOffsetAndDriftDoNotMatter) {
   experiment.position_noise = 5e-5;
   experiment.offset = -0.2;
   experiment.drift = 2e-4;  // 4e-3 rad over the record, a sixth of the play
-  Record record = run(machine, experiment);
-  for (double& value : record.column(Channel::motor_position)) value = std::round(value / 1e-4) * 1e-4;
+  record::Record record = run(machine, experiment);
+  for (double& value : record.column(record::Channel::motor_position))
+    value = std::round(value / 1e-4) * 1e-4;
   const Estimate estimate = estimate_lost_motion(record, at(3.5));
   expect_contains(estimate, machine.play(3.5, 4));
   // One step of the position.
@@ -258,14 +259,14 @@ TEST(LostMotionFree, UncertainDeflectionWidensTheInterval) {
 }
 
 // Square wave whose motion approaches the wall as W - B exp(-t/tau) + A exp(-t/tau) cos(omega t).
-Record settling_record(double wall, double creep, double ring, double tau) {
-  Record record;
+record::Record settling_record(double wall, double creep, double ring, double tau) {
+  record::Record record;
   for (int i = 0; i < 2000; ++i) {
     const double time = i * 1e-3, since = (i % 50) * 1e-3, side = (i / 50) % 2 == 0 ? 1 : -1;
     const double decay = std::exp(-since / tau);
     record.time.push_back(time);
-    record.column(Channel::motor_torque).push_back(side);
-    record.column(Channel::motor_position)
+    record.column(record::Channel::motor_torque).push_back(side);
+    record.column(record::Channel::motor_position)
         .push_back(side * (wall - creep * decay + ring * decay * std::cos(2 * kPi * 150 * since)));
   }
   return record;
@@ -287,9 +288,9 @@ TEST(LostMotionFree, RingingIsAveragedAndInTheInterval) {
 
 TEST(LostMotionRamp, RippleOfThePositionIsInTheInterval) {
   const double ripple = 2e-4;
-  Record record = run({}, {});
+  record::Record record = run({}, {});
   for (std::size_t i = 0; i < record.size(); ++i) {
-    record.column(Channel::motor_position)[i] += ripple * std::sin(2 * kPi * 30 * record.time[i]);
+    record.column(record::Channel::motor_position)[i] += ripple * std::sin(2 * kPi * 30 * record.time[i]);
   }
   const Estimate estimate = estimate_lost_motion(record, at(3));
   expect_contains(estimate, Machine().play(3, 4));
@@ -332,19 +333,19 @@ TEST(LostMotionStated, SwitchedTorqueBeyondTheLevelIsCorrectedWhereDeflectionIsK
 }
 
 TEST(LostMotionStatus, NamesTheMissingChannel) {
-  Record record = run({}, {});
-  record.column(Channel::motor_position).clear();
+  record::Record record = run({}, {});
+  record.column(record::Channel::motor_position).clear();
   expect_refusal(estimate_lost_motion(record, at(3)), Status::insufficient_data, "motor_position");
   record = run({}, {});
-  record.column(Channel::motor_torque).clear();
+  record.column(record::Channel::motor_torque).clear();
   expect_refusal(estimate_lost_motion(record, at(3)), Status::insufficient_data, "sensor_torque");
-  expect_refusal(estimate_lost_motion(Record(), at(3)), Status::insufficient_data, "motor_position");
+  expect_refusal(estimate_lost_motion(record::Record(), at(3)), Status::insufficient_data, "motor_position");
 }
 
 TEST(LostMotionStatus, SensorTorqueServesWhereMotorTorqueIsAbsent) {
-  Record record = run({}, {});
+  record::Record record = run({}, {});
   const double expected = estimate_lost_motion(record, at(3)).backlash_angle;
-  record.column(Channel::motor_torque).swap(record.column(Channel::sensor_torque));
+  record.column(record::Channel::motor_torque).swap(record.column(record::Channel::sensor_torque));
   EXPECT_DOUBLE_EQ(estimate_lost_motion(record, at(3)).backlash_angle, expected);
 }
 
@@ -355,8 +356,8 @@ TEST(LostMotionStatus, TorqueBelowTheLevelIsOutOfDomainWithWhatWasReached) {
                  "needed are +-3 N m");
   expect_refusal(estimate_lost_motion(run({}, experiment), without_deflection(3, 1e-3)),
                  Status::out_of_domain, "1.9");
-  Record one_sided = run({}, {});
-  for (double& torque : one_sided.column(Channel::motor_torque)) torque = std::max(torque, -1.0);
+  record::Record one_sided = run({}, {});
+  for (double& torque : one_sided.column(record::Channel::motor_torque)) torque = std::max(torque, -1.0);
   expect_refusal(estimate_lost_motion(one_sided, at(3)), Status::out_of_domain, "-1 N m");
 }
 
@@ -375,11 +376,12 @@ TEST(LostMotionStatus, OneExcursionPerSideIsTooFewAndTwoGiveAWideInterval) {
 }
 
 TEST(LostMotionStatus, MovingOutputIsOutOfDomain) {
-  Record record = run({}, {});
-  record.column(Channel::load_position).assign(record.size(), 0.7);
+  record::Record record = run({}, {});
+  record.column(record::Channel::load_position).assign(record.size(), 0.7);
   EXPECT_EQ(estimate_lost_motion(record, at(3)).status, Status::ok);
   for (std::size_t i = 0; i < record.size(); ++i) {
-    record.column(Channel::load_position)[i] = 0.2 * record.column(Channel::motor_position)[i];
+    record.column(record::Channel::load_position)[i] =
+        0.2 * record.column(record::Channel::motor_position)[i];
   }
   expect_refusal(estimate_lost_motion(record, at(3)), Status::out_of_domain, "not locked");
   LostMotionSettings settings = at(3);
@@ -390,23 +392,24 @@ TEST(LostMotionStatus, MovingOutputIsOutOfDomain) {
 TEST(LostMotionStatus, MotionThatDoesNotSettleOrGoesTheWrongWayIsOutOfDomain) {
   expect_refusal(estimate_lost_motion(settling_record(5e-3, 0, 5e-3, 1.0), without_deflection(1, 1e-3)),
                  Status::out_of_domain, "come to rest");
-  Record reversed = run({}, {});
-  for (double& position : reversed.column(Channel::motor_position)) position = -position;
+  record::Record reversed = run({}, {});
+  for (double& position : reversed.column(record::Channel::motor_position)) position = -position;
   expect_refusal(estimate_lost_motion(reversed, at(3)), Status::out_of_domain, "smaller positions");
   expect_refusal(estimate_lost_motion(run({}, {}), without_deflection(3, 1.0)), Status::out_of_domain,
                  "not this machine");
 }
 
 TEST(LostMotionStatus, SamplesThatAreNotFiniteAreSkipped) {
-  Record record = run({}, {});
+  record::Record record = run({}, {});
   const double expected = estimate_lost_motion(record, at(3)).backlash_angle;
-  for (std::size_t i = 50; i < record.size(); i += 400) record.column(Channel::motor_position)[i] = kNaN;
+  for (std::size_t i = 50; i < record.size(); i += 400)
+    record.column(record::Channel::motor_position)[i] = kNaN;
   // A missing sample shifts a window by less than a sample, 0.01 N m of torque on each side.
   EXPECT_NEAR(estimate_lost_motion(record, at(3)).backlash_angle, expected, 2 * 1e-3 * 0.01);
 }
 
 TEST(LostMotionStatus, SettingsOutOfRangeThrow) {
-  const Record record = run({}, {});
+  const record::Record record = run({}, {});
   for (const double torque : {0.0, -1.0, kNaN})
     EXPECT_THROW(estimate_lost_motion(record, at(torque)), InvalidParameter);
   LostMotionSettings settings = at(3);
@@ -431,7 +434,7 @@ TEST(LostMotionMeasured, CycloidalGearboxKeepsOrderAndReference) {
   for (const auto& [name, degrees] : reference) {
     const auto path = test::find_data("measured/cycloidal_" + name + "_play.csv");
     if (!path) GTEST_SKIP() << "measured record of " << name << " is absent";
-    const Estimate estimate = estimate_lost_motion(read_csv(*path), at(3.5));
+    const Estimate estimate = estimate_lost_motion(record::read_csv(*path), at(3.5));
     // Reading precision of the plots and the slips of a degree in single ramps: 0.05 deg.
     EXPECT_NEAR(estimate.backlash_angle * 180 / kPi, degrees, 0.05) << name << ": " << estimate.message;
     expect_contains(estimate, degrees * kPi / 180);
@@ -458,7 +461,7 @@ TEST(LostMotionMeasured, RigWithKnownHalfGapWithinThreeMicrometres) {
   for (const int half_gap : {0, 30, 55, 80}) {
     const auto path = test::find_data("rig/rig_halfgap_" + std::to_string(half_gap) + "um.csv");
     if (!path) GTEST_SKIP() << "rig record with half gap " << half_gap << " um is absent";
-    const Estimate estimate = estimate_lost_motion(read_csv(*path), settings);
+    const Estimate estimate = estimate_lost_motion(record::read_csv(*path), settings);
     const double truth = 2e-6 * half_gap;
     EXPECT_NEAR(estimate.backlash, truth, 3e-6) << estimate.message;  // demanded of the method
     EXPECT_LE(estimate.lower, truth);
@@ -468,4 +471,4 @@ TEST(LostMotionMeasured, RigWithKnownHalfGapWithinThreeMicrometres) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

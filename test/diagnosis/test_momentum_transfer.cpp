@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kInertia = 1e-3;  // kg m^2
@@ -16,8 +16,8 @@ constexpr double kRate = 10000;    // Hz
 
 /// A rigid body between two walls that swallow its momentum, under a square wave of 10 Hz: at rest on a wall,
 /// it crosses the gap with constant acceleration and hits with w^2 = 2 kTorque gap / kInertia.
-Record crossing(double gap, double noise = 0, double torque_bias = 0) {
-  Record r;
+record::Record crossing(double gap, double noise = 0, double torque_bias = 0) {
+  record::Record r;
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   for (int i = 0; i < kRate; ++i) {
@@ -26,10 +26,10 @@ Record crossing(double gap, double noise = 0, double torque_bias = 0) {
     const double acceleration = kTorque / kInertia, flight = std::sqrt(2 * gap / acceleration);
     const bool flies = since < flight && torque_bias == 0;
     r.time.push_back(t);
-    r.column(Channel::motor_torque).push_back(torque_bias + sign * kTorque);
-    r.column(Channel::motor_velocity)
+    r.column(record::Channel::motor_torque).push_back(torque_bias + sign * kTorque);
+    r.column(record::Channel::motor_velocity)
         .push_back((flies ? sign * acceleration * since : 0) + noise * normal(random));
-    r.column(Channel::motor_position)
+    r.column(record::Channel::motor_position)
         .push_back(sign * (flies ? 0.5 * acceleration * since * since - 0.5 * gap : 0.5 * gap));
   }
   return r;
@@ -47,8 +47,8 @@ TEST(MomentumTransfer, TravelOfAFreeFlightFromRest) {
   for (const double gap : {2e-3, 1e-2, 4e-2}) {
     const double speed = std::sqrt(2 * kTorque * gap / kInertia);
     for (const bool tachometer : {true, false}) {
-      Record record = crossing(gap);
-      record.column(tachometer ? Channel::motor_position : Channel::motor_velocity).clear();
+      record::Record record = crossing(gap);
+      record.column(tachometer ? record::Channel::motor_position : record::Channel::motor_velocity).clear();
       const Estimate e = estimate_momentum_transfer(record, settings());
       ASSERT_EQ(e.status, Status::ok) << e.message;
       EXPECT_EQ(e.method, "momentum_transfer");
@@ -77,12 +77,12 @@ TEST(MomentumTransfer, ALoadThatMovesIsSubtracted) {
   MomentumTransferSettings s = settings();
   s.output_locked = false;
   s.load_ratio = 2;
-  Record record = crossing(0.01);
+  record::Record record = crossing(0.01);
   EXPECT_EQ(estimate_momentum_transfer(record, s).status, Status::insufficient_data);
   for (std::size_t i = 0; i < record.size(); ++i) {
     const double drift = 0.3 * record.time[i];
-    record.column(Channel::motor_velocity)[i] += 0.3;
-    record.column(Channel::load_position).push_back(0.5 * drift);
+    record.column(record::Channel::motor_velocity)[i] += 0.3;
+    record.column(record::Channel::load_position).push_back(0.5 * drift);
   }
   const Estimate e = estimate_momentum_transfer(record, s);
   ASSERT_EQ(e.status, Status::ok) << e.message;
@@ -102,12 +102,12 @@ TEST(MomentumTransfer, RefusesWhatItCannotSee) {
   EXPECT_NE(noisy.message.find("noise"), std::string::npos) << noisy.message;
   EXPECT_EQ(estimate_momentum_transfer(crossing(0.01).slice(0, 0.12), settings()).status,
             Status::insufficient_data);
-  Record r = crossing(0.01);
-  r.column(Channel::motor_torque).clear();
+  record::Record r = crossing(0.01);
+  r.column(record::Channel::motor_torque).clear();
   EXPECT_EQ(estimate_momentum_transfer(r, settings()).status, Status::insufficient_data);
   r = crossing(0.01);
-  r.column(Channel::motor_velocity).clear();
-  r.column(Channel::motor_position).clear();
+  r.column(record::Channel::motor_velocity).clear();
+  r.column(record::Channel::motor_position).clear();
   EXPECT_EQ(estimate_momentum_transfer(r, settings()).status, Status::insufficient_data);
   // Motor and pinion swing at 2 kHz: five samples per cycle.
   MomentumTransferSettings s = settings();
@@ -117,8 +117,9 @@ TEST(MomentumTransfer, RefusesWhatItCannotSee) {
 }
 
 TEST(MomentumTransfer, RefusesFlightsThatTheDeclaredInertiaDoesNotExplain) {
-  Record record = crossing(0.01);
-  for (double& torque : record.column(Channel::motor_torque)) torque *= 1.6;  // 0.6 of 1.6 N m left in flight
+  record::Record record = crossing(0.01);
+  for (double& torque : record.column(record::Channel::motor_torque))
+    torque *= 1.6;  // 0.6 of 1.6 N m left in flight
   const Estimate e = estimate_momentum_transfer(record, settings());
   EXPECT_EQ(e.status, Status::out_of_domain);
   EXPECT_NE(e.message.find("fly freely"), std::string::npos) << e.message;
@@ -128,7 +129,7 @@ TEST(MomentumTransfer, RefusesSettingsOutOfRange) {
   const auto refused = [](void (*spoil)(MomentumTransferSettings&)) {
     MomentumTransferSettings s = settings();
     spoil(s);
-    EXPECT_THROW(estimate_momentum_transfer(Record(), s), InvalidParameter);
+    EXPECT_THROW(estimate_momentum_transfer(record::Record(), s), InvalidParameter);
   };
   refused([](auto& s) { s.motor_inertia = kNaN; });
   refused([](auto& s) { s.motor_damping = -1; });
@@ -140,4 +141,4 @@ TEST(MomentumTransfer, RefusesSettingsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 #include "support/curve.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 using test::linear_curve;
@@ -230,7 +230,7 @@ TEST(MonitoringCurve, AnUnknownNoiseWidensTheInterval) {
   EXPECT_NEAR(e.lower, backlash_at(3.3) - half, 1e-12);
   EXPECT_NEAR(e.upper, backlash_at(3.1) + half, 1e-12);
   EXPECT_NEAR(curve.invert(3, 5, {0.006, 0.006}).upper, backlash_at(3.3) + half, 1e-12);
-  const Estimate any = curve.invert(3, 5, NoiseRange());
+  const Estimate any = curve.invert(3, 5, signal::NoiseRange());
   EXPECT_NEAR(any.lower, backlash_at(3.5) - half, 1e-12);
   EXPECT_NEAR(any.upper, backlash_at(3.0) + half, 1e-12);
   EXPECT_EQ(curve.invert(3, 5, {-1, 99}).upper, any.upper);
@@ -423,4 +423,4 @@ TEST(MonitoringCurve, MalformedFilesAreRefusedWithTheirKey) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/period_analyser.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 const ApdLayout kLayout = {10, -1, 1};
@@ -225,4 +225,4 @@ TEST(WindowGrid, NeedsItsLeadingSamples) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kStiffness = 4e5;                       // N m/rad
@@ -46,8 +46,8 @@ struct Servo {
     return q + torque / stiffness + eccentricity * std::sin(2 * M_PI * q / 0.5) +
            0.5 * gap * (1 + gap_wave * std::sin(3 * q)) * std::erf(torque / 1.0);
   }
-  Record record(double rate = 1000) const {
-    Record r;
+  record::Record record(double rate = 1000) const {
+    record::Record r;
     std::mt19937 random(3);
     std::normal_distribution<double> normal;
     const auto rounded = [](double x, double step) { return step > 0 ? step * std::round(x / step) : x; };
@@ -56,11 +56,11 @@ struct Servo {
       const double acceleration = (motor(t + h) - 2 * motor(t) + motor(t - h)) / (h * h);
       const double speed = (motor(t + h) - motor(t - h)) / (2 * h);
       r.time.push_back(t);
-      r.column(Channel::motor_torque)
+      r.column(record::Channel::motor_torque)
           .push_back(transmitted(t) + motor_inertia * acceleration + motor_coulomb * std::tanh(speed / 1e-3) +
                      torque_noise * normal(random));
-      r.column(Channel::motor_position).push_back(rounded(motor(t), motor_step));
-      r.column(Channel::load_position).push_back(offset + rounded(scale * load(t), load_step));
+      r.column(record::Channel::motor_position).push_back(rounded(motor(t), motor_step));
+      r.column(record::Channel::load_position).push_back(offset + rounded(scale * load(t), load_step));
     }
     return r;
   }
@@ -125,16 +125,16 @@ TEST(PositionDifference, AGapThatVariesWithPositionWidensTheInterval) {
 }
 
 /// Locked output, torque in slow triangles, elastic deflection with a power law.
-Record locked(double gap, double compliance_error = 1) {
-  Record r;
+record::Record locked(double gap, double compliance_error = 1) {
+  record::Record r;
   for (int i = 0; i < 4000; ++i) {
     const double t = i / 1000.0, phase = std::fmod(t, 0.5) / 0.5;
     const double torque = 2 * (std::abs(4 * phase - 2) - 1);  // +-2 N m
     const double elastic = compliance_error * std::copysign(1e-3 * std::pow(std::abs(torque), 0.8), torque);
     r.time.push_back(t);
-    r.column(Channel::motor_torque).push_back(torque);
-    r.column(Channel::motor_position).push_back(elastic + 0.5 * gap * std::erf(torque / 0.01));
-    r.column(Channel::load_position).push_back(0);
+    r.column(record::Channel::motor_torque).push_back(torque);
+    r.column(record::Channel::motor_position).push_back(elastic + 0.5 * gap * std::erf(torque / 0.01));
+    r.column(record::Channel::load_position).push_back(0);
   }
   return r;
 }
@@ -166,11 +166,11 @@ TEST(PositionDifference, LockedOutputWithDeclaredElasticDeflection) {
 
 // Names of torque and position exchanged: the "position" is a square wave that no torque could drive.
 TEST(PositionDifference, PositionsThatJumpAreNoPositions) {
-  Record r = locked(5e-3);
+  record::Record r = locked(5e-3);
   for (std::size_t i = 0; i < r.size(); ++i) {
     const double side = std::sin(2 * M_PI * 10 * r.time[i] + 0.01) > 0 ? 1 : -1;
-    r.column(Channel::motor_torque)[i] = 5e-3 * side;
-    r.column(Channel::motor_position)[i] = 0.05 * side;
+    r.column(record::Channel::motor_torque)[i] = 5e-3 * side;
+    r.column(record::Channel::motor_position)[i] = 0.05 * side;
   }
   PositionDifferenceSettings s = locked_settings();
   s.output_locked = true;
@@ -181,34 +181,34 @@ TEST(PositionDifference, PositionsThatJumpAreNoPositions) {
 }
 
 TEST(PositionDifference, WhatTheRecordLacksBecomesAStatus) {
-  const Record full = Servo().record();
-  const auto status_without = [&full](Channel channel) {
-    Record r = full;
+  const record::Record full = Servo().record();
+  const auto status_without = [&full](record::Channel channel) {
+    record::Record r = full;
     r.column(channel).clear();
     const Estimate e = estimate_position_difference(r, settings());
     EXPECT_TRUE(std::isnan(e.backlash_angle));
     EXPECT_FALSE(e.message.empty());
     return e.status;
   };
-  EXPECT_EQ(status_without(Channel::motor_position), Status::insufficient_data);
-  EXPECT_EQ(status_without(Channel::load_position), Status::insufficient_data);
-  EXPECT_EQ(status_without(Channel::motor_torque), Status::insufficient_data);
+  EXPECT_EQ(status_without(record::Channel::motor_position), Status::insufficient_data);
+  EXPECT_EQ(status_without(record::Channel::load_position), Status::insufficient_data);
+  EXPECT_EQ(status_without(record::Channel::motor_torque), Status::insufficient_data);
   EXPECT_EQ(estimate_position_difference(full.slice(0, 0.05), settings()).status, Status::insufficient_data);
   // Enough samples to begin with, of which the longest averages leave no window at all.
   const double few = 100 * full.sampling_interval();
   EXPECT_EQ(estimate_position_difference(full.slice(0, few), settings()).status, Status::out_of_domain);
-  Record one_sided = locked(1e-3);
+  record::Record one_sided = locked(1e-3);
   for (std::size_t i = 0; i < one_sided.size(); ++i) {
-    one_sided.column(Channel::motor_torque)[i] = 1 + 0.1 * std::sin(20 * one_sided.time[i]);
-    one_sided.column(Channel::motor_position)[i] = 1e-3 + 1e-6 * std::sin(20 * one_sided.time[i]);
+    one_sided.column(record::Channel::motor_torque)[i] = 1 + 0.1 * std::sin(20 * one_sided.time[i]);
+    one_sided.column(record::Channel::motor_position)[i] = 1e-3 + 1e-6 * std::sin(20 * one_sided.time[i]);
   }
   EXPECT_EQ(estimate_position_difference(one_sided, locked_settings()).status, Status::out_of_domain);
-  Record negative = locked(-2e-3);  // the declared machine would have to overlap
+  record::Record negative = locked(-2e-3);  // the declared machine would have to overlap
   EXPECT_NE(estimate_position_difference(negative, locked_settings()).status, Status::ok);
 }
 
 TEST(PositionDifference, RefusesSettingsOutOfRange) {
-  const Record r = locked(1e-3);
+  const record::Record r = locked(1e-3);
   const auto refused = [&r](void (*spoil)(PositionDifferenceSettings&)) {
     PositionDifferenceSettings s = locked_settings();
     spoil(s);
@@ -222,4 +222,4 @@ TEST(PositionDifference, RefusesSettingsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

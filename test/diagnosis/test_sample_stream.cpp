@@ -12,7 +12,7 @@
 #include "support/curve.h"
 #include "support/records.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 using test::make_record;
@@ -22,7 +22,7 @@ using test::values_at;
 const ApdLayout kLayout = {60, -0.4, 0.4};
 
 ApdSettings apd_settings(double period = 0.1, int settling = 2) {
-  return {Channel::sensor_torque, period, settling, kLayout};
+  return {record::Channel::sensor_torque, period, settling, kLayout};
 }
 
 DiagnosisSettings diagnosis_settings(const ApdSettings& apd) {
@@ -42,7 +42,7 @@ struct Live {
   SampleStream stream;
   std::vector<PeriodResult> periods;
 
-  void push(const Record& record) {
+  void push(const record::Record& record) {
     for (std::size_t i = 0; i < record.size(); ++i)
       if (const PeriodResult* period = stream.add(record.time[i], values_at(record, i)))
         periods.push_back(*period);
@@ -53,10 +53,10 @@ bool same(double a, double b) {
   return a == b || (std::isnan(a) && std::isnan(b));
 }
 
-void expect_same(const Record& a, const Record& b) {
+void expect_same(const record::Record& a, const record::Record& b) {
   EXPECT_EQ(a.time, b.time);
-  for (const Channel channel : kChannels)
-    EXPECT_EQ(a.column(channel), b.column(channel)) << channel_name(channel);
+  for (const record::Channel channel : record::kChannels)
+    EXPECT_EQ(a.column(channel), b.column(channel)) << record::channel_name(channel);
 }
 
 void expect_same(const Diagnosis& a, const Diagnosis& b) {
@@ -91,7 +91,8 @@ void expect_apd_of_samples(const PeriodWindow& window, const ApdSettings& apd) {
 }
 
 /// Live and offline, on the same samples.
-void expect_live_equals_offline(const Record& record, const ApdSettings& apd, const std::string& what) {
+void expect_live_equals_offline(const record::Record& record, const ApdSettings& apd,
+                                const std::string& what) {
   SCOPED_TRACE(what);
   const MonitoringCurve curve = test::linear_curve();
   const DiagnosisSettings settings = diagnosis_settings(apd);
@@ -123,7 +124,7 @@ TEST(SampleStream, LiveEqualsOfflineAtAnyLength) {
   for (const double period : {0.1, 0.0}) {
     RecordRecipe recipe;
     recipe.duration = 0.62;
-    const Record record = make_record(recipe);
+    const record::Record record = make_record(recipe);
     const MonitoringCurve curve = test::linear_curve();
     const DiagnosisSettings settings = diagnosis_settings(apd_settings(period));
     SampleStream stream(StreamSettings{settings.apd, 60});
@@ -131,7 +132,7 @@ TEST(SampleStream, LiveEqualsOfflineAtAnyLength) {
       stream.add(record.time[i], values_at(record, i));
       if (i % 7 != 0 && i % 100 > 2 && i % 100 < 97) continue;  // all borders, some between
       SCOPED_TRACE(i);
-      const Record so_far = record.slice(0, 0.5 * (record.time[i] + (i + 1) * 1e-3));
+      const record::Record so_far = record.slice(0, 0.5 * (record.time[i] + (i + 1) * 1e-3));
       ASSERT_EQ(so_far.size(), i + 1);
       expect_same(diagnose(stream.latest(0), settings, &curve), diagnose(so_far, settings, &curve));
     }
@@ -139,20 +140,21 @@ TEST(SampleStream, LiveEqualsOfflineAtAnyLength) {
 }
 
 TEST(SampleStream, LiveEqualsOfflineWithGapsAndMissingChannels) {
-  Record gaps = make_record({});
+  record::Record gaps = make_record({});
   test::cut_out(gaps, 1, 4);
   test::cut_out(gaps, 640, 700);
   test::cut_out(gaps, 900, 903);
   expect_live_equals_offline(gaps, apd_settings(), "gaps");
   expect_live_equals_offline(gaps, apd_settings(0), "gaps, unknown period");
-  for (const Channel absent : {Channel::motor_torque, Channel::motor_position, Channel::load_position}) {
-    Record record = make_record({});
+  for (const record::Channel absent :
+       {record::Channel::motor_torque, record::Channel::motor_position, record::Channel::load_position}) {
+    record::Record record = make_record({});
     record.column(absent).clear();
-    expect_live_equals_offline(record, apd_settings(), channel_name(absent));
-    expect_live_equals_offline(record, apd_settings(0), channel_name(absent) + ", unknown period");
+    expect_live_equals_offline(record, apd_settings(), record::channel_name(absent));
+    expect_live_equals_offline(record, apd_settings(0), record::channel_name(absent) + ", unknown period");
   }
-  Record constant = make_record({});
-  for (const Channel channel : kChannels)
+  record::Record constant = make_record({});
+  for (const record::Channel channel : record::kChannels)
     for (double& value : constant.column(channel)) value = 0.03;
   expect_live_equals_offline(constant, apd_settings(), "constant");
   expect_live_equals_offline(constant, apd_settings(0), "constant, unknown period");
@@ -164,7 +166,7 @@ TEST(SampleStream, LiveEqualsOfflineWithGapsAndMissingChannels) {
 }
 
 TEST(SampleStream, ReportsEachSettledPeriodOnceWithTheOfflineDistribution) {
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   Live run(StreamSettings{apd_settings(), 60});
   run.push(record);
   ASSERT_EQ(run.periods.size(), 13u);  // 15 periods, 2 of them settling
@@ -173,23 +175,23 @@ TEST(SampleStream, ReportsEachSettledPeriodOnceWithTheOfflineDistribution) {
     EXPECT_EQ(run.periods[i].index, static_cast<long>(i) + 2);
     AmplitudeDistribution expected(kLayout);
     for (std::size_t k = 0; k < 100; ++k)
-      expected.add(record.column(Channel::sensor_torque)[100 * (i + 2) + k]);
+      expected.add(record.column(record::Channel::sensor_torque)[100 * (i + 2) + k]);
     EXPECT_EQ(run.periods[i].apd.counts(), expected.counts()) << i;
   }
 }
 
 TEST(SampleStream, LatestGivesExactlyTheSamplesAskedFor) {
   Live run(StreamSettings{apd_settings(), 60});
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   run.push(record);
   for (const long count : {1L, 2L, 5L, 13L, 14L, 1000L}) {
-    const Record latest = run.stream.latest(count).record;
+    const record::Record latest = run.stream.latest(count).record;
     const std::size_t samples = 100 * std::min(count, 13L);
     ASSERT_EQ(latest.size(), samples);
     EXPECT_EQ(latest.time.front(), record.time[1500 - samples]);
     EXPECT_EQ(latest.time.back(), record.time.back());
-    EXPECT_EQ(latest.column(Channel::motor_position).front(),
-              record.column(Channel::motor_position)[1500 - samples]);
+    EXPECT_EQ(latest.column(record::Channel::motor_position).front(),
+              record.column(record::Channel::motor_position)[1500 - samples]);
   }
 }
 
@@ -204,7 +206,7 @@ TEST(SampleStream, TrimmedBuffersGiveWholeWindows) {
           recipe.rate = rate;
           recipe.start = start;
           recipe.jitter = jitter;
-          const Record record = make_record(recipe);
+          const record::Record record = make_record(recipe);
           const ApdSettings apd = apd_settings();
           const auto grid = window_grid(record.time, apd.period);
           SampleStream stream(StreamSettings{apd, keep});
@@ -243,10 +245,10 @@ TEST(SampleStream, KeepsThreePeriodsHoweverLong) {
 }
 
 TEST(SampleStream, ABackwardStampStartsANewRun) {
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   Live run(StreamSettings{apd_settings(), 60});
   run.push(record);
-  const Record once = run.stream.latest(0).record;
+  const record::Record once = run.stream.latest(0).record;
   const auto first_periods = run.periods;
   run.periods.clear();
   run.push(record);  // a looped replay
@@ -263,7 +265,7 @@ TEST(SampleStream, ABackwardStampStartsANewRun) {
 
 TEST(SampleStream, AJumpForwardStartsANewRunAndAGapDoesNot) {
   RecordRecipe recipe;
-  const Record record = make_record(recipe);
+  const record::Record record = make_record(recipe);
   Live run(StreamSettings{apd_settings(), 60});
   run.push(record);
   EXPECT_EQ(run.stream.jump_limit(), 1);
@@ -271,7 +273,7 @@ TEST(SampleStream, AJumpForwardStartsANewRunAndAGapDoesNot) {
   run.push(make_record(recipe));
   EXPECT_EQ(run.stream.counters().restarts, 0);
   recipe.start = 100;
-  const Record later = make_record(recipe);
+  const record::Record later = make_record(recipe);
   run.push(later);
   EXPECT_EQ(run.stream.counters().restarts, 1);
   EXPECT_NE(run.stream.counters().last_problem.find("jumped forward"), std::string::npos);
@@ -281,13 +283,14 @@ TEST(SampleStream, AJumpForwardStartsANewRunAndAGapDoesNot) {
 }
 
 TEST(SampleStream, RepeatedStampsAndValuesThatAreNotFiniteAreLeftOut) {
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   Live clean(StreamSettings{apd_settings(), 60}), dirty(StreamSettings{apd_settings(), 60});
   clean.push(record);
   for (std::size_t i = 0; i < record.size(); ++i) {
     if (i % 50 == 20) {
-      ChannelValues bad = values_at(record, i);
-      bad[static_cast<std::size_t>(i % 100 == 20 ? Channel::sensor_torque : Channel::motor_position)] =
+      record::ChannelValues bad = values_at(record, i);
+      bad[static_cast<std::size_t>(i % 100 == 20 ? record::Channel::sensor_torque
+                                                 : record::Channel::motor_position)] =
           i % 3 ? std::nan("") : std::numeric_limits<double>::infinity();
       EXPECT_EQ(dirty.stream.add(record.time[i] - 1e-4, bad), nullptr);
     }
@@ -304,10 +307,10 @@ TEST(SampleStream, RepeatedStampsAndValuesThatAreNotFiniteAreLeftOut) {
 }
 
 TEST(SampleStream, BeginsWithTheSignal) {
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   SampleStream stream(StreamSettings{apd_settings(), 60});
-  ChannelValues values = values_at(record, 0);
-  values[static_cast<std::size_t>(Channel::sensor_torque)] = std::nan("");
+  record::ChannelValues values = values_at(record, 0);
+  values[static_cast<std::size_t>(record::Channel::sensor_torque)] = std::nan("");
   for (int i = 0; i < 5; ++i) EXPECT_EQ(stream.add(-1 + 1e-3 * i, values), nullptr);
   EXPECT_EQ(stream.counters().accepted, 0);
   EXPECT_EQ(stream.counters().not_a_number, 5);
@@ -318,26 +321,26 @@ TEST(SampleStream, BeginsWithTheSignal) {
 
 // A driver's first message may lack a value; that must not lose the channel for good.
 TEST(SampleStream, AChannelThatAppearsStartsANewRun) {
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   Live run(StreamSettings{apd_settings(), 60});
-  ChannelValues first = values_at(record, 0);
-  first[static_cast<std::size_t>(Channel::motor_position)] = std::nan("");
+  record::ChannelValues first = values_at(record, 0);
+  first[static_cast<std::size_t>(record::Channel::motor_position)] = std::nan("");
   run.stream.add(-1e-3, first);
   run.push(record);
   EXPECT_EQ(run.stream.counters().restarts, 1);
   EXPECT_EQ(run.stream.counters().not_a_number, 0);
-  EXPECT_EQ(run.stream.kept().column(Channel::motor_position).size(), record.size());
+  EXPECT_EQ(run.stream.kept().column(record::Channel::motor_position).size(), record.size());
   EXPECT_EQ(run.stream.periods(), 13);
 }
 
 // One stray message with a velocity must not make all later ones useless.
 TEST(SampleStream, AChannelThatIsGoneStartsANewRunAfterASecond) {
   RecordRecipe recipe;
-  const Record record = make_record(recipe);
+  const record::Record record = make_record(recipe);
   SampleStream stream({apd_settings(), 60});
   const double dt = record.time[1] - record.time[0];
-  ChannelValues stray = values_at(record, 0);
-  stray[static_cast<std::size_t>(Channel::load_velocity)] = 0.5;
+  record::ChannelValues stray = values_at(record, 0);
+  stray[static_cast<std::size_t>(record::Channel::load_velocity)] = 0.5;
   stream.add(0, stray);
   for (std::size_t i = 0; i < record.size(); ++i) stream.add(record.time[i] + dt, values_at(record, i));
   const StreamCounters& counters = stream.counters();
@@ -345,7 +348,7 @@ TEST(SampleStream, AChannelThatIsGoneStartsANewRunAfterASecond) {
   EXPECT_NEAR(counters.not_a_number * dt, stream.jump_limit(), 2 * dt);
   EXPECT_EQ(counters.accepted + counters.not_a_number, static_cast<long>(record.size()) + 1);
   EXPECT_NE(counters.last_problem.find("load_velocity"), std::string::npos) << counters.last_problem;
-  EXPECT_FALSE(stream.kept().has(Channel::load_velocity));
+  EXPECT_FALSE(stream.kept().has(record::Channel::load_velocity));
 }
 
 TEST(SampleStream, UnknownPeriodIsFoundFromTheSamples) {
@@ -367,7 +370,7 @@ TEST(SampleStream, ExcitationAfterLongIdling) {
   recipe.idle = 40;
   recipe.duration = 60;
   recipe.frequency = 5;
-  Record record = make_record(recipe);
+  record::Record record = make_record(recipe);
   Live run(StreamSettings{apd_settings(0), 4});
   std::size_t most = 0;
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -384,15 +387,15 @@ TEST(SampleStream, ExcitationAfterLongIdling) {
 
 TEST(SampleStream, WithoutAnApdAllSamplesCount) {
   RecordRecipe recipe;
-  const Record record = make_record(recipe);
+  const record::Record record = make_record(recipe);
   Live run(StreamSettings{std::nullopt, 60});
   run.push(record);
   expect_same(run.stream.latest(0).record, record);
   EXPECT_NEAR(run.stream.period(), 0.1, 1e-12);  // from motor_torque
   EXPECT_EQ(run.stream.periods(), 15);
   EXPECT_EQ(run.stream.latest(3).record.size(), 300u);
-  Record still = record;
-  for (double& torque : still.column(Channel::motor_torque)) torque = 0.01;
+  record::Record still = record;
+  for (double& torque : still.column(record::Channel::motor_torque)) torque = 0.01;
   Live none(StreamSettings{std::nullopt, 60});
   none.push(still);
   EXPECT_EQ(none.stream.periods(), 0);
@@ -405,7 +408,7 @@ TEST(SampleStream, RefusesToKeepNothing) {
 }
 
 TEST(SampleStream, RestartForgetsEverything) {
-  const Record record = make_record({});
+  const record::Record record = make_record({});
   Live run(StreamSettings{apd_settings(), 60});
   run.push(record);
   run.stream.restart();
@@ -417,4 +420,4 @@ TEST(SampleStream, RestartForgetsEverything) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "support/waves.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 using test::kWaves;
@@ -161,4 +161,4 @@ TEST(LooksSaturated, RestIsNoSaturation) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

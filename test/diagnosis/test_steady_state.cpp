@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "support/allocations.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kRate = 1000, kPeriod = 0.1;
@@ -51,14 +51,14 @@ TEST(SteadyState, SamplesAreKeptAndForgottenWithoutTheHeap) {
   settings.apd->period = kPeriod;
   settings.apd->layout = kLayout;
   SampleStream stream(settings);
-  ChannelValues values;
+  record::ChannelValues values;
   values.fill(std::nan(""));
   long k = 0, periods = 0;
   const auto run = [&](double seconds) {
     for (const long end = k + std::lround(seconds * kRate); k < end; ++k) {
-      values[std::size_t(Channel::sensor_torque)] = signal(k);
-      values[std::size_t(Channel::motor_torque)] = values[std::size_t(Channel::motor_position)] =
-          0.1 * signal(k);
+      values[std::size_t(record::Channel::sensor_torque)] = signal(k);
+      values[std::size_t(record::Channel::motor_torque)] =
+          values[std::size_t(record::Channel::motor_position)] = 0.1 * signal(k);
       periods += stream.add(double(k) / kRate, values) != nullptr;
     }
   };
@@ -71,4 +71,4 @@ TEST(SteadyState, SamplesAreKeptAndForgottenWithoutTheHeap) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -8,7 +8,7 @@
 
 #include "backlash_diagnosis/diagnosis/trend.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kDay = 86400, kYear = 365.25 * kDay, kStart = 1798761600;  // 2027-01-01
@@ -293,4 +293,4 @@ TEST(Trend, PointsAreThoseAfterTheLastBaselineOfThisRig) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

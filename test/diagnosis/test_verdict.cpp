@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/verdict.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 namespace {
 
 constexpr double kToAngle = 50;  // rad/m
@@ -355,4 +355,4 @@ TEST(Grade, Names) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::diagnosis

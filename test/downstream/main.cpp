@@ -9,15 +9,17 @@
 
 int main(int argc, char** argv) {
   if (argc != 2) return 64;
-  backlash::RigFile file = backlash::load_rig_file(argv[1]);
+  backlash::rig_file::RigFile file = backlash::rig_file::load_rig_file(argv[1]);
   const double truth = file.rig.mesh.backlash = 80e-6;  // m
   file.simulation.sensors.sampling_rate = 5000;         // Hz
-  const backlash::Record record = backlash::simulate_record(file.rig, file.simulation, 2.0);
-  const backlash::Diagnosis diagnosis = backlash::diagnose(record, file.diagnosis, nullptr);
+  const backlash::record::Record record =
+      backlash::simulation::simulate_record(file.rig, file.simulation, 2.0);
+  const backlash::diagnosis::Diagnosis diagnosis =
+      backlash::diagnosis::diagnose(record, file.diagnosis, nullptr);
 
   int answers = 0, right = 0;
-  for (const backlash::Estimate& estimate : diagnosis.estimates) {
-    const backlash_diagnosis::BacklashEstimate message = backlash::to_message(estimate);
+  for (const backlash::diagnosis::Estimate& estimate : diagnosis.estimates) {
+    const backlash_diagnosis::BacklashEstimate message = backlash::ros_bridge::to_message(estimate);
     std::cout << message.method << ": " << message.status_name << ", " << message.lower << " to "
               << message.upper << " m of " << truth << " m\n";
     if (message.status != backlash_diagnosis::BacklashEstimate::OK) continue;

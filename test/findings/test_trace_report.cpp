@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/findings/trace_report.h"
 #include "support/data.h"
 
-namespace backlash::test {
+namespace backlash::findings {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -21,14 +21,14 @@ using Json = nlohmann::ordered_json;
 const double kUnknown = std::nan("");
 const TraceInputs kInputs = {"rig.yaml", {"a.csv", "b<i>.csv"}, "test.csv"};
 
-std::shared_ptr<const Term> drag() {
+std::shared_ptr<const model::Term> drag() {
   ParameterValues values = {{"drag", 2.0}};
   values.set_choice("body", "motor");
-  return make_term("quadratic_drag", values);
+  return model::make_term("quadratic_drag", values);
 }
 
-TraceSeries series() {
-  TraceSeries s;
+identification::TraceSeries series() {
+  identification::TraceSeries s;
   for (int k = 0; k < 2000; ++k) {
     const double t = k * 1e-3, w = std::cos(7 * t);
     s.time.push_back(t);
@@ -49,11 +49,11 @@ TraceSeries series() {
   return s;
 }
 
-Trace trace() {
-  Trace t;
-  t.verdict = TraceVerdict::effect_found;
+identification::Trace trace() {
+  identification::Trace t;
+  t.verdict = identification::TraceVerdict::effect_found;
   t.cutoff = 25;
-  t.augmented = t.base = load_rig_file(package_file("config/two_inertia_servo.yaml")).rig;
+  t.augmented = t.base = rig_file::load_rig_file(test::package_file("config/two_inertia_servo.yaml")).rig;
   t.augmented.name = "a < b & \"c\"";
   t.augmented.terms = {drag()};
   t.base_parameters = {{"motor_inertia", {6.2, 0.3}}};
@@ -61,7 +61,7 @@ Trace trace() {
   t.units = {{"motor_inertia", "kg m^2"}};
   t.channels["torque"] = {0.05, 0.004, 0.003, 0.06, kUnknown};
   t.channels["deflection"] = {0.02, 0.02, 0.019, 0.02, 0.02};
-  FoundEffect e;
+  identification::FoundEffect e;
   e.id = "quadratic_drag";
   e.channel = "torque";
   e.terms = {0};
@@ -114,9 +114,9 @@ TEST(TraceReport, JsonIsTheContract) {
 }
 
 TEST(TraceReport, UnexplainedIsSaidWithItsSignature) {
-  Trace t = trace();
-  t.verdict = TraceVerdict::unexplained;
-  t.unexplained = Unexplained{"deflection", "follows load position, order 7.3"};
+  identification::Trace t = trace();
+  t.verdict = identification::TraceVerdict::unexplained;
+  t.unexplained = identification::Unexplained{"deflection", "follows load position, order 7.3"};
   const Json json = Json::parse(trace_report_json(t, kInputs));
   EXPECT_EQ(json["verdict"], "unexplained");
   EXPECT_EQ(json["unexplained"]["channel"], "deflection");
@@ -125,12 +125,12 @@ TEST(TraceReport, UnexplainedIsSaidWithItsSignature) {
   EXPECT_NE(verdict_sentence(t).find("order 7.3"), std::string::npos);
   t.steps.clear();
   EXPECT_EQ(verdict_sentence(t).find("lacks"), std::string::npos);
-  t.verdict = TraceVerdict::nothing_missing;
+  t.verdict = identification::TraceVerdict::nothing_missing;
   EXPECT_EQ(verdict_sentence(t).find("Nothing is missing"), 0u);
 }
 
 TEST(TraceReport, UnitsOfALinearAxis) {
-  Trace t = trace();
+  identification::Trace t = trace();
   t.augmented.linear = true;
   const Json json = Json::parse(trace_report_json(t, kInputs));
   EXPECT_EQ(json["steps"][0]["parameters"]["drag"]["unit"], "N s^2/m^2");
@@ -141,7 +141,7 @@ TEST(TraceReport, UnitsOfALinearAxis) {
 }
 
 TEST(TraceReport, SeriesAreThinnedAndHaveGapsWhereSamplesDoNotCount) {
-  const Trace t = trace();
+  const identification::Trace t = trace();
   const Json json = Json::parse(trace_series_json(t));
   // Four samples per cycle of 25 Hz: each tenth of 1 kHz.
   const Json &time = json["coordinates"]["time"]["values"], &torque = json["channels"]["torque"];
@@ -160,14 +160,14 @@ TEST(TraceReport, SeriesAreThinnedAndHaveGapsWhereSamplesDoNotCount) {
 }
 
 TEST(TraceReport, DryFrictionOpposesMotion) {
-  Trace t = trace();
+  identification::Trace t = trace();
   ParameterValues values = {{"torque", 1.5}};
   values.set_choice("body", "load");
-  t.augmented.terms = {make_term("asymmetric_coulomb", values)};
+  t.augmented.terms = {model::make_term("asymmetric_coulomb", values)};
   const Json json = Json::parse(trace_series_json(t));
   const Json& drawn = json["steps"][0]["contributions"];
   EXPECT_TRUE(drawn.empty());  // 1.5 more against forward motion and less against backward: -1.5 all the time
-  t.augmented.terms = {make_term("gravity", {{"amplitude", 3}, {"phase", 0.2}}), t.augmented.terms[0]};
+  t.augmented.terms = {model::make_term("gravity", {{"amplitude", 3}, {"phase", 0.2}}), t.augmented.terms[0]};
   t.steps[0].terms = {0, 1};
   const Json both = Json::parse(trace_series_json(t))["steps"][0]["contributions"][0];
   EXPECT_EQ(both["quantity"], "torque on the load");
@@ -176,7 +176,7 @@ TEST(TraceReport, DryFrictionOpposesMotion) {
 }
 
 TEST(TraceReport, ALearnedMapIsSaidToBeOne) {
-  Trace t = trace();
+  identification::Trace t = trace();
   t.steps[0].id = "learned_map";
   t.steps[0].words = {{"acts_on", "motor"}, {"coordinate", "motor_torque"}};
   t.steps[0].nearest = {"cogging"};
@@ -233,12 +233,13 @@ TEST_F(TraceFolderTest, GoesAwayWithoutFilesAndNeverReplacesInputs) {
 }
 
 TEST_F(TraceFolderTest, HoldsRigAndPageAlsoWhereNothingCanBeDrawn) {
-  Trace t = trace();
+  identification::Trace t = trace();
   t.series.torque.clear();  // refused by the script, where there is one
-  const RigFile declared = load_rig_file(package_file("config/two_inertia_servo.yaml"));
+  const rig_file::RigFile declared =
+      rig_file::load_rig_file(test::package_file("config/two_inertia_servo.yaml"));
   const TraceFolder folder(path("a/b"), {});
   folder.write(t, declared, kInputs);
-  EXPECT_EQ(load_rig_file(folder.files().rig).rig.terms.size(), 1u);
+  EXPECT_EQ(rig_file::load_rig_file(folder.files().rig).rig.terms.size(), 1u);
   std::ifstream in(folder.files().page);
   const std::string page{std::istreambuf_iterator<char>(in), {}};
   EXPECT_NE(page.find("</html>"), std::string::npos);
@@ -246,4 +247,4 @@ TEST_F(TraceFolderTest, HoldsRigAndPageAlsoWhereNothingCanBeDrawn) {
 }
 
 }  // namespace
-}  // namespace backlash::test
+}  // namespace backlash::findings

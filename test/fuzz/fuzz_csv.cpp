@@ -11,12 +11,12 @@ using namespace backlash;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::read_or_refuse("fuzz.csv", [&] {
     std::istringstream in(std::string(reinterpret_cast<const char*>(data), size));
-    const Record record = read_csv(in, "fuzz.csv");
+    const record::Record record = record::read_csv(in, "fuzz.csv");
     fuzz::require(record.size() > 0 && record.can_show_backlash(), "a record without any such channel");
     for (std::size_t i = 0; i < record.size(); ++i)
       fuzz::require(std::isfinite(record.time[i]) && (i == 0 || record.time[i] > record.time[i - 1]),
                     "times that do not increase");
-    for (const Channel channel : kChannels) {
+    for (const record::Channel channel : record::kChannels) {
       if (!record.has(channel)) continue;
       fuzz::require(record.column(channel).size() == record.size(), "columns of unequal length");
       for (const double value : record.column(channel))

@@ -12,23 +12,23 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   const auto yaml = [&] { return YamlReader::from_text(text, "fuzz.yaml"); };
   fuzz::read_or_refuse("fuzz.yaml", [&] {
-    const std::string written = MonitoringCurve::from_yaml(yaml()).to_yaml();
+    const std::string written = diagnosis::MonitoringCurve::from_yaml(yaml()).to_yaml();
     try {
-      const MonitoringCurve again =
-          MonitoringCurve::from_yaml(YamlReader::from_text(written, "written.yaml"));
+      const diagnosis::MonitoringCurve again =
+          diagnosis::MonitoringCurve::from_yaml(YamlReader::from_text(written, "written.yaml"));
       fuzz::require(again.to_yaml() == written, "a curve that changes when it is written");
     } catch (const Error& error) {
       fuzz::broken(std::string("a curve that cannot be read back: ") + error.what());
     }
   });
   fuzz::read_or_refuse("fuzz.yaml", [&] {
-    const std::string written = to_yaml(baseline_from_yaml(yaml()));
+    const std::string written = diagnosis::to_yaml(diagnosis::baseline_from_yaml(yaml()));
     try {
-      (void)baseline_from_yaml(YamlReader::from_text(written, "written.yaml"));
+      (void)diagnosis::baseline_from_yaml(YamlReader::from_text(written, "written.yaml"));
     } catch (const Error& error) {
       fuzz::broken(std::string("a baseline that cannot be read back: ") + error.what());
     }
   });
-  fuzz::read_or_refuse("fuzz.yaml", [&] { (void)read_limits(yaml()); });
+  fuzz::read_or_refuse("fuzz.yaml", [&] { (void)diagnosis::read_limits(yaml()); });
   return 0;
 }

@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   if (text.find("test_runs") != std::string::npos) return 0;  // may name a file: none of ours to open
   fuzz::read_or_refuse("fuzz.yaml", [&] {
-    const RigFile file = rig_file_from_text(text, "fuzz.yaml");
+    const rig_file::RigFile file = rig_file::rig_file_from_text(text, "fuzz.yaml");
     fuzz::require(file.simulation.sensors.sampling_rate > 0, "a sampling rate that is not positive");
     fuzz::require(file.rig.motor.inertia > 0 && std::isfinite(file.rig.motor.inertia),
                   "a motor without inertia");

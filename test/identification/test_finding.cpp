@@ -7,13 +7,13 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 const std::vector<std::string> kInertias = {"motor_inertia", "load_inertia"};
 
 TEST(Finding, TwoMeasurementsOfOneParameterAreWeighted) {
-  const Rig rig = test::servo_file().rig;
+  const model::Rig rig = test::servo_file().rig;
   const auto found = combine_findings(
       {{"a", {{"motor_inertia", 1}}, {7.0, 0.01}}, {"b", {{"motor_inertia", 1}}, {7.03, 0.02}}}, rig,
       kInertias);
@@ -26,7 +26,7 @@ TEST(Finding, TwoMeasurementsOfOneParameterAreWeighted) {
 }
 
 TEST(Finding, DriveMinusMotorIsTheLoad) {
-  const Rig rig = test::servo_file().rig;
+  const model::Rig rig = test::servo_file().rig;
   const auto found = combine_findings({{"motor", {{"motor_inertia", 1}}, {7, 0.03}},
                                        {"drive", {{"motor_inertia", 1}, {"load_inertia", 1}}, {100, 0.04}}},
                                       rig, kInertias);
@@ -52,4 +52,4 @@ TEST(Finding, WithoutErrorItDoesNotCount) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -5,11 +5,11 @@
 #include "backlash_diagnosis/identification/fitted_rig.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// An identification that has found all that `rig` (load side) says.
-Identification found_as(const Rig& rig, std::initializer_list<const char*> names) {
+Identification found_as(const model::Rig& rig, std::initializer_list<const char*> names) {
   Identification found;
   found.rig = rig;
   for (const char* name : names) {
@@ -20,14 +20,14 @@ Identification found_as(const Rig& rig, std::initializer_list<const char*> names
 }
 
 TEST(FittedRig, ValuesAreThoseFoundAndTheRestStays) {
-  const RigFile declared = test::servo_file();
-  Rig rig = test::other_servo();
+  const rig_file::RigFile declared = test::servo_file();
+  model::Rig rig = test::other_servo();
   rig.mesh.start_in_gap = -0.25;
   const std::string text = fitted_rig_text(
       declared,
       found_as(rig, {"motor_inertia", "load_inertia", "mesh_stiffness", "mesh_damping", "backlash_angle",
                      "motor_coulomb", "motor_viscous", "load_coulomb", "load_viscous"}));
-  const RigFile fitted = rig_file_from_text(text, "fitted.yaml");
+  const rig_file::RigFile fitted = rig_file::rig_file_from_text(text, "fitted.yaml");
   EXPECT_EQ(fitted.rig.motor.inertia, 7.8);
   EXPECT_EQ(fitted.rig.motor.viscous_damping, 10);
   EXPECT_EQ(fitted.rig.motor.coulomb_friction, 47);
@@ -44,28 +44,29 @@ TEST(FittedRig, ValuesAreThoseFoundAndTheRestStays) {
 }
 
 TEST(FittedRig, OnlyWhatWasFoundIsChanged) {
-  const RigFile declared = test::servo_file();
+  const rig_file::RigFile declared = test::servo_file();
   const std::string text = fitted_rig_text(declared, found_as(test::other_servo(), {"load_inertia"}));
-  const RigFile fitted = rig_file_from_text(text, "fitted.yaml");
+  const rig_file::RigFile fitted = rig_file::rig_file_from_text(text, "fitted.yaml");
   EXPECT_EQ(fitted.rig.link.inertia, 84);
   EXPECT_EQ(fitted.rig.motor.inertia, declared.rig.motor.inertia);
   EXPECT_EQ(fitted.rig.mesh.backlash, declared.rig.mesh.backlash);
 }
 
 TEST(FittedRig, DirectionsAreWrittenApart) {
-  Rig rig = test::other_servo();
+  model::Rig rig = test::other_servo();
   rig.motor.coulomb_asymmetry = 3;
-  const RigFile servo = test::servo_file();
-  const RigFile fitted =
-      rig_file_from_text(fitted_rig_text(servo, found_as(rig, {"motor_coulomb"})), "fitted.yaml");
+  const rig_file::RigFile servo = test::servo_file();
+  const rig_file::RigFile fitted =
+      rig_file::rig_file_from_text(fitted_rig_text(servo, found_as(rig, {"motor_coulomb"})), "fitted.yaml");
   EXPECT_EQ(fitted.rig.motor.coulomb_friction, 47);
   EXPECT_EQ(fitted.rig.motor.coulomb_asymmetry, 3);
-  const RigFile emps = load_rig_file(test::package_file("config/emps.yaml"));  // a map on lines of its own
-  Rig axis = emps.rig;
+  const rig_file::RigFile emps =
+      rig_file::load_rig_file(test::package_file("config/emps.yaml"));  // a map on lines of its own
+  model::Rig axis = emps.rig;
   axis.motor.inertia = 90;
   axis.motor.coulomb_friction = 22;
   axis.motor.coulomb_asymmetry = -2;
-  const RigFile one = rig_file_from_text(
+  const rig_file::RigFile one = rig_file::rig_file_from_text(
       fitted_rig_text(emps, found_as(axis, {"inertia", "viscous", "coulomb", "offset"})), "fitted.yaml");
   EXPECT_EQ(one.rig.motor.inertia, 90);
   EXPECT_EQ(one.rig.motor.coulomb_friction, 22);
@@ -73,11 +74,11 @@ TEST(FittedRig, DirectionsAreWrittenApart) {
 }
 
 TEST(FittedRig, MotorSideFilesGetMotorSideValues) {
-  RigFile declared = test::servo_file();
+  rig_file::RigFile declared = test::servo_file();
   std::string text = declared.text;
   text.replace(text.find("  motor:"), 0, "  motor_side: true\n");
-  declared = rig_file_from_text(text, "motor_side.yaml");
-  const RigFile fitted = rig_file_from_text(
+  declared = rig_file::rig_file_from_text(text, "motor_side.yaml");
+  const rig_file::RigFile fitted = rig_file::rig_file_from_text(
       fitted_rig_text(declared, found_as(test::other_servo(), {"motor_inertia", "motor_coulomb"})),
       "fitted.yaml");
   EXPECT_NEAR(fitted.rig.motor.inertia, 7.8 / (110 * 110), 1e-9);  // six digits
@@ -85,4 +86,4 @@ TEST(FittedRig, MotorSideFilesGetMotorSideValues) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -5,14 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/identify.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
-Record square_wave(double duration) {
-  Record record = simulate_record(test::servo_file().rig, test::servo_file().simulation, duration);
+record::Record square_wave(double duration) {
+  record::Record record =
+      simulation::simulate_record(test::servo_file().rig, test::servo_file().simulation, duration);
   record.name = "square.csv";
   return record;
 }
@@ -37,14 +39,15 @@ TEST(Identify, SquareWaveAllowsDecayAndOutputError) {
 TEST(Identify, ARecordOfTheMotorSideAloneTellsItsFriction) {
   // Speeds with their torque, as a drive without load encoder shows them: 63 + 13 w of the motor, 15 + 9 w of
   // the load.
-  Record record;
+  record::Record record;
   record.name = "speeds.csv";
   for (int k = 0; k < 40000; ++k) {
     const double t = k * 1e-3, speed = std::vector<double>{0.2, 0.8, -0.3, -1.0}[k / 10000];
     record.time.push_back(t);
-    record.column(Channel::motor_velocity).push_back(speed + 1e-4 * std::sin(17.3 * k));
-    record.column(Channel::motor_torque).push_back((speed > 0 ? 78 : -78) + 22 * speed + std::sin(31.7 * k));
-    record.column(Channel::motor_position).push_back(speed * (t - 10 * (k / 10000)));
+    record.column(record::Channel::motor_velocity).push_back(speed + 1e-4 * std::sin(17.3 * k));
+    record.column(record::Channel::motor_torque)
+        .push_back((speed > 0 ? 78 : -78) + 22 * speed + std::sin(31.7 * k));
+    record.column(record::Channel::motor_position).push_back(speed * (t - 10 * (k / 10000)));
   }
   const Identification found = identify(test::servo_file().rig, {record});
   EXPECT_EQ(report(found, "friction_lines").records.size(), 1u);
@@ -57,8 +60,8 @@ TEST(Identify, ARecordOfTheMotorSideAloneTellsItsFriction) {
 }
 
 TEST(Identify, NothingToGoByIsSaidWithAllReasons) {
-  Record record = square_wave(1);
-  for (const Channel channel : {Channel::motor_position, Channel::motor_velocity})
+  record::Record record = square_wave(1);
+  for (const record::Channel channel : {record::Channel::motor_position, record::Channel::motor_velocity})
     record.column(channel).clear();
   try {
     identify(test::servo_file().rig, {record});
@@ -70,10 +73,10 @@ TEST(Identify, NothingToGoByIsSaidWithAllReasons) {
 }
 
 TEST(Identify, HolesAndGapsAreNamed) {
-  Record hole = square_wave(3), gap = square_wave(3);
-  hole.column(Channel::load_position)[1500] = std::nan("");
+  record::Record hole = square_wave(3), gap = square_wave(3);
+  hole.column(record::Channel::load_position)[1500] = std::nan("");
   for (std::size_t k = 1000; k < gap.size(); ++k) gap.time[k] += 0.5;
-  for (const Record& bad : {hole, gap}) {
+  for (const record::Record& bad : {hole, gap}) {
     EXPECT_THROW(identify(test::servo_file().rig, {bad}), BadData);
     const Identification found = identify(test::servo_file().rig, {bad, square_wave(3)});
     ASSERT_FALSE(found.warnings.empty());
@@ -84,9 +87,9 @@ TEST(Identify, HolesAndGapsAreNamed) {
 TEST(Identify, CancelsAndRefusesOtherMachines) {
   const Progress cancel = [](double, const std::string&) { return false; };
   EXPECT_THROW(identify(test::servo_file().rig, {square_wave(1)}, cancel), Cancelled);
-  const Rig locked = load_rig_file(test::package_file("config/sarkar_1997.yaml")).rig;
+  const model::Rig locked = rig_file::load_rig_file(test::package_file("config/sarkar_1997.yaml")).rig;
   EXPECT_THROW(identify(locked, {square_wave(1)}), CannotIdentify);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

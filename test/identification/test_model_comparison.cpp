@@ -3,35 +3,36 @@
 
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/model_comparison.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kGap = 5.358e-4;  // rad, of both rigs with a gap
 
-RigFile rig_file(const std::string& name) {
-  return load_rig_file(test::package_file("config/" + name + ".yaml"));
+rig_file::RigFile rig_file(const std::string& name) {
+  return rig_file::load_rig_file(test::package_file("config/" + name + ".yaml"));
 }
 
-Record run(RigFile file, const std::string& name, double duration) {
-  apply_test_run(find_test_run(file.test_runs, name), file);
-  return simulate_record(file.rig, file.simulation, duration);
+record::Record run(rig_file::RigFile file, const std::string& name, double duration) {
+  rig_file::apply_test_run(rig_file::find_test_run(file.test_runs, name), file);
+  return simulation::simulate_record(file.rig, file.simulation, duration);
 }
 
 /// rms over the record of half of what the gap of config/yumrukcal_2013_varying.yaml differs from its mean.
-double rms_of_half_variation(const Record& record) {
+double rms_of_half_variation(const record::Record& record) {
   double sum = 0;
-  for (const double q : record.column(Channel::load_position))
+  for (const double q : record.column(record::Channel::load_position))
     sum += std::pow(0.5 * kGap * (0.10 * std::sin(q + 0.6) + 0.05 * std::sin(3 * q)), 2);
   return std::sqrt(sum / double(record.size()));
 }
 
 TEST(ModelComparison, EngagementsFollowTheSwitchesOfTheTorque) {
-  const RigFile file = rig_file("yumrukcal_2013");
+  const rig_file::RigFile file = rig_file("yumrukcal_2013");
   const ComparedRecord r = compared_record(run(file, "square_wave_backward", 6.2), file.rig);
   ASSERT_EQ(r.engagements.size(), 9u);  // 0.8 Hz: a switch every 0.625 s
   for (std::size_t i = 0; i < r.engagements.size(); ++i) {
@@ -46,10 +47,10 @@ TEST(ModelComparison, EngagementsFollowTheSwitchesOfTheTorque) {
 }
 
 TEST(ModelComparison, KnownTorqueErrorIsReported) {
-  const RigFile file = rig_file("yumrukcal_2013");
-  Record record = run(file, "square_wave", 10);
+  const rig_file::RigFile file = rig_file("yumrukcal_2013");
+  record::Record record = run(file, "square_wave", 10);
   const auto clean = compare_models({file.rig}, compared_record(record, file.rig)).front();
-  auto& torque = record.column(Channel::motor_torque);
+  auto& torque = record.column(record::Channel::motor_torque);
   for (std::size_t k = 0; k < torque.size(); ++k) torque[k] += 4 * std::sin(2 * M_PI * 7 * record.time[k]);
   const auto c = compare_models({file.rig}, compared_record(record, file.rig)).front();
   // 4 / sqrt 2 and what the clean record leaves; 70 cycles, of which standstills cut parts off.
@@ -60,9 +61,9 @@ TEST(ModelComparison, KnownTorqueErrorIsReported) {
 }
 
 TEST(ModelComparison, LadderOfTheThesis) {
-  const RigFile varying = rig_file("yumrukcal_2013_varying");
-  const Rig basic = rig_file("yumrukcal_2013_basic").rig, constant = rig_file("yumrukcal_2013").rig;
-  const Record record = run(varying, "square_wave_backward", 60);
+  const rig_file::RigFile varying = rig_file("yumrukcal_2013_varying");
+  const model::Rig basic = rig_file("yumrukcal_2013_basic").rig, constant = rig_file("yumrukcal_2013").rig;
+  const record::Record record = run(varying, "square_wave_backward", 60);
   const ComparedRecord r = compared_record(record, varying.rig);
   const auto models = compare_models({basic, constant, varying.rig}, r);
   const auto error = [&](int model, const char* channel) { return models[model].followed.at(channel).error; };
@@ -97,12 +98,12 @@ TEST(ModelComparison, LadderOfTheThesis) {
 
 /// Section 6.3: the map of the constant-speed runs, used directly, makes the gap too large by its wind-up.
 TEST(ModelComparison, MapUsedDirectlyIsTooLargeByTheWindUp) {
-  const RigFile varying = rig_file("yumrukcal_2013_varying");
-  const Rig constant = rig_file("yumrukcal_2013").rig;
+  const rig_file::RigFile varying = rig_file("yumrukcal_2013_varying");
+  const model::Rig constant = rig_file("yumrukcal_2013").rig;
   const GapMap runs = identify_gap_map(run(varying, "constant_speed_forward", 40).slice(3, 40),
                                        run(varying, "constant_speed_backward", 40).slice(3, 40));
   const GapMap map = with_wind_up(runs, constant);
-  const Record record = run(varying, "square_wave_backward", 20);
+  const record::Record record = run(varying, "square_wave_backward", 20);
   const auto models =
       compare_models({with_gap_map(constant, map), with_gap_map(constant, map, GapUse::directly)},
                      compared_record(record, varying.rig));
@@ -115,11 +116,11 @@ TEST(ModelComparison, MapUsedDirectlyIsTooLargeByTheWindUp) {
 }
 
 TEST(ModelComparison, RefusesARecordWithoutLoad) {
-  const RigFile file = rig_file("yumrukcal_2013");
-  Record record = run(file, "square_wave", 1);
-  record.column(Channel::load_position).clear();
+  const rig_file::RigFile file = rig_file("yumrukcal_2013");
+  record::Record record = run(file, "square_wave", 1);
+  record.column(record::Channel::load_position).clear();
   EXPECT_THROW(compared_record(record, file.rig), CannotIdentify);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/model/axis_unit.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 TEST(AxisUnit, OfALinearAxisIsForceAndLength) {
@@ -21,4 +21,4 @@ TEST(AxisUnit, OfALinearAxisIsForceAndLength) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

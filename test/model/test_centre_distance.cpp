@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/model/centre_distance.h"
 #include "support/gears.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
@@ -78,4 +78,4 @@ TEST(CentreDistance, NonsenseIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/contact_law.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 using Law = std::shared_ptr<const ContactLaw>;
@@ -289,4 +289,4 @@ TEST(ContactLaws, ReadFromYaml) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/model/gear_geometry.h"
 #include "support/gears.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 using test::gear_pair;
@@ -208,4 +208,4 @@ TEST(GearGeometry, NonsenseIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 using State = std::array<double, GearTrain::kMaxStates>;
@@ -405,4 +405,4 @@ TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/model/mesh_stiffness.h"
 #include "support/gears.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 using test::gear_pair;
@@ -155,4 +155,4 @@ TEST(MeshStiffness, NonsenseIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 using TermPointer = std::shared_ptr<const Term>;
@@ -214,8 +214,8 @@ TEST(MeshTerms, TorquesAreTheSlopesOfTheEnergy) {
 TEST(MeshTerms, NoEnergyIsMadeOrLost) {
   for (const char* text : {kVarying, kError, kEccentric, kMap}) {
     const TermPointer t = term(text);
-    Plant plant(free_rig({text}), test::constant(0), test::solver(1e-11));
-    Plant::State start{};
+    simulation::Plant plant(free_rig({text}), test::constant(0), test::solver(1e-11));
+    simulation::Plant::State start{};
     start[2] = 3.2, start[3] = 3;
     plant.set_state(start);
     const double before = 0.5 * 2 * 3.2 * 3.2 + 0.5 * 5 * 9;
@@ -334,9 +334,9 @@ TEST(MeshTerms, AnElasticImpactOnASlopeKeepsEnergyAndItsMomentum) {
   rig.terms = {steep};
   rig.mesh.contact = make_contact_law(
       "stereomechanical", {{"restitution", 1}, {"resting_speed", 1e-6}, {"stiffness", 4e4}, {"damping", 0}});
-  for (const std::string& method : integrator_methods()) {
-    Plant plant(rig, test::constant(0), test::solver(1e-10, method));
-    Plant::State start{};
+  for (const std::string& method : simulation::integrator_methods()) {
+    simulation::Plant plant(rig, test::constant(0), test::solver(1e-10, method));
+    simulation::Plant::State start{};
     start[2] = 0.2, start[3] = -0.1;
     plant.set_state(start);
     const auto depth = [&](double t) { return 0.3 * t - kHalf - shift(steep, 1, -0.1 * t).opening; };
@@ -410,4 +410,4 @@ TEST(MeshTerms, RefusalsNameWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

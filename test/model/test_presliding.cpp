@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/presliding.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 constexpr double kDistance = 2e-3;                 // rad
@@ -237,4 +237,4 @@ TEST(Presliding, TheTermSetsTheDistanceOfItsBody) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/restitution.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 // REFERENCE 1.3: wanted e, exact D, and the e that each approximation of D gives; printed to three or four
@@ -122,4 +122,4 @@ TEST(Restitution, RigidBodiesKeepMomentumAndPartAtTheRestitution) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -12,7 +12,7 @@
 #include "support/data.h"
 #include "support/rig_changes.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 // Valid, with every optional part; the tests below change one line of it each.
@@ -338,4 +338,4 @@ TEST(Rig, EqualsTheSameMachineMadeAgainAndNoOther) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

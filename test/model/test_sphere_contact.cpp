@@ -6,7 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/sphere_contact.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 const Sphere kSteel{0.01, 210e9, 0.3};
@@ -46,4 +46,4 @@ TEST(SphereContact, NonsenseIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/stick_slip.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 const FrictionLimits kLimits{3, 2};  // N m
@@ -192,4 +192,4 @@ TEST(StickSlip, OnTheMotorSideTheRatioCounts) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -10,7 +10,7 @@
 #include "support/data.h"
 #include "support/gears.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 using test::gear_pair;
@@ -193,4 +193,4 @@ TEST(StiffnessVariation, NonsenseIsRefusedWithItsPlace) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

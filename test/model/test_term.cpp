@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 YamlReader parse(const std::string& text) {
@@ -92,4 +92,4 @@ TEST(Term, RefusalNamesFileLineKeyValueAndLimit) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

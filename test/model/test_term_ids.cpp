@@ -10,7 +10,7 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 namespace fs = std::filesystem;
@@ -20,7 +20,7 @@ const fs::path kSource = BACKLASH_DIAGNOSIS_SOURCE_DIR;
 /// Words that are ids and mean something else as well: what, and in which file ("": in any).
 const std::set<std::pair<std::string, std::string>> kOtherMeanings = {
     {"backlash", ""},  // the quantity: keys of files, of JSON and of messages
-    {"delay", "src/report/identification_report.cpp"},           // of the sensors, a key of the identify JSON
+    {"delay", "src/findings/identification_report.cpp"},         // of the sensors, a key of the identify JSON
     {"delay", "src/identification/procedures/one_inertia.cpp"},  // the option of that name
 };
 
@@ -86,4 +86,4 @@ TEST(TermIds, EveryKindOfALearnedMapCanBeMade) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

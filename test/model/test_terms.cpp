@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/term_text.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 /// As the records of a servo of the size of the rig below.
@@ -238,4 +238,4 @@ TEST(TermText, EntriesFollowEachOtherInAFile) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 std::shared_ptr<const Term> term(const std::string& text) {
@@ -205,8 +205,8 @@ TEST(FlankTerms, TorquesAreTheSlopesOfTheEnergy) {
 
 TEST(FlankTerms, NoEnergyIsMadeOrLost) {
   for (const char* text : kConservative) {
-    Plant plant(free_rig(text), test::constant(0), test::solver(1e-11));
-    Plant::State start{};
+    simulation::Plant plant(free_rig(text), test::constant(0), test::solver(1e-11));
+    simulation::Plant::State start{};
     start[2] = 3.05, start[3] = 3;
     plant.set_state(start);
     const double before = 0.5 * 2 * 3.05 * 3.05 + 0.5 * 5 * 9;
@@ -285,4 +285,4 @@ TEST(FlankTerms, RefusalsNameWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

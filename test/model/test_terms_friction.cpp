@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 std::shared_ptr<const Term> term(const std::string& text) {
@@ -127,8 +127,8 @@ Rig one_body(const std::string& text, const std::string& body, double coulomb = 
 
 /// Speed and position at t, from `speed` at position 0.
 std::pair<double, double> moved(const Rig& rig, double speed, double t, double torque = 0) {
-  Plant plant(rig, test::constant(torque), test::solver(1e-11));
-  Plant::State start{};
+  simulation::Plant plant(rig, test::constant(torque), test::solver(1e-11));
+  simulation::Plant::State start{};
   start[1] = speed;
   plant.set_state(start);
   plant.advance_to(t);
@@ -258,4 +258,4 @@ TEST(EndTerms, RefusalsNameWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

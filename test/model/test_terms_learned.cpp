@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 std::shared_ptr<const Term> learned(const std::string& acts_on, const std::string& coordinate,
@@ -102,7 +102,7 @@ TEST(LearnedMap, MovesABody) {
     rig.link.inertia = 2;
     rig.mesh.rigid = true;
     rig.terms = {learned(end, "time", {-1, 0, 1, 2, 3, 4}, {-2, 0, 2, 4, 6, 8})};
-    Plant plant(rig, test::constant(0), test::solver(1e-10));
+    simulation::Plant plant(rig, test::constant(0), test::solver(1e-10));
     plant.advance_to(2.5);
     EXPECT_NEAR(plant.state()[1], 2.5 * 2.5 / 3, 1e-8);  // solver
   }
@@ -121,4 +121,4 @@ TEST(LearnedMap, IsWrittenAndReadBack) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::model

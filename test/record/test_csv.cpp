@@ -21,7 +21,7 @@
 #define BACKLASH_DIAGNOSIS_SOURCE_DIR "."
 #endif
 
-namespace backlash {
+namespace backlash::record {
 namespace {
 
 namespace fs = std::filesystem;
@@ -407,4 +407,4 @@ TEST(Csv, MeasuredRecordsAreReadWhole) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::record

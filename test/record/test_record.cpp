@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::record {
 namespace {
 
 Record small_record() {
@@ -117,4 +117,4 @@ TEST(Record, SliceRefusesColumnsOfUnequalLength) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::record

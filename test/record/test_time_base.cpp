@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/time_base.h"
 
-namespace backlash {
+namespace backlash::record {
 namespace {
 
 // n stamps, 1/1024 s apart: exact in binary, so that an even time base has no rounding.
@@ -143,4 +143,4 @@ TEST(TimeBase, JitterIsMeasuredAgainstTheMeanInterval) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::record

@@ -4,7 +4,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "report/html_template.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 TEST(HtmlTemplate, TextIsEscapedUnlessItIsHtml) {
@@ -42,4 +42,4 @@ TEST(HtmlTemplate, WhatIsMissingIsAnError) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::report

@@ -5,7 +5,7 @@
 
 #include "report/json.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
@@ -24,4 +24,4 @@ TEST(JsonNumber, IntervalsMayBeOpen) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::report

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iterator>
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 TEST(PublicHeaders, IncludeNoJsonLibrary) {
@@ -23,4 +23,4 @@ TEST(PublicHeaders, IncludeNoJsonLibrary) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::report

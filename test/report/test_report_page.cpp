@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/report/report_page.h"
 
-namespace backlash {
+namespace backlash::report {
 namespace {
 
 TEST(ReportPage, AShellReadsTheWordsOfACommandAsTheyWere) {
@@ -49,4 +49,4 @@ TEST(ReportPage, SaysWhyThereAreNoFigures) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::report

@@ -5,7 +5,7 @@
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 const char* const kText =
@@ -91,4 +91,4 @@ TEST(RigDocument, DropsTheCommentsBeforeTheFirstKey) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::rig_file

@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 namespace fs = std::filesystem;
@@ -79,7 +79,7 @@ TEST(RigFile, EveryRigOfThePackageLoads) {
     EXPECT_EQ(file.source, path);
     EXPECT_EQ(file.text, content_of(path));
     EXPECT_EQ(file.rig.name, entry.path().stem().string());
-    EXPECT_NO_THROW(Simulation(file.rig, file.simulation).step());
+    EXPECT_NO_THROW(simulation::Simulation(file.rig, file.simulation).step());
   }
   EXPECT_GE(count, 1);
 }
@@ -104,14 +104,14 @@ TEST(RigFile, TheSarkarRigAsPublished) {
   EXPECT_EQ(file.simulation.sensors.sampling_rate, 1000);
   ASSERT_TRUE(file.diagnosis.apd && file.diagnosis.lost_motion && file.diagnosis.limits);
   EXPECT_EQ(file.diagnosis.apd->period, 0.1);
-  EXPECT_TRUE(file.diagnosis.apd->layout == (ApdLayout{60, -0.4, 0.4}));
+  EXPECT_TRUE(file.diagnosis.apd->layout == (diagnosis::ApdLayout{60, -0.4, 0.4}));
   EXPECT_TRUE(file.diagnosis.lost_motion->subtract_elastic_deflection);
 }
 
 // One flank loaded: both springs in series with the contact F = K d^1.5.
 TEST(RigFile, LostMotionKnowsTheElasticDeflectionAndTheBaseRadius) {
   const RigFile file = default_rig_file();
-  const LostMotionSettings& lost_motion = *file.diagnosis.lost_motion;
+  const diagnosis::LostMotionSettings& lost_motion = *file.diagnosis.lost_motion;
   EXPECT_DOUBLE_EQ(lost_motion.base_radius, 0.014917);
   const double torque = 0.05, radius = 0.014917;
   const double expected =
@@ -193,4 +193,4 @@ TEST(RigFile, AnAngularMeshHasNoBaseRadius) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::rig_file

@@ -10,14 +10,14 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 std::string servo_text() {
   return load_rig_file(test::package_file("config/two_inertia_servo.yaml")).text;
 }
 
-Rig servo() {
+model::Rig servo() {
   return rig_file_from_text(servo_text(), "servo").rig;
 }
 
@@ -26,7 +26,7 @@ TEST(RigParameters, EachSetsItsOwnNumberAndNoOther) {
   for (const RigParameter& p : servo_parameters()) {
     EXPECT_TRUE(names.insert(p.name).second) << p.name;
     if (!p.known_to(servo())) continue;
-    Rig changed = servo();
+    model::Rig changed = servo();
     p.set(changed, 0.125);
     for (const RigParameter& other : servo_parameters())
       EXPECT_EQ(other.get(changed), &other == &p ? 0.125 : other.get(servo())) << p.name << " " << other.name;
@@ -37,7 +37,7 @@ TEST(RigParameters, EachSetsItsOwnNumberAndNoOther) {
 TEST(RigParameters, PowersOfTheRatioAreThoseOfTheReader) {
   std::string text = servo_text();
   text.replace(text.find("  motor:"), 0, "  motor_side: true\n");
-  const Rig of_shaft = rig_file_from_text(text, "shaft").rig, at_load = load_side(of_shaft);
+  const model::Rig of_shaft = rig_file_from_text(text, "shaft").rig, at_load = model::load_side(of_shaft);
   for (const RigParameter& p : servo_parameters())
     EXPECT_NEAR(p.get(at_load), p.get(of_shaft) * std::pow(of_shaft.motor_axis_ratio(), p.ratio_power),
                 1e-12 * std::fabs(p.get(at_load)))
@@ -80,10 +80,10 @@ TEST(RigParameters, AreFoundByNameAndByWhatTheyAre) {
 TEST(RigParameters, AMachineKnowsOnlyThoseOfItsMeshAndContactLaw) {
   EXPECT_TRUE(servo_parameter("mesh_damping").known_to(servo()));
   EXPECT_FALSE(servo_parameter("mesh_alpha").known_to(servo()));  // its law is linear
-  const Rig rigid = load_rig_file(test::package_file("config/emps.yaml")).rig;
+  const model::Rig rigid = load_rig_file(test::package_file("config/emps.yaml")).rig;
   EXPECT_FALSE(servo_parameter("backlash_angle").known_to(rigid));
   EXPECT_TRUE(servo_parameter("motor_coulomb").known_to(rigid));
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::rig_file

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,17 +87,17 @@ TEST_F(TestRuns, ReplaceTheExcitationOfTheRig) {
   RigFile file = load(kRuns);
   apply_test_run(find_test_run(file.test_runs, "walk"), file);
   EXPECT_EQ(file.simulation.excitation.type, "constant");
-  const Record record = simulate_record(file.rig, file.simulation, 2);
-  EXPECT_EQ(record.column(Channel::motor_torque).front(), 0.5);
-  EXPECT_GT(record.column(Channel::load_position).back(), 1);
+  const record::Record record = simulation::simulate_record(file.rig, file.simulation, 2);
+  EXPECT_EQ(record.column(record::Channel::motor_torque).front(), 0.5);
+  EXPECT_GT(record.column(record::Channel::load_position).back(), 1);
 }
 
 TEST_F(TestRuns, WithoutLoadTheDriverIsAlone) {
   RigFile file = load(kRuns);
   apply_test_run(find_test_run(file.test_runs, "alone"), file);
-  const Record record = simulate_record(file.rig, file.simulation, 2);
-  for (const double position : record.column(Channel::load_position)) EXPECT_EQ(position, 0);
-  EXPECT_NEAR(record.column(Channel::motor_velocity).back(), 0.5 / 0.1, 1e-5);  // 200 time constants
+  const record::Record record = simulation::simulate_record(file.rig, file.simulation, 2);
+  for (const double position : record.column(record::Channel::load_position)) EXPECT_EQ(position, 0);
+  EXPECT_NEAR(record.column(record::Channel::motor_velocity).back(), 0.5 / 0.1, 1e-5);  // 200 time constants
 }
 
 TEST_F(TestRuns, AnUnknownNameIsRefusedWithThoseThatThereAre) {
@@ -149,4 +149,4 @@ TEST_F(TestRuns, ALoadTorqueOnALockedLinkIsRefusedAlsoAsTheRigsOwn) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::rig_file

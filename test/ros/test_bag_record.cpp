@@ -15,7 +15,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 namespace fs = std::filesystem;
@@ -104,33 +104,33 @@ class Recording {
   std::uint32_t received_ = 100;
 };
 
-Record sample_record(std::vector<double> time = {0, 0.001, 0.0020000005, 0.003, 17}) {
-  Record record;
+record::Record sample_record(std::vector<double> time = {0, 0.001, 0.0020000005, 0.003, 17}) {
+  record::Record record;
   record.name = "run \"a\".csv";
   record.time = std::move(time);
   double value = 0.1;
-  for (const Channel channel : kChannels)
+  for (const record::Channel channel : record::kChannels)
     for (std::size_t i = 0; i < record.size(); ++i)
       record.column(channel).push_back(value = std::sin(97 * value + 1));
-  record.column(Channel::motor_torque)[1] = -0.0;
-  record.column(Channel::sensor_torque)[1] = std::numeric_limits<double>::denorm_min();
-  record.column(Channel::load_position)[1] = std::numeric_limits<double>::max();
+  record.column(record::Channel::motor_torque)[1] = -0.0;
+  record.column(record::Channel::sensor_torque)[1] = std::numeric_limits<double>::denorm_min();
+  record.column(record::Channel::load_position)[1] = std::numeric_limits<double>::max();
   return record;
 }
 
-void expect_same_columns(const Record& a, const Record& b) {
-  for (const Channel channel : kChannels)
-    EXPECT_EQ(a.column(channel), b.column(channel)) << channel_name(channel);
+void expect_same_columns(const record::Record& a, const record::Record& b) {
+  for (const record::Channel channel : record::kChannels)
+    EXPECT_EQ(a.column(channel), b.column(channel)) << record::channel_name(channel);
 }
 
 TEST_F(BagRecord, AllChannelsAndTimesSurviveExactly) {
-  const Record record = sample_record();
+  const record::Record record = sample_record();
   write_bag(record, file("a.bag"), "elbow");
-  const Record read = read_bag(file("a.bag"));
+  const record::Record read = read_bag(file("a.bag"));
   // 0.0020000005 is between two nanoseconds; the stamp is the nearest one.
   EXPECT_EQ(read.time, (std::vector<double>{0, 0.001, 0.002000001, 0.003, 17}));
   expect_same_columns(read, record);
-  EXPECT_TRUE(std::signbit(read.column(Channel::motor_torque)[1]));
+  EXPECT_TRUE(std::signbit(read.column(record::Channel::motor_torque)[1]));
   EXPECT_EQ(read.name, file("a.bag"));
   EXPECT_EQ(files(), 1u);  // no temporary file stays
 }
@@ -140,7 +140,7 @@ TEST_F(BagRecord, TimesThatDoNotStartAtZeroSurvive) {
   for (const std::vector<double>& time :
        {std::vector<double>{1234.567891234, 1234.567892, 1235.1}, std::vector<double>{-2.5, -0.25, 3.125},
         std::vector<double>{1700000000.25, 1700000000.251, 1700000001}}) {
-    const Record record = sample_record(time);
+    const record::Record record = sample_record(time);
     write_bag(record, file("a.bag"), "joint");
     EXPECT_EQ(read_bag(file("a.bag")).time, time);
   }
@@ -173,17 +173,17 @@ TEST_F(BagRecord, RecordedBagBeginsAtZeroAndOnlyHeaderStampsCount) {
       .add(Recording::motor(50.25, 1))
       .add(Recording::motor(50.5, 2))
       .add(Recording::motor(51, 3));
-  const Record record = read_bag(file("a.bag"));
+  const record::Record record = read_bag(file("a.bag"));
   EXPECT_EQ(record.time, (std::vector<double>{0, 0.25, 0.75}));
-  EXPECT_EQ(record.column(Channel::motor_position), (std::vector<double>{1, 2, 3}));
-  EXPECT_FALSE(record.has(Channel::sensor_torque));
+  EXPECT_EQ(record.column(record::Channel::motor_position), (std::vector<double>{1, 2, 3}));
+  EXPECT_FALSE(record.has(record::Channel::sensor_torque));
 }
 
 TEST_F(BagRecord, ChannelThatIsNanThroughoutIsAbsent) {
   Recording(file("a.bag")).add(Recording::motor(1, 1, kNan)).add(Recording::motor(2, 2, kNan));
-  const Record record = read_bag(file("a.bag"));
-  EXPECT_FALSE(record.has(Channel::motor_velocity));
-  EXPECT_TRUE(record.has(Channel::motor_torque));
+  const record::Record record = read_bag(file("a.bag"));
+  EXPECT_FALSE(record.has(record::Channel::motor_velocity));
+  EXPECT_TRUE(record.has(record::Channel::motor_torque));
 }
 
 TEST_F(BagRecord, ChannelThatIsNanAtTimesIsRefused) {
@@ -206,8 +206,8 @@ TEST_F(BagRecord, RepeatedStampLosesTheLaterMessageWithAWarning) {
       .add(Recording::motor(1, 1))
       .add(Recording::motor(2, 2))
       .add(Recording::motor(2, 9));
-  const Record record = read_bag(file("a.bag"));
-  EXPECT_EQ(record.column(Channel::motor_position), (std::vector<double>{1, 2}));
+  const record::Record record = read_bag(file("a.bag"));
+  EXPECT_EQ(record.column(record::Channel::motor_position), (std::vector<double>{1, 2}));
   ASSERT_FALSE(record.warnings.empty());
   expect_contains(record.warnings.front(), "repeated time stamp");
 }
@@ -234,7 +234,8 @@ TEST_F(BagRecord, JointIsChosenOrAskedFor) {
       .add(Recording::motor(1, 5, 5, 5, "wrist"))
       .add(Recording::motor(2, 2, 2, 2, "elbow"))
       .add(Recording::motor(2, 6, 6, 6, "wrist"));
-  EXPECT_EQ(read_bag(file("a.bag"), "wrist").column(Channel::motor_position), (std::vector<double>{5, 6}));
+  EXPECT_EQ(read_bag(file("a.bag"), "wrist").column(record::Channel::motor_position),
+            (std::vector<double>{5, 6}));
   const std::string several = message_of<BadData>([&] { read_bag(file("a.bag")); });
   for (const char* part : {"--joint", "elbow", "wrist"}) expect_contains(several, part);
   const std::string absent = message_of<BadData>([&] { read_bag(file("a.bag"), "knee"); });
@@ -308,7 +309,7 @@ TEST_F(BagRecord, UnindexedBagPointsToReindex) {
 // An unpacked chunk has no checksum, so a flipped bit may become another value, but never a crash or an
 // endless loop.
 TEST_F(BagRecord, FlippedBitsAreRefusedOrHarmless) {
-  const Record record = sample_record({0, 0.001, 0.002});
+  const record::Record record = sample_record({0, 0.001, 0.002});
   write_bag(record, file("packed.bag"), "joint");
   Recording(file("plain.bag")).add(Recording::motor(1)).add(Recording::motor(2));
   for (const char* name : {"packed.bag", "plain.bag"}) {
@@ -320,7 +321,7 @@ TEST_F(BagRecord, FlippedBitsAreRefusedOrHarmless) {
       bytes[i] = static_cast<char>(bytes[i] ^ (1 << (i % 8)));
       const std::string path = write_bytes("flipped.bag", bytes);
       try {
-        const Record read = read_bag(path);
+        const record::Record read = read_bag(path);
         if (packed) {  // lz4 has a checksum
           EXPECT_EQ(read.time, record.time) << "byte " << i;
           expect_same_columns(read, record);
@@ -335,7 +336,7 @@ TEST_F(BagRecord, FlippedBitsAreRefusedOrHarmless) {
 }
 
 TEST_F(BagRecord, WritingFailsWithoutLeavingAnything) {
-  const Record record = sample_record();
+  const record::Record record = sample_record();
   expect_contains(message_of<CannotWrite>([&] { write_bag(record, file("no/a.bag"), "joint"); }), "no/a.bag");
   fs::create_directory(folder_ / "d.bag");
   message_of<CannotWrite>([&] { write_bag(record, file("d.bag"), "joint"); });
@@ -345,20 +346,20 @@ TEST_F(BagRecord, WritingFailsWithoutLeavingAnything) {
 
 TEST_F(BagRecord, RecordThatCannotBeReadBackLeavesTheOldFile) {
   const std::string path = write_bytes("a.bag", "old");
-  const auto refused = [&](Record record) {
+  const auto refused = [&](record::Record record) {
     message_of<BadData>([&] { write_bag(record, path, "joint"); });
     EXPECT_EQ(bytes_of(path), "old");
   };
-  Record record = sample_record();
-  record.column(Channel::motor_torque)[2] = kNan;
+  record::Record record = sample_record();
+  record.column(record::Channel::motor_torque)[2] = kNan;
   refused(record);
   record = sample_record();
-  record.column(Channel::motor_torque).pop_back();
+  record.column(record::Channel::motor_torque).pop_back();
   refused(record);
   refused(sample_record({0, 1e-10}));
   refused(sample_record({0, 5e9}));
   refused(sample_record({-1e9, 0}));  // stamp 0
-  refused(Record());
+  refused(record::Record());
   write_bag(sample_record(), path, "joint");
   EXPECT_EQ(read_bag(path).size(), 5u);
 }
@@ -372,4 +373,4 @@ TEST_F(BagRecord, SymbolicLinkStaysALink) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

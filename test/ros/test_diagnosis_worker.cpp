@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/ros/diagnosis_worker.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 DiagnosisTask task_of(int number, std::size_t samples = 1) {
@@ -101,4 +101,4 @@ TEST(DiagnosisWorker, WhatFailsEndsNothing) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

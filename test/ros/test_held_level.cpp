@@ -3,7 +3,7 @@
 
 #include "backlash_diagnosis/ros/held_level.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 TEST(HeldLevelTest, RisesAtOnceAndFallsOnlyAfterTheTimeToTheHighestSince) {
@@ -37,4 +37,4 @@ TEST(HeldLevelTest, WithoutTimeItFollows) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/base/scratch_folder.h"
 #include "backlash_diagnosis/ros/job.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
@@ -110,10 +110,10 @@ TEST(Job, DoesNotWaitForWhatTheCommandLeavesBehind) {
 
 TEST(Job, RigFilesAreTheirOwnFileOrACopy) {
   const ScratchFolder scratch;
-  RigFile rig = default_rig_file();  // built in
+  rig_file::RigFile rig = rig_file::default_rig_file();  // built in
   const std::string copy = file_of(rig, scratch);
   EXPECT_EQ(copy, scratch.path("rig.yaml"));
-  const RigFile again = load_rig_file(copy);
+  const rig_file::RigFile again = rig_file::load_rig_file(copy);
   EXPECT_EQ(again.digest, rig.digest);
   const ScratchFolder other;
   EXPECT_EQ(file_of(again, other), copy);
@@ -123,4 +123,4 @@ TEST(Job, RigFilesAreTheirOwnFileOrACopy) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -13,7 +13,7 @@
 #include "support/curve.h"
 #include "support/records.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using test::make_record;
@@ -27,7 +27,7 @@ ros::Time stamp_of(double time) {
 MonitorSettings monitor_settings(const std::string& joint) {
   MonitorSettings settings;
   settings.joint = joint;
-  settings.rig = default_rig_file();
+  settings.rig = rig_file::default_rig_file();
   settings.curve = test::linear_curve();
   settings.estimate_interval = 0;  // each period
   return settings;
@@ -37,10 +37,10 @@ MonitorSettings monitor_settings(const std::string& joint) {
 struct Heard {
   std::mutex mutex;
   std::vector<ros::Time> stamps;
-  std::vector<Diagnosis> diagnoses;
+  std::vector<diagnosis::Diagnosis> diagnoses;
 
   JointMonitor::OnDiagnosis listener() {
-    return [this](const ros::Time& stamp, const Diagnosis& diagnosis) {
+    return [this](const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis) {
       const std::lock_guard<std::mutex> lock(mutex);
       stamps.push_back(stamp);
       diagnoses.push_back(diagnosis);
@@ -53,7 +53,7 @@ struct Heard {
 };
 
 /// All samples of a record; how many of them completed a period.
-long feed(JointMonitor& monitor, const Record& record, std::size_t from = 0) {
+long feed(JointMonitor& monitor, const record::Record& record, std::size_t from = 0) {
   long periods = 0;
   for (std::size_t i = from; i < record.size(); ++i)
     periods += monitor.take(stamp_of(record.time[i]), values_at(record, i), "", "joint_states").has_value();
@@ -68,18 +68,18 @@ class JointMonitorTest : public testing::Test {
 TEST_F(JointMonitorTest, EachPeriodHasItsEstimateAndItIsThatOfItsSamples) {
   Heard heard;
   JointMonitor monitor(monitor_settings("elbow"), heard.listener());
-  const Record record = make_record({});
-  std::vector<Diagnosis> expected;
+  const record::Record record = make_record({});
+  std::vector<diagnosis::Diagnosis> expected;
   for (std::size_t end = 300; end <= record.size(); end += 100) {  // two of 15 periods settle
     EXPECT_EQ(feed(monitor, record.slice(0, record.time[end - 1] + 1e-4), end - 100 - (end == 300 ? 200 : 0)),
               1);
     while (heard.count() < expected.size() + 1) std::this_thread::yield();
     const std::size_t begin = end - 100 * std::min<std::size_t>(5, (end - 200) / 100);
-    const MonitoringCurve curve = test::linear_curve();
-    DiagnosisSettings settings = default_rig_file().diagnosis;
+    const diagnosis::MonitoringCurve curve = test::linear_curve();
+    diagnosis::DiagnosisSettings settings = rig_file::default_rig_file().diagnosis;
     settings.apd->settling_periods = 0;
-    expected.push_back(
-        diagnose(record.slice(record.time[begin] - 1e-4, record.time[end - 1] + 1e-4), settings, &curve));
+    expected.push_back(diagnosis::diagnose(
+        record.slice(record.time[begin] - 1e-4, record.time[end - 1] + 1e-4), settings, &curve));
     EXPECT_EQ(heard.stamps.back(), stamp_of(record.time[end - 1]));
   }
   monitor.stop();
@@ -96,7 +96,7 @@ TEST_F(JointMonitorTest, ASlowJointDelaysNobody) {
   std::promise<void> allowed;
   const std::shared_future<void> wait = allowed.get_future().share();
   std::vector<ros::Time> told;
-  JointMonitor slow(monitor_settings("slow"), [&](const ros::Time& stamp, const Diagnosis&) {
+  JointMonitor slow(monitor_settings("slow"), [&](const ros::Time& stamp, const diagnosis::Diagnosis&) {
     told.push_back(stamp);
     wait.wait();
   });
@@ -104,7 +104,7 @@ TEST_F(JointMonitorTest, ASlowJointDelaysNobody) {
   JointMonitor quick(monitor_settings("quick"), heard.listener());
   test::RecordRecipe recipe;
   recipe.duration = 4;
-  const Record record = make_record(recipe);
+  const record::Record record = make_record(recipe);
   long periods = 0, quick_periods = 0;
   for (std::size_t i = 0; i < record.size(); ++i) {
     const ros::Time stamp = stamp_of(record.time[i]);
@@ -136,7 +136,7 @@ TEST_F(JointMonitorTest, SnapshotsUnderConcurrency) {
   JointMonitor monitor(monitor_settings("elbow"), heard.listener());
   test::RecordRecipe recipe;
   recipe.duration = 6;
-  const Record record = make_record(recipe);
+  const record::Record record = make_record(recipe);
   std::promise<void> fed;
   const auto done = fed.get_future().share();
   const auto busy = [&done] { return done.wait_for(std::chrono::seconds(0)) != std::future_status::ready; };
@@ -144,7 +144,7 @@ TEST_F(JointMonitorTest, SnapshotsUnderConcurrency) {
     while (busy()) {
       std::string note;
       ros::Time stamp;
-      const Diagnosis diagnosis = monitor.diagnose(3, 0, note, stamp);
+      const diagnosis::Diagnosis diagnosis = monitor.diagnose(3, 0, note, stamp);
       if (note.empty()) EXPECT_EQ(diagnosis.apd->periods.size(), 3u);
     }
   });
@@ -161,11 +161,11 @@ TEST_F(JointMonitorTest, SnapshotsUnderConcurrency) {
   changing.join();
   monitor.stop();
   EXPECT_GT(heard.count(), 0u);
-  for (const Diagnosis& diagnosis : heard.diagnoses) {
+  for (const diagnosis::Diagnosis& diagnosis : heard.diagnoses) {
     EXPECT_GE(diagnosis.apd->periods.size(), 1u);
     EXPECT_LE(diagnosis.apd->periods.size(), 7u);
   }
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -9,10 +9,10 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/ros/joint_state.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
-double of(const ChannelValues& values, Channel channel) {
+double of(const record::ChannelValues& values, record::Channel channel) {
   return values[static_cast<std::size_t>(channel)];
 }
 
@@ -21,12 +21,12 @@ TEST(JointState, CurrentAndAccelerationAreEffortsOfNamesOfTheirOwn) {
   m.name = {"elbow_accelerometer", "wrist_current", "elbow_current", "elbow_motor"};
   m.effort = {-120, 9, 1.5, 0.05};
   EXPECT_EQ(JointStateReader({"elbow"}).read(m).size(), 1u);
-  const ChannelValues values = read_joint_state(m, "elbow", "joint_states");
-  EXPECT_EQ(of(values, Channel::acceleration), -120);
-  EXPECT_EQ(of(values, Channel::motor_current), 1.5);
-  EXPECT_EQ(of(values, Channel::motor_torque), 0.05);
-  EXPECT_TRUE(std::isnan(of(values, Channel::sensor_torque)));
-  EXPECT_TRUE(std::isnan(of(values, Channel::motor_position)));
+  const record::ChannelValues values = read_joint_state(m, "elbow", "joint_states");
+  EXPECT_EQ(of(values, record::Channel::acceleration), -120);
+  EXPECT_EQ(of(values, record::Channel::motor_current), 1.5);
+  EXPECT_EQ(of(values, record::Channel::motor_torque), 0.05);
+  EXPECT_TRUE(std::isnan(of(values, record::Channel::sensor_torque)));
+  EXPECT_TRUE(std::isnan(of(values, record::Channel::motor_position)));
 }
 
 TEST(JointState, EitherNameAloneIsTheJoint) {
@@ -38,7 +38,7 @@ TEST(JointState, EitherNameAloneIsTheJoint) {
     EXPECT_TRUE(JointStateReader({"wrist"}).read(m).empty());
     m.effort.clear();
     m.position = {3};  // says nothing of these two
-    const ChannelValues values = read_joint_state(m, "elbow", "joint_states");
+    const record::ChannelValues values = read_joint_state(m, "elbow", "joint_states");
     EXPECT_TRUE(std::all_of(values.begin(), values.end(), [](double v) { return std::isnan(v); }));
   }
 }
@@ -62,18 +62,18 @@ TEST(JointState, WrongOnesAreRefusedByName) {
 }
 
 TEST(JointState, ARecordsSampleComesBackAsItWas) {
-  Record record;
+  record::Record record;
   record.time = {0, 1};
   double value = 0.5;
-  for (const Channel channel : kChannels) record.column(channel) = {value += 1, value += 1};
-  const ChannelValues values =
+  for (const record::Channel channel : record::kChannels) record.column(channel) = {value += 1, value += 1};
+  const record::ChannelValues values =
       read_joint_state(make_joint_state(record, 1, JointNames("elbow")), "elbow", "t");
-  for (const Channel channel : kChannels)
-    EXPECT_EQ(of(values, channel), record.column(channel)[1]) << channel_name(channel);
+  for (const record::Channel channel : record::kChannels)
+    EXPECT_EQ(of(values, channel), record.column(channel)[1]) << record::channel_name(channel);
 }
 
 TEST(JointState, TheSimulatorNamesOnlyWhatIsMeasured) {
-  Observation o{};
+  model::Observation o{};
   o.motor_current = std::nan("");
   o.acceleration = std::nan("");
   const JointNames names("elbow");
@@ -83,9 +83,9 @@ TEST(JointState, TheSimulatorNamesOnlyWhatIsMeasured) {
   o.acceleration = -120;
   const sensor_msgs::JointState m = make_joint_state(o, names);
   EXPECT_EQ(m.name.size(), 5u);
-  const ChannelValues values = read_joint_state(m, "elbow", "t");
-  EXPECT_EQ(of(values, Channel::motor_current), 1.5);
-  EXPECT_EQ(of(values, Channel::acceleration), -120);
+  const record::ChannelValues values = read_joint_state(m, "elbow", "t");
+  EXPECT_EQ(of(values, record::Channel::motor_current), 1.5);
+  EXPECT_EQ(of(values, record::Channel::acceleration), -120);
 }
 
 TEST(JointStateReader, TellsTheJointsOfAMessageApart) {
@@ -95,16 +95,16 @@ TEST(JointStateReader, TellsTheJointsOfAMessageApart) {
   m.position = {1, 2, 3, 4, 5};
   m.effort = {10, 20, 30, NAN, NAN};
   EXPECT_EQ(reader.read(m), (std::vector<std::size_t>{1, 0})) << "a reference alone is no mention";
-  EXPECT_EQ(of(reader.values(1), Channel::motor_torque), 10);
-  EXPECT_EQ(of(reader.values(1), Channel::load_position), 4);
-  EXPECT_EQ(of(reader.values(0), Channel::motor_position), 3);
-  EXPECT_TRUE(std::isnan(of(reader.values(0), Channel::load_position)));
+  EXPECT_EQ(of(reader.values(1), record::Channel::motor_torque), 10);
+  EXPECT_EQ(of(reader.values(1), record::Channel::load_position), 4);
+  EXPECT_EQ(of(reader.values(0), record::Channel::motor_position), 3);
+  EXPECT_TRUE(std::isnan(of(reader.values(0), record::Channel::load_position)));
   m.name = {"knee_reference", "knee_motor"};  // nothing of the last message is left
   m.position = {5, 6};
   m.effort.clear();
   EXPECT_EQ(reader.read(m), (std::vector<std::size_t>{2}));
-  EXPECT_EQ(of(reader.values(2), Channel::reference_position), 5);
-  EXPECT_TRUE(std::isnan(of(reader.values(1), Channel::motor_torque)));
+  EXPECT_EQ(of(reader.values(2), record::Channel::reference_position), 5);
+  EXPECT_TRUE(std::isnan(of(reader.values(1), record::Channel::motor_torque)));
 }
 
 TEST(JointStateReader, AProblemOfOneJointIsNotTheOthers) {
@@ -125,4 +125,4 @@ TEST(JointStateReader, AProblemOfOneJointIsNotTheOthers) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -3,7 +3,7 @@
 
 #include "backlash_diagnosis/ros/pacer.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 namespace {
 
 using namespace std::chrono_literals;
@@ -49,4 +49,4 @@ TEST(Pacer, WithoutPaceEverySampleIsDue) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

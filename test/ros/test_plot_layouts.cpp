@@ -18,7 +18,7 @@
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "support/data.h"
 
-namespace backlash::test {
+namespace backlash::ros_bridge {
 namespace {
 
 using Fields = std::map<std::string, std::string>;  // name -> type
@@ -56,7 +56,7 @@ std::string type_of(const std::string& topic, const std::string& field) {
 void expect_series(const std::string& series) {
   std::smatch found;
   if (std::regex_match(series, found, std::regex("/joint_states/(\\w+)/(\\w+)"))) {
-    const JointNames names(default_rig_file().rig.joint);
+    const JointNames names(rig_file::default_rig_file().rig.joint);
     EXPECT_TRUE((std::set<std::string>{names.motor, names.sensor, names.load}.count(found[1]))) << series;
     EXPECT_EQ(type_of("joint_states", found[2]), "float64[]") << series;
   } else {
@@ -75,7 +75,7 @@ void find_all(const Tree& tree, const std::string& name, std::vector<Tree>& foun
 
 TEST(PlotLayouts, PlotJugglerShowsWhatIsPublished) {
   Tree tree;
-  boost::property_tree::read_xml(package_file("config/plotjuggler.xml"), tree);
+  boost::property_tree::read_xml(test::package_file("config/plotjuggler.xml"), tree);
   std::vector<Tree> curves, splitters;
   find_all(tree.get_child("root"), "curve", curves);
   std::set<std::string> shown;
@@ -103,7 +103,7 @@ TEST(PlotLayouts, PlotJugglerShowsWhatIsPublished) {
 }
 
 TEST(PlotLayouts, RqtPlotIsGivenWhatIsPublished) {
-  std::ifstream page(package_file("doc/plots.md"));
+  std::ifstream page(test::package_file("doc/plots.md"));
   int fields = 0;
   for (std::string line; std::getline(page, line);) {
     std::smatch found;
@@ -121,4 +121,4 @@ TEST(PlotLayouts, RqtPlotIsGivenWhatIsPublished) {
 }
 
 }  // namespace
-}  // namespace backlash::test
+}  // namespace backlash::ros_bridge

@@ -4,9 +4,10 @@
 #include <cmath>
 #include <random>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/blocks.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 TEST(Blocks, MeansLeaveTheRestOut) {
@@ -61,4 +62,4 @@ TEST(Jackknife, RefusesWhatOneBlockDecides) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

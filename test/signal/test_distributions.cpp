@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/distributions.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 TEST(Distributions, StudentQuantileAgreesWithTables) {
@@ -50,4 +50,4 @@ TEST(Distributions, RefuseWhatTheyAreNotDefinedFor) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

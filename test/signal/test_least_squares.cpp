@@ -4,9 +4,10 @@
 #include <cmath>
 #include <random>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 /// A line y = 2 - 3 x at x = 0 .. n - 1, with normal noise.
@@ -109,4 +110,4 @@ TEST(LeastSquares, BlockCovarianceKnowsThatNeighboursAgree) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 Eigen::MatrixXd matrix(Eigen::Index rows, Eigen::Index columns, std::initializer_list<double> values) {
@@ -105,4 +105,4 @@ TEST(LinearAlgebra, EigenvaluesOfAChainOfMasses) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

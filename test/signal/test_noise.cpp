@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/signal/noise.h"
 #include "support/waves.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 using test::kWaves;
@@ -158,4 +158,4 @@ TEST(NoiseFromDifferences, LeavesACubicAndAJumpOut) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 TEST(OrderStatistics, MedianByHand) {
@@ -38,4 +38,4 @@ TEST(OrderStatistics, RangesByHand) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -3,7 +3,7 @@
 
 #include "backlash_diagnosis/signal/quadratic.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 using Intervals = std::vector<std::pair<double, double>>;
@@ -19,4 +19,4 @@ TEST(NotPositive, SolutionsByHand) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/robust.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 TEST(Robust, OutlierIsCountedAndClipped) {
@@ -39,4 +40,4 @@ TEST(RobustMean, NothingHasNoMeanAndOneValueIsItsOwn) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/signal/error_memory.h"
 #include "backlash_diagnosis/signal/sen_slope.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 TEST(SenSlope, IsTheMedianOfAllSlopesByHand) {
@@ -71,4 +71,4 @@ TEST(ErrorMemory, OfAnAutoregressionWithinItsOwnError) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

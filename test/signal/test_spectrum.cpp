@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/signal/spectrum.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 std::vector<double> white(std::size_t count, std::uint64_t seed) {
@@ -108,4 +108,4 @@ TEST(Welch, RefusesWhatItCannotCut) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::signal {
 namespace {
 
 constexpr double kInterval = 1e-3;  // s
@@ -69,19 +69,19 @@ TEST(ZeroPhase, DelayShiftsASineByItsPhase) {
 }
 
 TEST(ZeroPhase, EvenRecordsStayAndJitterIsMended) {
-  Record record;
+  record::Record record;
   for (int k = 0; k < 200; ++k) {
     record.time.push_back(k * kInterval + (k % 2 ? 2e-4 : 0));
-    record.column(Channel::motor_position).push_back(7 * record.time.back() - 1);
+    record.column(record::Channel::motor_position).push_back(7 * record.time.back() - 1);
   }
-  const Record even = evenly_sampled(record);
+  const record::Record even = record::evenly_sampled(record);
   for (std::size_t k = 0; k < even.size(); ++k)  // a straight line is interpolated exactly
-    ASSERT_NEAR(even.column(Channel::motor_position)[k], 7 * even.time[k] - 1, 1e-12);
+    ASSERT_NEAR(even.column(record::Channel::motor_position)[k], 7 * even.time[k] - 1, 1e-12);
   for (std::size_t k = 1; k < even.size(); ++k)
     ASSERT_NEAR(even.time[k] - even.time[k - 1], even.sampling_interval(), 1e-12);
-  EXPECT_EQ(evenly_sampled(even).time, even.time);
+  EXPECT_EQ(record::evenly_sampled(even).time, even.time);
   record.time.back() += 1;
-  EXPECT_THROW(evenly_sampled(record), BadData);
+  EXPECT_THROW(record::evenly_sampled(record), BadData);
 }
 
 TEST(ZeroPhase, RefusesWhatHasNoMeaning) {
@@ -91,4 +91,4 @@ TEST(ZeroPhase, RefusesWhatHasNoMeaning) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::signal

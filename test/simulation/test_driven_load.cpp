@@ -14,18 +14,18 @@
 #include "support/rigs.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 using test::other_servo;
 
-RecordedMotion motion_of(const Record& record) {
+RecordedMotion motion_of(const record::Record& record) {
   RecordedMotion motion;
   motion.interval = record.sampling_interval();
-  motion.motor = &record.column(Channel::motor_position);
-  motion.motor_rate = &record.column(Channel::motor_velocity);
-  motion.first_load = record.column(Channel::load_position).front();
-  motion.first_load_rate = record.column(Channel::load_velocity).front();
+  motion.motor = &record.column(record::Channel::motor_position);
+  motion.motor_rate = &record.column(record::Channel::motor_velocity);
+  motion.first_load = record.column(record::Channel::load_position).front();
+  motion.first_load_rate = record.column(record::Channel::load_velocity).front();
   return motion;
 }
 
@@ -36,31 +36,31 @@ double worst(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 TEST(DrivenLoad, RepeatsTheWholeTrain) {
-  const Rig rig = other_servo();
-  const Record record = simulate_record(rig, test::servo_run(3, false), 5);
+  const model::Rig rig = other_servo();
+  const record::Record record = simulate_record(rig, test::servo_run(3, false), 5);
   const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
   // No feedback here. A sample's step of the fixed integrator is exact to 1e-9 rad in contact; an impact
   // within it is placed to a fraction of a sample: at 0.1 rad/s between the flanks some 1e-5 rad for a
   // moment, and friction wears that off. The deflection is 1e-3 rad.
-  EXPECT_LT(worst(driven.load, record.column(Channel::load_position)), 2e-5);
-  EXPECT_LT(worst(driven.load_rate, record.column(Channel::load_velocity)), 5e-3);
+  EXPECT_LT(worst(driven.load, record.column(record::Channel::load_position)), 2e-5);
+  EXPECT_LT(worst(driven.load_rate, record.column(record::Channel::load_velocity)), 5e-3);
 }
 
 TEST(DrivenLoad, FeedbackHoldsALoadThatStartsWrong) {
-  const Rig rig = other_servo();
-  const Record record = simulate_record(rig, test::servo_run(4, false), 3);
+  const model::Rig rig = other_servo();
+  const record::Record record = simulate_record(rig, test::servo_run(4, false), 3);
   RecordedMotion motion = motion_of(record);
-  motion.load_rate = &record.column(Channel::load_velocity);
+  motion.load_rate = &record.column(record::Channel::load_velocity);
   motion.first_load_rate = 0.5;
   const DrivenLoad driven = simulate_driven_load(rig, motion);
   double late = 0;
   for (std::size_t k = 1000; k < record.size(); ++k)
-    late = std::max(late, std::fabs(driven.load[k] - record.column(Channel::load_position)[k]));
+    late = std::max(late, std::fabs(driven.load[k] - record.column(record::Channel::load_position)[k]));
   EXPECT_LT(late, 2e-5);
 }
 
 TEST(DrivenLoad, FreeLoadInTheGapStopsAsCoulombSays) {
-  Rig rig = other_servo();
+  model::Rig rig = other_servo();
   rig.mesh.backlash = 1;  // rad: never touched
   rig.link.viscous_damping = 0;
   const std::vector<double> still(1000, 0.0);
@@ -75,7 +75,7 @@ TEST(DrivenLoad, FreeLoadInTheGapStopsAsCoulombSays) {
 }
 
 TEST(DrivenLoad, HeldMotorUnderContactBalances) {
-  Rig rig = other_servo();
+  model::Rig rig = other_servo();
   rig.link.coulomb_friction = 0;
   const std::vector<double> still(20000, 0.0);
   RecordedMotion motion{1e-3,    &still, &still,
@@ -88,7 +88,7 @@ TEST(DrivenLoad, HeldMotorUnderContactBalances) {
 }
 
 TEST(DrivenLoad, LockedLoadStands) {
-  Rig rig = other_servo();
+  model::Rig rig = other_servo();
   rig.link_locked = true;
   const std::vector<double> pressed(5, 6e-4), still(5, 0.0);
   const RecordedMotion motion{1e-3, &pressed, &still, nullptr, 0, 0};
@@ -100,7 +100,7 @@ TEST(DrivenLoad, LockedLoadStands) {
 }
 
 TEST(DrivenLoad, RigidMeshTakesTheLoadAlong) {
-  Rig rig = other_servo();
+  model::Rig rig = other_servo();
   rig.mesh.rigid = true;
   const std::vector<double> position = {0, 2e-3, 4e-3, 6e-3, 8e-3}, rate(5, 2.0);
   const RecordedMotion motion{1e-3, &position, &rate, nullptr, 0, 0};
@@ -112,10 +112,10 @@ TEST(DrivenLoad, RigidMeshTakesTheLoadAlong) {
 }
 
 TEST(DrivenLoad, TermsSeeTheRecordedTorque) {
-  Rig rig = other_servo();
+  model::Rig rig = other_servo();
   rig.mesh.rigid = true;
-  struct Follows : Term {
-    void add(const Motion& motion, EndTorques& torques) const override {
+  struct Follows : model::Term {
+    void add(const model::Motion& motion, model::EndTorques& torques) const override {
       torques.motor += 0.1 * motion.motor_torque + 0.01 * motion.mesh_torque;
     }
   };
@@ -129,17 +129,21 @@ TEST(DrivenLoad, TermsSeeTheRecordedTorque) {
 
 // Flanks are looked up less often than forces.
 TEST(DrivenLoad, RepeatsATrainWithShapedFlanks) {
-  Rig rig = other_servo();
-  const auto error = make_term("transmission_error", {{"amplitude", 1e-4}, {"order", 60}, {"phase", 0.3}});
+  model::Rig rig = other_servo();
+  const auto error =
+      model::make_term("transmission_error", {{"amplitude", 1e-4}, {"order", 60}, {"phase", 0.3}});
   rig.terms = {error};
-  const Record record = simulate_record(rig, test::servo_run(3, false), 5);
+  const record::Record record = simulate_record(rig, test::servo_run(3, false), 5);
   const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
-  EXPECT_LT(worst(driven.load, record.column(Channel::load_position)), 2e-5);  // as without
-  struct Always : Term {  // says that it follows the torque: then flanks are looked up with every force
-    std::shared_ptr<const Term> error;
+  EXPECT_LT(worst(driven.load, record.column(record::Channel::load_position)), 2e-5);  // as without
+  struct Always
+      : model::Term {  // says that it follows the torque: then flanks are looked up with every force
+    std::shared_ptr<const model::Term> error;
     bool shapes_flanks() const override { return true; }
     bool shape_follows_torque() const override { return true; }
-    void shape(const FlankPoint& at, FlankShift& shift) const override { error->shape(at, shift); }
+    void shape(const model::FlankPoint& at, model::FlankShift& shift) const override {
+      error->shape(at, shift);
+    }
   };
   const auto always = std::make_shared<Always>();
   always->error = error;
@@ -149,16 +153,16 @@ TEST(DrivenLoad, RepeatsATrainWithShapedFlanks) {
   EXPECT_LT(worst(driven.load, simulate_driven_load(rig, motion_of(record)).load), 2e-8);
   rig.terms.clear();
   const DrivenLoad without = simulate_driven_load(rig, motion_of(record));
-  EXPECT_GT(worst(without.load, record.column(Channel::load_position)), 8e-5);
+  EXPECT_GT(worst(without.load, record.column(record::Channel::load_position)), 8e-5);
 }
 
 // With a load that is simulated by one rig and a motor that another one says: as if both were one.
 TEST(DrivenLoad, WhatMovesNoLoadNeedsNoSimulation) {
-  const Rig rig = other_servo();
-  Rig motor = rig, load = rig;
+  const model::Rig rig = other_servo();
+  model::Rig motor = rig, load = rig;
   motor.motor.viscous_damping += 3;
-  motor.terms.push_back(make_term("cogging", {{"amplitude", 5}, {"order", 40}, {"phase", 0}}));
-  motor.mesh.contact = make_contact_law(rig.mesh.contact_spec.law, rig.mesh.contact_spec.values);
+  motor.terms.push_back(model::make_term("cogging", {{"amplitude", 5}, {"order", 40}, {"phase", 0}}));
+  motor.mesh.contact = model::make_contact_law(rig.mesh.contact_spec.law, rig.mesh.contact_spec.values);
   load.link.viscous_damping += 1;
   EXPECT_TRUE(moves_same_load(rig, motor));
   EXPECT_FALSE(moves_same_load(rig, load));
@@ -166,18 +170,18 @@ TEST(DrivenLoad, WhatMovesNoLoadNeedsNoSimulation) {
   load.mesh.backlash *= 1.001;
   EXPECT_FALSE(moves_same_load(rig, load));
   load = rig;
-  load.terms.push_back(make_term("gravity", {{"amplitude", 5}, {"phase", 0}}));
+  load.terms.push_back(model::make_term("gravity", {{"amplitude", 5}, {"phase", 0}}));
   EXPECT_FALSE(moves_same_load(rig, load));
-  const Record record = simulate_record(rig, test::servo_run(3, false), 2);
+  const record::Record record = simulate_record(rig, test::servo_run(3, false), 2);
   const RecordedMotion motion = motion_of(record);
   const DrivenLoad followed = simulate_driven_load(rig, motion), same = simulate_driven_load(motor, motion);
   EXPECT_EQ(followed.load, same.load);
   const MotorTorques torques = motor_torques(motor, motion, followed);
   // About a sample, of sin(n q) with q = w t: the mean over triangular weights is sinc^2 of half the phase.
   const std::size_t k = 700;
-  const double w = record.column(Channel::motor_velocity)[k], half = 0.5 * 40 * w * motion.interval;
-  const double cogging =
-      5 * std::sin(40 * record.column(Channel::motor_position)[k]) * std::pow(std::sin(half) / half, 2);
+  const double w = record.column(record::Channel::motor_velocity)[k], half = 0.5 * 40 * w * motion.interval;
+  const double cogging = 5 * std::sin(40 * record.column(record::Channel::motor_position)[k]) *
+                         std::pow(std::sin(half) / half, 2);
   const double viscous = (rig.motor.viscous_damping + 3) * w;
   // acceleration of some 10 rad/s^2 changes the speed within a sample by 0.01 rad/s, its mean by 1/12 of the
   // change of that
@@ -191,25 +195,25 @@ bool same_motion(const DrivenLoad& a, const DrivenLoad& b) {
 
 // Whoever keeps a simulated load must not take it for that of another machine.
 TEST(DrivenLoad, AnyChangeOfTheRigThatMovesTheLoadIsSeen) {
-  const Rig rig = other_servo();
-  const Record record = simulate_record(rig, test::servo_run(3, false), 1);
+  const model::Rig rig = other_servo();
+  const record::Record record = simulate_record(rig, test::servo_run(3, false), 1);
   const RecordedMotion motion = motion_of(record);
   const DrivenLoad before = simulate_driven_load(rig, motion);
   std::set<std::string> idle;  // changes that leave the load as it is
-  const auto expect_seen = [&](const std::string& name, const Rig& changed) {
+  const auto expect_seen = [&](const std::string& name, const model::Rig& changed) {
     if (moves_same_load(rig, changed)) {
       EXPECT_TRUE(same_motion(before, simulate_driven_load(changed, motion))) << name;
       idle.insert(name);
     }
   };
   for (const test::RigChange& change : test::rig_changes()) {
-    Rig changed = rig;
+    model::Rig changed = rig;
     change.apply(changed);
     expect_seen(change.member, changed);
   }
-  for (const RigParameter& parameter : servo_parameters()) {
+  for (const rig_file::RigParameter& parameter : rig_file::servo_parameters()) {
     if (!parameter.known_to(rig)) continue;  // of another contact law
-    Rig changed = rig;
+    model::Rig changed = rig;
     parameter.set(changed, 1.1 * parameter.get(rig) + (parameter.positive() ? 0 : 0.3));
     expect_seen(parameter.name, changed);
   }
@@ -250,4 +254,4 @@ TEST(DrivenLoad, RefusesOtherTrains) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

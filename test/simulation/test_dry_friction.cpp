@@ -11,16 +11,16 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
-std::shared_ptr<const ContactLaw> linear(double stiffness, double damping) {
-  return make_contact_law("linear", {{"stiffness", stiffness}, {"damping", damping}});
+std::shared_ptr<const model::ContactLaw> linear(double stiffness, double damping) {
+  return model::make_contact_law("linear", {{"stiffness", stiffness}, {"damping", damping}});
 }
 
 /// One body that never meets a wall.
-Rig block(const Body& body) {
-  Rig rig;
+model::Rig block(const model::Body& body) {
+  model::Rig rig;
   rig.motor = body;
   rig.link_locked = true;
   rig.mesh.backlash = 1e6;
@@ -29,8 +29,8 @@ Rig block(const Body& body) {
 }
 
 /// Configuration 2 of Yumrukcal (2013), rounded, with friction that differs between the directions.
-Rig servo() {
-  Rig rig;
+model::Rig servo() {
+  model::Rig rig;
   rig.motor = {6.3, 13, 1, 63, 4};
   rig.link = {108, 9, -2, 15, -3};
   rig.mesh.backlash = 5.4e-4;
@@ -171,7 +171,7 @@ TEST(DryFriction, AShortReversalOfTheSpeedIsAStop) {
 }
 
 TEST(DryFriction, TheTorqueOfBreakAwayItselfMovesNothing) {
-  const Rig rig = block({2, 0.5, 0, 5, 1});
+  const model::Rig rig = block({2, 0.5, 0, 5, 1});
   for (const std::string& method : integrator_methods())
     for (double limit : {6.0, -4.0}) {
       Plant equal(rig, test::constant(limit), test::solver(1e-8, method));
@@ -240,7 +240,7 @@ TEST(DryFriction, ATorqueSetFromOutsideBreaksAwayAtOnce) {
 /// stops at zero, and a resting body moves where its friction is too small to hold it.
 class TimeStepping {
  public:
-  TimeStepping(const Rig& rig, std::function<double(double)> torque, double step)
+  TimeStepping(const model::Rig& rig, std::function<double(double)> torque, double step)
       : body_{rig.motor, rig.link}, half_(0.5 * rig.mesh.backlash), torque_(std::move(torque)), step_(step) {}
 
   void advance_to(double t) {
@@ -267,7 +267,7 @@ class TimeStepping {
     if (depth > 0) force = std::max(0.0, 460e3 * depth + 483 * side * (w[0] - w[1])) * side;
     const double net[2] = {torque_(t) - force, force};
     for (int i = 0; i < 2; ++i) {
-      const Body& b = body_[i];
+      const model::Body& b = body_[i];
       const double drag = b.viscous_damping * w[i] + b.viscous_asymmetry * std::fabs(w[i]);
       const double forward = b.coulomb_friction + b.coulomb_asymmetry,
                    backward = b.coulomb_friction - b.coulomb_asymmetry;
@@ -283,7 +283,7 @@ class TimeStepping {
   }
 
   double q_[2] = {0, 0}, w_[2] = {0, 0};
-  Body body_[2];
+  model::Body body_[2];
   double half_;
   std::function<double(double)> torque_;
   double step_, time_ = 0;
@@ -292,7 +292,7 @@ class TimeStepping {
 
 TEST(DryFriction, TwoInertiasWithBacklashAgreeWithATimeStepping) {
   const double amplitude = 400, frequency = 4;
-  const Rig rig = servo();
+  const model::Rig rig = servo();
   const auto torque = [=](double t) { return amplitude * std::sin(2 * M_PI * frequency * t); };
   Plant plant(rig, sine(amplitude, frequency), test::solver(1e-9));
   TimeStepping oracle(rig, torque, 1e-6);
@@ -320,13 +320,13 @@ struct Balance {
   double work = 0, lost = 0, change = 0;
 };
 
-Balance balance_of(Plant& plant, const Rig& rig, double duration, double rate, int link,
+Balance balance_of(Plant& plant, const model::Rig& rig, double duration, double rate, int link,
                    const std::function<double(const Plant&)>& inner_loss) {
   Balance sum;
   const auto powers = [&](double& in, double& out) {
     const auto& s = plant.state();
     const int n = plant.gear_train().dof();
-    const auto rub = [](const Body& b, double w) {
+    const auto rub = [](const model::Body& b, double w) {
       return std::fabs(w) *
              (w > 0 ? b.coulomb_friction + b.coulomb_asymmetry : b.coulomb_friction - b.coulomb_asymmetry);
     };
@@ -351,7 +351,7 @@ Balance balance_of(Plant& plant, const Rig& rig, double duration, double rate, i
 // Work of the motor = change of energy + losses. Rigid couplings, then a flexible input coupling.
 TEST(DryFriction, EnergyIsNeitherMadeNorLost) {
   for (bool flexible : {false, true}) {
-    Rig rig = servo();
+    model::Rig rig = servo();
     rig.mesh.contact = linear(460e3, 0);  // its damping would have to be integrated too
     if (flexible) {
       rig.input_coupling = {false, 50e3, 20, 0};
@@ -366,7 +366,7 @@ TEST(DryFriction, EnergyIsNeitherMadeNorLost) {
 }
 
 TEST(DryFriction, TheLoadMovesWhileTheMotorSticks) {
-  Rig rig = servo();
+  model::Rig rig = servo();
   rig.motor.coulomb_friction = 500;  // more than an impact
   Plant plant(rig, at_load(sine(40, 2)), test::solver(1e-8));
   double most = 0, least = 0;
@@ -381,7 +381,7 @@ TEST(DryFriction, TheLoadMovesWhileTheMotorSticks) {
 }
 
 TEST(DryFriction, TheMotorMovesWhileTheLoadSticks) {
-  Rig rig = servo();
+  model::Rig rig = servo();
   rig.link.coulomb_friction = 400;
   Plant plant(rig, sine(150, 2), test::solver(1e-8));
   double most = 0, least = 0;
@@ -408,14 +408,14 @@ TEST(DryFriction, ABrakeHoldsToTheBit) {
   }
 }
 
-std::shared_ptr<const ContactLaw> rigid(double restitution) {
-  return make_contact_law(
+std::shared_ptr<const model::ContactLaw> rigid(double restitution) {
+  return model::make_contact_law(
       "stereomechanical",
       {{"restitution", restitution}, {"resting_speed", 1e-6}, {"stiffness", 460e3}, {"damping", 483}});
 }
 
 TEST(DryFriction, AgainstABrakedMotorTheLoadBouncesAsFromAWall) {
-  Rig rig = servo();
+  model::Rig rig = servo();
   rig.link = {108};
   rig.mesh.contact = rigid(0.5);
   for (const std::string& method : integrator_methods()) {
@@ -438,7 +438,7 @@ TEST(DryFriction, AnImpactSetsAStuckBodyInMotion) {
   const double first = 2, second = 5, e = 0.6, v = 0.4, friction = 30, gap = 1e-2;
   for (const std::string& method : integrator_methods())
     for (int sign : {1, -1}) {
-      Rig rig;
+      model::Rig rig;
       rig.motor.inertia = first;
       rig.link = {second, 0, 0, friction, 0};
       rig.mesh.backlash = 2 * gap;
@@ -462,11 +462,11 @@ TEST(DryFriction, AnImpactSetsAStuckBodyInMotion) {
 }
 
 /// Friction of a term on top of, or instead of, that of the bodies.
-class Rubbing : public Term {
+class Rubbing : public model::Term {
  public:
   explicit Rubbing(double constant, double per_torque = 0) : constant_(constant), per_torque_(per_torque) {}
   bool has_dry_friction() const override { return true; }
-  void add_friction(const Motion& m, EndFriction& f) const override {
+  void add_friction(const model::Motion& m, model::EndFriction& f) const override {
     const double more = constant_ + per_torque_ * std::fabs(m.mesh_torque);
     f.motor.forward += more, f.motor.backward += more;
   }
@@ -477,7 +477,7 @@ class Rubbing : public Term {
 
 TEST(DryFriction, ATermWithoutFrictionChangesNothing) {
   for (double limit : {0.0, -3.0}) {  // a negative limit is none
-    Rig rig = block({2, 0, 0, 0, 0});
+    model::Rig rig = block({2, 0, 0, 0, 0});
     rig.terms = {std::make_shared<Rubbing>(limit)};
     Plant plant(rig, sine(5, 1), test::solver(1e-9));
     EXPECT_EQ(plant.gear_train().friction_event_count(), 1);
@@ -493,7 +493,7 @@ TEST(DryFriction, ATermWithoutFrictionChangesNothing) {
 // The motor presses against a locked load: friction grows with the torque through the teeth, so the torque at
 // which it moves on is larger by 1 + mu, and back again smaller.
 TEST(DryFriction, FrictionThatGrowsWithTheTransmittedTorque) {
-  Rig rig = block({2, 200, 0, 0, 0});
+  model::Rig rig = block({2, 200, 0, 0, 0});
   rig.mesh.backlash = 0;
   rig.mesh.contact = linear(1000, 0);
   rig.terms = {std::make_shared<Rubbing>(0, 0.25)};
@@ -531,7 +531,7 @@ TEST(DryFriction, ANewBacklashNeitherMovesNorStopsAnything) {
 
 TEST(DryFriction, SamplingDoesNotMatter) {
   for (const auto& law : {linear(460e3, 483), rigid(0.4)}) {
-    Rig rig = servo();
+    model::Rig rig = servo();
     rig.mesh.contact = law;
     Plant often(rig, sine(400, 4), test::solver(1e-10)), seldom(rig, sine(400, 4), test::solver(1e-10));
     for (int k = 1; k <= 500; ++k) {
@@ -546,7 +546,7 @@ TEST(DryFriction, SamplingDoesNotMatter) {
 // The same machine, motor values stated at the load side and at the motor shaft.
 TEST(DryFriction, EitherSideOfTheReductionIsTheSameMachine) {
   const double n = 110;
-  Rig load_side = servo(), motor_side = servo();
+  model::Rig load_side = servo(), motor_side = servo();
   load_side.reduction_ratio = motor_side.reduction_ratio = n;
   motor_side.motor_side = true;
   motor_side.motor = {6.3 / n / n, 13 / n / n, 1 / n / n, 63 / n, 4 / n};
@@ -563,7 +563,7 @@ TEST(DryFriction, EitherSideOfTheReductionIsTheSameMachine) {
 // A torque sensor between a motor that rubs and a locked link: where all has come to rest the sensor shows
 // the torque but for the motor's friction, and nothing at all before the motor moves.
 TEST(DryFriction, BehindAFlexibleCouplingTheMotorsFrictionIsMissing) {
-  Rig rig = servo();
+  model::Rig rig = servo();
   rig.input_coupling = {false, 50e3, 200, 0};
   rig.pinion.inertia = 2;
   rig.link_locked = true;
@@ -583,4 +583,4 @@ TEST(DryFriction, BehindAFlexibleCouplingTheMotorsFrictionIsMissing) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -11,12 +11,12 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 /// Every combination of couplings and ends, with different numbers everywhere.
-Rig rig_of(bool motor_apart, bool link_apart, bool locked) {
-  Rig rig = test::sarkar_rig(40e-6);
+model::Rig rig_of(bool motor_apart, bool link_apart, bool locked) {
+  model::Rig rig = test::sarkar_rig(40e-6);
   rig.reduction_ratio = 2;
   rig.motor.viscous_asymmetry = 0.001;
   rig.gear.viscous_damping = 0.003;
@@ -29,8 +29,8 @@ Rig rig_of(bool motor_apart, bool link_apart, bool locked) {
   return rig;
 }
 
-std::vector<Rig> different(const Rig& rig, int count) {
-  std::vector<Rig> rigs(count, rig);
+std::vector<model::Rig> different(const model::Rig& rig, int count) {
+  std::vector<model::Rig> rigs(count, rig);
   for (int i = 0; i < count; ++i) {
     rigs[i].mesh.backlash *= 0.5 + 0.2 * i;
     rigs[i].motor.inertia *= 1 + 0.03 * i;
@@ -41,7 +41,8 @@ std::vector<Rig> different(const Rig& rig, int count) {
 
 /// Largest difference of any state from that of a plant, relative to the largest state of its kind. Short
 /// enough that no gap has become chaotic.
-double largest_error(const std::vector<Rig>& rigs, const ExcitationSettings& excitation, double tolerance) {
+double largest_error(const std::vector<model::Rig>& rigs, const ExcitationSettings& excitation,
+                     double tolerance) {
   Ensemble ensemble(rigs, excitation, test::solver(tolerance));
   double worst = 0;
   std::vector<std::vector<double>> all;
@@ -102,8 +103,8 @@ TEST(Ensemble, EveryContactLawThatHasNumbers) {
       {"power_law", {{"stiffness", 2e8}, {"exponent", 1.5}}},
       {"linear", {{"stiffness", 1e6}, {"damping", 0}}}};
   for (const auto& [name, values] : laws) {
-    Rig rig = rig_of(true, true, true);
-    rig.mesh.contact = make_contact_law(name, values);
+    model::Rig rig = rig_of(true, true, true);
+    rig.mesh.contact = model::make_contact_law(name, values);
     EXPECT_LT(largest_error(different(rig, 2), test::square(0.05, 50), 1e-10), 1e-5) << name;
   }
 }
@@ -124,7 +125,7 @@ TEST(Ensemble, ObservesWhatAPlantObserves) {
   for (std::size_t i = 0; i < rigs.size(); ++i) {
     Plant plant(rigs[i], test::square(0.05, 50), test::solver(1e-12));
     plant.advance_to(0.01);
-    const Observation a = ensemble.observe(i), b = plant.observe();
+    const model::Observation a = ensemble.observe(i), b = plant.observe();
     EXPECT_EQ(a.motor_torque, -0.05);
     EXPECT_NEAR(a.motor_position, b.motor_position, 1e-6 * std::fabs(b.motor_position));
     EXPECT_NEAR(a.sensor_torque, b.sensor_torque, 1e-5 * std::fabs(b.sensor_torque));
@@ -144,20 +145,20 @@ TEST(Ensemble, IsTheSameEveryTime) {
 
 TEST(Ensemble, LeavesToPlantsWhatIsNotSmooth) {
   const ExcitationSettings square = test::square(0.05, 50);
-  const Rig smooth = rig_of(true, true, true);
+  const model::Rig smooth = rig_of(true, true, true);
   EXPECT_TRUE(Ensemble::takes({smooth}, square));
   EXPECT_FALSE(Ensemble::takes({}, square));
   EXPECT_FALSE(Ensemble::takes({smooth, rig_of(true, false, true)}, square)) << "other layout";
-  Rig rubs = smooth;
+  model::Rig rubs = smooth;
   rubs.motor.coulomb_friction = 0.01;
   EXPECT_FALSE(Ensemble::takes({smooth, rubs}, square));
-  Rig other = smooth;
-  other.mesh.contact = make_contact_law("linear", {{"stiffness", 1e6}, {"damping", 0}});
+  model::Rig other = smooth;
+  other.mesh.contact = model::make_contact_law("linear", {{"stiffness", 1e6}, {"damping", 0}});
   EXPECT_FALSE(Ensemble::takes({smooth, other}, square)) << "other exponent";
-  Rig remembers = smooth;
-  remembers.mesh.contact =
-      make_contact_law("stereomechanical",
-                       {{"restitution", 0.5}, {"resting_speed", 1e-3}, {"stiffness", 1e6}, {"damping", 10}});
+  model::Rig remembers = smooth;
+  remembers.mesh.contact = model::make_contact_law(
+      "stereomechanical",
+      {{"restitution", 0.5}, {"resting_speed", 1e-3}, {"stiffness", 1e6}, {"damping", 10}});
   EXPECT_FALSE(Ensemble::takes({remembers}, square));
   EXPECT_FALSE(Ensemble::takes({smooth}, test::topic()));
   ExcitationSettings braked = square;
@@ -178,11 +179,11 @@ TEST(Ensemble, RefusesTimesThatItCannotReach) {
 
 // Damping in another unit: a time constant of 1e-14 s. Given up within seconds instead of going on for years.
 TEST(Ensemble, AMachineThatIsTooStiffIsGivenUp) {
-  Rig rig = test::sarkar_rig(40e-6);
+  model::Rig rig = test::sarkar_rig(40e-6);
   rig.motor.viscous_damping = 2e9;
   Ensemble ensemble({rig}, test::square(0.05, 10), test::solver(1e-6));
   EXPECT_THROW(ensemble.advance_to(1e-3), IntegrationError);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/simulation/excitation.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 const double kNever = std::numeric_limits<double>::infinity();
@@ -235,7 +235,7 @@ TEST(ExcitationSettings, EveryTypeIsReadAndCreated) {
 TEST(ExcitationSettings, SpeedLoopsAreReadAndCreated) {
   const std::string controller = "controller: {rate: 10, proportional: 2, integral: 0, torque_limit: 5}";
   const auto asked = [](Excitation& loop, long sample) {
-    loop.begin_segment(sample, Observation{});
+    loop.begin_segment(sample, model::Observation{});
     return loop.torque(0, sample);
   };
   const auto one = created("{type: constant_speed, speed: 1.5, ramp: 1, " + controller + "}");
@@ -376,4 +376,4 @@ TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr double kMass = 0.125, kHalfGap = 1e-3;
@@ -18,7 +18,7 @@ const double kRadius = 0.02;  // of wall_rig()
 /// One mass without any torque, which touches the forward wall at time 0.
 class Bounce {
  public:
-  Bounce(std::shared_ptr<const ContactLaw> law, double speed,
+  Bounce(std::shared_ptr<const model::ContactLaw> law, double speed,
          const SolverSettings& solver = test::solver(1e-10))
       : plant_(test::wall_rig(kMass, kHalfGap, std::move(law)), test::constant(0), solver) {
     Plant::State state{};
@@ -39,8 +39,8 @@ class Bounce {
   Plant plant_;
 };
 
-std::shared_ptr<const ContactLaw> linear(double stiffness, double damping) {
-  return make_contact_law("linear", {{"stiffness", stiffness}, {"damping", damping}});
+std::shared_ptr<const model::ContactLaw> linear(double stiffness, double damping) {
+  return model::make_contact_law("linear", {{"stiffness", stiffness}, {"damping", damping}});
 }
 
 TEST(Impact, UndampedLinearContactIsAHalfSine) {
@@ -133,7 +133,7 @@ TEST(Impact, HuntCrossleyRestitutionFollowsTheExactRelation) {
   for (double exponent : {1.0, 1.25, 1.5})
     for (double alpha : {0.1, 0.72})
       for (double speed : {0.01, 0.03, 0.1, 0.3, 1.0}) {
-        const auto law = make_contact_law(
+        const auto law = model::make_contact_law(
             "hunt_crossley", {{"stiffness", stiffness}, {"exponent", exponent}, {"alpha", alpha}});
         Bounce bounce(law, speed);
         const double deepest =  // of the undamped impact, from m v^2 / 2 = K d^(n+1) / (n+1)
@@ -147,7 +147,8 @@ TEST(Impact, HuntCrossleyRestitutionFollowsTheExactRelation) {
 }
 
 TEST(Impact, RestitutionAtSmallSpeedIsOneMinusAlphaTimesSpeed) {
-  const auto law = make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0.5}});
+  const auto law =
+      model::make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0.5}});
   Bounce bounce(law, 0.01);
   bounce.advance_to(0.05);
   // Hunt and Crossley (1975); the next term is of the order (alpha v)^2 = 2.5e-5
@@ -155,10 +156,10 @@ TEST(Impact, RestitutionAtSmallSpeedIsOneMinusAlphaTimesSpeed) {
 }
 
 TEST(Impact, TheWallNeverPulls) {
-  const std::shared_ptr<const ContactLaw> laws[] = {
+  const std::shared_ptr<const model::ContactLaw> laws[] = {
       linear(1e7, 0), linear(1e7, 500),
-      make_contact_law("power_law", {{"stiffness", 1e8}, {"exponent", 1.5}}),
-      make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 2}})};
+      model::make_contact_law("power_law", {{"stiffness", 1e8}, {"exponent", 1.5}}),
+      model::make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 2}})};
   for (const auto& law : laws)
     for (const std::string& method : integrator_methods()) {
       Bounce bounce(law, 1, test::solver(1e-6, method));
@@ -178,4 +179,4 @@ TEST(Impact, TheWallNeverPulls) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

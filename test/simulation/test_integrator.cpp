@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/simulation/integrator.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 const double kNever = std::numeric_limits<double>::infinity();
@@ -436,4 +436,4 @@ TEST(SolverSettings, ReadsAllAndRefusesTheRest) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -11,41 +11,41 @@
 #include "support/gears.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 using test::constant;
 
 constexpr double kStiffness = 1e7;  // N/m, mean
 
-GearPair gears() {
-  GearPair pair = test::gear_pair(20, 40, 1e-3);
+model::GearPair gears() {
+  model::GearPair pair = test::gear_pair(20, 40, 1e-3);
   pair.centre_distance_change = 50e-6;
   return pair;
 }
 
-Rig rig_with(const std::shared_ptr<const StiffnessVariation>& variation) {
-  Rig rig;
-  rig.mesh.base_radius = gear_geometry(gears()).gear.base_radius;
-  rig.mesh.backlash = gear_geometry(gears()).backlash;
-  rig.mesh.contact = make_contact_law("linear", {{"stiffness", kStiffness}, {"damping", 1000}});
+model::Rig rig_with(const std::shared_ptr<const model::StiffnessVariation>& variation) {
+  model::Rig rig;
+  rig.mesh.base_radius = model::gear_geometry(gears()).gear.base_radius;
+  rig.mesh.backlash = model::gear_geometry(gears()).backlash;
+  rig.mesh.contact = model::make_contact_law("linear", {{"stiffness", kStiffness}, {"damping", 1000}});
   rig.mesh.variation = variation;
   rig.motor.inertia = 1e-4;
   return rig;
 }
 
-MeshStiffness mesh_of(const std::string& law, double transition) {
-  return MeshStiffness(gears(), {law, 0.01, 206e9, 0.3, transition});
+model::MeshStiffness mesh_of(const std::string& law, double transition) {
+  return model::MeshStiffness(gears(), {law, 0.01, 206e9, 0.3, transition});
 }
 
 // A gear that is held: the motor leans on it and sinks in by F / k at the phase that the offset sets.
 TEST(MeshCycle, StaticDeflectionFollowsTheStiffness) {
   const double torque = 2;
-  for (const std::string& law : mesh_stiffness_laws()) {
-    const MeshStiffness mesh = mesh_of(law, 0.02);
+  for (const std::string& law : model::mesh_stiffness_laws()) {
+    const model::MeshStiffness mesh = mesh_of(law, 0.02);
     double least = 1e9, most = 0;
     for (const double offset : {0.05, 0.3, 0.45, 0.8, 0.95}) {
-      Rig rig = rig_with(std::make_shared<StiffnessVariation>(mesh, offset));
+      model::Rig rig = rig_with(std::make_shared<model::StiffnessVariation>(mesh, offset));
       rig.link_locked = true;
       const double r = rig.mesh.base_radius;
       Plant plant(rig, constant(torque), test::solver(1e-9));
@@ -69,8 +69,8 @@ struct Lines {
 
 // A loaded rig turning at a constant mean speed, as an observer sees the mesh: relative displacement along
 // the line of action over a whole number of mesh cycles, in the angle that drives it.
-Lines turning(const std::shared_ptr<const StiffnessVariation>& variation) {
-  Rig rig = rig_with(variation);
+Lines turning(const std::shared_ptr<const model::StiffnessVariation>& variation) {
+  model::Rig rig = rig_with(variation);
   const double torque = 2, speed = 10;  // N m, rad/s of the gear
   rig.link.inertia = 0.01;
   rig.link.viscous_damping = torque / speed;
@@ -83,7 +83,7 @@ Lines turning(const std::shared_ptr<const StiffnessVariation>& variation) {
   for (int i = 0; i < (kCycles + kSettling) * kPerCycle; ++i) {
     plant.advance_to(i / (kPerCycle * mesh_frequency));
     if (i < kSettling * kPerCycle) continue;
-    const Observation o = plant.observe();
+    const model::Observation o = plant.observe();
     const double x = r * (o.motor_position - o.load_position) - offset, angle = 2 * M_PI * i / kPerCycle;
     const double window = 1 - std::cos(2 * M_PI * (i - kSettling * kPerCycle) / (kCycles * kPerCycle));
     at_mesh += window * x * std::polar(1.0, -angle);
@@ -95,11 +95,11 @@ Lines turning(const std::shared_ptr<const StiffnessVariation>& variation) {
 TEST(MeshCycle, ATurningLoadedRigHasALineAtTheMeshFrequency) {
   const double steady = turning(nullptr).at_mesh;
   for (const auto& [law, transition] : {std::pair{"hertz_bending", 0.05}, {"step", 0.0}}) {
-    const MeshStiffness mesh = mesh_of(law, transition);
-    const Lines varying = turning(std::make_shared<StiffnessVariation>(mesh, 0.2));
+    const model::MeshStiffness mesh = mesh_of(law, transition);
+    const Lines varying = turning(std::make_shared<model::StiffnessVariation>(mesh, 0.2));
     // Far below the contact resonance (64 Hz against some 900 Hz) the deflection is quasi-static, F mean(k) /
     // (k K): its first harmonic by the cycle alone.
-    const double force = 2 / gear_geometry(gears()).gear.base_radius;
+    const double force = 2 / model::gear_geometry(gears()).gear.base_radius;
     std::complex<double> line = 0;
     constexpr int kPoints = 10000;
     for (int i = 0; i < kPoints; ++i) {
@@ -115,4 +115,4 @@ TEST(MeshCycle, ATurningLoadedRigHasALineAtTheMeshFrequency) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 Plant make_plant(double half_gap, const std::string& method = "dormand_prince") {
@@ -35,7 +35,8 @@ TEST(Plant, BeginsAtRestInTheMiddleOfTheGap) {
 // A sample at a switch must always see the torque after it, also where k / rate and n / (2 f) round
 // differently: otherwise half periods have 49, 50 or 51 samples.
 TEST(Plant, EveryHalfPeriodHasTheSameNumberOfSamples) {
-  const auto heavy = test::wall_rig(1e6, 1, make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}}));
+  const auto heavy =
+      test::wall_rig(1e6, 1, model::make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}}));
   int apart = 0;  // how often the two times differ
   for (double frequency : {10.0, 0.1, 0.7, 3.3, 1.1, 12.3})
     for (int half : {5, 50}) {
@@ -67,7 +68,8 @@ TEST(Plant, ChangesARoundingBeforeASwitchAreSurvived) {
 
 TEST(Plant, ASwitchIsNeitherSkippedNorSmeared) {
   // free mass: 1 N m on 1 kg m^2, exact parabola per half period
-  Rig rig = test::wall_rig(1 / 0.0004, 1, make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}}));
+  model::Rig rig =
+      test::wall_rig(1 / 0.0004, 1, model::make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}}));
   for (const std::string& method : integrator_methods()) {
     Plant plant(rig, test::square(1, 5), test::solver(1e-8, method));
     for (int k = 1; k <= 40; ++k) {
@@ -199,7 +201,8 @@ TEST(Plant, MovesAfterALongRest) {
 
 TEST(Plant, ADriftAcrossTheGapOfManyMinutesEndsInAnOrdinaryImpact) {
   for (const std::string& method : integrator_methods()) {
-    const auto law = make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0}});
+    const auto law =
+        model::make_contact_law("hunt_crossley", {{"stiffness", 1e8}, {"exponent", 1.5}, {"alpha", 0}});
     const double half_gap = 0.3, speed = 1e-4, flight = half_gap / speed;  // 50 minutes
     Plant plant(test::wall_rig(0.125, half_gap, law), test::constant(0), test::solver(1e-9, method));
     Plant::State state{};
@@ -277,9 +280,9 @@ TEST(Plant, EveryKindOfRigRuns) {
     for (bool rigid_output : {false, true})
       for (bool locked : {false, true})
         for (double half_gap : {0.0, 30e-6}) {
-          Rig rig = test::sarkar_rig(half_gap);
-          if (rigid_input) rig.input_coupling = Coupling{};
-          if (rigid_output) rig.output_coupling = Coupling{};
+          model::Rig rig = test::sarkar_rig(half_gap);
+          if (rigid_input) rig.input_coupling = model::Coupling{};
+          if (rigid_output) rig.output_coupling = model::Coupling{};
           rig.link_locked = locked;
           rig.link.inertia = 1e-4;
           rig.link.viscous_damping = 0.01;
@@ -296,4 +299,4 @@ TEST(Plant, EveryKindOfRigRuns) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

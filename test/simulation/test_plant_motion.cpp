@@ -12,20 +12,20 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr double kTorque = 0.05;
 
-Rig without_dampers(Rig rig) {
-  for (Body* body : {&rig.motor, &rig.pinion, &rig.gear, &rig.link}) body->viscous_damping = 0;
+model::Rig without_dampers(model::Rig rig) {
+  for (model::Body* body : {&rig.motor, &rig.pinion, &rig.gear, &rig.link}) body->viscous_damping = 0;
   rig.input_coupling.damping = rig.output_coupling.damping = 0;
   rig.mesh.contact =
-      make_contact_law("hunt_crossley", {{"stiffness", 2.28e8}, {"exponent", 1.5}, {"alpha", 0}});
+      model::make_contact_law("hunt_crossley", {{"stiffness", 2.28e8}, {"exponent", 1.5}, {"alpha", 0}});
   return rig;
 }
 
-Rig with_free_link(Rig rig) {
+model::Rig with_free_link(model::Rig rig) {
   rig.link_locked = false;
   rig.link.inertia = 3e-4;
   return rig;
@@ -52,7 +52,7 @@ TEST(PlantMotion, EnergyIsKeptWithoutDamping) {
   for (const std::string& method : integrator_methods())
     for (bool free_link : {false, true})
       for (double torque : {0.0, kTorque}) {
-        const Rig locked = without_dampers(test::sarkar_rig(30e-6));
+        const model::Rig locked = without_dampers(test::sarkar_rig(30e-6));
         Plant plant(free_link ? with_free_link(locked) : locked, test::constant(torque),
                     test::solver(1e-9, method));
         Plant::State state{};
@@ -75,7 +75,7 @@ TEST(PlantMotion, EnergyDriftFallsWithTheTolerance) {
 }
 
 /// Power lost in a Hunt-Crossley contact, from its equation: K d^n 3/2 alpha d'^2.
-double hunt_crossley_loss(const Rig& rig, const Plant::State& s) {
+double hunt_crossley_loss(const model::Rig& rig, const Plant::State& s) {
   const double r = rig.mesh.base_radius, rate = r * (s[4] - s[5]);
   const double d = r * std::fabs(s[1] - s[2]) - 0.5 * rig.mesh.backlash;
   return d > 0 ? 2.28e8 * std::pow(d, 1.5) * 1.5 * 0.72 * rate * rate : 0;
@@ -83,7 +83,7 @@ double hunt_crossley_loss(const Rig& rig, const Plant::State& s) {
 
 /// Energy balance over 50 ms of the damped rig, per work of the motor; `loss` is the contact's own power
 /// loss.
-double damped_imbalance(const Rig& rig, const std::function<double(const Plant::State&)>& loss) {
+double damped_imbalance(const model::Rig& rig, const std::function<double(const Plant::State&)>& loss) {
   Plant plant(rig, test::constant(kTorque), test::solver(1e-9));
   const int count = 50000;
   const double dt = 0.05 / count;
@@ -99,14 +99,14 @@ double damped_imbalance(const Rig& rig, const std::function<double(const Plant::
 }
 
 TEST(PlantMotion, EnergyLostIsThatOfTheDampers) {
-  Rig rig = test::sarkar_rig(30e-6);
-  rig.mesh.contact = make_contact_law("power_law", {{"stiffness", 2.28e8}, {"exponent", 1.5}});
+  model::Rig rig = test::sarkar_rig(30e-6);
+  rig.mesh.contact = model::make_contact_law("power_law", {{"stiffness", 2.28e8}, {"exponent", 1.5}});
   const double imbalance = damped_imbalance(rig, [](const Plant::State&) { return 0.0; });
   EXPECT_NEAR(imbalance, 0, 1e-6);  // 1e-9 tolerance, steps of 1 us; measured 2e-8
 }
 
 TEST(PlantMotion, EnergyLostIsThatOfDampersAndContact) {
-  const Rig rig = test::sarkar_rig(30e-6);
+  const model::Rig rig = test::sarkar_rig(30e-6);
   double contact = 0;
   const double imbalance = damped_imbalance(rig, [&](const Plant::State& s) {
     const double loss = hunt_crossley_loss(rig, s);
@@ -120,13 +120,13 @@ TEST(PlantMotion, EnergyLostIsThatOfDampersAndContact) {
 TEST(PlantMotion, ComesToRestAtTheStaticDeflection) {
   for (double ratio : {1.0, 20.0})
     for (double torque : {-0.05, 0.05}) {
-      Rig rig = test::sarkar_rig(30e-6);
+      model::Rig rig = test::sarkar_rig(30e-6);
       rig.motor_side = ratio > 1;
       rig.reduction_ratio = ratio;
       rig.input_coupling.damping = 0.05;  // settles faster
       Plant plant(rig, test::constant(torque), test::solver(1e-8));
       plant.advance_to(3);
-      const GearTrain& train = plant.gear_train();
+      const model::GearTrain& train = plant.gear_train();
       const double gap = std::copysign(0.5 * rig.backlash_angle(rig.mesh.backlash), torque);
       const double expected = gap + train.elastic_deflection(torque);
       EXPECT_NEAR(plant.observe().motor_position, expected, 1e-6 * std::fabs(expected));
@@ -211,7 +211,7 @@ TEST(PlantMotion, FirstImpactConvergesWithTheTolerance) {
 }
 
 TEST(PlantMotion, TurningFarDoesNotBlurTheMesh) {
-  const Rig rig = with_free_link(test::sarkar_rig(30e-6));
+  const model::Rig rig = with_free_link(test::sarkar_rig(30e-6));
   Plant near(rig, test::square(kTorque, 10), test::solver(1e-6));
   Plant far(rig, test::square(kTorque, 10), test::solver(1e-6));
   Plant::State turned{};
@@ -226,10 +226,10 @@ TEST(PlantMotion, TurningFarDoesNotBlurTheMesh) {
 
 TEST(PlantMotion, AMotorSideRigMovesAsItsLoadSideTwin) {
   const double n = 50;
-  Rig motor_side = test::sarkar_rig(30e-6), load_side = motor_side;
+  model::Rig motor_side = test::sarkar_rig(30e-6), load_side = motor_side;
   motor_side.reduction_ratio = n;
   motor_side.motor_side = true;
-  for (Body* body : {&load_side.motor, &load_side.pinion})
+  for (model::Body* body : {&load_side.motor, &load_side.pinion})
     body->inertia *= n * n, body->viscous_damping *= n * n;
   load_side.input_coupling.stiffness *= n * n;
   load_side.input_coupling.damping *= n * n;
@@ -245,4 +245,4 @@ TEST(PlantMotion, AMotorSideRigMovesAsItsLoadSideTwin) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

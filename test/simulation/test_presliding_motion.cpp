@@ -12,24 +12,24 @@
 #include "support/rigs.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
-std::shared_ptr<const Term> presliding(const std::string& body, double distance, double damping = 0) {
+std::shared_ptr<const model::Term> presliding(const std::string& body, double distance, double damping = 0) {
   ParameterValues values{{"distance", distance}, {"damping", damping}};
   values.set_choice("body", body);
-  return make_term("presliding", values);
+  return model::make_term("presliding", values);
 }
 
 constexpr double kInertia = 2, kForward = 6, kBackward = 4;  // kg m^2, N m
 
 /// One body that never meets a wall.
-Rig block(double distance, double viscous = 0, double damping = 0) {
-  Rig rig;
+model::Rig block(double distance, double viscous = 0, double damping = 0) {
+  model::Rig rig;
   rig.motor = {kInertia, viscous, 0, 0.5 * (kForward + kBackward), 0.5 * (kForward - kBackward)};
   rig.link_locked = true;
   rig.mesh.backlash = 1e6;
-  rig.mesh.contact = make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}});
+  rig.mesh.contact = model::make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}});
   rig.terms = {presliding("motor", distance, damping)};
   return rig;
 }
@@ -108,7 +108,7 @@ TEST(PreslidingMotion, FollowsLuGresDifferentialEquations) {
 // loss of a loop falls with the cube of the amplitude.
 TEST(PreslidingMotion, SmallOscillationsHaveTheFrequencyOfTheSpring) {
   const double distance = 0.01, w = std::sqrt(5 / distance / kInertia);
-  Rig rig = block(distance);
+  model::Rig rig = block(distance);
   rig.motor.coulomb_asymmetry = 0;
   Plant plant(rig, test::constant(0), test::solver(1e-10));
   const double speed = 1e-4 * distance * w;
@@ -144,7 +144,7 @@ TEST(PreslidingMotion, NothingChatters) {
   for (const std::string& method : integrator_methods())
     for (double distance : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2})
       for (double tolerance : {1e-6, 1e-7}) {
-        Rig rig = test::other_servo();
+        model::Rig rig = test::other_servo();
         rig.terms = {presliding("motor", distance), presliding("load", 0.3 * distance)};
         ExcitationSettings push = test::constant(30);
         Plant plant(rig, push, test::solver(tolerance, method));
@@ -190,7 +190,7 @@ TEST(PreslidingMotion, FrictionOnlyDissipates) {
 // t = (60 J x_s / R)^(1/3) and leaves a speed off by R t^2 / (2 J): the first slip differs from Coulomb's by
 // x_s^(2/3). (Later ones begin with a swing that the stop before has left, and differ more.)
 TEST(PreslidingMotion, AVanishingDistanceIsCoulombFriction) {
-  Rig bare = block(0);
+  model::Rig bare = block(0);
   bare.terms.clear();
   const auto difference = [&](double distance) {
     Plant without(bare, sine(9, 1.5), test::solver(1e-9)),
@@ -214,14 +214,14 @@ TEST(PreslidingMotion, ANewBacklashKeepsTheMemoryAndANewStateForgetsIt) {
     two.set_backlash(1e6 + k);
     ASSERT_NEAR(one.state()[0], two.state()[0], 1e-8);
   }
-  const Observation moving = one.observe();
+  const model::Observation moving = one.observe();
   put(one, one.state()[0], one.state()[1]);
   EXPECT_NEAR(one.observe().acceleration, one.motor_torque() / kInertia, 1e-12);
   EXPECT_GT(std::fabs(moving.acceleration - one.observe().acceleration), 0.1);
 }
 
 TEST(PreslidingMotion, ABrakedMotorDoesNotGiveWay) {
-  Rig rig = test::other_servo();
+  model::Rig rig = test::other_servo();
   rig.terms = {presliding("motor", 1e-3)};
   ExcitationSettings excitation = sine(300, 2);
   excitation.at_load = excitation.motor_brake = true;
@@ -234,34 +234,34 @@ TEST(PreslidingMotion, ABrakedMotorDoesNotGiveWay) {
 }
 
 /// With a damping of the load's bristles that is small for the shortest distance here.
-Rig presliding_servo(double motor, double load) {
-  Rig rig = test::other_servo();
+model::Rig presliding_servo(double motor, double load) {
+  model::Rig rig = test::other_servo();
   rig.terms = {presliding("motor", motor, 300), presliding("load", load, 2000)};
   return rig;
 }
 
-RecordedMotion motion_of(const Record& record) {
+RecordedMotion motion_of(const record::Record& record) {
   RecordedMotion motion;
   motion.interval = record.sampling_interval();
-  motion.motor = &record.column(Channel::motor_position);
-  motion.motor_rate = &record.column(Channel::motor_velocity);
-  motion.first_load = record.column(Channel::load_position).front();
-  motion.first_load_rate = record.column(Channel::load_velocity).front();
+  motion.motor = &record.column(record::Channel::motor_position);
+  motion.motor_rate = &record.column(record::Channel::motor_velocity);
+  motion.first_load = record.column(record::Channel::load_position).front();
+  motion.first_load_rate = record.column(record::Channel::load_velocity).front();
   return motion;
 }
 
 TEST(PreslidingMotion, TheDrivenLoadRepeatsTheWholeTrain) {
   for (double distance : {3e-5, 3e-4, 3e-3}) {
-    const Rig rig = presliding_servo(1e-4, distance);
-    const Record record = simulate_record(rig, test::servo_run(3, false), 5);
+    const model::Rig rig = presliding_servo(1e-4, distance);
+    const record::Record record = simulate_record(rig, test::servo_run(3, false), 5);
     const DrivenLoad driven = simulate_driven_load(rig, motion_of(record));
     const MotorTorques motor = motor_torques(rig, motion_of(record), driven);
-    Rig other = rig;
+    model::Rig other = rig;
     other.terms = {presliding("motor", 1e-4, 300)};
     const DrivenLoad without = simulate_driven_load(other, motion_of(record));
     double worst = 0, wrong = 0;
     for (std::size_t k = 0; k < record.size(); ++k) {
-      const double truth = record.column(Channel::load_position)[k];
+      const double truth = record.column(record::Channel::load_position)[k];
       worst = std::max(worst, std::fabs(driven.load[k] - truth));
       wrong = std::max(wrong, std::fabs(without.load[k] - truth));
       ASSERT_EQ(motor.friction[k].presliding, 1e-4);
@@ -276,24 +276,25 @@ TEST(PreslidingMotion, TheDrivenLoadRepeatsTheWholeTrain) {
 // The motor's friction from the record of its motion, beside that which the simulation had.
 TEST(PreslidingMotion, FrictionAlongARecordIsThatOfTheSimulation) {
   for (double distance : {1e-4, 1e-3}) {
-    const Rig rig = presliding_servo(distance, 1e-3);
+    const model::Rig rig = presliding_servo(distance, 1e-3);
     const SimulationSettings settings = test::servo_run(5, false);
     Simulation simulation(rig, settings);
     std::vector<double> position, rate, friction;
-    const GearTrain train(rig);
+    const model::GearTrain train(rig);
     for (int k = 0; k < 4000; ++k) {
-      const Observation o = simulation.step();
+      const model::Observation o = simulation.step();
       const Plant& plant = simulation.plant();
-      double rates[GearTrain::kMaxStates];
+      double rates[model::GearTrain::kMaxStates];
       plant.gear_train().derivative(plant.time(), plant.state().data(), plant.applied_torque(), rates);
       const double net = train.end_forces(plant.time(), plant.state().data(), plant.applied_torque()).motor;
       position.push_back(o.motor_position);
       rate.push_back(o.motor_velocity);
       friction.push_back(net - train.motor_inertia() * rates[2]);
     }
-    const FrictionLimits limits{47, 47, distance, 300};
-    const auto found = presliding_friction(position, std::vector<FrictionLimits>(position.size(), limits),
-                                           rate, 1 / simulation.sampling_rate());
+    const model::FrictionLimits limits{47, 47, distance, 300};
+    const auto found =
+        model::presliding_friction(position, std::vector<model::FrictionLimits>(position.size(), limits),
+                                   rate, 1 / simulation.sampling_rate());
     double worst = 0, square = 0;
     for (std::size_t k = 0; k < found.size(); ++k) {
       worst = std::max(worst, std::fabs(found[k] - friction[k]));
@@ -306,4 +307,4 @@ TEST(PreslidingMotion, FrictionAlongARecordIsThatOfTheSimulation) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -9,21 +9,21 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/simulation/sensor_model.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr int kCount = 100000;
 // 5 standard deviations: one honest generator in 1.7 million fails, and the seeds here are fixed
 constexpr double kSigmas = 5;
 
-SensorsSettings with(Channel channel, const SensorSettings& sensor, std::uint64_t seed = 1) {
+SensorsSettings with(record::Channel channel, const SensorSettings& sensor, std::uint64_t seed = 1) {
   SensorsSettings settings;
   settings.seed = seed;
   settings.of(channel) = sensor;
   return settings;
 }
 
-std::vector<double> draw(SensorModel& model, Channel channel, int count = kCount, double exact = 0) {
+std::vector<double> draw(SensorModel& model, record::Channel channel, int count = kCount, double exact = 0) {
   std::vector<double> values;
   for (int i = 0; i < count; ++i) values.push_back(model.measure(channel, exact));
   return values;
@@ -49,27 +49,28 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b, s
 
 TEST(SensorModel, WithoutSettingsMeasuresExactly) {
   SensorModel model{SensorsSettings{}};
-  for (Channel channel : kChannels)
+  for (record::Channel channel : record::kChannels)
     for (double value : {0.0, -1.25e-9, 3e7}) EXPECT_EQ(model.measure(channel, value), value);
 }
 
 TEST(SensorModel, NoiseHasTheStatedMeanAndStandardDeviationOnEveryChannel) {
   const double sigma = 0.002;
   for (std::uint64_t seed : {1, 2, 77})
-    for (Channel channel : kChannels) {
+    for (record::Channel channel : record::kChannels) {
       SensorModel model(with(channel, {sigma, 0, 0}, seed));
       const std::vector<double> noise = draw(model, channel, kCount, 0.7);
       const double m = mean(noise);
-      EXPECT_NEAR(m, 0.7, kSigmas * sigma / std::sqrt(kCount)) << channel_name(channel);
+      EXPECT_NEAR(m, 0.7, kSigmas * sigma / std::sqrt(kCount)) << record::channel_name(channel);
       double chi_square = 0;  // with n - 1 degrees of freedom: mean n - 1, variance 2 (n - 1)
       for (double v : noise) chi_square += (v - m) * (v - m) / (sigma * sigma);
-      EXPECT_NEAR(chi_square, kCount - 1, kSigmas * std::sqrt(2.0 * (kCount - 1))) << channel_name(channel);
+      EXPECT_NEAR(chi_square, kCount - 1, kSigmas * std::sqrt(2.0 * (kCount - 1)))
+          << record::channel_name(channel);
     }
 }
 
 TEST(SensorModel, NoiseIsGaussian) {
-  SensorModel model(with(Channel::sensor_torque, {1, 0, 0}));
-  const std::vector<double> noise = draw(model, Channel::sensor_torque);
+  SensorModel model(with(record::Channel::sensor_torque, {1, 0, 0}));
+  const std::vector<double> noise = draw(model, record::Channel::sensor_torque);
   for (double limit : {0.5, 1.0, 2.0, 3.0}) {
     const double p = std::erf(limit / std::sqrt(2));
     int inside = 0;
@@ -80,12 +81,12 @@ TEST(SensorModel, NoiseIsGaussian) {
 
 TEST(SensorModel, NoiseIsWhiteAndIndependentBetweenChannels) {
   SensorsSettings settings;
-  for (Channel channel : kChannels) settings.of(channel).noise = 1;
+  for (record::Channel channel : record::kChannels) settings.of(channel).noise = 1;
   SensorModel model(settings);
   std::vector<std::vector<double>> noise;
-  for (Channel channel : kChannels) noise.push_back(draw(model, channel));
+  for (record::Channel channel : record::kChannels) noise.push_back(draw(model, channel));
   const double bound = kSigmas / std::sqrt(kCount);
-  for (std::size_t i = 0; i < kChannelCount; ++i) {
+  for (std::size_t i = 0; i < record::kChannelCount; ++i) {
     for (std::size_t lag : {1, 2, 100}) EXPECT_NEAR(correlation(noise[i], noise[i], lag), 0, bound);
     for (std::size_t j = 0; j < i; ++j)
       for (std::size_t lag : {0, 1})
@@ -94,27 +95,27 @@ TEST(SensorModel, NoiseIsWhiteAndIndependentBetweenChannels) {
 }
 
 TEST(SensorModel, ASensorAddedLeavesTheNoiseOfTheOthersUnchanged) {
-  SensorsSettings one = with(Channel::sensor_torque, {0.002, 0, 0}, 5);
+  SensorsSettings one = with(record::Channel::sensor_torque, {0.002, 0, 0}, 5);
   SensorsSettings two = one;
-  two.of(Channel::motor_position) = {1e-6, 1e-7, 0.1};
-  two.of(Channel::motor_torque).noise = 3;
+  two.of(record::Channel::motor_position) = {1e-6, 1e-7, 0.1};
+  two.of(record::Channel::motor_torque).noise = 3;
   SensorModel a(one), b(two);
-  Observation exact{};
+  model::Observation exact{};
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(a.measure(exact).sensor_torque, b.measure(exact).sensor_torque);
 }
 
 TEST(SensorModel, IsDeterministicForASeedAndAcrossReset) {
-  const SensorsSettings settings = with(Channel::load_position, {1, 0, 0}, 42);
+  const SensorsSettings settings = with(record::Channel::load_position, {1, 0, 0}, 42);
   SensorModel a(settings), b(settings);
-  const std::vector<double> first = draw(a, Channel::load_position, 1001);
-  EXPECT_EQ(first, draw(b, Channel::load_position, 1001));
+  const std::vector<double> first = draw(a, record::Channel::load_position, 1001);
+  EXPECT_EQ(first, draw(b, record::Channel::load_position, 1001));
   a.reset();  // after an odd number: half a pair of normal numbers is left over
-  EXPECT_EQ(first, draw(a, Channel::load_position, 1001));
-  EXPECT_NE(first, draw(b, Channel::load_position, 1001));
+  EXPECT_EQ(first, draw(a, record::Channel::load_position, 1001));
+  EXPECT_NE(first, draw(b, record::Channel::load_position, 1001));
 }
 
 TEST(SensorModel, NoiseSetWhileItRunsIsThatOfTheSeed) {
-  const Channel channel = Channel::motor_position;
+  const record::Channel channel = record::Channel::motor_position;
   SensorModel quiet{SensorsSettings()}, noisy(with(channel, SensorSettings{0.25}));
   EXPECT_EQ(quiet.measure(channel, 1), 1);
   quiet.set_noise(channel, 0.25);
@@ -129,56 +130,57 @@ TEST(SensorModel, NoiseSetWhileItRunsIsThatOfTheSeed) {
 TEST(SensorModel, EverySeedGivesOtherNoise) {
   std::vector<double> first;
   for (std::uint64_t seed : {0ULL, 1ULL, 2ULL, 1ULL << 32, (1ULL << 32) + 1, 1ULL << 53}) {
-    SensorModel model(with(Channel::motor_velocity, {1, 0, 0}, seed));
-    const double value = model.measure(Channel::motor_velocity, 0);
+    SensorModel model(with(record::Channel::motor_velocity, {1, 0, 0}, seed));
+    const double value = model.measure(record::Channel::motor_velocity, 0);
     for (double other : first) EXPECT_NE(value, other) << seed;
     first.push_back(value);
   }
 }
 
 TEST(SensorModel, QuantisesToTheNearestStep) {
-  SensorModel model(with(Channel::motor_position, {0, 0.25, 0}));
-  EXPECT_EQ(model.measure(Channel::motor_position, 0.124), 0);
-  EXPECT_EQ(model.measure(Channel::motor_position, 0.126), 0.25);
-  EXPECT_EQ(model.measure(Channel::motor_position, -0.126), -0.25);
-  EXPECT_EQ(model.measure(Channel::motor_position, 100.1), 100);
-  SensorModel encoder(with(Channel::motor_position, {0, 8.7e-7, 0}));
+  SensorModel model(with(record::Channel::motor_position, {0, 0.25, 0}));
+  EXPECT_EQ(model.measure(record::Channel::motor_position, 0.124), 0);
+  EXPECT_EQ(model.measure(record::Channel::motor_position, 0.126), 0.25);
+  EXPECT_EQ(model.measure(record::Channel::motor_position, -0.126), -0.25);
+  EXPECT_EQ(model.measure(record::Channel::motor_position, 100.1), 100);
+  SensorModel encoder(with(record::Channel::motor_position, {0, 8.7e-7, 0}));
   for (double exact = -0.01; exact < 0.01; exact += 1.234e-5) {
-    const double measured = encoder.measure(Channel::motor_position, exact);
+    const double measured = encoder.measure(record::Channel::motor_position, exact);
     EXPECT_LE(std::fabs(measured - exact), 0.5 * 8.7e-7 * (1 + 1e-9));
     EXPECT_NEAR(measured / 8.7e-7, std::round(measured / 8.7e-7), 1e-9);
   }
 }
 
 TEST(SensorModel, AddsItsOffset) {
-  SensorModel model(with(Channel::motor_torque, {0, 0, -0.3}));
-  EXPECT_DOUBLE_EQ(model.measure(Channel::motor_torque, 1), 0.7);
+  SensorModel model(with(record::Channel::motor_torque, {0, 0, -0.3}));
+  EXPECT_DOUBLE_EQ(model.measure(record::Channel::motor_torque, 1), 0.7);
 }
 
 TEST(SensorModel, SaturatesAtBothLimits) {
-  SensorModel model(with(Channel::sensor_torque, {0, 0, 0, 0.15}));
-  EXPECT_EQ(model.measure(Channel::sensor_torque, 0.1), 0.1);
-  EXPECT_EQ(model.measure(Channel::sensor_torque, 7), 0.15);
-  EXPECT_EQ(model.measure(Channel::sensor_torque, -7), -0.15);
+  SensorModel model(with(record::Channel::sensor_torque, {0, 0, 0, 0.15}));
+  EXPECT_EQ(model.measure(record::Channel::sensor_torque, 0.1), 0.1);
+  EXPECT_EQ(model.measure(record::Channel::sensor_torque, 7), 0.15);
+  EXPECT_EQ(model.measure(record::Channel::sensor_torque, -7), -0.15);
 }
 
 TEST(SensorModel, OffsetAndNoiseComeBeforeSaturationAndThatBeforeQuantisation) {
-  SensorModel offset(with(Channel::sensor_torque, {0, 0, 0.1, 0.15}));
-  EXPECT_EQ(offset.measure(Channel::sensor_torque, 0.1), 0.15);
-  SensorModel noisy(with(Channel::sensor_torque, {1, 0, 0, 0.5}));
-  for (double v : draw(noisy, Channel::sensor_torque, 1000)) EXPECT_LE(std::fabs(v), 0.5);
-  SensorModel quantised(with(Channel::sensor_torque, {0, 0.1, 0, 0.26}));
-  EXPECT_DOUBLE_EQ(quantised.measure(Channel::sensor_torque, 1), 0.3);  // 0.26 rounded to steps of 0.1
+  SensorModel offset(with(record::Channel::sensor_torque, {0, 0, 0.1, 0.15}));
+  EXPECT_EQ(offset.measure(record::Channel::sensor_torque, 0.1), 0.15);
+  SensorModel noisy(with(record::Channel::sensor_torque, {1, 0, 0, 0.5}));
+  for (double v : draw(noisy, record::Channel::sensor_torque, 1000)) EXPECT_LE(std::fabs(v), 0.5);
+  SensorModel quantised(with(record::Channel::sensor_torque, {0, 0.1, 0, 0.26}));
+  EXPECT_DOUBLE_EQ(quantised.measure(record::Channel::sensor_torque, 1),
+                   0.3);  // 0.26 rounded to steps of 0.1
 }
 
 TEST(SensorModel, AMissingSensorStaysMissingAndDisturbsNobody) {
   SensorsSettings settings;
-  for (Channel channel : kChannels) settings.of(channel) = {0.1, 0.01, 1, 5, false};
+  for (record::Channel channel : record::kChannels) settings.of(channel) = {0.1, 0.01, 1, 5, false};
   SensorModel a(settings), b(settings);
-  Observation there{}, missing{};
+  model::Observation there{}, missing{};
   missing.sensor_torque = std::nan("");
   for (int i = 0; i < 20; ++i) {
-    const Observation x = a.measure(there), y = b.measure(missing);
+    const model::Observation x = a.measure(there), y = b.measure(missing);
     EXPECT_TRUE(std::isnan(y.sensor_torque));
     EXPECT_EQ(x.motor_position, y.motor_position);
     EXPECT_EQ(x.load_velocity, y.load_velocity);
@@ -187,24 +189,24 @@ TEST(SensorModel, AMissingSensorStaysMissingAndDisturbsNobody) {
 
 TEST(SensorModel, EachValueOfAnObservationHasItsOwnSensor) {
   SensorsSettings settings;
-  for (std::size_t i = 0; i < kChannelCount; ++i) settings.channels[i].offset = 10.0 * (1 << i);
+  for (std::size_t i = 0; i < record::kChannelCount; ++i) settings.channels[i].offset = 10.0 * (1 << i);
   SensorModel model(settings);
-  const auto offset = [&](Channel channel) { return settings.of(channel).offset; };
-  Observation exact{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
-  const Observation measured = model.measure(exact);
-  EXPECT_EQ(measured.motor_torque, 1 + offset(Channel::motor_torque));
-  EXPECT_EQ(measured.motor_position, 2 + offset(Channel::motor_position));
-  EXPECT_EQ(measured.motor_velocity, 3 + offset(Channel::motor_velocity));
-  EXPECT_EQ(measured.sensor_torque, 4 + offset(Channel::sensor_torque));
-  EXPECT_EQ(measured.load_position, 7 + offset(Channel::load_position));
-  EXPECT_EQ(measured.load_velocity, 8 + offset(Channel::load_velocity));
+  const auto offset = [&](record::Channel channel) { return settings.of(channel).offset; };
+  model::Observation exact{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11};
+  const model::Observation measured = model.measure(exact);
+  EXPECT_EQ(measured.motor_torque, 1 + offset(record::Channel::motor_torque));
+  EXPECT_EQ(measured.motor_position, 2 + offset(record::Channel::motor_position));
+  EXPECT_EQ(measured.motor_velocity, 3 + offset(record::Channel::motor_velocity));
+  EXPECT_EQ(measured.sensor_torque, 4 + offset(record::Channel::sensor_torque));
+  EXPECT_EQ(measured.load_position, 7 + offset(record::Channel::load_position));
+  EXPECT_EQ(measured.load_velocity, 8 + offset(record::Channel::load_velocity));
   EXPECT_EQ(measured.sensor_twist, 5);  // no sensor of their own
   EXPECT_EQ(measured.sensor_twist_rate, 6);
   EXPECT_EQ(measured.load_torque, 9);
 }
 
 TEST(SensorModel, CurrentAndAccelerationAreMeasuredWhereTheRigDeclaresThem) {
-  Observation exact{};
+  model::Observation exact{};
   exact.motor_current = 2;
   exact.acceleration = 300;
   const SensorsSettings none = read_sensors(YamlReader::from_text("{sampling_rate: 1, seed: 1}", "rig.yaml"));
@@ -230,13 +232,13 @@ TEST(SensorsSettings, ReadsEveryValue) {
       "sensor_torque: {noise: 0.002, resolution: 1e-4, offset: -0.01, limit: 0.5}\nmotor_position: {}\n");
   EXPECT_EQ(settings.sampling_rate, 2000);
   EXPECT_EQ(settings.seed, std::uint64_t{1} << 53);
-  const SensorSettings& torque = settings.of(Channel::sensor_torque);
+  const SensorSettings& torque = settings.of(record::Channel::sensor_torque);
   EXPECT_EQ(torque.noise, 0.002);
   EXPECT_EQ(torque.resolution, 1e-4);
   EXPECT_EQ(torque.offset, -0.01);
   EXPECT_EQ(torque.limit, 0.5);
-  EXPECT_EQ(settings.of(Channel::motor_position).noise, 0);
-  EXPECT_EQ(settings.of(Channel::load_position).limit, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(settings.of(record::Channel::motor_position).noise, 0);
+  EXPECT_EQ(settings.of(record::Channel::load_position).limit, std::numeric_limits<double>::infinity());
 }
 
 TEST(SensorsSettings, RefusalNamesFileLineKeyValueAndLimit) {
@@ -275,4 +277,4 @@ TEST(SensorsSettings, RefusalNamesFileLineKeyValueAndLimit) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

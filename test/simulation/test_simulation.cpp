@@ -12,7 +12,7 @@
 #include "support/data.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 SimulationSettings shipped_settings() {
@@ -22,15 +22,15 @@ SimulationSettings shipped_settings() {
 SimulationSettings noisy_settings(std::uint64_t seed) {
   SimulationSettings settings = shipped_settings();
   settings.sensors.seed = seed;
-  settings.sensors.of(Channel::sensor_torque).noise = 0.002;
-  settings.sensors.of(Channel::motor_position).noise = 1e-6;
+  settings.sensors.of(record::Channel::sensor_torque).noise = 0.002;
+  settings.sensors.of(record::Channel::motor_position).noise = 1e-6;
   return settings;
 }
 
-bool same(const Record& a, const Record& b) {
+bool same(const record::Record& a, const record::Record& b) {
   if (a.time != b.time) return false;
-  return std::all_of(kChannels.begin(), kChannels.end(),
-                     [&](Channel c) { return a.column(c) == b.column(c); });
+  return std::all_of(record::kChannels.begin(), record::kChannels.end(),
+                     [&](record::Channel c) { return a.column(c) == b.column(c); });
 }
 
 double standard_deviation(const std::vector<double>& values) {
@@ -45,7 +45,7 @@ TEST(Simulation, SamplesAtWholeMultiplesOfTheInterval) {
   Simulation simulation(test::sarkar_rig(30e-6), shipped_settings());
   EXPECT_EQ(simulation.index(), 0);
   EXPECT_EQ(simulation.sampling_rate(), 1000);
-  const Observation first = simulation.step();
+  const model::Observation first = simulation.step();
   EXPECT_EQ(first.motor_position, 0);
   EXPECT_EQ(first.motor_velocity, 0);
   EXPECT_EQ(first.sensor_torque, 0);
@@ -53,7 +53,7 @@ TEST(Simulation, SamplesAtWholeMultiplesOfTheInterval) {
   Plant plant(test::sarkar_rig(30e-6), shipped_settings().excitation, shipped_settings().solver);
   for (int k = 1; k < 120; ++k) {
     EXPECT_EQ(simulation.index(), k);
-    const Observation o = simulation.step();
+    const model::Observation o = simulation.step();
     plant.advance_to(k / 1000.0);
     EXPECT_EQ(o.sensor_torque, plant.observe().sensor_torque);
     EXPECT_EQ(o.motor_torque, k / 50 % 2 == 0 ? 0.05 : -0.05) << k;
@@ -61,43 +61,44 @@ TEST(Simulation, SamplesAtWholeMultiplesOfTheInterval) {
 }
 
 TEST(Simulation, RecordHoldsEverySensorOfTheRig) {
-  const Record record = simulate_record(test::sarkar_rig(30e-6), shipped_settings(), 0.25);
+  const record::Record record = simulate_record(test::sarkar_rig(30e-6), shipped_settings(), 0.25);
   EXPECT_EQ(record.name, "sarkar_1997");
   ASSERT_EQ(record.size(), 250u);
   for (std::size_t k = 0; k < record.size(); ++k) EXPECT_EQ(record.time[k], k / 1000.0);
-  for (Channel channel : {Channel::motor_torque, Channel::motor_position, Channel::motor_velocity,
-                          Channel::sensor_torque, Channel::load_position, Channel::load_velocity})
-    EXPECT_EQ(record.column(channel).size(), 250u) << channel_name(channel);
-  EXPECT_FALSE(record.has(Channel::reference_position));
-  Rig rigid = test::sarkar_rig(30e-6);
-  rigid.input_coupling = Coupling{};
-  EXPECT_FALSE(simulate_record(rigid, shipped_settings(), 0.05).has(Channel::sensor_torque));
+  for (record::Channel channel :
+       {record::Channel::motor_torque, record::Channel::motor_position, record::Channel::motor_velocity,
+        record::Channel::sensor_torque, record::Channel::load_position, record::Channel::load_velocity})
+    EXPECT_EQ(record.column(channel).size(), 250u) << record::channel_name(channel);
+  EXPECT_FALSE(record.has(record::Channel::reference_position));
+  model::Rig rigid = test::sarkar_rig(30e-6);
+  rigid.input_coupling = model::Coupling{};
+  EXPECT_FALSE(simulate_record(rigid, shipped_settings(), 0.05).has(record::Channel::sensor_torque));
 }
 
 TEST(Simulation, RecordsCurrentAndAccelerationOnlyWhereDeclared) {
-  Rig rig = test::sarkar_rig(30e-6);
+  model::Rig rig = test::sarkar_rig(30e-6);
   rig.torque_constant = 0.02;
-  const Record without = simulate_record(rig, shipped_settings(), 0.25);
-  EXPECT_FALSE(without.has(Channel::motor_current));
-  EXPECT_FALSE(without.has(Channel::acceleration));
+  const record::Record without = simulate_record(rig, shipped_settings(), 0.25);
+  EXPECT_FALSE(without.has(record::Channel::motor_current));
+  EXPECT_FALSE(without.has(record::Channel::acceleration));
   SimulationSettings settings = shipped_settings();
   settings.sensors.sampling_rate = 20000;  // fine enough to integrate the acceleration
-  settings.sensors.of(Channel::motor_current).declared = settings.sensors.of(Channel::acceleration).declared =
-      true;
+  settings.sensors.of(record::Channel::motor_current).declared =
+      settings.sensors.of(record::Channel::acceleration).declared = true;
   rig.link_locked = true;
-  rig.output_coupling = Coupling{};  // the gear is fixed: the acceleration is the pinion's
-  rig.input_coupling = Coupling{};   // and motor and pinion are one body
-  const Record record = simulate_record(rig, settings, 0.25);
-  ASSERT_EQ(record.column(Channel::motor_current).size(), record.size());
-  ASSERT_EQ(record.column(Channel::acceleration).size(), record.size());
+  rig.output_coupling = model::Coupling{};  // the gear is fixed: the acceleration is the pinion's
+  rig.input_coupling = model::Coupling{};   // and motor and pinion are one body
+  const record::Record record = simulate_record(rig, settings, 0.25);
+  ASSERT_EQ(record.column(record::Channel::motor_current).size(), record.size());
+  ASSERT_EQ(record.column(record::Channel::acceleration).size(), record.size());
   for (std::size_t k = 0; k < record.size(); ++k)
-    EXPECT_DOUBLE_EQ(record.column(Channel::motor_current)[k],
-                     record.column(Channel::motor_torque)[k] / 0.02);
+    EXPECT_DOUBLE_EQ(record.column(record::Channel::motor_current)[k],
+                     record.column(record::Channel::motor_torque)[k] / 0.02);
   // Its integral is the speed, here in the free flight to the first contact: 30 um at 0.05 N m on 4.34e-5 kg
   // m^2 take 1.9 ms. With drag 0.0048 N m s/rad the trapezoidal rule errs by (h c / J)^2 / 12 = 2.5e-6; twice
   // that allowed.
-  const auto& a = record.column(Channel::acceleration);
-  const auto& w = record.column(Channel::motor_velocity);
+  const auto& a = record.column(record::Channel::acceleration);
+  const auto& w = record.column(record::Channel::motor_velocity);
   double speed = 0;
   for (int k = 1; k < 30; ++k) {
     speed += 0.5 * (a[k] + a[k - 1]) / 20000;
@@ -106,12 +107,13 @@ TEST(Simulation, RecordsCurrentAndAccelerationOnlyWhereDeclared) {
 }
 
 TEST(Simulation, IsDeterministicForASeed) {
-  const Rig rig = test::sarkar_rig(30e-6);
-  const Record one = simulate_record(rig, noisy_settings(1), 0.2);
+  const model::Rig rig = test::sarkar_rig(30e-6);
+  const record::Record one = simulate_record(rig, noisy_settings(1), 0.2);
   EXPECT_TRUE(same(one, simulate_record(rig, noisy_settings(1), 0.2)));
-  const Record other = simulate_record(rig, noisy_settings(2), 0.2);
+  const record::Record other = simulate_record(rig, noisy_settings(2), 0.2);
   EXPECT_FALSE(same(one, other));
-  EXPECT_EQ(one.column(Channel::motor_velocity), other.column(Channel::motor_velocity));  // has no noise
+  EXPECT_EQ(one.column(record::Channel::motor_velocity),
+            other.column(record::Channel::motor_velocity));  // has no noise
 }
 
 TEST(Simulation, ResetBeginsAgainWithTheRigsBacklashAndTheSameNoise) {
@@ -130,11 +132,11 @@ TEST(Simulation, ResetBeginsAgainWithTheRigsBacklashAndTheSameNoise) {
 TEST(Simulation, TwoSimulationsWithDifferentGapsDoNotInfluenceEachOther) {
   const SimulationSettings settings = noisy_settings(4);
   Simulation a(test::sarkar_rig(10e-6), settings), b(test::sarkar_rig(55e-6), settings);
-  const Record alone_a = simulate_record(test::sarkar_rig(10e-6), settings, 0.15);
-  const Record alone_b = simulate_record(test::sarkar_rig(55e-6), settings, 0.15);
+  const record::Record alone_a = simulate_record(test::sarkar_rig(10e-6), settings, 0.15);
+  const record::Record alone_b = simulate_record(test::sarkar_rig(55e-6), settings, 0.15);
   for (std::size_t k = 0; k < 150; ++k) {
-    EXPECT_EQ(a.step().sensor_torque, alone_a.column(Channel::sensor_torque)[k]);
-    EXPECT_EQ(b.step().sensor_torque, alone_b.column(Channel::sensor_torque)[k]);
+    EXPECT_EQ(a.step().sensor_torque, alone_a.column(record::Channel::sensor_torque)[k]);
+    EXPECT_EQ(b.step().sensor_torque, alone_b.column(record::Channel::sensor_torque)[k]);
   }
   EXPECT_FALSE(same(alone_a, alone_b));
 }
@@ -160,7 +162,7 @@ TEST(Simulation, BacklashInjectedWhileRunningShowsInTheTravel) {
 
 TEST(Simulation, ProgressRisesAndMayCancel) {
   std::vector<double> seen;
-  const Rig rig = test::sarkar_rig(30e-6);
+  const model::Rig rig = test::sarkar_rig(30e-6);
   simulate_record(rig, shipped_settings(), 3, [&](double fraction, const std::string& phase) {
     seen.push_back(fraction);
     EXPECT_EQ(phase, "simulating");
@@ -176,7 +178,7 @@ TEST(Simulation, ProgressRisesAndMayCancel) {
 }
 
 TEST(Simulation, RefusesDurationsWithoutSense) {
-  const Rig rig = test::sarkar_rig(30e-6);
+  const model::Rig rig = test::sarkar_rig(30e-6);
   for (double duration :
        {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity(), 1e-4, 1e12, 1e300})
     EXPECT_THROW(simulate_record(rig, shipped_settings(), duration), InvalidParameter) << duration;
@@ -205,19 +207,22 @@ class ReferenceRecord : public testing::TestWithParam<int> {};
 TEST_P(ReferenceRecord, IsReproducedFromRestToWithinItsNoise) {
   const auto path = test::find_data("rig/rig_halfgap_" + std::to_string(GetParam()) + "um.csv");
   if (!path) GTEST_SKIP() << "no reference record for a half gap of " << GetParam() << " um";
-  const Record reference = read_csv(*path);
-  const Record simulated = simulate_record(test::sarkar_rig(GetParam() * 1e-6), shipped_settings(), 1);
+  const record::Record reference = record::read_csv(*path);
+  const record::Record simulated =
+      simulate_record(test::sarkar_rig(GetParam() * 1e-6), shipped_settings(), 1);
   const std::size_t n = simulated.size();
   ASSERT_EQ(n, 1000u);
   ASSERT_GE(reference.size(), n);
   std::vector<double> torque, position;
   for (std::size_t k = 0; k < n; ++k) {
     ASSERT_NEAR(reference.time[k], simulated.time[k], 1e-9);
-    EXPECT_EQ(reference.column(Channel::motor_torque)[k], simulated.column(Channel::motor_torque)[k]) << k;
-    torque.push_back(reference.column(Channel::sensor_torque)[k] -
-                     simulated.column(Channel::sensor_torque)[k]);
-    position.push_back(reference.column(Channel::motor_position)[k] -
-                       simulated.column(Channel::motor_position)[k]);
+    EXPECT_EQ(reference.column(record::Channel::motor_torque)[k],
+              simulated.column(record::Channel::motor_torque)[k])
+        << k;
+    torque.push_back(reference.column(record::Channel::sensor_torque)[k] -
+                     simulated.column(record::Channel::sensor_torque)[k]);
+    position.push_back(reference.column(record::Channel::motor_position)[k] -
+                       simulated.column(record::Channel::motor_position)[k]);
     // 5 standard deviations of either noise
     EXPECT_NEAR(torque.back(), 0, 0.010) << "at " << simulated.time[k];
     EXPECT_NEAR(position.back(), 0, 5e-6) << "at " << simulated.time[k];
@@ -232,4 +237,4 @@ TEST_P(ReferenceRecord, IsReproducedFromRestToWithinItsNoise) {
 INSTANTIATE_TEST_SUITE_P(HalfGapMicrometres, ReferenceRecord, testing::Values(0, 30, 55));
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -11,15 +11,16 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 const double kNever = std::numeric_limits<double>::infinity();
 const SpeedController kController = {1000, 2000, 7000, 2475};
 
 /// A motor that no tooth reaches.
-Rig motor_alone() {
-  Rig rig = test::wall_rig(1, 1e6, make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}}));
+model::Rig motor_alone() {
+  model::Rig rig =
+      test::wall_rig(1, 1e6, model::make_contact_law("linear", {{"stiffness", 1}, {"damping", 0}}));
   rig.motor.inertia = 6.3;
   return rig;
 }
@@ -37,7 +38,7 @@ ExcitationSettings speeds(std::vector<double> speeds, double hold, double ramp,
 
 /// What a controller with P = 1 and I = 0 asks for from a motor at rest: the reference.
 double reference(Excitation& excitation, long sample) {
-  excitation.begin_segment(sample, Observation{});
+  excitation.begin_segment(sample, model::Observation{});
   return excitation.torque(0, sample);
 }
 
@@ -75,7 +76,7 @@ TEST(SpeedLoop, SineSpeedHasItsOffsetAndFadesIn) {
 
 TEST(SpeedLoop, TorqueIsProportionalPlusSumAndSampledOncePerSegment) {
   const auto loop = constant_speed_excitation({10, 3, 5, 1e3}, {1}, kNever, 1e-9);
-  Observation machine{};
+  model::Observation machine{};
   reference(*loop, 0);  // the reference is 0 at time 0
   for (long k = 1; k < 20; ++k) {
     machine.motor_velocity = 0.75;
@@ -86,7 +87,7 @@ TEST(SpeedLoop, TorqueIsProportionalPlusSumAndSampledOncePerSegment) {
 
 // Friction lines of the driver alone (Table 5.2): at constant speed the motor overcomes friction only.
 TEST(SpeedLoop, ReachesItsSpeedsAndThenNeedsTheFrictionLine) {
-  Rig rig = motor_alone();
+  model::Rig rig = motor_alone();
   rig.motor.viscous_damping = 0.5 * (13.7 + 11.5);
   rig.motor.viscous_asymmetry = 0.5 * (13.7 - 11.5);
   rig.motor.coulomb_friction = 0.5 * (63.0 + 62.7);
@@ -137,7 +138,7 @@ TEST(SpeedLoop, LimitedTorqueDoesNotWindUp) {
 }
 
 TEST(SpeedLoop, WorksInTheUnitsOfTheMotorShaft) {
-  Rig rig = motor_alone();
+  model::Rig rig = motor_alone();
   rig.motor_side = true;
   rig.reduction_ratio = 4;
   Plant plant(rig, speeds({2}, kNever, 0.1), test::solver(1e-8));
@@ -176,15 +177,15 @@ TEST(SpeedLoop, RefusesWhatHasNoMeaning) {
 }
 
 /// Two bodies, angular mesh: lever 1.
-Rig two_bodies(double backlash, double stiffness, double start) {
-  Rig rig;
+model::Rig two_bodies(double backlash, double stiffness, double start) {
+  model::Rig rig;
   rig.motor.inertia = 6;
   rig.motor.coulomb_friction = 1;
   rig.link.inertia = 40;
   rig.link.viscous_damping = 2000;
   rig.mesh.backlash = backlash;
   rig.mesh.start_in_gap = start;
-  rig.mesh.contact = make_contact_law("linear", {{"stiffness", stiffness}, {"damping", 100}});
+  rig.mesh.contact = model::make_contact_law("linear", {{"stiffness", stiffness}, {"damping", 100}});
   return rig;
 }
 
@@ -197,7 +198,7 @@ TEST(TorqueAtTheLoad, MovesTheLoadThroughTheGapWhileTheMotorIsBraked) {
   const double middle = 0.5 * gap * start, reach = 0.5 * gap + 50 / stiffness;
   for (int half = 1; half <= 4; ++half) {
     plant.advance_to(5 * half - 0.01);
-    const Observation o = plant.observe();
+    const model::Observation o = plant.observe();
     EXPECT_EQ(o.motor_position, 0);
     EXPECT_EQ(o.motor_velocity, 0);
     EXPECT_EQ(o.motor_torque, 0);
@@ -223,12 +224,12 @@ TEST(TorqueAtTheLoad, IsRefusedForALockedLink) {
 
 // The teeth never touch: the motor runs freely and the load stays where it is, exactly.
 TEST(WithoutLoad, TheDriverIsAlone) {
-  Rig rig = without_load(two_bodies(1e-4, 4e5, 0.9));
+  model::Rig rig = model::without_load(two_bodies(1e-4, 4e5, 0.9));
   rig.motor.viscous_damping = 10;
   Plant plant(rig, test::constant(6), test::solver(1e-8));
   for (int k = 1; k <= 20; ++k) {
     plant.advance_to(0.1 * k);
-    const Observation o = plant.observe();
+    const model::Observation o = plant.observe();
     EXPECT_NEAR(o.motor_velocity, 0.5 * (1 - std::exp(-10 * 0.1 * k / 6)),
                 1e-7);  // (6 - 1) / 10 rad/s, J / c
     EXPECT_EQ(o.load_position, 0);
@@ -237,4 +238,4 @@ TEST(WithoutLoad, TheDriverIsAlone) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/simulation/excitation.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 TEST(SteppedSine, EveryFrequencyHasItsWholeCyclesAndThenItStartsAgain) {
@@ -55,4 +55,4 @@ TEST(SteppedSine, RefusesWhatHasNoMeaning) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

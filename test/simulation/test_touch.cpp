@@ -13,24 +13,24 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr double kMass = 0.125, kHalfGap = 1e-3, kRadius = 0.02;
 
-using Law = std::shared_ptr<const ContactLaw>;
+using Law = std::shared_ptr<const model::ContactLaw>;
 
 Law remembering(double restitution = 0.7) {
-  return make_contact_law(
+  return model::make_contact_law(
       "lankarani_nikravesh",
       {{"stiffness", 1e8}, {"exponent", 1.5}, {"restitution", restitution}, {"minimum_speed", 1e-4}});
 }
 
 Law rigid(double restitution, double resting_speed = 1e-3, double damping = 100) {
-  return make_contact_law("stereomechanical", {{"restitution", restitution},
-                                               {"resting_speed", resting_speed},
-                                               {"stiffness", 1e6},
-                                               {"damping", damping}});
+  return model::make_contact_law("stereomechanical", {{"restitution", restitution},
+                                                      {"resting_speed", resting_speed},
+                                                      {"stiffness", 1e6},
+                                                      {"damping", damping}});
 }
 
 /// A mass between two walls, x [m] from the middle.
@@ -53,7 +53,7 @@ class Between : public Plant {
 };
 
 TEST(Touch, EachTouchOfEitherFlankIsKeptAnew) {
-  const double e = restitution_of_damping(0.75 * (1 - 0.49));  // what the law gives at every speed
+  const double e = model::restitution_of_damping(0.75 * (1 - 0.49));  // what the law gives at every speed
   for (const std::string& method : integrator_methods()) {
     Between plant(remembering(), 0, 0.3, test::constant(0), test::solver(1e-9, method));
     EXPECT_EQ(plant.impact_speed(), 0);
@@ -74,7 +74,7 @@ TEST(Touch, OnTheFlankAtTheStartIsATouch) {
     Between plant(remembering(), side * kHalfGap, side * 0.2);
     EXPECT_DOUBLE_EQ(plant.impact_speed(), 0.2);
     plant.advance_to(3e-3);
-    EXPECT_NEAR(plant.speed(), -side * 0.2 * restitution_of_damping(0.75 * (1 - 0.49)), 1e-8);
+    EXPECT_NEAR(plant.speed(), -side * 0.2 * model::restitution_of_damping(0.75 * (1 - 0.49)), 1e-8);
     Between leaving(remembering(), side * kHalfGap, -side * 0.2);
     EXPECT_EQ(leaving.impact_speed(), 0);
     Between jumping(rigid(0.5), side * kHalfGap, side * 0.2);
@@ -109,7 +109,7 @@ TEST(Touch, AnExcitationThatSwitchesForgetsNothing) {
   EXPECT_GT(plant.x(), kHalfGap) << "the test does not show what it is for";
   EXPECT_NEAR(plant.impact_speed(), 0.4, 1e-4);
   plant.advance_to(4e-3);
-  EXPECT_NEAR(plant.speed(), -0.4 * restitution_of_damping(0.75 * (1 - 0.49)), 1e-5);
+  EXPECT_NEAR(plant.speed(), -0.4 * model::restitution_of_damping(0.75 * (1 - 0.49)), 1e-5);
 }
 
 TEST(Touch, AtASwitchOfTheExcitationIsFoundToo) {
@@ -229,7 +229,7 @@ TEST(Touch, ManyBouncesKeepTheirEnergyAtRestitutionOne) {
 }
 
 TEST(Touch, TurnedFarItIsTheSame) {
-  Rig rig = test::two_body_rig(kMass, 0.2, kHalfGap, rigid(0.6));
+  model::Rig rig = test::two_body_rig(kMass, 0.2, kHalfGap, rigid(0.6));
   Plant plant(rig, test::constant(0), test::solver(1e-9));
   Plant::State state{};
   state[0] = state[1] = 1e4;  // rad
@@ -241,7 +241,7 @@ TEST(Touch, TurnedFarItIsTheSame) {
 
 TEST(Touch, SamplingDoesNotMatter) {
   for (const Law& law : {remembering(), rigid(0.6)}) {
-    Rig rig = test::sarkar_rig(30e-6);
+    model::Rig rig = test::sarkar_rig(30e-6);
     rig.mesh.contact = law;
     Plant often(rig, test::square(0.05, 10), test::solver(1e-8)),
         once(rig, test::square(0.05, 10), test::solver(1e-8));
@@ -277,11 +277,11 @@ std::map<std::string, ParameterValues> laws_of_the_rig() {
 
 TEST(Touch, TheWholeRigRunsWithEveryLaw) {
   const auto parameters = laws_of_the_rig();
-  for (const ContactLawType& type : contact_laws())
+  for (const model::ContactLawType& type : model::contact_laws())
     for (double half_gap : {0.0, 30e-6}) {
-      Rig rig = test::sarkar_rig(half_gap);
+      model::Rig rig = test::sarkar_rig(half_gap);
       ASSERT_EQ(parameters.count(type.name), 1u) << type.name;
-      rig.mesh.contact = make_contact_law(type.name, parameters.at(type.name));
+      rig.mesh.contact = model::make_contact_law(type.name, parameters.at(type.name));
       Plant plant(rig, test::square(0.05, 10), test::solver(1e-6));
       double most = 0, travel = 0;
       for (int k = 1; k <= 300; ++k) {
@@ -296,4 +296,4 @@ TEST(Touch, TheWholeRigRunsWithEveryLaw) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

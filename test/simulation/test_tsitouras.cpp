@@ -8,7 +8,7 @@
 
 #include "../../src/simulation/tsitouras.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 using namespace tsitouras;
@@ -81,4 +81,4 @@ TEST(Tsitouras, InterpolantIsOfOrderFourAndEndsAtTheSolution) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

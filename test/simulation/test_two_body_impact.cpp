@@ -12,14 +12,14 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr double kFirst = 0.2, kSecond = 0.3, kReduced = 0.12, kHalfGap = 1e-3, kRadius = 0.02;
 constexpr double kStiffness = 1e8;  // N/m^n
 const double kSpeeds[] = {0.01, 0.03, 0.1, 0.3, 1.0};
 
-using Law = std::shared_ptr<const ContactLaw>;
+using Law = std::shared_ptr<const model::ContactLaw>;
 
 /// The first body flies at the second, which rests, from the middle of the gap.
 class Meeting {
@@ -77,7 +77,7 @@ struct Case {
 };
 
 Law falling(const std::string& name, double n) {
-  return make_contact_law(
+  return model::make_contact_law(
       name,
       {{"stiffness", kStiffness}, {"exponent", n}, {"alpha", 0.4}, {"beta", 0.25}, {"minimum_speed", 1e-3}});
 }
@@ -90,28 +90,28 @@ void add_linear_cases(std::vector<Case>& cases) {
   for (double z : {0.05, 0.3}) {  // of critical damping
     const double c = 2 * z * std::sqrt(kStiffness * kReduced), w = std::sqrt(1 - z * z);
     cases.push_back({"kelvin_voigt", 1,
-                     make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", c}}),
+                     model::make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", c}}),
                      [=](double) { return std::exp(-M_PI * z / w); }});
     // Schwager and Poeschel (2007): the contact ends where its force would turn into tension
     cases.push_back(
-        {"linear", 1, make_contact_law("linear", {{"stiffness", kStiffness}, {"damping", c}}),
+        {"linear", 1, model::make_contact_law("linear", {{"stiffness", kStiffness}, {"damping", c}}),
          [=](double) { return std::exp(-z / w * (M_PI - std::atan2(2 * z * w, w * w - z * z))); }});
   }
 }
 
 Law foundation(double exponent, double damping) {
-  return make_contact_law("foundation", {{"stiffness", kStiffness},
-                                         {"exponent", exponent},
-                                         {"radius", 0.5 / M_PI},  // 2 pi R = 1 m
-                                         {"viscosity", damping},
-                                         {"thickness", 0.5},
-                                         {"share", 0.5}});
+  return model::make_contact_law("foundation", {{"stiffness", kStiffness},
+                                                {"exponent", exponent},
+                                                {"radius", 0.5 / M_PI},  // 2 pi R = 1 m
+                                                {"viscosity", damping},
+                                                {"thickness", 0.5},
+                                                {"share", 0.5}});
 }
 
 void add_foundation_cases(std::vector<Case>& cases) {
   // n = 1 is separable: the exact relation with D = lambda v / K
   cases.push_back({"foundation", 1, foundation(1, 6e7),
-                   [](double v) { return restitution_of_damping(6e7 * v / kStiffness); }});
+                   [](double v) { return model::restitution_of_damping(6e7 * v / kStiffness); }});
   // n = 1.5: energy balance with the undamped speed v sqrt(1 - (d/d_max)^2.5), loss 2 lambda times the
   // integral of d times it over d: 2 lambda v d_max^2 B(4/5, 3/2) / 2.5. Its square, left out, is up to 2e-8.
   const double lambda = 150, beta = std::tgamma(0.8) * std::tgamma(1.5) / std::tgamma(2.3);
@@ -128,33 +128,33 @@ std::vector<Case> all_cases() {
   add_foundation_cases(cases);
   for (double n : {1.0, 1.5}) {
     cases.push_back({"power_law", n,
-                     make_contact_law("power_law", {{"stiffness", kStiffness}, {"exponent", n}}),
+                     model::make_contact_law("power_law", {{"stiffness", kStiffness}, {"exponent", n}}),
                      [](double) { return 1.0; }});
-    cases.push_back(
-        {"hunt_crossley", n,
-         make_contact_law("hunt_crossley", {{"stiffness", kStiffness}, {"exponent", n}, {"alpha", 0.7}}),
-         [](double v) { return restitution_of_damping(1.5 * 0.7 * v); }});
+    cases.push_back({"hunt_crossley", n,
+                     model::make_contact_law("hunt_crossley",
+                                             {{"stiffness", kStiffness}, {"exponent", n}, {"alpha", 0.7}}),
+                     [](double v) { return model::restitution_of_damping(1.5 * 0.7 * v); }});
     cases.push_back({"herbert_mcwhannell", n, falling("herbert_mcwhannell", n), wanted});
     cases.push_back({"yang_sun", n, falling("yang_sun", n), [](double v) {
                        const double e = wanted(v);
-                       return restitution_of_damping(6 * (1 - e) / ((2 * e - 1) * (2 * e - 1) + 3));
+                       return model::restitution_of_damping(6 * (1 - e) / ((2 * e - 1) * (2 * e - 1) + 3));
                      }});
     cases.push_back(
         {"lankarani_nikravesh", n,
-         make_contact_law(
+         model::make_contact_law(
              "lankarani_nikravesh",
              {{"stiffness", kStiffness}, {"exponent", n}, {"restitution", 0.5}, {"minimum_speed", 1e-3}}),
-         [](double) { return restitution_of_damping(0.75 * 0.75); }});
+         [](double) { return model::restitution_of_damping(0.75 * 0.75); }});
   }
   for (double e : {0.9, 0.5})
     cases.push_back(
         {"jankowski", 1.5,
-         make_contact_law("jankowski",
-                          {{"stiffness", kStiffness}, {"restitution", e}, {"effective_mass", kReduced}}),
-         [=](double) { return jankowski_restitution(jankowski_damping_ratio(e)); }});
+         model::make_contact_law(
+             "jankowski", {{"stiffness", kStiffness}, {"restitution", e}, {"effective_mass", kReduced}}),
+         [=](double) { return model::jankowski_restitution(model::jankowski_damping_ratio(e)); }});
   cases.push_back(
       {"stereomechanical", 1,
-       make_contact_law(
+       model::make_contact_law(
            "stereomechanical",
            {{"restitution", 0.6}, {"resting_speed", 1e-3}, {"stiffness", kStiffness}, {"damping", 100}}),
        [](double) { return 0.6; }});
@@ -162,7 +162,7 @@ std::vector<Case> all_cases() {
 }
 
 TEST(TwoBodyImpact, TheTestCoversTheRegistry) {
-  for (const ContactLawType& type : contact_laws()) {
+  for (const model::ContactLawType& type : model::contact_laws()) {
     bool covered = false;
     for (const Case& c : all_cases()) covered |= c.name == type.name;
     EXPECT_TRUE(covered) << type.name;
@@ -180,11 +180,11 @@ TEST(TwoBodyImpact, RestitutionIsThatOfTheLaw) {
 TEST(TwoBodyImpact, SlowTouchesAreDampedAsAtTheSmallestSpeed) {
   const double smallest = 0.05;
   for (double speed : {0.01, 0.03, 0.0499}) {
-    const auto law = make_contact_law(
+    const auto law = model::make_contact_law(
         "lankarani_nikravesh",
         {{"stiffness", kStiffness}, {"exponent", 1.5}, {"restitution", 0.5}, {"minimum_speed", smallest}});
     EXPECT_NEAR(simulated_restitution(law, 1.5, speed),
-                restitution_of_damping(0.75 * 0.75 * speed / smallest), 1e-7);
+                model::restitution_of_damping(0.75 * 0.75 * speed / smallest), 1e-7);
   }
 }
 
@@ -233,7 +233,8 @@ TEST(TwoBodyImpact, OnlyKelvinVoigtPulls) {
 
 TEST(TwoBodyImpact, KelvinVoigtBeginsWithAJump) {
   const double damping = 1000, speed = 0.3;
-  Meeting impact(make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", damping}}), speed);
+  Meeting impact(model::make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", damping}}),
+                 speed);
   impact.advance_to(kHalfGap / speed * (1 - 1e-9));
   EXPECT_EQ(impact.force(), 0);
   impact.advance_to(kHalfGap / speed * (1 + 1e-9));
@@ -248,7 +249,8 @@ TEST(TwoBodyImpact, KelvinVoigtIsTheTwoMassOscillator) {
   const double wd = w0 * std::sqrt(1 - z * z), mean = kFirst * speed / sum;  // g12; g11 and g22 are 0
   const double g21 = kReduced / (kFirst * wd) * speed;
   const double step = M_PI / wd / 20, touch = kHalfGap / speed;  // they part after 20 steps
-  Meeting impact(make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", damping}}), speed);
+  Meeting impact(model::make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", damping}}),
+                 speed);
   for (int k = 1; k < 20; ++k) {
     const double t = k * step, decay = std::exp(-z * w0 * t);
     impact.advance_to(touch + t);
@@ -272,7 +274,7 @@ TEST(TwoBodyImpact, LossGrowsWithThePowerOfTheDeepestPenetration) {
   };
   for (const Growth& g :
        {Growth{foundation(1, 1e6), 3},
-        {make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", 20}}), 2}}) {
+        {model::make_contact_law("kelvin_voigt", {{"stiffness", kStiffness}, {"damping", 20}}), 2}}) {
     std::vector<double> loss, deepest;
     for (const double speed : {0.02, 0.2}) {
       Meeting impact(g.law, speed);
@@ -292,7 +294,7 @@ TEST(TwoBodyImpact, LossGrowsWithThePowerOfTheDeepestPenetration) {
 
 TEST(TwoBodyImpact, StereomechanicalSpeedsAreThoseOfTheTheory) {
   for (double e : {0.0, 0.35, 1.0}) {
-    const auto law = make_contact_law(
+    const auto law = model::make_contact_law(
         "stereomechanical",
         {{"restitution", e}, {"resting_speed", 1e-3}, {"stiffness", kStiffness}, {"damping", 0}});
     Meeting impact(law, 0.3);
@@ -307,4 +309,4 @@ TEST(TwoBodyImpact, StereomechanicalSpeedsAreThoseOfTheTheory) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "identification/procedures/procedures.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 constexpr int kSeed = 5;
@@ -29,36 +29,36 @@ double shortened(const std::string& run) {
 }
 
 /// Findings of all procedures but the last, from records alone and a rig file that is wrong by 20 to 40 %.
-IdentificationCase run_procedures(const std::string& rig_file) {
-  const RigFile file = load_rig_file(config(rig_file));
-  std::vector<Record> records;
-  for (const TestRun& run : file.test_runs) {
+identification::IdentificationCase run_procedures(const std::string& rig_file) {
+  const rig_file::RigFile file = rig_file::load_rig_file(config(rig_file));
+  std::vector<record::Record> records;
+  for (const rig_file::TestRun& run : file.test_runs) {
     if (run.name == "sine_sweep") continue;  // it reverses; the one with bias is preferred
-    RigFile applied = file;
-    apply_test_run(run, applied);
+    rig_file::RigFile applied = file;
+    rig_file::apply_test_run(run, applied);
     applied.simulation.sensors.seed = kSeed;
     const double duration = shortened(run.name) > 0 ? shortened(run.name) : run.duration;
-    records.push_back(simulate_record(applied.rig, applied.simulation, duration));
+    records.push_back(simulation::simulate_record(applied.rig, applied.simulation, duration));
     records.back().name = run.name;
   }
-  Rig wrong = file.rig;
+  model::Rig wrong = file.rig;
   int i = 0;
-  for (const RigParameter& p : servo_parameters()) {
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     const double factors[] = {1.3, 0.75, 0.8, 1.4};
     if (p.name != "start_in_gap" && p.name != "mesh_alpha") p.set(wrong, p.get(wrong) * factors[i++ % 4]);
   }
-  IdentificationCase c = identification_case(wrong, records);
-  for (const Procedure& procedure : servo_procedures()) {
-    if (procedure.run == run_output_error) continue;
-    const ProcedureReport report = procedure.run(c);
+  identification::IdentificationCase c = identification::identification_case(wrong, records);
+  for (const identification::Procedure& procedure : identification::servo_procedures()) {
+    if (procedure.run == identification::run_output_error) continue;
+    const identification::ProcedureReport report = procedure.run(c);
     EXPECT_FALSE(report.records.empty()) << procedure.name;
-    update_from_findings(c);
+    identification::update_from_findings(c);
   }
   return c;
 }
 
-const IdentificationCase& found(const std::string& rig_file) {
-  static std::map<std::string, IdentificationCase> cases;
+const identification::IdentificationCase& found(const std::string& rig_file) {
+  static std::map<std::string, identification::IdentificationCase> cases;
   const auto known = cases.find(rig_file);
   return known != cases.end() ? known->second
                               : cases.emplace(rig_file, run_procedures(rig_file)).first->second;
@@ -75,15 +75,15 @@ double goal(const std::string& name) {
 class ClosedCircle : public testing::TestWithParam<const char*> {};
 
 TEST_P(ClosedCircle, EveryProcedureFindsWhatWasSimulated) {
-  const IdentificationCase& c = found(GetParam());
-  const Rig truth = load_side(load_rig_file(config(GetParam())).rig);
+  const identification::IdentificationCase& c = found(GetParam());
+  const model::Rig truth = model::load_side(rig_file::load_rig_file(config(GetParam())).rig);
   std::set<std::string> procedures;
-  for (const Finding& f : c.result.findings) {
+  for (const identification::Finding& f : c.result.findings) {
     procedures.insert(f.procedure);
     double expected = 0;
     std::string name;
     for (const auto& [parameter, factor] : f.combination) {
-      expected += factor * servo_parameter(parameter).get(truth);
+      expected += factor * rig_file::servo_parameter(parameter).get(truth);
       name += " " + parameter;
     }
     const double most = goal(f.combination.begin()->first) * expected;
@@ -94,7 +94,7 @@ TEST_P(ClosedCircle, EveryProcedureFindsWhatWasSimulated) {
   }
   EXPECT_EQ(procedures.size(), 6u);  // all but the calibration, which has no parameter, and the joint fit
   for (const auto& [name, m] : c.result.parameters) {
-    const double expected = servo_parameter(name).get(truth);
+    const double expected = rig_file::servo_parameter(name).get(truth);
     EXPECT_NEAR(m.value, expected, 3.5 * m.standard_error) << name;
     // Differences of the directions are small against what they are differences of.
     if (name.find("asymmetry") == std::string::npos) {
@@ -108,13 +108,13 @@ TEST_P(ClosedCircle, EveryProcedureFindsWhatWasSimulated) {
 
 // The last step fits all parameters at once to the raw records, with the findings as evidence.
 TEST_P(ClosedCircle, OutputErrorFindsWhatWasSimulated) {
-  IdentificationCase c = found(GetParam());
-  const Rig truth = load_side(load_rig_file(config(GetParam())).rig);
-  const ProcedureReport report = run_output_error(c);
+  identification::IdentificationCase c = found(GetParam());
+  const model::Rig truth = model::load_side(rig_file::load_rig_file(config(GetParam())).rig);
+  const identification::ProcedureReport report = identification::run_output_error(c);
   EXPECT_FALSE(report.records.empty());
   EXPECT_EQ(c.result.parameters.size(), c.names.size());
   for (const auto& [name, m] : c.result.parameters) {
-    const double expected = servo_parameter(name).get(truth);
+    const double expected = rig_file::servo_parameter(name).get(truth);
     // Damping acts for a sample or two at each touch, which 1 kHz does not resolve.
     const double bias = name == "mesh_damping" ? 0.001 * expected : 0;
     EXPECT_NEAR(m.value, expected, 3.5 * m.standard_error + bias) << name;
@@ -135,4 +135,4 @@ INSTANTIATE_TEST_SUITE_P(Yumrukcal2013, ClosedCircle,
                          });
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 /// A quick one: 5 periods of the built-in rig.
@@ -31,8 +31,8 @@ TEST(BuildCurve, MeetsThePublishedParametersOfTheSarkarRig) {
   request.points = 5;  // half gaps 0, 25, 50, 75 and 100 um
   request.sampling_rate = 10000;
   request.periods = 1;
-  const MonitoringCurve curve =
-      build_curve(load_rig_file(test::package_file("config/sarkar_1997.yaml")), request);
+  const diagnosis::MonitoringCurve curve =
+      build_curve(rig_file::load_rig_file(test::package_file("config/sarkar_1997.yaml")), request);
   ASSERT_EQ(curve.points.size(), 5u);
   // By a separate program with the same parameters; rounded, and from one sampling phase. Beyond 60 um the
   // motion is not periodic and the value scatters.
@@ -45,10 +45,10 @@ TEST(BuildCurve, MeetsThePublishedParametersOfTheSarkarRig) {
 }
 
 TEST(BuildCurve, KnowsItsConditions) {
-  RigFile file = default_rig_file();
-  file.simulation.sensors.of(Channel::sensor_torque).noise = 0.0007;
-  const MonitoringCurve curve = build_curve(file, quick());
-  const CurveConditions& c = curve.conditions;
+  rig_file::RigFile file = rig_file::default_rig_file();
+  file.simulation.sensors.of(record::Channel::sensor_torque).noise = 0.0007;
+  const diagnosis::MonitoringCurve curve = build_curve(file, quick());
+  const diagnosis::CurveConditions& c = curve.conditions;
   EXPECT_EQ(c.rig, "sarkar_1997");
   EXPECT_EQ(c.rig_digest, file.digest);
   EXPECT_FALSE(c.version.empty());
@@ -76,7 +76,7 @@ TEST(BuildCurve, KnowsItsConditions) {
   EXPECT_EQ(std::count(curve.noise_levels.begin(), curve.noise_levels.end(), 0.0007), 1);
   EXPECT_EQ(curve.noise_levels.front(), 0);
   EXPECT_DOUBLE_EQ(curve.noise_levels.back(), 0.3 * 0.05);
-  for (const CurvePoint& point : curve.points) {
+  for (const diagnosis::CurvePoint& point : curve.points) {
     EXPECT_EQ(point.cells.size(), curve.noise_levels.size());
     EXPECT_NEAR(point.signal_level, 0.05, 0.005);  // the sensor settles at the torque; ringing is about that
     // More noise, a wider APD, less skewness.
@@ -85,7 +85,7 @@ TEST(BuildCurve, KnowsItsConditions) {
 }
 
 TEST(BuildCurve, NoiseLevelsOfAMultiSineFollowItsLargestTorque) {
-  RigFile file = default_rig_file();
+  rig_file::RigFile file = rig_file::default_rig_file();
   file.simulation.excitation.type = "multi_sine";
   file.simulation.excitation.amplitude = 0;
   file.simulation.excitation.lines = {{0.03, 10, 0}, {0.01, 30, 1}};
@@ -93,13 +93,13 @@ TEST(BuildCurve, NoiseLevelsOfAMultiSineFollowItsLargestTorque) {
 }
 
 TEST(BuildCurve, IsReadBackAsWritten) {
-  const MonitoringCurve curve = build_curve(default_rig_file(), quick());
+  const diagnosis::MonitoringCurve curve = build_curve(rig_file::default_rig_file(), quick());
   const std::string text = curve.to_yaml();
-  EXPECT_EQ(MonitoringCurve::from_yaml(YamlReader::from_text(text, "curve")).to_yaml(), text);
+  EXPECT_EQ(diagnosis::MonitoringCurve::from_yaml(YamlReader::from_text(text, "curve")).to_yaml(), text);
 }
 
 TEST(BuildCurve, IsDeterministicOnAnyNumberOfProcessors) {
-  const RigFile file = default_rig_file();
+  const rig_file::RigFile file = rig_file::default_rig_file();
   const std::string all = build_curve(file, quick(4)).to_yaml();
   EXPECT_EQ(build_curve(file, quick(4)).to_yaml(), all);
   cpu_set_t allowed, one;
@@ -118,8 +118,8 @@ TEST(BuildCurve, IsDeterministicOnAnyNumberOfProcessors) {
 // runs differ by errors of the solver; where a gap is chaotic these decide which of many like motions is run,
 // and so the mean within its own scatter.
 TEST(BuildCurve, PointsDependOnTheOthersByTheSolversErrorOnly) {
-  const MonitoringCurve three = build_curve(default_rig_file(), quick(3)),
-                        two = build_curve(default_rig_file(), quick(2));
+  const diagnosis::MonitoringCurve three = build_curve(rig_file::default_rig_file(), quick(3)),
+                                   two = build_curve(rig_file::default_rig_file(), quick(2));
   for (const auto& [i, k] : {std::pair{0, 0}, std::pair{2, 1}})
     for (std::size_t level = 0; level < three.noise_levels.size(); ++level)
       EXPECT_NEAR(three.points[i].cells[level].mean, two.points[k].cells[level].mean,
@@ -129,8 +129,8 @@ TEST(BuildCurve, PointsDependOnTheOthersByTheSolversErrorOnly) {
 TEST(BuildCurve, MoreSeedsKeepTheFirstAndChangeTheRest) {
   CurveRequest request = quick(2);
   request.seeds = 1;
-  const double one = build_curve(default_rig_file(), request).points[0].cells.back().mean;
-  RigFile file = default_rig_file();
+  const double one = build_curve(rig_file::default_rig_file(), request).points[0].cells.back().mean;
+  rig_file::RigFile file = rig_file::default_rig_file();
   file.simulation.sensors.seed = 99;
   EXPECT_NE(build_curve(file, request).points[0].cells.back().mean, one);
 }
@@ -140,7 +140,7 @@ TEST(BuildCurve, ProgressRisesToOneAndIsNeverCalledTwiceAtOnce) {
   double last = 0;
   int calls = 0;
   bool overlapped = false, fell = false;
-  build_curve(default_rig_file(), quick(4), [&](double fraction, const std::string& phase) {
+  build_curve(rig_file::default_rig_file(), quick(4), [&](double fraction, const std::string& phase) {
     overlapped |= ++inside > 1;
     fell |= fraction < last || fraction > 1 || phase.empty();
     last = fraction;
@@ -160,7 +160,7 @@ TEST(BuildCurve, StopsWhenProgressSaysSo) {
   request.periods = 1000;
   for (const int calls_before : {0, 2}) {
     int calls = 0;
-    EXPECT_THROW(build_curve(default_rig_file(), request,
+    EXPECT_THROW(build_curve(rig_file::default_rig_file(), request,
                              [&](double fraction, const std::string&) {
                                EXPECT_LT(fraction, 0.05);
                                return calls++ < calls_before;
@@ -173,35 +173,40 @@ TEST(BuildCurve, StopsWhenProgressSaysSo) {
 TEST(BuildCurve, RefusesWhatItCannotBuild) {
   const double infinity = std::numeric_limits<double>::infinity(), nan = std::nan("");
   struct Case {
-    std::function<void(RigFile&, CurveRequest&)> change;
+    std::function<void(rig_file::RigFile&, CurveRequest&)> change;
     std::string name;
   };
   std::vector<Case> cases = {
-      {[](RigFile&, CurveRequest& r) { r.points = 1; }, "points"},
-      {[](RigFile&, CurveRequest& r) { r.points = -5; }, "points"},
-      {[](RigFile&, CurveRequest& r) { r.periods = 0; }, "periods"},
-      {[](RigFile&, CurveRequest& r) { r.periods = 2000000000; }, "periods"},
-      {[](RigFile&, CurveRequest& r) { r.seeds = 0; }, "seeds"},
-      {[](RigFile&, CurveRequest& r) { r.sampling_rate = 1e12; }, "periods"},  // too many samples
-      {[](RigFile&, CurveRequest& r) { r.sampling_rate = 50; }, "sample_rate"},
-      {[](RigFile&, CurveRequest& r) { r.sampling_rate = 1e-300; }, "sample_rate"},
-      {[](RigFile& f, CurveRequest&) { f.diagnosis.apd.reset(); }, "diagnosis.apd"},
-      {[](RigFile& f, CurveRequest&) { f.simulation.excitation.type = "constant"; }, "excitation.type"},
-      {[](RigFile& f, CurveRequest&) { f.simulation.excitation.type = "topic"; }, "excitation.type"},
-      {[](RigFile& f, CurveRequest&) { f.simulation.excitation.type = "saw"; }, "excitation.type"},
-      {[](RigFile& f, CurveRequest&) { f.rig.input_coupling = Coupling(); }, "diagnosis.apd.signal"},
-      {[](RigFile& f, CurveRequest&) { f.diagnosis.apd->layout.classes = 1; }, "apd.classes"},
-      {[](RigFile& f, CurveRequest&) {
+      {[](rig_file::RigFile&, CurveRequest& r) { r.points = 1; }, "points"},
+      {[](rig_file::RigFile&, CurveRequest& r) { r.points = -5; }, "points"},
+      {[](rig_file::RigFile&, CurveRequest& r) { r.periods = 0; }, "periods"},
+      {[](rig_file::RigFile&, CurveRequest& r) { r.periods = 2000000000; }, "periods"},
+      {[](rig_file::RigFile&, CurveRequest& r) { r.seeds = 0; }, "seeds"},
+      {[](rig_file::RigFile&, CurveRequest& r) { r.sampling_rate = 1e12; }, "periods"},  // too many samples
+      {[](rig_file::RigFile&, CurveRequest& r) { r.sampling_rate = 50; }, "sample_rate"},
+      {[](rig_file::RigFile&, CurveRequest& r) { r.sampling_rate = 1e-300; }, "sample_rate"},
+      {[](rig_file::RigFile& f, CurveRequest&) { f.diagnosis.apd.reset(); }, "diagnosis.apd"},
+      {[](rig_file::RigFile& f, CurveRequest&) { f.simulation.excitation.type = "constant"; },
+       "excitation.type"},
+      {[](rig_file::RigFile& f, CurveRequest&) { f.simulation.excitation.type = "topic"; },
+       "excitation.type"},
+      {[](rig_file::RigFile& f, CurveRequest&) { f.simulation.excitation.type = "saw"; }, "excitation.type"},
+      {[](rig_file::RigFile& f, CurveRequest&) { f.rig.input_coupling = model::Coupling(); },
+       "diagnosis.apd.signal"},
+      {[](rig_file::RigFile& f, CurveRequest&) { f.diagnosis.apd->layout.classes = 1; }, "apd.classes"},
+      {[](rig_file::RigFile& f, CurveRequest&) {
          f.diagnosis.apd->layout = {60, 5, 6};
        },
        "diagnosis.apd"},  // never reached
   };
   for (const double value : {0.0, -1e-4, nan, infinity})
-    cases.push_back({[value](RigFile&, CurveRequest& r) { r.max_backlash = value; }, "max_backlash"});
+    cases.push_back(
+        {[value](rig_file::RigFile&, CurveRequest& r) { r.max_backlash = value; }, "max_backlash"});
   for (const double value : {-1.0, nan, infinity})
-    cases.push_back({[value](RigFile&, CurveRequest& r) { r.sampling_rate = value; }, "sample_rate"});
+    cases.push_back(
+        {[value](rig_file::RigFile&, CurveRequest& r) { r.sampling_rate = value; }, "sample_rate"});
   for (const Case& c : cases) {
-    RigFile file = default_rig_file();
+    rig_file::RigFile file = rig_file::default_rig_file();
     CurveRequest request = quick(2);
     c.change(file, request);
     try {
@@ -214,8 +219,8 @@ TEST(BuildCurve, RefusesWhatItCannotBuild) {
 }
 
 TEST(CheckCurve, AnotherVersionIsToldAnotherGeometryIsRefused) {
-  const RigFile file = default_rig_file();
-  MonitoringCurve curve;
+  const rig_file::RigFile file = rig_file::default_rig_file();
+  diagnosis::MonitoringCurve curve;
   curve.backlash_to_angle = 1 / 0.014917;  // the base radius of the default rig
   curve.conditions.rig_digest = file.digest;
   EXPECT_EQ(check_curve(curve, file, "curve.yaml"), "");
@@ -232,4 +237,4 @@ TEST(CheckCurve, AnotherVersionIsToldAnotherGeometryIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/studies/integrator_study.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 const IntegratorStudySettings& shipped() {
@@ -76,10 +76,11 @@ TEST(IntegratorStudy, RestitutionIsThatOfTheTable) {
   // REFERENCE 1.3, solved independently: e = 0.9, 0.8, 0.5, 0.2 at D = 1.5 alpha v
   const double table[][2] = {{0.1665, 0.9}, {0.3731, 0.8}, {1.4328, 0.5}, {4.9192, 0.2}};
   for (const auto& [d, e] : table)
-    EXPECT_NEAR(hunt_crossley_restitution(d / 1.5), e, 1e-4);  // printed digits
-  EXPECT_EQ(hunt_crossley_restitution(0), 1);
-  EXPECT_NEAR(hunt_crossley_restitution(1e-3), 1 - 1e-3, 1e-6);  // the next term is of the order (alpha v)^2
-  EXPECT_THROW(hunt_crossley_restitution(-1), InvalidParameter);
+    EXPECT_NEAR(model::hunt_crossley_restitution(d / 1.5), e, 1e-4);  // printed digits
+  EXPECT_EQ(model::hunt_crossley_restitution(0), 1);
+  EXPECT_NEAR(model::hunt_crossley_restitution(1e-3), 1 - 1e-3,
+              1e-6);  // the next term is of the order (alpha v)^2
+  EXPECT_THROW(model::hunt_crossley_restitution(-1), InvalidParameter);
 }
 
 TEST(IntegratorStudy, ReferencesAreConverged) {
@@ -109,7 +110,7 @@ TEST(IntegratorStudy, ReferenceAgreesWithFixedSmallSteps) {
 
 TEST(IntegratorStudy, LoopAreaIsTheEnergyLost) {
   const Tooth& tooth = tooth_of(shipped(), "loop");
-  const double e = hunt_crossley_restitution(tooth.alpha * tooth.speed);
+  const double e = model::hunt_crossley_restitution(tooth.alpha * tooth.speed);
   const double lost = 0.5 * tooth.mass * tooth.speed * tooth.speed * (1 - e * e);
   const ToothMotion motion = ToothSimulator(tooth, "verner", 1e-8, AbsoluteTolerance::scaled).run(3000);
   // trapezoids over some 350 samples of the contact: 1 / 12 of the square of a share of 1 / 350 of it, about
@@ -193,12 +194,13 @@ TEST(IntegratorStudy, AGapThatTheRightMotionCrossesIsRefused) {
 }
 
 // y' = -y: each method against exp(-1)
-std::vector<double> decay(const std::string& method, double tolerance, IntegratorStatistics& statistics) {
-  SolverSettings settings;
+std::vector<double> decay(const std::string& method, double tolerance,
+                          simulation::IntegratorStatistics& statistics) {
+  simulation::SolverSettings settings;
   settings.method = method;
   settings.relative_tolerance = tolerance;
-  Integrator integrator([](double, const double* y, double* rate) { rate[0] = -y[0]; }, {tolerance},
-                        settings);
+  simulation::Integrator integrator([](double, const double* y, double* rate) { rate[0] = -y[0]; },
+                                    {tolerance}, settings);
   double y = 1;
   integrator.restart(0, &y, 1);
   integrator.integrate_to(1, &y);
@@ -213,7 +215,7 @@ TEST(WorkPrecisionTest, ErrorsAreThoseOfTheClosedForm) {
   EXPECT_EQ(work.points().size(), 8 * 17);
   EXPECT_LT(work.agreement(), 1e-12);
   for (const WorkPoint& point : work.points()) {
-    IntegratorStatistics statistics;
+    simulation::IntegratorStatistics statistics;
     const double y = decay(point.method, point.tolerance, statistics).front();
     EXPECT_NEAR(point.error, std::fabs(y / std::exp(-1.0) - 1), 1e-12) << point.method;
     EXPECT_EQ(point.evaluations, statistics.evaluations);
@@ -222,7 +224,7 @@ TEST(WorkPrecisionTest, ErrorsAreThoseOfTheClosedForm) {
 
 TEST(WorkPrecisionTest, CostLiesBetweenTheToleratedPoints) {
   const WorkPrecision work("decay", decay, nullptr);
-  for (const std::string& method : integrator_methods()) {
+  for (const std::string& method : simulation::integrator_methods()) {
     const double cost = work.cost(method, 1e-7, Cost::evaluations);
     double looser = 0, tighter = 1e9;
     for (const WorkPoint& point : work.points())
@@ -239,8 +241,8 @@ TEST(WorkPrecisionTest, CostLiesBetweenTheToleratedPoints) {
 
 TEST(WorkPrecisionTest, TheRigFilesSolverIsRightToItsTolerance) {
   WorkPoint declared;
-  const WorkPrecision work = rig_work(default_rig_file(), shipped().half_gap, shipped().rig_duration,
-                                      declared, nullptr, {"dormand_prince", "bdf"});
+  const WorkPrecision work = rig_work(rig_file::default_rig_file(), shipped().half_gap,
+                                      shipped().rig_duration, declared, nullptr, {"dormand_prince", "bdf"});
   EXPECT_LT(work.agreement(), 1e-11);  // measured 2e-13
   EXPECT_EQ(declared.method, "dormand_prince");
   EXPECT_LT(declared.error, 1e-5);  // ten tolerances; measured 1.4e-6
@@ -272,4 +274,4 @@ TEST(IntegratorStudyFile, IsReadStrictly) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/studies/minimise.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 using Point = std::vector<double>;
@@ -104,4 +104,4 @@ TEST(Minimise, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
@@ -22,9 +22,9 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 }
 
 /// config/sarkar_1997.yaml with changes, through the loader of rig files.
-RigFile rig(const std::string& sensors, const std::string& signal, const std::string& range,
-            const std::string& motor = "") {
-  std::string text = default_rig_file().text;
+rig_file::RigFile rig(const std::string& sensors, const std::string& signal, const std::string& range,
+                      const std::string& motor = "") {
+  std::string text = rig_file::default_rig_file().text;
   text = replaced(text, "  sampling_rate: 1000 ", "  " + sensors + "\n  sampling_rate: 2000 ");
   text = replaced(text, "signal: sensor_torque", "signal: " + signal);
   text = replaced(text, "lower: -0.4 ", "lower: -" + range + " ");
@@ -32,7 +32,7 @@ RigFile rig(const std::string& sensors, const std::string& signal, const std::st
   if (!motor.empty()) text = replaced(text, "  motor:\n", "  motor:\n    " + motor + "\n");
   const std::string path = ::testing::TempDir() + "/other_signal_" + std::to_string(::getpid()) + ".yaml";
   std::ofstream(path) << text;
-  const RigFile file = load_rig_file(path);
+  const rig_file::RigFile file = rig_file::load_rig_file(path);
   std::remove(path.c_str());
   return file;
 }
@@ -45,23 +45,24 @@ CurveRequest coarse() {
   return request;
 }
 
-Estimate by_skewness(const RigFile& file, const MonitoringCurve& curve, double backlash, unsigned seed) {
-  RigFile machine = file;
+diagnosis::Estimate by_skewness(const rig_file::RigFile& file, const diagnosis::MonitoringCurve& curve,
+                                double backlash, unsigned seed) {
+  rig_file::RigFile machine = file;
   machine.rig.mesh.backlash = backlash;
   machine.simulation.sensors.seed = seed;
-  const Record record = simulate_record(machine.rig, machine.simulation, 1.2);
+  const record::Record record = simulation::simulate_record(machine.rig, machine.simulation, 1.2);
   EXPECT_TRUE(record.has(file.diagnosis.apd->signal));
-  return diagnose(record, file.diagnosis, &curve, std::nullopt, "apd_skewness").estimates.front();
+  return diagnosis::diagnose(record, file.diagnosis, &curve, std::nullopt, "apd_skewness").estimates.front();
 }
 
 // The gear's acceleration rings at 2.8 kHz behind the stiff output coupling, and its skewness has a dip at 50
 // um: the curve needs a grid that shows it, and most intervals span branches. What they claim must be true
 // all the same.
 TEST(OtherSignals, AccelerationTellsBacklashOrSaysThatItCannot) {
-  const RigFile file = rig("acceleration: {noise: 5}", "acceleration", "1500");
+  const rig_file::RigFile file = rig("acceleration: {noise: 5}", "acceleration", "1500");
   CurveRequest request = coarse();
   request.points = 21;
-  const MonitoringCurve curve = build_curve(file, request);
+  const diagnosis::MonitoringCurve curve = build_curve(file, request);
   EXPECT_EQ(curve.conditions.signal, "acceleration");
   EXPECT_EQ(curve.conditions.noise, 5);
   EXPECT_FALSE(curve.flat());
@@ -72,8 +73,8 @@ TEST(OtherSignals, AccelerationTellsBacklashOrSaysThatItCannot) {
   EXPECT_LT(curve.noise_levels.back(), 0.3 * 2000);
   int informative = 0;
   for (const double backlash : {0.0, 2e-5, 5e-5, 7e-5, 9e-5, 1.3e-4}) {
-    const Estimate e = by_skewness(file, curve, backlash, 3);
-    if (e.status != Status::ok) continue;
+    const diagnosis::Estimate e = by_skewness(file, curve, backlash, 3);
+    if (e.status != diagnosis::Status::ok) continue;
     ++informative;
     EXPECT_LE(e.lower, backlash) << e.message;
     EXPECT_GE(e.upper, backlash) << e.message;
@@ -83,13 +84,14 @@ TEST(OtherSignals, AccelerationTellsBacklashOrSaysThatItCannot) {
 }
 
 TEST(OtherSignals, ACommandedCurrentTellsNothing) {
-  const RigFile file = rig("motor_current: {noise: 0.01}", "motor_current", "5", "torque_constant: 0.02");
-  const MonitoringCurve curve = build_curve(file, coarse());
+  const rig_file::RigFile file =
+      rig("motor_current: {noise: 0.01}", "motor_current", "5", "torque_constant: 0.02");
+  const diagnosis::MonitoringCurve curve = build_curve(file, coarse());
   EXPECT_TRUE(curve.flat());
   EXPECT_DOUBLE_EQ(curve.noise_levels.back(), 0.3 * 0.05 / 0.02);  // 30 % of the square wave's rms, in A
   for (const double backlash : {0.0, 5e-5, 1.3e-4, 2e-4}) {
-    const Estimate e = by_skewness(file, curve, backlash, 3);
-    EXPECT_EQ(e.status, Status::ambiguous) << e.message;
+    const diagnosis::Estimate e = by_skewness(file, curve, backlash, 3);
+    EXPECT_EQ(e.status, diagnosis::Status::ambiguous) << e.message;
     EXPECT_NE(e.message.find("motor_current does not depend on backlash"), std::string::npos) << e.message;
     EXPECT_TRUE(std::isnan(e.backlash) && std::isnan(e.upper));
   }
@@ -97,7 +99,7 @@ TEST(OtherSignals, ACommandedCurrentTellsNothing) {
 
 TEST(OtherSignals, ACurrentNeedsItsTorqueConstant) {
   EXPECT_THROW(rig("motor_current: {noise: 0.01}", "motor_current", "5"), BadData);
-  const RigFile undeclared = rig("sensor_torque: {noise: 0}", "motor_current", "5");
+  const rig_file::RigFile undeclared = rig("sensor_torque: {noise: 0}", "motor_current", "5");
   try {
     build_curve(undeclared, coarse());
     ADD_FAILURE() << "built";
@@ -107,16 +109,16 @@ TEST(OtherSignals, ACurrentNeedsItsTorqueConstant) {
 }
 
 TEST(OtherSignals, MessagesNameTheUnitOfTheSignal) {
-  const RigFile file = rig("acceleration: {noise: 5}", "acceleration", "1500");
+  const rig_file::RigFile file = rig("acceleration: {noise: 5}", "acceleration", "1500");
   CurveRequest request = coarse();
   request.points = 3;
-  const MonitoringCurve curve = build_curve(file, request);
-  RigFile loud = file;
-  loud.simulation.sensors.of(Channel::acceleration).noise = 2 * curve.noise_levels.back();
-  const Estimate e = by_skewness(loud, curve, 5e-5, 3);
-  EXPECT_EQ(e.status, Status::out_of_domain);
+  const diagnosis::MonitoringCurve curve = build_curve(file, request);
+  rig_file::RigFile loud = file;
+  loud.simulation.sensors.of(record::Channel::acceleration).noise = 2 * curve.noise_levels.back();
+  const diagnosis::Estimate e = by_skewness(loud, curve, 5e-5, 3);
+  EXPECT_EQ(e.status, diagnosis::Status::out_of_domain);
   EXPECT_NE(e.message.find("rad/s^2"), std::string::npos) << e.message;
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

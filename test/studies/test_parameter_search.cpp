@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/studies/parameter_search.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 namespace fs = std::filesystem;
@@ -145,7 +145,7 @@ TEST(ParameterSearch, DependsOnTheSeedNotOnTheThreadsAndWritesWhatItFound) {
   EXPECT_NE(search_parameters(search).values, one.values);
 
   // The text holds the values found, and judged anew it gives the same figures.
-  const RigFile file = rig_file_from_text(one.rig_text, "found");
+  const rig_file::RigFile file = rig_file::rig_file_from_text(one.rig_text, "found");
   EXPECT_EQ(file.rig.input_coupling.damping, std::stod(one.values[1]));
   EXPECT_EQ(file.diagnosis.apd->settling_periods, 0);
   EXPECT_GE(file.diagnosis.apd->layout.classes, 50);
@@ -163,7 +163,7 @@ TEST(ParameterSearch, DependsOnTheSeedNotOnTheThreadsAndWritesWhatItFound) {
 
 // A rig that never moves out of one or two classes has the skewness of those classes, whatever its backlash.
 TEST(ParameterSearch, ReadsTheSkewnessThatWideClassesMustGive) {
-  RigFile file = default_rig_file();
+  rig_file::RigFile file = rig_file::default_rig_file();
   file.diagnosis.apd->layout = {40, -20, 20};  // the torque is within +-1 N m: classes 19 and 20 alone
   CurveTarget target;
   target.backlash = {1e-4};
@@ -188,7 +188,8 @@ TEST(ParameterSearch, TheFittedRigMeetsThePublishedValuesAndItsCurveNeverRises) 
   target.max_backlash = 2e-4;
   target.points = 21;
   target.phases = 4;
-  const RigFile file = load_rig_file(test::package_file("config/sarkar_1997_fitted.yaml"));
+  const rig_file::RigFile file =
+      rig_file::load_rig_file(test::package_file("config/sarkar_1997_fitted.yaml"));
   const CurveFit fit = fit_of(file, target);
   EXPECT_LE(fit.rms, 0.08);
   EXPECT_EQ(fit.rise, 0);
@@ -211,4 +212,4 @@ TEST(ParameterSearch, TheFittedRigMeetsThePublishedValuesAndItsCurveNeverRises) 
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -18,30 +18,30 @@
 #include "support/data.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 /// What a rig file says to the estimators.
-const GearTrain& declared_train() {
-  static const GearTrain train(default_rig_file().rig);
+const model::GearTrain& declared_train() {
+  static const model::GearTrain train(rig_file::default_rig_file().rig);
   return train;
 }
 
 double base_radius() {
-  return default_rig_file().rig.mesh.base_radius;
+  return rig_file::default_rig_file().rig.mesh.base_radius;
 }
 
-PositionDifferenceSettings position_settings() {
-  PositionDifferenceSettings s;
+diagnosis::PositionDifferenceSettings position_settings() {
+  diagnosis::PositionDifferenceSettings s;
   s.elastic_deflection = [](double torque) { return declared_train().elastic_deflection(torque); };
-  s.motor_inertia = default_rig_file().rig.motor.inertia;
+  s.motor_inertia = rig_file::default_rig_file().rig.motor.inertia;
   s.base_radius = base_radius();
   return s;
 }
 
-MomentumTransferSettings momentum_settings() {
-  const Rig rig = default_rig_file().rig;
-  MomentumTransferSettings s;
+diagnosis::MomentumTransferSettings momentum_settings() {
+  const model::Rig rig = rig_file::default_rig_file().rig;
+  diagnosis::MomentumTransferSettings s;
   s.motor_inertia = rig.motor.inertia;
   s.motor_damping = rig.motor.viscous_damping;
   s.pinion_inertia = rig.pinion.inertia;
@@ -70,33 +70,33 @@ class Draw {
 
 struct Case {
   double backlash = 0;  // m
-  Record record;
+  record::Record record;
 };
 
 /// The Sarkar rig with a random half gap, noise and seed; its stiffness differs from the declared one by the
 /// declared uncertainty (2 % at 95 %).
 Case random_case(Draw& draw, double largest_half_gap, double rate) {
-  RigFile file = default_rig_file();
+  rig_file::RigFile file = rig_file::default_rig_file();
   Case c;
   c.backlash = file.rig.mesh.backlash = 2 * draw.uniform(0, largest_half_gap);
   file.rig.input_coupling.stiffness *= 1 + 0.01 * draw.normal();
-  SensorsSettings& sensors = file.simulation.sensors;
+  simulation::SensorsSettings& sensors = file.simulation.sensors;
   sensors.sampling_rate = rate;
   sensors.seed = draw.seed();
-  sensors.of(Channel::motor_torque).noise = draw.uniform(0, 2e-3);
-  sensors.of(Channel::motor_position).resolution = 1e-6;
-  sensors.of(Channel::motor_velocity).noise = draw.uniform(0, 0.02);
-  c.record = simulate_record(file.rig, file.simulation, draw.uniform(0.5, 1.5));
+  sensors.of(record::Channel::motor_torque).noise = draw.uniform(0, 2e-3);
+  sensors.of(record::Channel::motor_position).resolution = 1e-6;
+  sensors.of(record::Channel::motor_velocity).noise = draw.uniform(0, 0.02);
+  c.record = simulation::simulate_record(file.rig, file.simulation, draw.uniform(0.5, 1.5));
   return c;
 }
 
 struct Score {
   int answers = 0, right = 0, far = 0;
-  std::map<Status, int> seen;
+  std::map<diagnosis::Status, int> seen;
   std::vector<double> errors;
-  void add(const Estimate& e, double truth) {
+  void add(const diagnosis::Estimate& e, double truth) {
     ++seen[e.status];
-    if (e.status != Status::ok && e.status != Status::below_range) return;
+    if (e.status != diagnosis::Status::ok && e.status != diagnosis::Status::below_range) return;
     ++answers;
     const double rounding = 1e-12, width = e.upper - e.lower;
     right += e.lower <= truth + rounding && truth <= e.upper + rounding;
@@ -117,10 +117,10 @@ TEST(RigEstimators, PositionDifferenceOfTheLockedRig) {
   Score score;
   for (int i = 0; i < kCases; ++i) {
     const Case c = random_case(draw, 100e-6, i % 2 ? 1000 : 5000);
-    score.add(estimate_position_difference(c.record, position_settings()), c.backlash);
+    score.add(diagnosis::estimate_position_difference(c.record, position_settings()), c.backlash);
   }
-  EXPECT_GE(score.seen[Status::ok], 57);  // a gap of a few um may be below the range
-  EXPECT_EQ(score.seen[Status::ok] + score.seen[Status::below_range], kCases);
+  EXPECT_GE(score.seen[diagnosis::Status::ok], 57);  // a gap of a few um may be below the range
+  EXPECT_EQ(score.seen[diagnosis::Status::ok] + score.seen[diagnosis::Status::below_range], kCases);
   EXPECT_GE(score.right, kFewestRight);
   EXPECT_EQ(score.far, 0);
   EXPECT_LT(score.median_error(), 3e-6);
@@ -133,14 +133,14 @@ TEST(RigEstimators, MomentumTransferOfTheLockedRig) {
   for (int i = 0; i < kCases; ++i) {
     Case c = random_case(draw, 100e-6, i % 2 ? 5000 : 10000);
     const bool tachometer = i % 4 < 2;
-    c.record.column(tachometer ? Channel::motor_position : Channel::motor_velocity).clear();
+    c.record.column(tachometer ? record::Channel::motor_position : record::Channel::motor_velocity).clear();
     (tachometer ? by_speed : by_position)
-        .add(estimate_momentum_transfer(c.record, momentum_settings()), c.backlash);
+        .add(diagnosis::estimate_momentum_transfer(c.record, momentum_settings()), c.backlash);
   }
-  EXPECT_GE(by_speed.seen[Status::ok], 27);
-  EXPECT_EQ(by_speed.answers + by_speed.seen[Status::out_of_domain],
+  EXPECT_GE(by_speed.seen[diagnosis::Status::ok], 27);
+  EXPECT_EQ(by_speed.answers + by_speed.seen[diagnosis::Status::out_of_domain],
             30);  // a noisy tachometer may be refused
-  EXPECT_GE(by_position.seen[Status::ok], 28);
+  EXPECT_GE(by_position.seen[diagnosis::Status::ok], 28);
   EXPECT_EQ(by_position.answers, 30);
   EXPECT_GE(by_speed.right + by_position.right,
             by_speed.answers + by_position.answers - kCases + kFewestRight);
@@ -152,14 +152,16 @@ TEST(RigEstimators, MomentumTransferOfTheLockedRig) {
 TEST(RigEstimators, MomentumTransferNeedsToSeeTheImpacts) {
   Draw draw(3);
   const Case slow = random_case(draw, 100e-6, 1000);
-  const Estimate e = estimate_momentum_transfer(slow.record, momentum_settings());
-  EXPECT_EQ(e.status, Status::out_of_domain);
+  const diagnosis::Estimate e = diagnosis::estimate_momentum_transfer(slow.record, momentum_settings());
+  EXPECT_EQ(e.status, diagnosis::Status::out_of_domain);
   EXPECT_NE(e.message.find("samples per cycle"), std::string::npos) << e.message;
-  RigFile file = default_rig_file();  // no gap: contact is lost for no longer than the flanks spring back
+  rig_file::RigFile file =
+      rig_file::default_rig_file();  // no gap: contact is lost for no longer than the flanks spring back
   file.simulation.sensors.sampling_rate = 10000;
-  EXPECT_EQ(
-      estimate_momentum_transfer(simulate_record(file.rig, file.simulation, 0.6), momentum_settings()).status,
-      Status::below_range);
+  EXPECT_EQ(diagnosis::estimate_momentum_transfer(simulation::simulate_record(file.rig, file.simulation, 0.6),
+                                                  momentum_settings())
+                .status,
+            diagnosis::Status::below_range);
 }
 
 // Friction of 44 to 73 N m that the settings do not know: no confident answer.
@@ -169,19 +171,19 @@ TEST(RigEstimators, MomentumTransferRefusesServosWithFriction) {
     const auto path = test::find_data(std::string("undeclared/") + name + "/train.csv");
     if (!path) continue;
     ++seen;
-    MomentumTransferSettings s;
+    diagnosis::MomentumTransferSettings s;
     s.motor_inertia = 6.3;
     s.motor_damping = 13;
     s.flank_deflection = [](double torque) { return torque / 460e3; };
-    const Estimate e = estimate_momentum_transfer(read_csv(*path), s);
-    EXPECT_EQ(e.status, Status::out_of_domain) << *path << ": " << e.message;
+    const diagnosis::Estimate e = diagnosis::estimate_momentum_transfer(record::read_csv(*path), s);
+    EXPECT_EQ(e.status, diagnosis::Status::out_of_domain) << *path << ": " << e.message;
   }
   if (seen == 0) GTEST_SKIP() << "no undeclared/dev*/*.csv in $BACKLASH_DIAGNOSIS_DATA or ../shared/data";
 }
 
 /// Two inertias with a free load, as they are declared for the records of the separate program.
-Rig servo_rig(double stiffness) {
-  return read_rig(YamlReader::from_text(
+model::Rig servo_rig(double stiffness) {
+  return model::read_rig(YamlReader::from_text(
       "{name: servo, joint: servo, gear_train: {reduction_ratio: 1, motor: {inertia: 6.3, viscous_damping: "
       "13}, "
       "input_coupling: rigid, mesh: {backlash_angle: 5.4e-4, contact: {law: linear, stiffness: " +
@@ -190,8 +192,8 @@ Rig servo_rig(double stiffness) {
       "servo"));
 }
 
-PositionDifferenceSettings servo_settings() {
-  PositionDifferenceSettings s;
+diagnosis::PositionDifferenceSettings servo_settings() {
+  diagnosis::PositionDifferenceSettings s;
   s.elastic_deflection = [](double torque) { return torque / 460e3; };
   s.elastic_uncertainty = 0.4;
   s.motor_inertia = 6.3;
@@ -203,11 +205,11 @@ TEST(RigEstimators, PositionDifferenceOfAServoWithUnknownParameters) {
   int right = 0;
   constexpr int cases = 12;
   for (int i = 0; i < cases; ++i) {
-    Rig rig = servo_rig(460e3 * draw.uniform(0.7, 1.4));
+    model::Rig rig = servo_rig(460e3 * draw.uniform(0.7, 1.4));
     rig.mesh.backlash = 5.4e-4 * draw.uniform(0.6, 1.4);
     rig.motor.inertia *= draw.uniform(0.6, 1.4);
     rig.link.inertia *= draw.uniform(0.6, 1.4);
-    SimulationSettings run;
+    simulation::SimulationSettings run;
     run.excitation.type = "random";
     run.excitation.amplitude = draw.uniform(150, 400);
     run.excitation.start_frequency = 0.3;
@@ -215,11 +217,12 @@ TEST(RigEstimators, PositionDifferenceOfAServoWithUnknownParameters) {
     run.excitation.line_count = 40;
     run.excitation.seed = draw.seed();
     run.sensors.seed = draw.seed();
-    run.sensors.of(Channel::motor_torque).noise = draw.uniform(1, 3);
-    run.sensors.of(Channel::motor_position).resolution = 8.7e-7;
-    run.sensors.of(Channel::load_position).resolution = 7e-6;
-    const Estimate e = estimate_position_difference(simulate_record(rig, run, 20), servo_settings());
-    ASSERT_EQ(e.status, Status::ok) << e.message;
+    run.sensors.of(record::Channel::motor_torque).noise = draw.uniform(1, 3);
+    run.sensors.of(record::Channel::motor_position).resolution = 8.7e-7;
+    run.sensors.of(record::Channel::load_position).resolution = 7e-6;
+    const diagnosis::Estimate e =
+        diagnosis::estimate_position_difference(simulation::simulate_record(rig, run, 20), servo_settings());
+    ASSERT_EQ(e.status, diagnosis::Status::ok) << e.message;
     EXPECT_NEAR(e.backlash_angle, rig.mesh.backlash, 1e-6);  // a seventh of the step of the load encoder
     right += e.angle_lower <= rig.mesh.backlash && rig.mesh.backlash <= e.angle_upper;
   }
@@ -241,8 +244,9 @@ TEST(RigEstimators, PositionDifferenceOfServosWithUndeclaredEffects) {
       if (!path) continue;
       ++seen;
       SCOPED_TRACE(*path);
-      const Estimate e = estimate_position_difference(read_csv(*path), servo_settings());
-      ASSERT_EQ(e.status, Status::ok) << e.message;
+      const diagnosis::Estimate e =
+          diagnosis::estimate_position_difference(record::read_csv(*path), servo_settings());
+      ASSERT_EQ(e.status, diagnosis::Status::ok) << e.message;
       const double width = e.angle_upper - e.angle_lower;
       EXPECT_GE(machine.gap, e.angle_lower - width);
       EXPECT_LE(machine.gap, e.angle_upper + width);
@@ -258,49 +262,53 @@ TEST(RigEstimators, PositionDifferenceOfServosWithUndeclaredEffects) {
 
 TEST(RigEstimators, CoherenceFallsWithTheGap) {
   const auto detected = [](double half_gap, std::uint64_t seed,
-                           const std::optional<CoherenceBaseline>& baseline) {
-    RigFile file = default_rig_file();
+                           const std::optional<diagnosis::CoherenceBaseline>& baseline) {
+    rig_file::RigFile file = rig_file::default_rig_file();
     file.rig.mesh.backlash = 2 * half_gap;
-    ExcitationSettings& excitation = file.simulation.excitation;
+    simulation::ExcitationSettings& excitation = file.simulation.excitation;
     excitation.type = "random";
     excitation.start_frequency = 5;
     excitation.end_frequency = 100;
     excitation.line_count = 48;
     excitation.seed = seed;
     file.simulation.sensors.sampling_rate = 2000;
-    file.simulation.sensors.of(Channel::motor_velocity).noise = 0.01;
-    CoherenceSettings settings;
+    file.simulation.sensors.of(record::Channel::motor_velocity).noise = 0.01;
+    diagnosis::CoherenceSettings settings;
     settings.segment = 0.256;
     settings.baseline = baseline;
-    return detect_nonlinearity(simulate_record(file.rig, file.simulation, 6), settings);
+    return diagnosis::detect_nonlinearity(simulation::simulate_record(file.rig, file.simulation, 6),
+                                          settings);
   };
-  const CoherenceDetection healthy = detected(0, 1, std::nullopt);
-  ASSERT_EQ(healthy.status, Status::ok) << healthy.message;
-  const CoherenceBaseline baseline{healthy.loss, healthy.deviation, healthy.lower, healthy.upper};
-  const CoherenceDetection again = detected(0, 2, baseline);
+  const diagnosis::CoherenceDetection healthy = detected(0, 1, std::nullopt);
+  ASSERT_EQ(healthy.status, diagnosis::Status::ok) << healthy.message;
+  const diagnosis::CoherenceBaseline baseline{healthy.loss, healthy.deviation, healthy.lower, healthy.upper};
+  const diagnosis::CoherenceDetection again = detected(0, 2, baseline);
   EXPECT_FALSE(again.nonlinear.value_or(false)) << again.message;
-  const CoherenceDetection small = detected(30e-6, 2, baseline), large = detected(80e-6, 3, baseline);
+  const diagnosis::CoherenceDetection small = detected(30e-6, 2, baseline),
+                                      large = detected(80e-6, 3, baseline);
   EXPECT_TRUE(small.nonlinear.value_or(false)) << small.message;
   EXPECT_TRUE(large.nonlinear.value_or(false)) << large.message;
   EXPECT_GT(large.index_lower, small.index_upper);
-  RigFile square = default_rig_file();
-  CoherenceSettings settings;
+  rig_file::RigFile square = rig_file::default_rig_file();
+  diagnosis::CoherenceSettings settings;
   settings.segment = 0.256;
-  EXPECT_EQ(detect_nonlinearity(simulate_record(square.rig, square.simulation, 6), settings).status,
-            Status::out_of_domain);
+  EXPECT_EQ(
+      diagnosis::detect_nonlinearity(simulation::simulate_record(square.rig, square.simulation, 6), settings)
+          .status,
+      diagnosis::Status::out_of_domain);
 }
 
 /// What position_difference says of a machine that differs from the declared one as far as its file allows.
-Estimate of_softer_servo(const RigFile& declared, double gap, bool square_wave) {
+diagnosis::Estimate of_softer_servo(const rig_file::RigFile& declared, double gap, bool square_wave) {
   std::string softer = declared.text;
   softer.replace(softer.find("460e3"), 5, "400e3");
-  RigFile machine = rig_file_from_text(softer, "softer");
+  rig_file::RigFile machine = rig_file::rig_file_from_text(softer, "softer");
   machine.rig.mesh.backlash = gap;
   machine.rig.link.inertia = 125;
   machine.rig.motor.coulomb_friction = 52;
   if (!square_wave) machine.simulation.excitation = test::shaking(11);
-  const Record record = simulate_record(machine.rig, machine.simulation, 20);
-  for (const Estimate& e : diagnose(record, declared.diagnosis, nullptr).estimates)
+  const record::Record record = simulation::simulate_record(machine.rig, machine.simulation, 20);
+  for (const diagnosis::Estimate& e : diagnosis::diagnose(record, declared.diagnosis, nullptr).estimates)
     if (e.method == "position_difference") return e;
   return {};
 }
@@ -308,12 +316,12 @@ Estimate of_softer_servo(const RigFile& declared, double gap, bool square_wave) 
 // The torque of a slow square wave has two values: play and compliance have the same effect on the
 // deflection, and none of it may be called play. With a torque of many values all machines must be ok.
 TEST(RigEstimators, ATorqueOfTwoValuesGivesNoPlay) {
-  const RigFile declared = test::servo_file();
+  const rig_file::RigFile declared = test::servo_file();
   for (const double gap : {3e-4, 7e-4, 1.1e-3}) {  // rad
-    const Estimate square = of_softer_servo(declared, gap, true);
-    EXPECT_EQ(square.status, Status::out_of_domain) << gap << ": " << square.message;
-    const Estimate random = of_softer_servo(declared, gap, false);
-    ASSERT_EQ(random.status, Status::ok) << gap << ": " << random.message;
+    const diagnosis::Estimate square = of_softer_servo(declared, gap, true);
+    EXPECT_EQ(square.status, diagnosis::Status::out_of_domain) << gap << ": " << square.message;
+    const diagnosis::Estimate random = of_softer_servo(declared, gap, false);
+    ASSERT_EQ(random.status, diagnosis::Status::ok) << gap << ": " << random.message;
     EXPECT_LE(random.angle_lower, gap);
     EXPECT_GE(random.angle_upper, gap);
     EXPECT_LT(random.angle_upper - random.angle_lower, 0.1 * gap) << "an interval that says something";
@@ -321,4 +329,4 @@ TEST(RigEstimators, ATorqueOfTwoValuesGivesNoPlay) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

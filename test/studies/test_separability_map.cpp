@@ -9,18 +9,18 @@
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "backlash_diagnosis/studies/separability_map.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 /// Of the built-in rig at another sampling rate than its own: that of the curve counts.
-const MonitoringCurve& curve() {
-  static const MonitoringCurve built = [] {
+const diagnosis::MonitoringCurve& curve() {
+  static const diagnosis::MonitoringCurve built = [] {
     CurveRequest request;
     request.points = 9;
     request.sampling_rate = 5000;
     request.periods = 3;
     request.seeds = 3;
-    return build_curve(default_rig_file(), request);
+    return build_curve(rig_file::default_rig_file(), request);
   }();
   return built;
 }
@@ -35,7 +35,7 @@ SeparabilityRequest quick() {
 
 /// One of the rig's disturbances with levels of the test.
 Disturbance disturbance(const std::string& name, std::vector<double> levels) {
-  for (Disturbance& d : disturbances_of(default_rig_file()))
+  for (Disturbance& d : disturbances_of(rig_file::default_rig_file()))
     if (d.name == name) {
       d.levels = std::move(levels);
       return d;
@@ -44,7 +44,7 @@ Disturbance disturbance(const std::string& name, std::vector<double> levels) {
 }
 
 Separability mapped(const std::vector<Disturbance>& disturbances) {
-  return map_separability(default_rig_file(), curve(), disturbances, quick());
+  return map_separability(rig_file::default_rig_file(), curve(), disturbances, quick());
 }
 
 int told(const SeparabilityAnswer& a) {
@@ -64,7 +64,7 @@ TEST(SeparabilityMap, NoDisturbanceIsRightAndNoiseBeyondTheCurveIsRefused) {
     EXPECT_EQ(cells[0][1].answers[m].wrong, 0) << m;
     for (const SeparabilityCell& cell : cells[1]) {
       EXPECT_EQ(cell.answers[m].refused, 2) << m;
-      EXPECT_EQ(cell.answers[m].status, Status::out_of_domain) << m;
+      EXPECT_EQ(cell.answers[m].status, diagnosis::Status::out_of_domain) << m;
       // The same noise is on motor_torque, whose median it moves beyond the 5 % allowed in some records.
       const std::string& reason = cell.answers[m].reason;
       EXPECT_TRUE(reason.find("noise") != std::string::npos ||
@@ -134,15 +134,15 @@ TEST(SeparabilityMap, ACellDependsNeitherOnTheOthersNorOnTheNumberOfProcessors) 
 TEST(SeparabilityMap, RefusesWhatItCannotMap) {
   SeparabilityRequest request = quick();
   request.records = 0;
-  EXPECT_THROW(map_separability(default_rig_file(), curve(), {}, request), InvalidParameter);
+  EXPECT_THROW(map_separability(rig_file::default_rig_file(), curve(), {}, request), InvalidParameter);
   request = quick();
   request.noise = -0.1;
-  EXPECT_THROW(map_separability(default_rig_file(), curve(), {}, request), InvalidParameter);
+  EXPECT_THROW(map_separability(rig_file::default_rig_file(), curve(), {}, request), InvalidParameter);
   EXPECT_THROW(mapped({disturbance("sensor_noise", {0.1, 0.2})}), InvalidParameter);  // no level without
-  RigFile other = default_rig_file();
+  rig_file::RigFile other = rig_file::default_rig_file();
   other.diagnosis.apd->layout.classes = 50;
   EXPECT_THROW(map_separability(other, curve(), {}, quick()), InvalidParameter);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

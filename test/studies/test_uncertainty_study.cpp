@@ -8,14 +8,15 @@
 #include "backlash_diagnosis/studies/uncertainty_study.h"
 #include "support/estimates.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
-StudyTrial trial(double truth, double estimate, double lower, double upper, Status status = Status::ok) {
+StudyTrial trial(double truth, double estimate, double lower, double upper,
+                 diagnosis::Status status = diagnosis::Status::ok) {
   StudyTrial t;
   t.backlash = truth;
   t.noise = 0.02;
-  Estimate e;
+  diagnosis::Estimate e;
   e.method = "any";
   e.status = status;
   e.backlash = estimate;
@@ -27,11 +28,11 @@ StudyTrial trial(double truth, double estimate, double lower, double upper, Stat
 
 TEST(SummariseStudy, CountsByHand) {
   std::vector<StudyTrial> trials = {
-      trial(1e-5, 1.1e-5, 0.9e-5, 1.2e-5),                   // holds, error 1 um
-      trial(2e-5, 2.3e-5, 2.1e-5, 2.5e-5),                   // misses by 1 um, error 3 um, width 4 um
-      trial(3e-5, 5e-5, 4.9e-5, 5.1e-5),                     // 20 um off, width 2 um: confident
-      trial(4e-5, kNaN, kNaN, kNaN, Status::out_of_domain),  // cannot tell
-      trial(9e-5, 9e-5, 8e-5, 10e-5)};                       // half gap 45 um: beyond the group
+      trial(1e-5, 1.1e-5, 0.9e-5, 1.2e-5),  // holds, error 1 um
+      trial(2e-5, 2.3e-5, 2.1e-5, 2.5e-5),  // misses by 1 um, error 3 um, width 4 um
+      trial(3e-5, 5e-5, 4.9e-5, 5.1e-5),    // 20 um off, width 2 um: confident
+      trial(4e-5, kNaN, kNaN, kNaN, diagnosis::Status::out_of_domain),  // cannot tell
+      trial(9e-5, 9e-5, 8e-5, 10e-5)};                                  // half gap 45 um: beyond the group
   const std::vector<StudyRow> rows = summarise_study(trials, true, 30e-6);
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].trials, 4);
@@ -49,7 +50,7 @@ TEST(SummariseStudy, CountsByHand) {
 TEST(SummariseVariants, NearIsRightFarIsWrong) {
   std::vector<StudyTrial> trials = {trial(1e-5, 1.5e-5, 1.2e-5, 1.8e-5),  // 2 um outside, width 6 um
                                     trial(1e-5, 3e-5, 2.9e-5, 3.1e-5),
-                                    trial(1e-5, kNaN, kNaN, kNaN, Status::ambiguous)};
+                                    trial(1e-5, kNaN, kNaN, kNaN, diagnosis::Status::ambiguous)};
   for (StudyTrial& t : trials) t.variant = "louder";
   const std::vector<VariantRow> rows = summarise_variants(trials);
   ASSERT_EQ(rows.size(), 1u);
@@ -59,11 +60,11 @@ TEST(SummariseVariants, NearIsRightFarIsWrong) {
   EXPECT_EQ(rows[0].recognised, 1);
 }
 
-const MonitoringCurve& curve() {
-  static const MonitoringCurve built = [] {
+const diagnosis::MonitoringCurve& curve() {
+  static const diagnosis::MonitoringCurve built = [] {
     CurveRequest request;
     request.points = 41;
-    return build_curve(default_rig_file(), request);
+    return build_curve(rig_file::default_rig_file(), request);
   }();
   return built;
 }
@@ -73,7 +74,7 @@ TEST(UncertaintyStudy, IntervalsHoldWhatTheyPromise) {
   StudyRequest request;
   request.records = 48;
   request.seed = 77;  // not that of the documented study
-  const auto trials = run_study(default_rig_file(), curve(), request);
+  const auto trials = run_study(rig_file::default_rig_file(), curve(), request);
   ASSERT_EQ(trials.size(), 96u);
   for (const bool position : {true, false})
     for (const StudyRow& row : summarise_study(trials, position, 70e-6)) {
@@ -94,7 +95,7 @@ TEST(UncertaintyStudy, IntervalsHoldWhatTheyPromise) {
 TEST(UncertaintyStudy, WrongConditionsAreRecognised) {
   StudyRequest request;
   request.seed = 78;
-  const auto rows = summarise_variants(run_variants(default_rig_file(), curve(), request, 2));
+  const auto rows = summarise_variants(run_variants(rig_file::default_rig_file(), curve(), request, 2));
   EXPECT_GE(rows.size(), 13u * 2 * 6);
   for (const VariantRow& row : rows) {
     EXPECT_EQ(row.wrong, 0) << row.variant << ' ' << row.method << ' ' << row.position;
@@ -109,8 +110,8 @@ TEST(UncertaintyStudy, WrongConditionsAreRecognised) {
 TEST(UncertaintyStudy, IsDeterministicForASeedAndRefusesNonsense) {
   StudyRequest request;
   request.records = 2;
-  const auto first = run_study(default_rig_file(), curve(), request),
-             again = run_study(default_rig_file(), curve(), request);
+  const auto first = run_study(rig_file::default_rig_file(), curve(), request),
+             again = run_study(rig_file::default_rig_file(), curve(), request);
   for (std::size_t i = 0; i < first.size(); ++i) {
     EXPECT_EQ(first[i].backlash, again[i].backlash);
     EXPECT_EQ(test::by("lost_motion", first[i].estimates).message,
@@ -119,16 +120,16 @@ TEST(UncertaintyStudy, IsDeterministicForASeedAndRefusesNonsense) {
               test::by("apd_skewness", again[i].estimates).skewness);
   }
   request.seed = 2;
-  EXPECT_NE(run_study(default_rig_file(), curve(), request)[0].backlash, first[0].backlash);
+  EXPECT_NE(run_study(rig_file::default_rig_file(), curve(), request)[0].backlash, first[0].backlash);
   for (const auto& spoil :
        {+[](StudyRequest& r) { r.records = 0; }, +[](StudyRequest& r) { r.max_backlash = -1; },
         +[](StudyRequest& r) { r.noise.clear(); }, +[](StudyRequest& r) { r.noise = {-0.1}; },
         +[](StudyRequest& r) { r.most_periods = 1; }}) {
     StudyRequest bad;
     spoil(bad);
-    EXPECT_THROW(run_study(default_rig_file(), curve(), bad), InvalidParameter);
+    EXPECT_THROW(run_study(rig_file::default_rig_file(), curve(), bad), InvalidParameter);
   }
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -14,13 +14,13 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::studies {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
 
-RigFile rig(const std::string& model) {
-  return load_rig_file(test::package_file("config/yumrukcal_2013" + model + ".yaml"));
+rig_file::RigFile rig(const std::string& model) {
+  return rig_file::load_rig_file(test::package_file("config/yumrukcal_2013" + model + ".yaml"));
 }
 
 /// A row of Table 5.2; friction of the whole system.
@@ -32,7 +32,7 @@ struct Row {
 const Row kConfiguration1 = {"_config1", 18.0, 21.6, 79.4, 77.9, 48.9, 6.0, 355e3, 515, 0.0253};
 const Row kConfiguration2 = {"", 21.3, 23.0, 79.8, 76.0, 114.6, 6.3, 460e3, 483, 0.0307};
 
-void expect_row(const Rig& rig, const Row& row) {
+void expect_row(const model::Rig& rig, const Row& row) {
   SCOPED_TRACE(rig.name);
   const auto forward = [](double mean, double asymmetry) { return mean + asymmetry; };
   EXPECT_NEAR(forward(rig.motor.viscous_damping, rig.motor.viscous_asymmetry), 13.7, 1e-12);
@@ -56,7 +56,7 @@ void expect_row(const Rig& rig, const Row& row) {
 
 TEST(YumrukcalRigs, HoldTable52) {
   for (const Row& row : {kConfiguration1, kConfiguration2}) {
-    const Rig machine = rig(row.model).rig;
+    const model::Rig machine = rig(row.model).rig;
     expect_row(machine, row);
     EXPECT_NEAR(machine.mesh.backlash, row.backlash_degrees * kDegree, 5e-8);  // four digits
   }
@@ -65,14 +65,14 @@ TEST(YumrukcalRigs, HoldTable52) {
   expect_row(rig("_varying").rig, kConfiguration2);
 }
 
-double opening(const Rig& rig, double load_position, double half_gap) {
-  FlankShift shift;
+double opening(const model::Rig& rig, double load_position, double half_gap) {
+  model::FlankShift shift;
   for (const auto& term : rig.terms) term->shape({load_position, load_position, half_gap, 0, 1}, shift);
   return shift.opening;
 }
 
 TEST(YumrukcalRigs, TheVaryingGapVariesUpTo15PercentAndItsTableIsTheSame) {
-  const Rig series = rig("_varying").rig;
+  const model::Rig series = rig("_varying").rig;
   std::stringstream text;
   text << std::ifstream(test::package_file("config/yumrukcal_2013_varying.yaml")).rdbuf();
   std::string file, line;
@@ -84,7 +84,7 @@ TEST(YumrukcalRigs, TheVaryingGapVariesUpTo15PercentAndItsTableIsTheSame) {
     if (line == "excitation:" || line.rfind("excitation:", 0) == 0) table = false;
     if (!table) file += line + "\n";
   }
-  const Rig map = rig_file_from_text(file, test::package_file("config/as_table.yaml")).rig;
+  const model::Rig map = rig_file::rig_file_from_text(file, test::package_file("config/as_table.yaml")).rig;
   ASSERT_EQ(map.terms.size(), 1u);
   const double half = 0.5 * series.mesh.backlash;
   double largest = 0;
@@ -108,28 +108,29 @@ TEST(YumrukcalRigs, TheirRunsStayWithinTheMachine) {
                                              "inertia_sine",           "motor_inertia_sine"};
   for (const char* model : {"", "_config1", "_basic", "_varying"}) {
     std::vector<std::string> names;
-    for (const TestRun& run : rig(model).test_runs) names.push_back(run.name);
+    for (const rig_file::TestRun& run : rig(model).test_runs) names.push_back(run.name);
     EXPECT_EQ(names, expected) << model;
   }
-  for (const TestRun& run : rig("_config1").test_runs) {  // the lighter one is the faster one
+  for (const rig_file::TestRun& run : rig("_config1").test_runs) {  // the lighter one is the faster one
     SCOPED_TRACE(run.name);
-    RigFile file = rig("_config1");
-    apply_test_run(run, file);
+    rig_file::RigFile file = rig("_config1");
+    rig_file::apply_test_run(run, file);
     file.simulation.sensors.sampling_rate = 50;
-    const Record record = simulate_record(file.rig, file.simulation, 12);
+    const record::Record record = simulation::simulate_record(file.rig, file.simulation, 12);
     double fastest = 0;
-    for (const double speed : record.column(Channel::load_velocity))
+    for (const double speed : record.column(record::Channel::load_velocity))
       fastest = std::max(fastest, std::fabs(speed));
     EXPECT_LT(fastest, speed_limit());
     EXPECT_GT(fastest, run.without_load ? 0 : 1e-3);
-    for (const double torque : record.column(Channel::motor_torque)) EXPECT_LT(std::fabs(torque), 22.5 * 110);
+    for (const double torque : record.column(record::Channel::motor_torque))
+      EXPECT_LT(std::fabs(torque), 22.5 * 110);
   }
 }
 
 TEST(YumrukcalRigs, SweepsLastAsLongAsTheirFrequencies) {
   for (const char* name : {"sine_sweep", "sine_sweep_bias"}) {
-    const RigFile file = rig("");
-    const TestRun& run = find_test_run(file.test_runs, name);
+    const rig_file::RigFile file = rig("");
+    const rig_file::TestRun& run = rig_file::find_test_run(file.test_runs, name);
     const double once = run.excitation.create()->period();
     EXPECT_GE(run.duration, once);
     EXPECT_LT(run.duration, once + 1);
@@ -140,15 +141,15 @@ TEST(YumrukcalRigs, SweepsLastAsLongAsTheirFrequencies) {
 // the gap and by what the load's friction winds the mesh up, on either side of the start.
 TEST(YumrukcalRigs, ConstantSpeedsShowFrictionAndTheWoundUpGap) {
   for (const Row& row : {kConfiguration1, kConfiguration2}) {
-    RigFile file = rig(row.model);
+    rig_file::RigFile file = rig(row.model);
     double difference[2];
     for (const bool forward : {true, false}) {
-      apply_test_run(
-          find_test_run(file.test_runs, forward ? "constant_speed_forward" : "constant_speed_backward"),
-          file);
-      Plant plant(file.rig, file.simulation.excitation, file.simulation.solver);
+      rig_file::apply_test_run(rig_file::find_test_run(file.test_runs, forward ? "constant_speed_forward"
+                                                                               : "constant_speed_backward"),
+                               file);
+      simulation::Plant plant(file.rig, file.simulation.excitation, file.simulation.solver);
       plant.advance_to(8);
-      const Observation o = plant.observe();
+      const model::Observation o = plant.observe();
       const double friction = forward ? row.coulomb_forward + row.viscous_forward * 0.1745
                                       : -row.coulomb_backward - row.viscous_backward * 0.1745;
       EXPECT_NEAR(o.motor_velocity, forward ? 0.1745 : -0.1745, 1e-6);
@@ -169,13 +170,13 @@ double deepest(double torque, double gap, double stiffness) {
 }
 
 TEST(YumrukcalRigs, ExternalExcitationCrossesTheGapWithTheMotorStill) {
-  RigFile file = rig("");
-  apply_test_run(find_test_run(file.test_runs, "external_excitation"), file);
-  Plant plant(file.rig, file.simulation.excitation, file.simulation.solver);
+  rig_file::RigFile file = rig("");
+  rig_file::apply_test_run(rig_file::find_test_run(file.test_runs, "external_excitation"), file);
+  simulation::Plant plant(file.rig, file.simulation.excitation, file.simulation.solver);
   double lowest = 1, highest = -1;
   for (int k = 1000; k < 4000; ++k) {
     plant.advance_to(k / 100.0);
-    const Observation o = plant.observe();
+    const model::Observation o = plant.observe();
     ASSERT_EQ(o.motor_position, 0);
     lowest = std::min(lowest, o.load_position);
     highest = std::max(highest, o.load_position);
@@ -187,4 +188,4 @@ TEST(YumrukcalRigs, ExternalExcitationCrossesTheGapWithTheMotorStill) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -13,9 +13,9 @@ constexpr double kCurveBetween = 0.05, kCurveWithin = 0.1;
 constexpr double kCurveToAngle = 67;  // rad/m
 
 /// Conditions: a square wave of 0.05 N m at 10 Hz, sampled at 1 kHz.
-inline MonitoringCurve linear_curve(int points = 21) {
-  MonitoringCurve curve;
-  CurveConditions& c = curve.conditions;
+inline diagnosis::MonitoringCurve linear_curve(int points = 21) {
+  diagnosis::MonitoringCurve curve;
+  diagnosis::CurveConditions& c = curve.conditions;
   c.rig = "linear";
   c.rig_digest = "0123456789abcdef";
   c.version = "0.1.0";
@@ -33,10 +33,11 @@ inline MonitoringCurve linear_curve(int points = 21) {
   curve.noise_levels = {0, 0.01};
   curve.backlash_to_angle = kCurveToAngle;
   for (int i = 0; i < points; ++i) {
-    CurvePoint point;
+    diagnosis::CurvePoint point;
     point.backlash = kCurveEnd * i / (points - 1);
     point.signal_level = 0.05;
-    const SkewnessCell cell{kCurveStart + kCurveSlope * point.backlash, kCurveBetween, kCurveWithin};
+    const diagnosis::SkewnessCell cell{kCurveStart + kCurveSlope * point.backlash, kCurveBetween,
+                                       kCurveWithin};
     point.cells.assign(2, cell);
     curve.points.push_back(point);
   }

@@ -10,8 +10,9 @@
 
 namespace backlash::test {
 
-inline const Estimate& by(const std::string& method, const std::vector<Estimate>& estimates) {
-  for (const Estimate& estimate : estimates)
+inline const diagnosis::Estimate& by(const std::string& method,
+                                     const std::vector<diagnosis::Estimate>& estimates) {
+  for (const diagnosis::Estimate& estimate : estimates)
     if (estimate.method == method) return estimate;
   throw std::runtime_error("no estimate by " + method);
 }

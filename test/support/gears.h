@@ -9,8 +9,9 @@
 namespace backlash::test {
 
 /// Unshifted gears with an addendum of one module.
-inline GearPair gear_pair(int pinion_teeth, int gear_teeth, double module, double pressure_angle_deg = 20) {
-  GearPair pair;
+inline model::GearPair gear_pair(int pinion_teeth, int gear_teeth, double module,
+                                 double pressure_angle_deg = 20) {
+  model::GearPair pair;
   pair.pinion.teeth = pinion_teeth;
   pair.gear.teeth = gear_teeth;
   pair.module = module;
@@ -19,8 +20,8 @@ inline GearPair gear_pair(int pinion_teeth, int gear_teeth, double module, doubl
 }
 
 /// Table 2 of Sarkar, Ellis and Moore (1997): 40 and 40 teeth, pitch diameter 31.75 mm, 20 deg.
-inline GearPair sarkar_gears(double centre_distance_change = 0) {
-  GearPair pair = gear_pair(40, 40, 0.79375e-3);
+inline model::GearPair sarkar_gears(double centre_distance_change = 0) {
+  model::GearPair pair = gear_pair(40, 40, 0.79375e-3);
   pair.centre_distance_change = centre_distance_change;
   return pair;
 }

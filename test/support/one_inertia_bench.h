@@ -20,10 +20,10 @@ struct OneInertiaMachine {
 };
 
 /// 20 s at 100 Hz of two sines, from about -1.4 to 1.4 rad.
-inline Record record_of(const OneInertiaMachine& m, std::uint64_t seed = 1) {
+inline record::Record record_of(const OneInertiaMachine& m, std::uint64_t seed = 1) {
   constexpr double kFirst = 2 * M_PI * 0.17, kSecond = 2 * M_PI * 0.43;  // rad/s
   Random random(seed);
-  Record record;
+  record::Record record;
   record.name = "one inertia";
   for (int k = 0; k < 2000; ++k) {
     const double t = 0.01 * k;
@@ -33,16 +33,16 @@ inline Record record_of(const OneInertiaMachine& m, std::uint64_t seed = 1) {
         -kFirst * kFirst * std::sin(kFirst * t) - 0.4 * kSecond * kSecond * std::sin(kSecond * t + 1);
     const double friction = m.coulomb * (w > 0 ? 1 : -1) + m.viscous * w;
     record.time.push_back(t);
-    record.column(Channel::motor_position).push_back(q);
-    record.column(Channel::motor_torque)
+    record.column(record::Channel::motor_position).push_back(q);
+    record.column(record::Channel::motor_torque)
         .push_back(m.inertia * a + friction + m.extra(q, w) + m.noise * random.normal());
   }
   return record;
 }
 
 /// As somebody would declare it, a fifth off.
-inline Rig one_inertia_rig() {
-  Rig rig;
+inline model::Rig one_inertia_rig() {
+  model::Rig rig;
   rig.mesh.rigid = true;
   rig.motor.inertia = 2.4;
   rig.motor.coulomb_friction = 2.4;
@@ -52,23 +52,24 @@ inline Rig one_inertia_rig() {
 
 /// Records and settings of a search, whose steps refer to it.
 struct SearchBench {
-  std::vector<ServoData> data;
-  SearchContext context;
+  std::vector<identification::ServoData> data;
+  identification::SearchContext context;
 
-  SearchBench(const Rig& rig, const std::vector<Record>& records)
+  SearchBench(const model::Rig& rig, const std::vector<record::Record>& records)
       : data(data_of(rig, records)),
-        context{data, motion_range(data), SearchSettings(), [](const std::string&) {},
-                [](const Hypothesis&) {}} {
-    context.settings.fit = with_bands(context.settings.fit, rig, data);
+        context{data, identification::motion_range(data), identification::SearchSettings(),
+                [](const std::string&) {}, [](const identification::Hypothesis&) {}} {
+    context.settings.fit = identification::with_bands(context.settings.fit, rig, data);
   }
   explicit SearchBench(const OneInertiaMachine& machine)
       : SearchBench(one_inertia_rig(), {record_of(machine)}) {}
   SearchBench(const SearchBench&) = delete;  // refers to itself
 
  private:
-  static std::vector<ServoData> data_of(const Rig& rig, const std::vector<Record>& records) {
-    std::vector<ServoData> data;
-    for (const Record& record : records) data.push_back(servo_data(record, rig));
+  static std::vector<identification::ServoData> data_of(const model::Rig& rig,
+                                                        const std::vector<record::Record>& records) {
+    std::vector<identification::ServoData> data;
+    for (const record::Record& record : records) data.push_back(identification::servo_data(record, rig));
     return data;
   }
 };
@@ -78,15 +79,15 @@ inline std::function<double(double, double)> cogging_torque(double amplitude, do
   return [=](double q, double) { return amplitude * std::sin(order * q + phase); };
 }
 
-inline Effect cogging_effect(double amplitude, double order, double phase) {
-  Effect effect;
+inline identification::Effect cogging_effect(double amplitude, double order, double phase) {
+  identification::Effect effect;
   effect.candidate.id = "cogging";
   effect.candidate.terms = {{{"amplitude", amplitude}, {"order", order}, {"phase", phase}}};
   return effect;
 }
 
-inline Effect drag_effect(double drag) {
-  Effect effect;
+inline identification::Effect drag_effect(double drag) {
+  identification::Effect effect;
   effect.candidate.id = "quadratic_drag";
   effect.candidate.terms = {{{"drag", drag}}};
   effect.candidate.terms.front().set_choice("body", "motor");

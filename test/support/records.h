@@ -19,8 +19,8 @@ struct RecordRecipe {
   double idle = 0;                                // s without torque at the start
 };
 
-inline Record make_record(const RecordRecipe& recipe) {
-  Record record;
+inline record::Record make_record(const RecordRecipe& recipe) {
+  record::Record record;
   record.name = "recipe";
   std::mt19937 random(17);
   std::normal_distribution<double> normal;
@@ -33,27 +33,27 @@ inline Record make_record(const RecordRecipe& recipe) {
     const double sign = t < 0 ? 0 : std::fmod(std::floor(half), 2) == 0 ? 1 : -1;
     const double ring = std::exp(-since / 0.01) * std::cos(2 * M_PI * 130 * since);
     record.time.push_back(recipe.start + (i + shift) / recipe.rate);
-    record.column(Channel::motor_torque).push_back(recipe.amplitude * sign);
-    record.column(Channel::motor_position).push_back(0.5 * recipe.travel * sign * (1 - 0.2 * ring));
-    record.column(Channel::sensor_torque)
+    record.column(record::Channel::motor_torque).push_back(recipe.amplitude * sign);
+    record.column(record::Channel::motor_position).push_back(0.5 * recipe.travel * sign * (1 - 0.2 * ring));
+    record.column(record::Channel::sensor_torque)
         .push_back(recipe.amplitude * sign * (1 - 2 * ring) + recipe.noise * normal(random));
-    record.column(Channel::load_position).push_back(0);
+    record.column(record::Channel::load_position).push_back(0);
   }
   return record;
 }
 
-inline ChannelValues values_at(const Record& record, std::size_t i) {
-  ChannelValues values;
-  for (const Channel channel : kChannels)
+inline record::ChannelValues values_at(const record::Record& record, std::size_t i) {
+  record::ChannelValues values;
+  for (const record::Channel channel : record::kChannels)
     values[static_cast<std::size_t>(channel)] =
         record.has(channel) ? record.column(channel)[i] : std::nan("");
   return values;
 }
 
 /// Removes samples [from, to).
-inline void cut_out(Record& record, std::ptrdiff_t from, std::ptrdiff_t to) {
+inline void cut_out(record::Record& record, std::ptrdiff_t from, std::ptrdiff_t to) {
   record.time.erase(record.time.begin() + from, record.time.begin() + to);
-  for (const Channel channel : kChannels)
+  for (const record::Channel channel : record::kChannels)
     if (auto& column = record.column(channel); !column.empty())
       column.erase(column.begin() + from, column.begin() + to);
 }

@@ -10,19 +10,19 @@
 
 namespace backlash::test {
 
-inline RigFile servo_file() {
-  return load_rig_file(package_file("config/two_inertia_servo.yaml"));
+inline rig_file::RigFile servo_file() {
+  return rig_file::load_rig_file(package_file("config/two_inertia_servo.yaml"));
 }
 
 /// A machine that differs from config/two_inertia_servo.yaml by up to 30 %.
-inline Rig other_servo() {
-  Rig rig = servo_file().rig;
+inline model::Rig other_servo() {
+  model::Rig rig = servo_file().rig;
   rig.motor.inertia = 7.8;
   rig.link.inertia = 84;
   rig.mesh.backlash = 6.3e-4;
   rig.mesh.contact_spec.values["stiffness"] = 400e3;
   rig.mesh.contact_spec.values["damping"] = 560;
-  rig.mesh.contact = make_contact_law(rig.mesh.contact_spec.law, rig.mesh.contact_spec.values);
+  rig.mesh.contact = model::make_contact_law(rig.mesh.contact_spec.law, rig.mesh.contact_spec.values);
   rig.motor.coulomb_friction = 47;
   rig.motor.viscous_damping = 10;
   rig.link.coulomb_friction = 18;
@@ -31,8 +31,8 @@ inline Rig other_servo() {
 }
 
 /// Torque that moves the servo to and fro with many impacts.
-inline ExcitationSettings shaking(std::uint64_t seed) {
-  ExcitationSettings e;
+inline simulation::ExcitationSettings shaking(std::uint64_t seed) {
+  simulation::ExcitationSettings e;
   e.type = "random";
   e.amplitude = 250;  // N m rms
   e.start_frequency = 0.2;
@@ -42,8 +42,8 @@ inline ExcitationSettings shaking(std::uint64_t seed) {
   return e;
 }
 
-inline SimulationSettings servo_run(std::uint64_t seed, bool noise = true) {
-  SimulationSettings settings = servo_file().simulation;
+inline simulation::SimulationSettings servo_run(std::uint64_t seed, bool noise = true) {
+  simulation::SimulationSettings settings = servo_file().simulation;
   settings.excitation = shaking(seed);
   settings.sensors.seed = seed;
   if (!noise) settings.sensors.channels = {};

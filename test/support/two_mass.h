@@ -71,9 +71,9 @@ struct TwoMassSensors {
   unsigned seed = 1;
 };
 
-inline Record simulate(const TwoMass& machine, double duration, const TwoMassSensors& sensors = {},
-                       double h = 1e-5) {
-  Record record;
+inline record::Record simulate(const TwoMass& machine, double duration, const TwoMassSensors& sensors = {},
+                               double h = 1e-5) {
+  record::Record record;
   std::mt19937 random(sensors.seed);
   std::normal_distribution<double> normal;
   const auto rounded = [](double value, double step) {
@@ -85,11 +85,12 @@ inline Record simulate(const TwoMass& machine, double duration, const TwoMassSen
   for (int i = 0; i < samples; ++i) {
     const double t = 1e-3 * i, torque = machine.motor_torque(t, s[2]);  // held over a sample
     record.time.push_back(t);
-    record.column(Channel::motor_torque).push_back(torque + sensors.torque_noise * normal(random));
-    record.column(Channel::motor_position).push_back(rounded(sensors.motor_scale * s[0], sensors.motor_step));
-    record.column(Channel::load_position).push_back(rounded(s[1], sensors.load_step));
-    record.column(Channel::motor_velocity).push_back(s[2] + sensors.speed_noise * normal(random));
-    record.column(Channel::load_velocity).push_back(s[3] + sensors.speed_noise * normal(random));
+    record.column(record::Channel::motor_torque).push_back(torque + sensors.torque_noise * normal(random));
+    record.column(record::Channel::motor_position)
+        .push_back(rounded(sensors.motor_scale * s[0], sensors.motor_step));
+    record.column(record::Channel::load_position).push_back(rounded(s[1], sensors.load_step));
+    record.column(record::Channel::motor_velocity).push_back(s[2] + sensors.speed_noise * normal(random));
+    record.column(record::Channel::load_velocity).push_back(s[3] + sensors.speed_noise * normal(random));
     for (int k = 0; k < inner; ++k) machine.step(s, t + k * h, h, torque);
   }
   return record;

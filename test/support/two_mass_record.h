@@ -24,8 +24,8 @@ using Torque = std::function<double(double t, long sample)>;  // N m; sample: th
 
 /// `rate` samples/s, four steps per sample: at 41 Hz 0.06 rad per step, 1e-8 of the amplitude a cycle. The
 /// load speed and positions are recorded too.
-inline Record two_mass_record(const TwoMassMachine& m, const Torque& torque, double duration,
-                              double rate = 1000) {
+inline record::Record two_mass_record(const TwoMassMachine& m, const Torque& torque, double duration,
+                                      double rate = 1000) {
   using State = std::array<double, 4>;  // motor angle, twist, motor speed, load speed
   const auto derivative = [&](const State& x, double u) -> State {
     const double mesh = m.stiffness * x[1] + m.damping * (x[2] - x[3]);
@@ -36,7 +36,7 @@ inline Record two_mass_record(const TwoMassMachine& m, const Torque& torque, dou
   const auto moved = [](const State& x, const State& v, double h) {
     return State{x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2], x[3] + h * v[3]};
   };
-  Record record;
+  record::Record record;
   record.name = "two masses";
   State x{};
   const long samples = std::lround(duration * rate);
@@ -45,11 +45,11 @@ inline Record two_mass_record(const TwoMassMachine& m, const Torque& torque, dou
   for (long k = 0; k < samples; ++k) {
     const double t0 = double(k) / rate;
     record.time.push_back(t0);
-    record.column(Channel::motor_torque).push_back(torque(t0, k));
-    record.column(Channel::motor_position).push_back(x[0]);
-    record.column(Channel::motor_velocity).push_back(x[2]);
-    record.column(Channel::load_position).push_back(x[0] - x[1]);
-    record.column(Channel::load_velocity).push_back(x[3]);
+    record.column(record::Channel::motor_torque).push_back(torque(t0, k));
+    record.column(record::Channel::motor_position).push_back(x[0]);
+    record.column(record::Channel::motor_velocity).push_back(x[2]);
+    record.column(record::Channel::load_position).push_back(x[0] - x[1]);
+    record.column(record::Channel::load_velocity).push_back(x[3]);
     for (int i = 0; i < kSteps; ++i) {
       const double t = t0 + i * h;
       const double begin = torque(t, k), middle = torque(t + h / 2, k), end = torque(t + h, k);
@@ -68,11 +68,11 @@ inline void add_noise(std::vector<double>& values, double deviation, unsigned se
 }
 
 /// The sensors of Table 3.1: speeds to 0.015 deg/s. Torque to 0.5 N m, seen from the load.
-inline Record with_noise(Record record, unsigned seed) {
+inline record::Record with_noise(record::Record record, unsigned seed) {
   constexpr double kSpeed = 0.015 * M_PI / 180;
-  add_noise(record.column(Channel::motor_torque), 0.5, 3 * seed);
-  add_noise(record.column(Channel::motor_velocity), kSpeed, 3 * seed + 1);
-  add_noise(record.column(Channel::load_velocity), kSpeed, 3 * seed + 2);
+  add_noise(record.column(record::Channel::motor_torque), 0.5, 3 * seed);
+  add_noise(record.column(record::Channel::motor_velocity), kSpeed, 3 * seed + 1);
+  add_noise(record.column(record::Channel::load_velocity), kSpeed, 3 * seed + 2);
   return record;
 }
 

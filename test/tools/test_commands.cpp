@@ -286,7 +286,7 @@ TEST_F(Commands, ReportHasTheDocumentedShape) {
   EXPECT_EQ(json["estimates"][0]["method"], "apd_skewness");
   std::vector<std::string> methods;
   for (const Json& estimate : json["estimates"]) methods.push_back(estimate["method"]);
-  EXPECT_EQ(methods, diagnosis_methods());
+  EXPECT_EQ(methods, diagnosis::diagnosis_methods());
   const std::size_t index = std::find(methods.begin(), methods.end(), "lost_motion") - methods.begin();
   const Json& lost_motion = json["estimates"][index];
   EXPECT_EQ(lost_motion["status"], "ok");
@@ -389,7 +389,7 @@ TEST_F(Commands, RepeatedStampsAreTold) {
 
 TEST_F(Commands, EachMethodAloneGetsWhatItNeeds) {
   done("simulate rig.yaml --duration 1 --backlash 6e-5 --out a.csv");
-  for (const std::string& method : diagnosis_methods()) {
+  for (const std::string& method : diagnosis::diagnosis_methods()) {
     const Json json =
         Json::parse(run("diagnose_record a.csv --rig rig.yaml --method " + method + " --json -").out);
     ASSERT_EQ(json["estimates"].size(), 1u);
@@ -399,7 +399,7 @@ TEST_F(Commands, EachMethodAloneGetsWhatItNeeds) {
   }
   const Json json = Json::parse(run("diagnose_record a.csv --json -").out);
   for (const Json& e : json["estimates"])
-    EXPECT_EQ(e["message"], needs_curve(e["method"]) ? "needs --rig or --curve" : "needs --rig");
+    EXPECT_EQ(e["message"], diagnosis::needs_curve(e["method"]) ? "needs --rig or --curve" : "needs --rig");
 }
 
 TEST_F(Commands, CurveIsDrawnWhole) {

@@ -24,16 +24,16 @@ class TrendCommand : public CommandTest {
   void SetUp() override {
     CommandTest::SetUp();
     std::filesystem::create_symlink(kRig, path("rig.yaml"));
-    digest_ = load_rig_file(kRig).digest;
+    digest_ = rig_file::load_rig_file(kRig).digest;
   }
 
   /// A point per day from 100 um on; scatter 0.5 um.
   void write_history(int days, double um_per_day, const std::string& name = "elbow.csv") const {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
-    History history({path(name)});
+    diagnosis::History history({path(name)});
     for (int i = 0; i < days; ++i) {
-      HistoryEntry e;
+      diagnosis::HistoryEntry e;
       e.time = kStart + kDay * i;
       e.grade = "good";
       e.backlash = 1e-6 * (100 + um_per_day * i + 0.5 * normal(random));
@@ -104,7 +104,7 @@ TEST_F(TrendCommand, JsonHasTheDocumentedKeys) {
 
 TEST_F(TrendCommand, LimitsComeFromRigFileOrBaseline) {
   write_history(40, 0.5);
-  const double service = load_rig_file(kRig).diagnosis.limits->service;
+  const double service = rig_file::load_rig_file(kRig).diagnosis.limits->service;
   const Json by_rig = report("elbow.csv --rig rig.yaml", 1);
   EXPECT_EQ(by_rig["limit"], service);
   EXPECT_EQ(by_rig["rig"], "sarkar_1997");

@@ -53,6 +53,13 @@ class IntegrationError : public Error {
   using Error::Error;
 };
 
+/// Thrown by a procedure where the record does not contain the information it needs; the message says why in
+/// one sentence and with figures.
+class CannotIdentify : public Error {
+ public:
+  using Error::Error;
+};
+
 /// Long work that the caller asked to stop.
 class Cancelled : public Error {
  public:

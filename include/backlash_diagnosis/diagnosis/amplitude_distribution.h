@@ -17,7 +17,7 @@
 
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct ApdLayout {
   int classes = 0;              // >= 2
@@ -93,4 +93,4 @@ class RunningMoments {
   double first_ = 0, sum_ = 0, squares_ = 0;
 };
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 constexpr int kQuantiles = 100;
 using Quantiles = std::vector<double>;  ///< kQuantiles values, not decreasing
@@ -117,4 +117,4 @@ class FamilyDistance {
   Place smallest_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

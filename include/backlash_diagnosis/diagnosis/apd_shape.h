@@ -8,9 +8,9 @@
 
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// The estimate, or a status with its reason. `match` is that of the same record and curve.
 Estimate estimate_apd_shape(const ApdResult& apd, const CurveMatch& match, const MonitoringCurve* curve);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

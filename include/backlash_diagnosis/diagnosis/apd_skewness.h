@@ -11,10 +11,10 @@
 #include "backlash_diagnosis/diagnosis/period_analyser.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct ApdSettings {
-  Channel signal = Channel::sensor_torque;
+  record::Channel signal = record::Channel::sensor_torque;
   double period = 0;         // s; 0: found from the signal
   int settling_periods = 0;  // windows discarded at the start of a record
   ApdLayout layout;
@@ -22,7 +22,7 @@ struct ApdSettings {
 
 /// Whole excitation periods as a SampleStream cuts them: their samples, and the APD of each.
 struct PeriodWindow {
-  Record record;
+  record::Record record;
   double period = 0;                  // s; 0 where none was found: `record` is all that there is
   long count = 0;                     // whole periods in `record`
   std::vector<PeriodResult> periods;  // in order, also those with gaps; none where `record` lacks the signal
@@ -32,10 +32,10 @@ struct PeriodWindow {
 struct ApdResult {
   double period = 0;                  // s; 0 where none was found
   std::vector<PeriodResult> periods;  // complete ones
-  int incomplete = 0;      // windows left out because of gaps, or with no sample inside the classes
-  double skewness = kNaN;  // mean over the periods
-  NoiseRange noise_range;  // of the signal
-  double noise = kNaN;     // its upper end; NaN with fewer than two periods
+  int incomplete = 0;              // windows left out because of gaps, or with no sample inside the classes
+  double skewness = kNaN;          // mean over the periods
+  signal::NoiseRange noise_range;  // of the signal
+  double noise = kNaN;             // its upper end; NaN with fewer than two periods
   AmplitudeDistribution total{ApdLayout{2, 0, 1}};  // all periods together
 };
 
@@ -45,7 +45,7 @@ double travel_of(const std::vector<double>& position);
 
 /// Excitation period of a record [s]: of motor_torque where recorded, else of `signal`. 0 where there is
 /// none.
-double excitation_period(const Record& record, Channel signal);
+double excitation_period(const record::Record& record, record::Channel signal);
 
 /// Length of a run after which its period is searched [s]; after that twice as long each time.
 constexpr double kFirstPeriodSearch = 0.25;
@@ -69,12 +69,12 @@ struct Mismatch {
 /// amplitudes within about 12 % and another shape with the same median magnitude; without motor_position,
 /// backlash beyond the end of the curve; without it and load_position, an output that moves but leaves the
 /// signal's level alone.
-std::optional<Mismatch> out_of_domain(const Record& record, const ApdResult& apd, const ApdSettings& settings,
-                                      const MonitoringCurve& curve);
+std::optional<Mismatch> out_of_domain(const record::Record& record, const ApdResult& apd,
+                                      const ApdSettings& settings, const MonitoringCurve& curve);
 
 /// What a curve says about a record before an estimator inverts it.
 struct CurveMatch {
-  NoiseRange noise;                   // of the record, with the error of its estimate
+  signal::NoiseRange noise;           // of the record, with the error of its estimate
   std::optional<Estimate> refused;    // why no estimate can be made: status and reason
   std::optional<Mismatch> mismatch;   // where that is a condition of the curve
   std::optional<FamilyMatch> family;  // where none was refused and the curve has a family
@@ -82,10 +82,10 @@ struct CurveMatch {
 
 /// Checks a record against the conditions of a curve (null: none is there), and its distribution against the
 /// curve's family: one that resembles no member is out_of_domain.
-CurveMatch match_curve(const Record& record, const ApdResult& apd, const ApdSettings& settings,
+CurveMatch match_curve(const record::Record& record, const ApdResult& apd, const ApdSettings& settings,
                        const MonitoringCurve* curve);
 
 /// The estimate, or a status with its reason. `match` is that of the same record and curve.
 Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, const MonitoringCurve* curve);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

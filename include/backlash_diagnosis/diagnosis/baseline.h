@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/diagnosis/estimate.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct Diagnosis;
 
@@ -41,4 +41,4 @@ void write_baseline(const Baseline& baseline, const std::string& path);  ///< wh
 std::string check_baseline(const Baseline& baseline, const std::string& rig, const std::string& rig_digest,
                            const std::string& source);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -23,7 +23,7 @@
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct CoherenceSpectrum {
   std::vector<double> frequency;    ///< Hz, from one line above 0 to one line below half of the sampling rate
@@ -46,9 +46,9 @@ struct CoherenceBaseline {
 };
 
 struct CoherenceSettings {
-  Channel response =
-      Channel::motor_velocity;  ///< positions are differenced twice, velocities once, torques not
-  double segment = 0;           ///< s, > 0: resolution is two lines of 1 / segment
+  record::Channel response =
+      record::Channel::motor_velocity;  ///< positions are differenced twice, velocities once, torques not
+  double segment = 0;                   ///< s, > 0: resolution is two lines of 1 / segment
   /// Hz, band to look at; NaN: that of the baseline, else what holds 98 % of the torque's power.
   double lower = kNaN, upper = kNaN;
   /// Least growth of the loss over the baseline that counts as a finding, > 0. Below it a machine is left
@@ -76,6 +76,6 @@ struct CoherenceDetection {
 ///                      so that any response repeats with it and is coherent; samples not equidistant
 ///   ambiguous          with a baseline: the interval of the index holds least_growth
 ///   ok                 else; `nonlinear` only with a baseline
-CoherenceDetection detect_nonlinearity(const Record& record, const CoherenceSettings& settings);
+CoherenceDetection detect_nonlinearity(const record::Record& record, const CoherenceSettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 #include "backlash_diagnosis/diagnosis/verdict.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// What a rig file says under `diagnosis`, and what its estimators need of the rig (position_difference,
 /// momentum_transfer). An absent part means that its estimator cannot be served.
@@ -40,7 +40,7 @@ struct Diagnosis {
 
 /// What an estimator may look at.
 struct DiagnosisInput {
-  const Record& record;
+  const record::Record& record;
   const DiagnosisSettings& settings;
   const MonitoringCurve* curve;
   const std::optional<ApdResult>& apd;
@@ -70,7 +70,8 @@ Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings
 
 /// The same for the whole excitation periods of a record after settling, or all of it where the rig declares
 /// no APD or the excitation has no period: cut_periods().
-Diagnosis diagnose(const Record& record, const DiagnosisSettings& settings, const MonitoringCurve* curve,
-                   const std::optional<Baseline>& baseline = std::nullopt, const std::string& method = "");
+Diagnosis diagnose(const record::Record& record, const DiagnosisSettings& settings,
+                   const MonitoringCurve* curve, const std::optional<Baseline>& baseline = std::nullopt,
+                   const std::string& method = "");
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -8,7 +8,7 @@
 
 #include "backlash_diagnosis/base/not_a_number.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 enum class Status {
   ok,
@@ -44,4 +44,4 @@ struct Estimate {
   std::string message;  ///< the reason of the status, or how the value came about
 };
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -4,7 +4,7 @@
 
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct FamilyMatch {
   double backlash = kNaN;             // m (angular mesh: rad), of the nearest distribution on the curve
@@ -20,6 +20,7 @@ struct FamilyMatch {
 
 /// Compares samples of whole periods with the curve's family (which must be there), at any noise of a range
 /// (NaN: any that the curve covers).
-FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> samples, const NoiseRange& noise);
+FamilyMatch match_family(const MonitoringCurve& curve, std::vector<double> samples,
+                         const signal::NoiseRange& noise);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

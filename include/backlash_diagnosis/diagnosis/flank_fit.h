@@ -16,7 +16,7 @@
 #include <functional>
 #include <vector>
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// Samples at equal distances `interval` [s], all columns of the same length, finite. `unbroken[i]` is false
 /// where samples i - 1 and i are not neighbours in time.
@@ -60,4 +60,4 @@ struct FlankFit {
 /// White 1980, Liang and Zeger 1986).
 FlankFit fit_flanks(const FlankWindows& windows, const FlankModel& model);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

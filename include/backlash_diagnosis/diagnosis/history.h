@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/diagnosis/estimate.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct Diagnosis;
 
@@ -78,4 +78,4 @@ struct HistoryFile {
 /// file that is no history.
 HistoryFile read_history(const std::string& path);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -22,7 +22,7 @@
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/diagnosis/wall_reading.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct HysteresisLoop {
   PlayComponents components;     ///< at_torque is left NaN
@@ -35,4 +35,4 @@ struct HysteresisLoop {
 HysteresisLoop analyse_hysteresis(const LockedMotion& motion, const std::vector<TorqueExcursion>& excursions,
                                   double lower, double upper);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

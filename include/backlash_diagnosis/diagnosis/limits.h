@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// Backlash from which a grade begins, by experience with the machine: in m (`backlash`) or rad
 /// (`backlash_angle`). With a baseline they limit the growth since then.
@@ -28,4 +28,4 @@ Limits read_limits_file(const std::string& path);
 /// Throws BadData where limits in m meet a machine whose backlash is known as an angle only.
 void check_limits(const Limits& limits, bool angular_machine, const std::string& source);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

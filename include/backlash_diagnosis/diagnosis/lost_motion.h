@@ -35,7 +35,7 @@
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct LostMotionSettings {
   /// N m, > 0: torque at which play is stated. With subtract_elastic_deflection NaN is allowed and means 0.9
@@ -70,6 +70,6 @@ struct LostMotionSettings {
 /// `components` (angles at the axis of motor_position) come from the hysteresis loop, see hysteresis_loop.h;
 /// where torque is switched, gap is the play without elastic_deflection, compliance and coulomb are NaN and
 /// message says why.
-Estimate estimate_lost_motion(const Record& record, const LostMotionSettings& settings);
+Estimate estimate_lost_motion(const record::Record& record, const LostMotionSettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -38,7 +38,7 @@
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// All at the motor_position axis.
 struct MomentumTransferSettings {
@@ -60,6 +60,6 @@ struct MomentumTransferSettings {
 ///                      explain (friction, another machine); less travel than elastic deflection
 ///   below_range        the interval, which is given, holds 0: contact is not lost for longer than the
 ///                      averaging resolves
-Estimate estimate_momentum_transfer(const Record& record, const MomentumTransferSettings& settings);
+Estimate estimate_momentum_transfer(const record::Record& record, const MomentumTransferSettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -19,7 +19,7 @@
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/signal/noise.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// All that a curve depends on. A record taken under other conditions is out of its domain.
 struct CurveConditions {
@@ -89,7 +89,7 @@ class MonitoringCurve {
   ///   ambiguous    the interval is longer than half of the curve; no upper bound where it reaches the end;
   ///   or the
   ///                curve is flat
-  Estimate invert(double skewness, int periods, const NoiseRange& noise) const;
+  Estimate invert(double skewness, int periods, const signal::NoiseRange& noise) const;
   Estimate invert(double skewness, int periods, double noise) const {
     return invert(skewness, periods, {noise, noise});
   }
@@ -102,4 +102,4 @@ class MonitoringCurve {
 MonitoringCurve read_curve(const std::string& path);                      ///< MissingInput, BadData
 void write_curve(const MonitoringCurve& curve, const std::string& path);  ///< CannotWrite
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

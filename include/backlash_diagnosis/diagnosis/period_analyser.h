@@ -15,7 +15,7 @@
 
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// Samples from which the sampling interval of a run is known: the median of the first eight distances, which
 /// a lost sample or jitter at the start cannot spoil.
@@ -91,4 +91,4 @@ class PeriodAnalyser {
       -std::numeric_limits<double>::infinity();  // stamps before it only belong to the open window
 };
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

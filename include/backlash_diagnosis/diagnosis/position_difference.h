@@ -28,7 +28,7 @@
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct PositionDifferenceSettings {
   /// rad at the motor_position axis, odd: elastic deflection of one side under a torque [N m]. Needed; where
@@ -59,6 +59,7 @@ struct PositionDifferenceSettings {
 ///   deflection does not follow the torque; the
 ///                      encoders differ by more than 1 % in scale; the play is negative beyond the interval
 /// Torque is motor_torque where present, else sensor_torque.
-Estimate estimate_position_difference(const Record& record, const PositionDifferenceSettings& settings);
+Estimate estimate_position_difference(const record::Record& record,
+                                      const PositionDifferenceSettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
 #include "backlash_diagnosis/record/time_base.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// How a stream is cut; from the diagnosis settings of a rig.
 struct StreamSettings {
@@ -39,10 +39,10 @@ class SampleStream {
   /// has been gone for as long, starts a new run: everything kept is forgotten and settling begins again.
   /// Null where no period ends here; valid until the next call. Throws InvalidParameter for a stamp that is
   /// not finite.
-  const PeriodResult* add(double time, const ChannelValues& values);
+  const PeriodResult* add(double time, const record::ChannelValues& values);
 
   /// Adds all samples of a record.
-  void add(const Record& record);
+  void add(const record::Record& record);
 
   /// Whole settled periods at hand.
   long periods() const;
@@ -56,7 +56,7 @@ class SampleStream {
   double jump_limit() const;                 ///< s; infinite for a record
   double sampling_interval() const;          ///< s, median of the latest samples; 0 with fewer than two
   const StreamCounters& counters() const { return counters_; }
-  const Record& kept() const { return record_; }
+  const record::Record& kept() const { return record_; }
 
   void restart();
 
@@ -65,10 +65,10 @@ class SampleStream {
   struct Windows {
     long begin, end;  // settled and still kept whole: [begin, end)
   };
-  Fit fit(const ChannelValues& values);
+  Fit fit(const record::ChannelValues& values);
   Fit fit(double time);
-  Channel needed() const;
-  bool has_lost_channel(double time, const ChannelValues& values) const;
+  record::Channel needed() const;
+  bool has_lost_channel(double time, const record::ChannelValues& values) const;
   void find_period();
   const PeriodResult* start_windows();
   const PeriodResult* analyse(double time, double value);
@@ -79,15 +79,15 @@ class SampleStream {
   PeriodWindow searched_now(long count) const;
 
   StreamSettings settings_;
-  StampChecker stamps_;
+  record::StampChecker stamps_;
   StreamCounters counters_;
-  Record record_;
-  std::vector<Channel> channels_;   // those that the run's first sample has
-  unsigned present_ = 0;            // the same, a bit each
-  double period_ = 0, start_ = 0;   // s; first stamp of the run
-  double next_search_ = 0;          // s after start_
-  std::optional<double> dropped_;   // s, last stamp that was trimmed since the windows began
-  std::optional<WindowGrid> grid_;  // once the period and kLeadingSamples samples are there
+  record::Record record_;
+  std::vector<record::Channel> channels_;  // those that the run's first sample has
+  unsigned present_ = 0;                   // the same, a bit each
+  double period_ = 0, start_ = 0;          // s; first stamp of the run
+  double next_search_ = 0;                 // s after start_
+  std::optional<double> dropped_;          // s, last stamp that was trimmed since the windows began
+  std::optional<WindowGrid> grid_;         // once the period and kLeadingSamples samples are there
   std::optional<PeriodAnalyser> analyser_;
   std::vector<PeriodResult> results_;  // of the windows kept, settling included; storage beyond for the next
   std::size_t result_count_ = 0;
@@ -95,6 +95,6 @@ class SampleStream {
 
 /// The whole settled periods of a record (`last` > 0: only so many of them, the last), as a stream that keeps
 /// all of it cuts them. Without `apd` the period is that of motor_torque, and nothing settles.
-PeriodWindow cut_periods(const Record& record, const std::optional<ApdSettings>& apd, long last = 0);
+PeriodWindow cut_periods(const record::Record& record, const std::optional<ApdSettings>& apd, long last = 0);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// Repetition time of a signal [s], from the first maximum of its autocorrelation that is nearly as high as
 /// the highest. Rounded to a whole number of samples (of steps of n/65536 samples for a period of n > 65536).
@@ -22,4 +22,4 @@ double signal_level(std::vector<double> signal);
 /// runs or more begin at full speed. A signal that comes to rest at its extreme slows down before.
 bool looks_saturated(const std::vector<double>& signal);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

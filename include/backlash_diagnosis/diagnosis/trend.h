@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/diagnosis/history.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 struct TrendPoint {
   double time = 0, value = 0;  // s since 1970, any unit
@@ -41,4 +41,4 @@ Trend find_trend(std::vector<TrendPoint> points, std::optional<double> limit, bo
 std::vector<TrendPoint> trend_points(const std::vector<HistoryEntry>& entries, bool angular,
                                      const std::string& rig_digest);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

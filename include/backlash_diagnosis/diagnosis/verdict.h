@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/diagnosis/limits.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 enum class Grade { good, watch, service, stop, cannot_tell };
 const char* to_string(Grade grade);
@@ -51,4 +51,4 @@ struct Verdict {
 Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limits>& limits,
                 const std::optional<Baseline>& baseline);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// Torque [N m] and motor position [rad] over time [s], same length, finite values only.
 struct LockedMotion {
@@ -43,4 +43,4 @@ struct WallReading {
 WallReading read_wall(const LockedMotion& motion, const TorqueExcursion& excursion, double level,
                       double torque_span, std::size_t limit);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/diagnosis/wall_reading.h"
 
-namespace backlash {
+namespace backlash::diagnosis {
 
 /// Median over the readings of one of their members.
 double median_of(const std::vector<WallReading>& readings, double WallReading::*member);
@@ -38,4 +38,4 @@ struct WallToWall {
 WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<WallReading>& readings,
                                 const std::vector<double>& deflections, bool switched);
 
-}  // namespace backlash
+}  // namespace backlash::diagnosis

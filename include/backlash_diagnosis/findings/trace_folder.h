@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/report/trace_files.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::findings {
 
 /// Makes the folder (and those above it) that the files go to, and takes it away again where the work fails.
 class TraceFolder {
@@ -20,20 +20,21 @@ class TraceFolder {
   TraceFolder(const TraceFolder&) = delete;
   TraceFolder& operator=(const TraceFolder&) = delete;
 
-  const TraceFiles& files() const { return files_; }
+  const report::TraceFiles& files() const { return files_; }
 
   /// Writes all. Plots are drawn by a Python script; where that fails the page says so instead. Throws
   /// CannotWrite, and BadData as traced_rig_text().
-  void write(const Trace& trace, const RigFile& declared, const TraceInputs& inputs) const;
+  void write(const identification::Trace& trace, const rig_file::RigFile& declared,
+             const TraceInputs& inputs) const;
 
  private:
   std::string folder_;
-  TraceFiles files_;
+  report::TraceFiles files_;
   bool new_ = false;
 };
 
 /// The page; `plots` is what the script drew, or a sentence on why there is nothing; `provenance` ends it.
-std::string trace_page(const Trace& trace, const TraceInputs& inputs, const std::string& plots,
-                       const std::string& provenance);
+std::string trace_page(const identification::Trace& trace, const TraceInputs& inputs,
+                       const std::string& plots, const std::string& provenance);
 
-}  // namespace backlash
+}  // namespace backlash::findings

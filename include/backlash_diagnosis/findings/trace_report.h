@@ -8,7 +8,7 @@
 
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 
-namespace backlash {
+namespace backlash::findings {
 
 /// What was traced: paths as the user gave them.
 struct TraceInputs {
@@ -18,31 +18,31 @@ struct TraceInputs {
 };
 
 /// "effect_found", "nothing_missing", "unexplained"
-std::string to_string(TraceVerdict verdict);
+std::string to_string(identification::TraceVerdict verdict);
 
 /// The verdict in one or two sentences.
-std::string verdict_sentence(const Trace& trace);
+std::string verdict_sentence(const identification::Trace& trace);
 
 /// Tables for a terminal: errors before and after, effects, what is left, warnings.
-std::string trace_summary(const Trace& trace);
+std::string trace_summary(const identification::Trace& trace);
 
 /// The trace_residual JSON of the design: schema_version, verdict, channels, steps, unexplained; and beyond
 /// that message, inputs, cutoff, parameters of the machine, words and terms of each effect, warnings. What is
 /// not known is null.
-std::string trace_report_json(const Trace& trace, const TraceInputs& inputs);
+std::string trace_report_json(const identification::Trace& trace, const TraceInputs& inputs);
 
 /// For plots: the test record as both models have it and what each step adds to it. As many samples as
 /// signals of this bandwidth need.
-std::string trace_series_json(const Trace& trace);
+std::string trace_series_json(const identification::Trace& trace);
 
 /// The id, or of a learned map what it is a function of.
-std::string effect_name(const FoundEffect& effect);
+std::string effect_name(const identification::FoundEffect& effect);
 
 /// 0.0123 -> "1.23 %"
 std::string percent(double share);
 
 /// A value as people read it, with its standard error where that is known: "12.3 +- 0.4"; "15" for a fixed
 /// one.
-std::string with_error(const Measured& measured);
+std::string with_error(const signal::Measured& measured);
 
-}  // namespace backlash
+}  // namespace backlash::findings

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/model/rig.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Relative standard error of a declared value, used where a finding determines only its sum with another.
 constexpr double kDeclaredUncertainty = 0.4;
@@ -20,13 +20,14 @@ constexpr double kDeclaredUncertainty = 0.4;
 struct Finding {
   std::string procedure;
   std::map<std::string, double> combination;
-  Measured measured;
+  signal::Measured measured;
 };
 
 /// The parameters that the findings determine, by least squares weighted with their standard errors; the
 /// others keep what `rig` says, and a combination with one of those is read with it. Standard errors grow
 /// where findings contradict each other. Only `names` are touched.
-std::map<std::string, Measured> combine_findings(const std::vector<Finding>& findings, const Rig& rig,
-                                                 const std::vector<std::string>& names);
+std::map<std::string, signal::Measured> combine_findings(const std::vector<Finding>& findings,
+                                                         const model::Rig& rig,
+                                                         const std::vector<std::string>& names);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/identification/fit/output_error.h"
@@ -21,7 +22,7 @@
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// What became of a procedure.
 struct ProcedureReport {
@@ -45,7 +46,7 @@ struct CalibrationTrace {
 struct InertiaDetail {
   std::string subject;
   std::vector<LineInertia> runs;
-  RobustMean combined;
+  signal::RobustMean combined;
 };
 
 struct ResponseDetail {
@@ -67,8 +68,8 @@ struct ChannelTrace {
 
 /// All values are those of the load side of the reduction.
 struct Identification {
-  Rig rig;  // fitted
-  std::map<std::string, Measured> parameters;
+  model::Rig rig;  // fitted
+  std::map<std::string, signal::Measured> parameters;
   std::map<std::string, std::string> units;
   std::map<std::string, ChannelError> channels;  // torque, deflection; of all records of the last fit
   std::vector<ProcedureReport> procedures;
@@ -84,14 +85,14 @@ struct Identification {
   std::optional<DecayIdentification> decay;
   std::optional<Clearance> clearance;
   std::optional<GapMap> gap_map;
-  std::optional<Measured> delay;  // s, of the torque, beyond the hold between samples
+  std::optional<signal::Measured> delay;  // s, of the torque, beyond the hold between samples
   std::optional<OneInertia> one_inertia;
   std::vector<ChannelTrace> torque, deflection;
 };
 
 /// For a rig with two inertias or one (mesh: rigid). Starts from what the rig declares. Throws CannotIdentify
 /// where no procedure can use any record, with all reasons; BadData; Cancelled.
-Identification identify(const Rig& declared, const std::vector<Record>& records,
+Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
                         const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -21,10 +21,11 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/identification/fit/output_error.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct ComparisonSettings {
   double cutoff = 60;    // Hz, low-pass of torque and deflection of the followed model
@@ -85,12 +86,13 @@ struct ComparedRecord {
 
 /// The record needs motor_torque and both positions. Throws CannotIdentify, BadData; the rig says which side
 /// of the reduction the record is from.
-ComparedRecord compared_record(const Record& record, const Rig& rig, const ComparisonSettings& settings = {});
+ComparedRecord compared_record(const record::Record& record, const model::Rig& rig,
+                               const ComparisonSettings& settings = {});
 
 /// One result per rig, in their order. Throws InvalidParameter for a rig that is not one of two inertias or
 /// has no contact stiffness, IntegrationError, CannotIdentify; Cancelled.
-std::vector<ModelComparison> compare_models(const std::vector<Rig>& rigs, const ComparedRecord& record,
+std::vector<ModelComparison> compare_models(const std::vector<model::Rig>& rigs, const ComparedRecord& record,
                                             const ComparisonSettings& settings = {},
                                             const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,10 +4,10 @@
 
 #include <string>
 
-namespace backlash {
+namespace backlash::model {
 
 /// "N m s/rad" of a rotary axis is "N s/m" of a linear one, "kg m^2" is "kg", "rad" is "m". Unchanged unless
 /// `linear`.
 std::string axis_unit(const std::string& rotary, bool linear);
 
-}  // namespace backlash
+}  // namespace backlash::model

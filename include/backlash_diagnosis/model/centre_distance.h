@@ -5,7 +5,7 @@
 // (C: centre distance).
 #pragma once
 
-namespace backlash {
+namespace backlash::model {
 
 /// A bracket that turns the pinion about a pivot, held by a stop. Throws InvalidParameter from the functions
 /// below for lengths that are not > 0 and angles outside -89 to 89 deg.
@@ -32,4 +32,4 @@ double small_change_backlash(double centre_distance_change, double pressure_angl
 /// (N m / 2) step. Multiply by cos(phi) for the line of action. Throws InvalidParameter.
 double resolution_on_pitch_circle(int teeth, double module, double step);
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -11,7 +11,7 @@
 
 #include "backlash_diagnosis/base/parameter.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// A force with four coefficients, which can be computed for many teeth at once:
 ///   F = max(0, K d^n (1 + loss d') + damping d')
@@ -74,4 +74,4 @@ ContactSpec read_contact_spec(const YamlReader& yaml);
 /// Creates a law by name; throws InvalidParameter for an unknown name or a value outside its range.
 std::shared_ptr<const ContactLaw> make_contact_law(const std::string& name, const ParameterValues& values);
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -9,7 +9,7 @@
 
 #include <type_traits>
 
-namespace backlash {
+namespace backlash::model {
 
 /// The rotating parts in the order of the drive.
 struct TrainParts {
@@ -161,4 +161,4 @@ struct EquationsOfMotion : TrainParts {
   }
 };
 
-}  // namespace backlash
+}  // namespace backlash::model

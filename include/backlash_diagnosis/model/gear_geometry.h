@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace backlash {
+namespace backlash::model {
 
 /// inv(a) = tan(a) - a [rad] for 0 <= a < pi/2; the absolute error is that of doubles near a.
 double involute(double angle);
@@ -69,4 +69,4 @@ GearGeometry gear_geometry(const GearPair& pair);
 /// the change in `pair`. Throws InvalidParameter.
 double centre_distance_change_for(GearPair pair, double backlash);
 
-}  // namespace backlash
+}  // namespace backlash::model

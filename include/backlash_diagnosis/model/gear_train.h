@@ -22,7 +22,7 @@
 #include "backlash_diagnosis/model/rig.h"
 #include "backlash_diagnosis/model/stick_slip.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// Torques from outside at one moment [N m]: of the motor in the units of the rig's records, on the load.
 struct AppliedTorque {
@@ -230,4 +230,4 @@ class GearTrain : private TrainParts {
   double load_gain_;                                   // -, of the load encoder
 };
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -34,7 +34,7 @@
 
 #include "backlash_diagnosis/model/gear_geometry.h"
 
-namespace backlash {
+namespace backlash::model {
 
 struct MeshStiffnessSettings {
   std::string law;            // one of mesh_stiffness_laws()
@@ -83,4 +83,4 @@ class MeshStiffness {
   double mean_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -18,7 +18,7 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// State of presliding friction: position of the last reversal, and the friction there.
 class Presliding {
@@ -47,4 +47,4 @@ std::vector<double> presliding_friction(const std::vector<double>& positions,
                                         const std::vector<FrictionLimits>& limits,
                                         const std::vector<double>& rates, double interval = 0);
 
-}  // namespace backlash
+}  // namespace backlash::model

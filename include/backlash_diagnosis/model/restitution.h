@@ -10,7 +10,7 @@
 // 1; e = 1 for D = 0, e < 1 / D, e -> 0 as D grows.
 #pragma once
 
-namespace backlash {
+namespace backlash::model {
 
 /// e that follows from D >= 0 by the exact relation. Throws InvalidParameter for another D.
 double restitution_of_damping(double damping);
@@ -53,4 +53,4 @@ struct ImpactSpeeds {
 /// and 2.16, whose printed sign in the latter is corrected). Masses > 0 [kg], infinite for a wall.
 ImpactSpeeds speeds_after_impact(double mass1, double mass2, ImpactSpeeds before, double restitution);
 
-}  // namespace backlash
+}  // namespace backlash::model

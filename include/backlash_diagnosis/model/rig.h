@@ -16,7 +16,7 @@
 #include "backlash_diagnosis/model/stiffness_variation.h"
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// A rotating part and its friction against the frame:
 ///   T = c w + a |w| + F sign(w) + b        c, F: means of both directions; a, b: half differences
@@ -99,4 +99,4 @@ Rig read_rig(const YamlReader& yaml);
 /// The driver alone: the teeth never touch.
 Rig without_load(Rig rig);
 
-}  // namespace backlash
+}  // namespace backlash::model

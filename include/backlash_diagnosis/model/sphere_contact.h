@@ -5,7 +5,7 @@
 // instead: mesh_stiffness.h.
 #pragma once
 
-namespace backlash {
+namespace backlash::model {
 
 struct Sphere {
   double radius = 0;          // m, > 0
@@ -21,4 +21,4 @@ double sphere_stiffness(const Sphere& first, const Sphere& second);
 /// another shape is replaced [m]. Throws InvalidParameter.
 double equivalent_radius(double mass, double density);
 
-}  // namespace backlash
+}  // namespace backlash::model

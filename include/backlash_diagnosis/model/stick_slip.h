@@ -16,7 +16,7 @@
 #include "backlash_diagnosis/model/presliding.h"
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 
 class StickSlip {
  public:
@@ -48,4 +48,4 @@ class StickSlip {
   Presliding memory_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -21,7 +21,7 @@
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/model/mesh_stiffness.h"
 
-namespace backlash {
+namespace backlash::model {
 
 class StiffnessVariation {
  public:
@@ -53,4 +53,4 @@ class StiffnessVariation {
 std::shared_ptr<const StiffnessVariation> read_stiffness_variation(const YamlReader& yaml,
                                                                    double base_radius);
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -14,7 +14,7 @@
 
 #include "backlash_diagnosis/base/parameter.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// What a term may depend on; all at the load side of the reduction.
 struct Motion {
@@ -199,4 +199,4 @@ Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms);
 /// Reads one entry of `terms:`: `id: ID` and that term's parameters.
 std::shared_ptr<const Term> read_term(const YamlReader& yaml);
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// One entry of `terms:` in YAML block style, indented by two, each key with its unit as comment:
 ///   - id: gravity
@@ -15,4 +15,4 @@ namespace backlash {
 /// Numbers are the shortest that read back as the same double. For a term of make_term() or read_term().
 std::string term_text(const Term& term);
 
-}  // namespace backlash
+}  // namespace backlash::model

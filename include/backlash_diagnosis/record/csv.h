@@ -13,7 +13,7 @@
 
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::record {
 
 constexpr std::size_t kLongestCsvLine = std::size_t{1} << 20;  ///< bytes
 
@@ -28,4 +28,4 @@ Record read_csv(std::istream& in, const std::string& name);
 /// are not finite, times that do not increase by a nanosecond.
 void write_csv(const Record& record, const std::string& path);
 
-}  // namespace backlash
+}  // namespace backlash::record

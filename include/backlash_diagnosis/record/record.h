@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace backlash {
+namespace backlash::record {
 
 /// The channels a record may have. `motor_*` and `sensor_torque` are seen from the load side of the reduction
 /// (angle divided by the ratio, torque multiplied by it) unless the rig file says `motor_side: true`.
@@ -73,4 +73,4 @@ class Record {
   std::array<std::vector<double>, kChannelCount> columns_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::record

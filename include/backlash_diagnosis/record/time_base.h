@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace backlash {
+namespace backlash::record {
 
 enum class StampVerdict {
   accept,     ///< later than the stamp accepted before, or the first
@@ -51,4 +51,4 @@ constexpr double kJitterFraction =
 /// count as jitter. Empty where the time base is even or has fewer than three stamps.
 std::vector<std::string> describe_time_base(const std::vector<double>& time);
 
-}  // namespace backlash
+}  // namespace backlash::record

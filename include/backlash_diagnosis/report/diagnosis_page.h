@@ -8,10 +8,11 @@
 #include "backlash_diagnosis/report/report_page.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::report {
 
 /// The page of a diagnosis; `rig` may be null. Plots are drawn by a Python script; where that fails the page
 /// says so instead.
-std::string diagnosis_page(const DiagnosisReport& report, const RigFile* rig, const Provenance& provenance);
+std::string diagnosis_page(const DiagnosisReport& report, const rig_file::RigFile* rig,
+                           const Provenance& provenance);
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -8,18 +8,18 @@
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
-namespace backlash {
+namespace backlash::report {
 
 /// A diagnosis and what it rests on.
 struct DiagnosisReport {
-  const Record* record = nullptr;
+  const record::Record* record = nullptr;
   std::vector<std::string> warnings;  ///< of the record and of the curve
-  std::optional<ApdSettings> apd_settings;
-  std::optional<Limits> limits;            ///< that the verdict grades by
-  std::string rig;                         ///< name; empty: none
-  const MonitoringCurve* curve = nullptr;  ///< may be null
-  std::string curve_source;                ///< path, or "built for this record"
-  Diagnosis diagnosis;
+  std::optional<diagnosis::ApdSettings> apd_settings;
+  std::optional<diagnosis::Limits> limits;            ///< that the verdict grades by
+  std::string rig;                                    ///< name; empty: none
+  const diagnosis::MonitoringCurve* curve = nullptr;  ///< may be null
+  std::string curve_source;                           ///< path, or "built for this record"
+  diagnosis::Diagnosis diagnosis;
 };
 
 /// The `diagnose_record` JSON of the design; keys in the order of the documentation, NaN is null.
@@ -28,4 +28,4 @@ std::string diagnosis_json(const DiagnosisReport& report);
 /// Lengths in m, angles in rad and deg.
 void print_summary(const DiagnosisReport& report, std::ostream& out);
 
-}  // namespace backlash
+}  // namespace backlash::report

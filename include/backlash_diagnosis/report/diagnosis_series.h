@@ -7,9 +7,9 @@
 #include "backlash_diagnosis/report/diagnosis_report.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::report {
 
 /// The report itself, the last periods of the record, the curve and the limits. `rig` may be null.
-std::string diagnosis_series(const DiagnosisReport& report, const RigFile* rig);
+std::string diagnosis_series(const DiagnosisReport& report, const rig_file::RigFile* rig);
 
-}  // namespace backlash
+}  // namespace backlash::report

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace backlash {
+namespace backlash::report {
 
 /// A file that went into a result: what it is for ("rig") and its path.
 struct UsedFile {
@@ -37,4 +37,4 @@ std::string no_figures(const std::string& reason);
 /// The whole page; `body` is HTML.
 std::string report_page(const std::string& title, const std::string& body);
 
-}  // namespace backlash
+}  // namespace backlash::report

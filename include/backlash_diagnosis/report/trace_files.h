@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace backlash {
+namespace backlash::report {
 
 struct TraceFiles {
   std::string report;  // report.json
@@ -16,4 +16,4 @@ struct TraceFiles {
 /// Their paths in a folder.
 TraceFiles trace_files(const std::string& folder);
 
-}  // namespace backlash
+}  // namespace backlash::report

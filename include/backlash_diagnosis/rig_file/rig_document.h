@@ -12,14 +12,15 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 
 /// What a fit says of a machine.
 struct FittedValues {
-  const Rig& rig;                                     // at the load side
-  double motor_axis_ratio;                            // of the rig file
-  const std::map<std::string, Measured>& parameters;  // what was fitted, by the names of servo_parameters()
-  const std::map<std::string, std::string>& units;    // of all of these
+  const model::Rig& rig;    // at the load side
+  double motor_axis_ratio;  // of the rig file
+  const std::map<std::string, signal::Measured>&
+      parameters;                                   // what was fitted, by the names of servo_parameters()
+  const std::map<std::string, std::string>& units;  // of all of these
 };
 
 /// All that changes the text throws BadData with the name, the line and the key where the document does not
@@ -47,7 +48,7 @@ class RigDocument {
   void set_fitted(const FittedValues& found);
 
   /// Another law with all its values in place of the declared one.
-  void set_contact_law(const ContactSpec& contact);
+  void set_contact_law(const model::ContactSpec& contact);
 
   /// A file of test runs beside this one is found from any folder.
   void set_whole_path_of_test_runs();
@@ -75,11 +76,11 @@ class RigDocument {
 
   YamlTree tree() const { return parse_yaml(text(), name_); }
   void set_directional(const std::string& key, double mean, double asymmetry, const std::string& comment);
-  void set_backlash(const Rig& rig, const std::string& comment);
+  void set_backlash(const model::Rig& rig, const std::string& comment);
   Item item(const YamlEntry& list, const YamlNode& node) const;
 
   std::string name_;
   Lines lines_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

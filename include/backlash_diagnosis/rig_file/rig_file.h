@@ -9,12 +9,12 @@
 #include "backlash_diagnosis/rig_file/test_runs.h"
 #include "backlash_diagnosis/simulation/simulation.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 
 struct RigFile {
-  Rig rig;
-  SimulationSettings simulation;
-  DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
+  model::Rig rig;
+  simulation::SimulationSettings simulation;
+  diagnosis::DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
   std::vector<TestRun> test_runs;
   std::string source;  // path, or "built-in sarkar_1997"
   std::string text;    // as read
@@ -30,4 +30,4 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source);
 /// config/sarkar_1997.yaml as it was when the library was built: what nodes use without a rig file.
 RigFile default_rig_file();
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

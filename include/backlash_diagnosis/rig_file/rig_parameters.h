@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/model/rig.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 
 /// What a parameter belongs to.
 enum class RigPart { motor, link, mesh };
@@ -37,8 +37,8 @@ struct RigParameter {
   std::string contact;  // the parameter of the contact law that it is; empty: none
   std::string mean;     // of half a difference between directions: the name of their mean; empty: it is none
   std::string one_inertia;  // its name in reports on a machine of one inertia; empty: such a machine has none
-  double (*get)(const Rig&);
-  void (*set)(Rig&, double);
+  double (*get)(const model::Rig&);
+  void (*set)(model::Rig&, double);
 
   bool positive() const { return range.lower == 0 && range.open_lower; }
   bool is_friction() const {
@@ -47,7 +47,7 @@ struct RigParameter {
   /// Half of forward minus backward.
   bool is_asymmetry() const { return !mean.empty(); }
   /// Whether a machine like this rig has such a parameter: a rigid mesh has none, a contact law only its own.
-  bool known_to(const Rig& rig) const;
+  bool known_to(const model::Rig& rig) const;
 };
 
 /// Of two inertias with a mesh between them: motor_inertia load_inertia mesh_stiffness mesh_damping
@@ -64,4 +64,4 @@ const RigParameter& servo_parameter(RigPart part, ParameterKind kind);
 /// The parameter that says how far the directions of this one differ; null: it has none.
 const RigParameter* asymmetry_of(const RigParameter& mean);
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

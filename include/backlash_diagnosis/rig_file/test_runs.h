@@ -15,22 +15,23 @@
 #include "backlash_diagnosis/model/rig.h"
 #include "backlash_diagnosis/simulation/excitation.h"
 
-namespace backlash {
+namespace backlash::rig_file {
 
 struct RigFile;
 
 struct TestRun {
   std::string name;
   double duration = 0;  // s
-  ExcitationSettings excitation;
+  simulation::ExcitationSettings excitation;
   bool without_load = false;
 };
 
 /// The runs of a rig file in their order; none without the key. Throws BadData, MissingInput.
-std::vector<TestRun> read_test_runs(const YamlReader& rig_file, const Rig& rig);
+std::vector<TestRun> read_test_runs(const YamlReader& rig_file, const model::Rig& rig);
 
 /// BadData where an excitation, read from this map, cannot act on this rig.
-void check_excitation(const YamlReader& yaml, const ExcitationSettings& excitation, const Rig& rig);
+void check_excitation(const YamlReader& yaml, const simulation::ExcitationSettings& excitation,
+                      const model::Rig& rig);
 
 /// The run of this name. Throws InvalidParameter with the names that there are.
 const TestRun& find_test_run(const std::vector<TestRun>& runs, const std::string& name);
@@ -38,4 +39,4 @@ const TestRun& find_test_run(const std::vector<TestRun>& runs, const std::string
 /// Makes the run the rig file's own simulation.
 void apply_test_run(const TestRun& run, RigFile& file);
 
-}  // namespace backlash
+}  // namespace backlash::rig_file

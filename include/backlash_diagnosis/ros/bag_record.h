@@ -13,7 +13,7 @@
 
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 extern const ros::Time kBagTimeOrigin;  ///< 1e9 s: stamp of time 0 in written bags, as ROS refuses stamp 0
 
@@ -30,14 +30,14 @@ extern const ros::Time kBagTimeOrigin;  ///< 1e9 s: stamp of time 0 in written b
 /// topic, message (from 0) and stamp, when it is no bag, is damaged or not indexed; has no such topic or
 /// joint or more than one; when stamps are 0 or go back (looped or merged recordings), a channel is NaN in
 /// some messages only, an array has the wrong size or a value is infinite.
-Record read_bag(const std::string& path, const std::string& joint = "",
-                const std::string& topic = "joint_states");
+record::Record read_bag(const std::string& path, const std::string& joint = "",
+                        const std::string& topic = "joint_states");
 
 /// Writes a record as messages of `joint` on /joint_states, stamped `origin` + time (rounded to 1 ns), whole
 /// or not at all. Throws CannotWrite when the file cannot be written, BadData when read_bag would not read it
 /// back: no samples or channels, columns of unequal length, values that are not finite, times that do not
 /// increase by a nanosecond or whose stamp ROS cannot hold.
-void write_bag(const Record& record, const std::string& path, const std::string& joint,
+void write_bag(const record::Record& record, const std::string& path, const std::string& joint,
                const ros::Time& origin = kBagTimeOrigin);
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -4,11 +4,12 @@
 
 #include "backlash_diagnosis/studies/curve_builder.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// As build_curve() and the same curve; `memory` [GB] as that of a Job. Throws InvalidParameter, JobFailed,
 /// Cancelled.
-MonitoringCurve build_curve_as_job(const RigFile& rig, const CurveRequest& request, double memory,
-                                   const Progress& progress);
+diagnosis::MonitoringCurve build_curve_as_job(const rig_file::RigFile& rig,
+                                              const studies::CurveRequest& request, double memory,
+                                              const Progress& progress);
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

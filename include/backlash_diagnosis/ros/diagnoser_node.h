@@ -24,7 +24,7 @@
 #include "backlash_diagnosis/ros/live_server.h"
 #include "backlash_diagnosis/ros/trace_server.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// Parameters of the node, validated.
 struct DiagnoserSettings {
@@ -67,7 +67,7 @@ class DiagnoserNode {
 
   void on_joint_state(const sensor_msgs::JointState::ConstPtr& message);
   void publish(const Joint& joint, const PeriodReport& report);
-  void publish(const Joint& joint, const ros::Time& stamp, const Diagnosis& diagnosis);
+  void publish(const Joint& joint, const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis);
   bool on_diagnose(backlash_diagnosis::Diagnose::Request& request,
                    backlash_diagnosis::Diagnose::Response& response);
   bool on_set_baseline(backlash_diagnosis::SetBaseline::Request& request,
@@ -78,7 +78,8 @@ class DiagnoserNode {
   bool on_get_curve(backlash_diagnosis::GetCurve::Request& request,
                     backlash_diagnosis::GetCurve::Response& response);
   void on_build_curve(const backlash_diagnosis::BuildCurveGoalConstPtr& goal);
-  MonitoringCurve built_curve(const backlash_diagnosis::BuildCurveGoal& goal, JointMonitor& monitor);
+  diagnosis::MonitoringCurve built_curve(const backlash_diagnosis::BuildCurveGoal& goal,
+                                         JointMonitor& monitor);
   void advertise();
   void add_joint(MonitorSettings settings, const DiagnoserSettings& common);
   void serve_live(const DiagnoserSettings& settings);
@@ -107,4 +108,4 @@ class DiagnoserNode {
   std::unique_ptr<LiveServer<Live>> live_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

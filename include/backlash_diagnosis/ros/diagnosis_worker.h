@@ -15,18 +15,20 @@
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// What a diagnosis needs, as it was when the last sample of the window came. Nothing of it is shared with
 /// the stream.
 struct DiagnosisTask {
   ros::Time stamp;  // of the last sample
-  PeriodWindow window;
-  DiagnosisSettings settings;
-  std::shared_ptr<const MonitoringCurve> curve;  // null: none is there
-  std::optional<Baseline> baseline;
+  diagnosis::PeriodWindow window;
+  diagnosis::DiagnosisSettings settings;
+  std::shared_ptr<const diagnosis::MonitoringCurve> curve;  // null: none is there
+  std::optional<diagnosis::Baseline> baseline;
 
-  Diagnosis compute() const { return diagnose(window, settings, curve.get(), baseline); }
+  diagnosis::Diagnosis compute() const {
+    return diagnosis::diagnose(window, settings, curve.get(), baseline);
+  }
 };
 
 /// Works through tasks in their order. Some may wait, so that a moment without processor time loses none;
@@ -58,4 +60,4 @@ class DiagnosisWorker {
   std::thread thread_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -2,7 +2,7 @@
 // An alarm level with hysteresis in time: it rises at once and falls after a hold time.
 #pragma once
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// Rises at once; falls to the highest level of the last `hold` seconds.
 class HeldLevel {
@@ -33,4 +33,4 @@ class HeldLevel {
   int held_ = 0, next_ = 0;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -12,8 +12,10 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace backlash {
-
 class ScratchFolder;
+}  // namespace backlash
+
+namespace backlash::ros_bridge {
 
 /// Memory that a job may hold [GB]; a choice: many times what a search of ten minutes of records needs.
 constexpr double kJobMemory = 4;
@@ -41,6 +43,6 @@ void run_job(const Job& job);
 std::string command_path(const std::string& name);
 
 /// A file with the text of a rig file: its own, while that is as it was read, else one in `scratch`.
-std::string file_of(const RigFile& rig, const ScratchFolder& scratch);
+std::string file_of(const rig_file::RigFile& rig, const ScratchFolder& scratch);
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

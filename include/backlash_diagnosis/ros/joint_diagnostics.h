@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/ros/joint_history.h"
 #include "backlash_diagnosis/ros/joint_monitor.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 struct DiagnosticsSettings {
   double stale = 2;          // s of wall time without a message, > 0
@@ -61,4 +61,4 @@ class JointDiagnostics {
   std::mutex mutex_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/diagnosis/limits.h"
 #include "backlash_diagnosis/diagnosis/trend.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 class JointHistory {
  public:
@@ -31,16 +31,16 @@ class JointHistory {
     bool behind = false;  // the latest verdict was left out
     long lost = 0;        // given up, as too many waited
     std::string problem;  // why the last attempt to write failed; empty: it did not
-    Trend trend;
+    diagnosis::Trend trend;
   };
 
   /// Opens the file and reads what it holds. Throws CannotWrite, BadData.
   explicit JointHistory(const Settings& settings);
 
   /// Takes the verdict at a stamp [s since 1970] where one is due; does not wait for the disk.
-  void take(double stamp, const Diagnosis& diagnosis);
+  void take(double stamp, const diagnosis::Diagnosis& diagnosis);
   /// Marks where the healthy machine was taken: the trend begins anew.
-  void take_baseline(double stamp, const Diagnosis& diagnosis);
+  void take_baseline(double stamp, const diagnosis::Diagnosis& diagnosis);
 
   /// Writes what waits, and finds the trend towards `limit` (service, in the unit of the trend) where there
   /// is something new. From one thread only.
@@ -49,18 +49,18 @@ class JointHistory {
   State state() const;
 
  private:
-  void add(HistoryEntry entry);
-  void add_points(const std::vector<HistoryEntry>& entries);
+  void add(diagnosis::HistoryEntry entry);
+  void add_points(const std::vector<diagnosis::HistoryEntry>& entries);
 
   Settings settings_;
-  History history_;
+  diagnosis::History history_;
   mutable std::mutex mutex_;
-  std::deque<HistoryEntry> waiting_;
+  std::deque<diagnosis::HistoryEntry> waiting_;
   std::optional<double> last_;  // s, of the latest entry
   State state_;
-  std::vector<TrendPoint> points_;  // since the last baseline; of the flushing thread
+  std::vector<diagnosis::TrendPoint> points_;  // since the last baseline; of the flushing thread
   std::optional<double> limit_;
   bool stale_trend_ = true;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

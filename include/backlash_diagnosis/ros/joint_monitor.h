@@ -19,30 +19,31 @@
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 struct MonitorSettings {
   std::string joint;
-  RigFile rig;
-  std::optional<Baseline> baseline;
-  std::string baseline_path;             // where a new baseline is kept; empty: nowhere
-  std::optional<MonitoringCurve> curve;  // absent: built from the rig at the sampling rate of the messages
-  std::string curve_warning;             // what check_curve() says of it
-  int window = 5;                        // periods that the running estimates look back
-  double estimate_interval = 0.25;       // s of stamps at least from one running estimate to the next
-  double keep = 60;                      // s of samples kept
-  double job_memory = kJobMemory;        // GB, of the process that builds a curve
+  rig_file::RigFile rig;
+  std::optional<diagnosis::Baseline> baseline;
+  std::string baseline_path;  // where a new baseline is kept; empty: nowhere
+  std::optional<diagnosis::MonitoringCurve>
+      curve;                        // absent: built from the rig at the sampling rate of the messages
+  std::string curve_warning;        // what check_curve() says of it
+  int window = 5;                   // periods that the running estimates look back
+  double estimate_interval = 0.25;  // s of stamps at least from one running estimate to the next
+  double keep = 60;                 // s of samples kept
+  double job_memory = kJobMemory;   // GB, of the process that builds a curve
 };
 
 /// What is published when a period is complete.
 struct PeriodReport {
-  PeriodResult period;
+  diagnosis::PeriodResult period;
   double period_length = 0;  // s
   ros::Time stamp;           // of the last sample
 };
 
 struct MonitorState {
-  StreamCounters counters;
+  diagnosis::StreamCounters counters;
   long bad_messages = 0;  // wrong array sizes, infinite values, names twice
   std::string last_problem;
   std::string curve_state;                      // "loaded", "building, 40 %", "built", "none: ..."
@@ -54,7 +55,7 @@ struct MonitorState {
   bool any_sample = false;
   ros::WallTime last_arrival;
   double latency = 0;  // s from stamp to arrival by ROS time, of the latest message
-  std::shared_ptr<const Diagnosis> latest;
+  std::shared_ptr<const diagnosis::Diagnosis> latest;
   bool building_curve = false;
   bool baseline = false;
 
@@ -65,35 +66,35 @@ class JointMonitor {
  public:
   /// Hears of running estimates over the last `window` periods, in their order, from a thread of the monitor;
   /// `stamp` is that of their last sample.
-  using OnDiagnosis = std::function<void(const ros::Time& stamp, const Diagnosis& diagnosis)>;
+  using OnDiagnosis = std::function<void(const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis)>;
 
   explicit JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis = nullptr);
   ~JointMonitor();
 
   const std::string& joint() const { return settings_.joint; }
-  const RigFile& rig() const { return settings_.rig; }
+  const rig_file::RigFile& rig() const { return settings_.rig; }
   const std::string& baseline_path() const { return settings_.baseline_path; }
 
   /// Takes what a message says of the joint, or what is wrong with it (see JointStateReader); a report when
   /// it completes a period with an APD. Bad content is counted and told by state(). Where a running estimate
   /// is due it copies the window; the rest of the work is not done here.
-  std::optional<PeriodReport> take(const ros::Time& stamp, const ChannelValues& values,
+  std::optional<PeriodReport> take(const ros::Time& stamp, const record::ChannelValues& values,
                                    const std::string& problem, const std::string& topic);
 
   /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s]
   /// of wall time, then diagnoses the latest `periods` (0: all kept).
-  Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
+  diagnosis::Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
 
   /// Ends the running estimates: the latest that waits is still told.
   void stop() { worker_.stop(); }
 
-  void set_baseline(const std::optional<Baseline>& baseline);
-  void set_curve(MonitoringCurve curve);
+  void set_baseline(const std::optional<diagnosis::Baseline>& baseline);
+  void set_curve(diagnosis::MonitoringCurve curve);
   void set_window(int periods, double estimate_interval);  ///< as in MonitorSettings
-  void set_limits(const std::optional<Limits>& limits);
-  std::optional<Limits> limits() const;
-  std::optional<Baseline> baseline() const;
-  std::shared_ptr<const MonitoringCurve> curve() const;
+  void set_limits(const std::optional<diagnosis::Limits>& limits);
+  std::optional<diagnosis::Limits> limits() const;
+  std::optional<diagnosis::Baseline> baseline() const;
+  std::shared_ptr<const diagnosis::MonitoringCurve> curve() const;
   MonitorState state() const;
 
  private:
@@ -105,16 +106,16 @@ class JointMonitor {
   long wanted_periods(long periods) const { return periods > 0 ? periods : 1; }
 
   MonitorSettings settings_;
-  DiagnosisSettings diagnosis_settings_;
+  diagnosis::DiagnosisSettings diagnosis_settings_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   StampClock clock_;
-  SampleStream stream_;
+  diagnosis::SampleStream stream_;
   long reported_periods_ = 0;
   std::optional<double> estimated_;  // s, when the last running estimate was due
-  std::shared_ptr<const MonitoringCurve> curve_;
-  std::optional<Baseline> baseline_;
-  std::shared_ptr<const Diagnosis> latest_;
+  std::shared_ptr<const diagnosis::MonitoringCurve> curve_;
+  std::optional<diagnosis::Baseline> baseline_;
+  std::shared_ptr<const diagnosis::Diagnosis> latest_;
   std::string curve_state_, last_problem_;
   std::string curve_warning_, baseline_warning_;
   long bad_messages_ = 0;
@@ -126,4 +127,4 @@ class JointMonitor {
   DiagnosisWorker worker_;  // last: it uses all of the others
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -27,7 +27,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 struct JointNames {
   explicit JointNames(const std::string& joint);
@@ -55,7 +55,7 @@ class JointStateReader {
   /// The joints that a message speaks of, by their place in `joints` (the topic may carry others). This and
   /// what follows are valid until the next call.
   const std::vector<std::size_t>& read(const sensor_msgs::JointState& message);
-  const ChannelValues& values(std::size_t joint) const { return readings_[joint].values; }
+  const record::ChannelValues& values(std::size_t joint) const { return readings_[joint].values; }
   /// What is wrong with a joint: position, velocity or effort neither empty nor as long as `name` (array and
   /// sizes), a name twice, an infinite value. Empty where nothing is.
   const std::string& problem(std::size_t joint) const { return readings_[joint].problem; }
@@ -66,7 +66,7 @@ class JointStateReader {
     int part;
   };
   struct Reading {
-    ChannelValues values;
+    record::ChannelValues values;
     std::string problem;
     unsigned seen = 0;  // a bit for each part
   };
@@ -79,17 +79,18 @@ class JointStateReader {
 };
 
 /// Reads one message of one joint. Throws BadData naming `topic` where something is wrong with it.
-ChannelValues read_joint_state(const sensor_msgs::JointState& message, const std::string& joint,
-                               const std::string& topic);
+record::ChannelValues read_joint_state(const sensor_msgs::JointState& message, const std::string& joint,
+                                       const std::string& topic);
 
 /// Adds a simulated sample to a message, which may have those of other joints.
-void add_joint_state(const Observation& observation, const JointNames& names,
+void add_joint_state(const model::Observation& observation, const JointNames& names,
                      sensor_msgs::JointState& message);
 
 /// Message for a simulated sample, without stamp.
-sensor_msgs::JointState make_joint_state(const Observation& observation, const JointNames& names);
+sensor_msgs::JointState make_joint_state(const model::Observation& observation, const JointNames& names);
 
 /// Message for sample i of a record, without stamp; only channels that the record has.
-sensor_msgs::JointState make_joint_state(const Record& record, std::size_t i, const JointNames& names);
+sensor_msgs::JointState make_joint_state(const record::Record& record, std::size_t i,
+                                         const JointNames& names);
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

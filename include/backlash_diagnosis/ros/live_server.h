@@ -15,7 +15,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// Name below which live parameters are served.
 constexpr const char* kLive = "live";
@@ -69,4 +69,4 @@ class LiveServer {
   dynamic_reconfigure::Server<Config> server_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

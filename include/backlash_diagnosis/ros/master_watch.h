@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// What the master knows of a node, by name.
 struct Registrations {
@@ -39,4 +39,4 @@ class MasterWatch {
   std::thread thread_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -10,16 +10,19 @@
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// One period.
-backlash_diagnosis::AmplitudeDistribution to_message(const PeriodResult& period, const ApdSettings& settings,
+backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::PeriodResult& period,
+                                                     const diagnosis::ApdSettings& settings,
                                                      double period_length);
 /// All periods of an analysis together; skewness is the mean over the periods.
-backlash_diagnosis::AmplitudeDistribution to_message(const ApdResult& apd, const ApdSettings& settings);
-backlash_diagnosis::BacklashEstimate to_message(const Estimate& estimate);
+backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::ApdResult& apd,
+                                                     const diagnosis::ApdSettings& settings);
+backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& estimate);
 /// The estimates that the verdict is about give its members their names.
-backlash_diagnosis::Verdict to_message(const Verdict& verdict, const std::vector<Estimate>& estimates);
-backlash_diagnosis::MonitoringCurve to_message(const MonitoringCurve& curve);
+backlash_diagnosis::Verdict to_message(const diagnosis::Verdict& verdict,
+                                       const std::vector<diagnosis::Estimate>& estimates);
+backlash_diagnosis::MonitoringCurve to_message(const diagnosis::MonitoringCurve& curve);
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// Runs a node and returns its exit code. `--help` prints `help` without a roscore; any other argument that
 /// is neither a remapping nor a parameter is refused with 64. An exception of `run` becomes one ROS_FATAL
@@ -13,4 +13,4 @@ namespace backlash {
 int node_main(int argc, char** argv, const std::string& name, const char* help,
               const std::function<int()>& run);
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

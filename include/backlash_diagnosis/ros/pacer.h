@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// Time of sample k after sample 0, each rounded to the nanosecond on its own, so that no error ever adds up.
 /// `rate` samples per second, > 0; k >= 0, exact up to k = 1.8e10 for rates that divide a second into whole
@@ -29,4 +29,4 @@ class Pacer {
   double rate_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -11,7 +11,7 @@
 
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 class Parameters {
  public:
@@ -37,4 +37,4 @@ class Parameters {
   std::set<std::string> known_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

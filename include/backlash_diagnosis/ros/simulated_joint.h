@@ -19,7 +19,7 @@
 #include "backlash_diagnosis/ros/simulator_settings.h"
 #include "backlash_diagnosis/simulation/simulation.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 class SimulatedJoint {
  public:
@@ -35,7 +35,7 @@ class SimulatedJoint {
   /// At rest in the middle of the gap, backlash as at the start.
   void reset();
   std::string true_backlash() const;  // with its unit, for people
-  const Simulation& simulation() const { return simulation_; }
+  const simulation::Simulation& simulation() const { return simulation_; }
 
  private:
   using Live = backlash_diagnosis::SimulatedJointLiveConfig;
@@ -52,7 +52,7 @@ class SimulatedJoint {
   std::string name_;
   bool angular_;
   JointNames names_;
-  Simulation simulation_;
+  simulation::Simulation simulation_;
   std::chrono::steady_clock::time_point next_torque_warning_;
   ros::NodeHandle handle_;
   ros::Publisher rig_description_, true_backlash_;
@@ -61,4 +61,4 @@ class SimulatedJoint {
   std::unique_ptr<LiveServer<Live>> live_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

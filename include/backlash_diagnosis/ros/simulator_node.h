@@ -19,7 +19,7 @@
 #include "backlash_diagnosis/ros/simulated_joint.h"
 #include "backlash_diagnosis/ros/simulator_settings.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 class SimulatorNode {
  public:
@@ -73,4 +73,4 @@ class SimulatorNode {
   diagnostic_updater::Updater updater_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

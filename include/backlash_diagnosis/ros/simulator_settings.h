@@ -9,11 +9,11 @@
 
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::ros_bridge {
 
 /// One simulated joint.
 struct JointSettings {
-  RigFile file;             // with the parameters that override it applied to `rig` and `simulation`
+  rig_file::RigFile file;   // with the parameters that override it applied to `rig` and `simulation`
   std::string description;  // the rig file's text after a comment line: its source and what overrides it
 };
 
@@ -34,4 +34,4 @@ SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle)
 /// The node's parameters, topics and services for `--help`.
 const char* simulator_help();
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -14,13 +14,15 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace backlash {
-
 class ScratchFolder;
+}
+
+namespace backlash::ros_bridge {
 
 class TraceServer {
  public:
   /// The rig of a joint; null with the reason in `why`.
-  using FindRig = std::function<const RigFile*(const std::string& joint, std::string& why)>;
+  using FindRig = std::function<const rig_file::RigFile*(const std::string& joint, std::string& why)>;
 
   /// Serves `name` from then on; all paths of a goal must lie in `folder`. The work is done by the command
   /// trace_residual as a job beside the node, which may hold `memory` [GB].
@@ -41,4 +43,4 @@ class TraceServer {
   std::unique_ptr<Server> server_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::ros_bridge

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Standard deviation of the white noise of a signal: the smaller of two estimates, which noise raises
 /// equally and motion differently. From the median of its periodogram (Hann window) in the upper three tenths
@@ -30,4 +30,4 @@ double motion_bandwidth(const std::vector<double>& position, double interval);
 /// Standard deviation that low_pass (zero_phase.h) leaves of white noise of standard deviation 1.
 double noise_after_low_pass(double interval, double cutoff);
 
-}  // namespace backlash
+}  // namespace backlash::signal

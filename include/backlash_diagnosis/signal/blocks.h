@@ -6,9 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Means of consecutive blocks of `length` samples; the rest at the end is left out.
 std::vector<double> block_means(const std::vector<double>& values, std::size_t length);
@@ -38,4 +39,4 @@ Eigen::MatrixXd jackknife_covariance(const Eigen::MatrixXd& a, const Eigen::Vect
 /// The same for numbers of which the changes are known.
 double jackknife_error(const Eigen::VectorXd& changes);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -2,7 +2,7 @@
 // Distributions that tests and intervals rest on. From Boost.Math, whose templates are compiled once, here.
 #pragma once
 
-namespace backlash {
+namespace backlash::signal {
 
 /// 97.5 % quantile of the standard normal distribution: half of a 95 % interval in standard deviations.
 constexpr double kNormalQuantile975 = 1.959963984540054;
@@ -19,4 +19,4 @@ double chi_square_quantile(double probability, double degrees);
 /// P(X <= x), x >= 0; `degrees` of freedom > 0. Throws InvalidParameter.
 double chi_square_probability(double x, double degrees);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Variances with the errors as they are over those with independent errors of the same size.
 struct ErrorMemory {
@@ -23,4 +23,4 @@ struct ErrorMemory {
 /// which is at most 2 % smaller.
 ErrorMemory error_memory(const std::vector<double>& times, const std::vector<double>& residuals);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -6,9 +6,10 @@
 #include <Eigen/Core>
 #include <functional>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::signal {
 
 struct LeastSquaresFit {
   Eigen::VectorXd values;
@@ -58,4 +59,4 @@ void widen_jacobian(LeastSquaresFit& fit, const ResidualFunction& residuals, con
 /// rows are independent and of variance 1. Needs `jacobian`.
 Eigen::MatrixXd block_covariance(const LeastSquaresFit& fit, Eigen::Index block, Eigen::Index known = 0);
 
-}  // namespace backlash
+}  // namespace backlash::signal

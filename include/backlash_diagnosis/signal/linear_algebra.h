@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Any matrix or vector of double, without a copy where it is stored as one.
 using MatrixView = Eigen::Ref<const Eigen::MatrixXd>;
@@ -52,4 +52,4 @@ Eigen::MatrixXd orthonormal_basis(const MatrixView& a);
 /// Eigenvalues of a symmetric matrix, in increasing order. Only the lower triangle is read.
 Eigen::VectorXd symmetric_eigenvalues(const MatrixView& a);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -4,9 +4,7 @@
 
 #include <limits>
 
-#include "backlash_diagnosis/base/error.h"
-
-namespace backlash {
+namespace backlash::signal {
 
 /// A value and its standard error, both in the same unit; NaN: not known.
 struct Measured {
@@ -14,11 +12,4 @@ struct Measured {
   double standard_error = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Thrown by a procedure where the record does not contain the information it needs; the message says why in
-/// one sentence and with figures.
-class CannotIdentify : public Error {
- public:
-  using Error::Error;
-};
-
-}  // namespace backlash
+}  // namespace backlash::signal

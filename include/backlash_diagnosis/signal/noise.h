@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Differences of `order`: 1 x[k+1] - x[k], 2 x[k+2] - 2 x[k+1] + x[k], and so on. Empty where the values are
 /// too few.
@@ -39,4 +39,4 @@ NoiseRange estimate_noise(const std::vector<double>& signal, double samples_per_
 /// the standard deviation to about one half, see test_noise.cpp.
 NoiseRange with_standard_error(const NoiseRange& range, std::size_t samples);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// The value below which `fraction` [0, 1] of the values lie, linear between neighbours: of n sorted values
 /// the one at place fraction * (n - 1), from 0 (Hyndman and Fan 1996, definition 7; the default of R and
@@ -31,4 +31,4 @@ constexpr double kNormalPerMedianDeviation = 1.482602218505602;
 /// where none changes.
 double smallest_step(const std::vector<double>& values, double rounding = 0);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Solutions of a x^2 + b x + c <= 0 within [0, 1], as up to two intervals in increasing order.
 std::vector<std::pair<double, double>> quadratic_at_most_zero(double a, double b, double c);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Location and scale of values of which a minority may be wrong.
 struct RobustScale {
@@ -19,4 +19,4 @@ struct RobustScale {
 /// `floor` [unit of the values, >= 0] is the smallest difference that may count as one.
 RobustScale robust_scale(const std::vector<double>& values, double floor);
 
-}  // namespace backlash
+}  // namespace backlash::signal

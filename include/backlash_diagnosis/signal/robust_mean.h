@@ -4,9 +4,10 @@
 
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::signal {
 
 struct RobustMean : Measured {
   std::vector<std::size_t> outliers;  // values beyond three standard deviations
@@ -19,4 +20,4 @@ struct RobustMean : Measured {
 /// values.
 RobustMean robust_mean(const std::vector<Measured>& values);
 
-}  // namespace backlash
+}  // namespace backlash::signal

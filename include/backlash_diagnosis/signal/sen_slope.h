@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 class SenSlope {
  public:
@@ -26,4 +26,4 @@ class SenSlope {
   double variance_ = 0;         // of Kendall's statistic
 };
 
-}  // namespace backlash
+}  // namespace backlash::signal

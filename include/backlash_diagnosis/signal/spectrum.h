@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// X[k] = sum over n of x[n] exp(-j 2 pi k n / N), k = 0 ... N/2. Fast where N has small prime factors.
 std::vector<std::complex<double>> fourier_transform(const std::vector<double>& x);
@@ -42,4 +42,4 @@ struct WelchSpectra {
 WelchSpectra welch(const std::vector<double>& x, const std::vector<double>& y, double interval,
                    std::size_t segment);
 
-}  // namespace backlash
+}  // namespace backlash::signal

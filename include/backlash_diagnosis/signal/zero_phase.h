@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace backlash {
+namespace backlash::signal {
 
 /// Butterworth low-pass of order 4, forward and backward: gain 1 / (1 + (tan(pi f T) / tan(pi f_c T))^8), no
 /// phase shift, half of the amplitude at the cutoff f_c [Hz]. `interval` T [s]. The ends are continued by
@@ -20,4 +20,4 @@ std::vector<double> derivative(const std::vector<double>& values, double interva
 /// (Catmull-Rom); beyond the ends the first or last value.
 std::vector<double> delayed(const std::vector<double>& values, double samples);
 
-}  // namespace backlash
+}  // namespace backlash::signal

@@ -19,7 +19,7 @@
 
 #include "backlash_diagnosis/model/rig.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 /// Columns of equal length, at the load side.
 struct RecordedMotion {
@@ -44,26 +44,26 @@ struct DrivenLoad {
 /// All that acts on the motor but its torque and inertia.
 struct MotorTorques {
   std::vector<double> mean;  // N m, with the mesh, without dry friction; weighted as above
-  std::vector<FrictionLimits> friction;
+  std::vector<model::FrictionLimits> friction;
 };
 
 /// Typical k [1/s].
 constexpr double kLoadFeedback = 50;
 
 /// Whether the load has a motion of its own to be simulated.
-bool load_moves_freely(const Rig& rig);
+bool load_moves_freely(const model::Rig& rig);
 
 /// Throws InvalidParameter for a rig with flexible couplings or a contact law that needs touches;
 /// IntegrationError where the load runs away.
-DrivenLoad simulate_driven_load(const Rig& rig, const RecordedMotion& motion,
+DrivenLoad simulate_driven_load(const model::Rig& rig, const RecordedMotion& motion,
                                 double feedback = kLoadFeedback);
 
 /// Whether the loads of both rigs move equally when the motor moves equally. False where any member of Rig
 /// differs but those that are known to act on the motor or on what is shown only.
-bool moves_same_load(const Rig& a, const Rig& b);
+bool moves_same_load(const model::Rig& a, const model::Rig& b);
 
 /// Beside a load that has been simulated with this motion, by a rig that may differ in what does not move the
 /// load.
-MotorTorques motor_torques(const Rig& rig, const RecordedMotion& motion, const DrivenLoad& load);
+MotorTorques motor_torques(const model::Rig& rig, const RecordedMotion& motion, const DrivenLoad& load);
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/simulation/excitation.h"
 #include "backlash_diagnosis/simulation/integrator.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 /// By the explicit pair of Tsitouras (2011), which stands beside SUNDIALS here because a step of a few rigs
 /// in vector registers is shorter than the library's own work for one. The tolerances are those of `solver`,
@@ -21,11 +21,12 @@ class Ensemble {
   /// Whether these can be moved at once: smooth trains (GearTrain::smooth()) of one layout with contact laws
   /// of one exponent (ContactLaw::power_contact()), and an excitation that asks nothing of the machine.
   /// Others need a Plant each.
-  static bool takes(const std::vector<Rig>& rigs, const ExcitationSettings& excitation);
+  static bool takes(const std::vector<model::Rig>& rigs, const ExcitationSettings& excitation);
 
   /// All at rest in the middle of their gaps at time 0, as Plant. Throws InvalidParameter where takes() says
   /// no.
-  Ensemble(const std::vector<Rig>& rigs, const ExcitationSettings& excitation, const SolverSettings& solver);
+  Ensemble(const std::vector<model::Rig>& rigs, const ExcitationSettings& excitation,
+           const SolverSettings& solver);
   ~Ensemble();
 
   /// Moves all on to t [s], not before time(). At a switch of the torque it is that after it. Throws
@@ -34,7 +35,7 @@ class Ensemble {
 
   std::size_t size() const { return trains_.size(); }
   double time() const { return time_; }
-  Observation observe(std::size_t rig) const;
+  model::Observation observe(std::size_t rig) const;
   /// 2 dof numbers of one rig, as Plant::state().
   std::vector<double> state(std::size_t rig) const;
   long steps() const;  // of all groups of rigs that share their steps
@@ -42,7 +43,7 @@ class Ensemble {
  private:
   struct Group;
 
-  std::vector<GearTrain> trains_;
+  std::vector<model::GearTrain> trains_;
   bool at_load_;
   std::unique_ptr<Excitation> excitation_;
   std::vector<Group> groups_;
@@ -50,4 +51,4 @@ class Ensemble {
   long segment_ = 0;
 };
 
-}  // namespace backlash
+}  // namespace backlash::simulation

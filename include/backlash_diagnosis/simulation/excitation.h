@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/model/gear_train.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 class Excitation {
  public:
@@ -28,7 +28,7 @@ class Excitation {
 
   /// Called at the start of each segment, before its torque is needed, with what can be seen of the machine.
   /// A closed loop decides here.
-  virtual void begin_segment(long /*segment*/, const Observation& /*machine*/) {}
+  virtual void begin_segment(long /*segment*/, const model::Observation& /*machine*/) {}
 
   /// Time [s] within which the torque may rise and fall again inside a segment; infinite where it does not.
   virtual double shortest_period(long segment) const;
@@ -119,4 +119,4 @@ struct ExcitationSettings {
 
 ExcitationSettings read_excitation(const YamlReader& yaml);
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -16,7 +16,7 @@
 
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 struct SolverSettings {
   std::string method = "dormand_prince";  // one of integrator_methods()
@@ -82,4 +82,4 @@ class Integrator {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::simulation

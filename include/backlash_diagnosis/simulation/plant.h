@@ -9,16 +9,16 @@
 #include "backlash_diagnosis/simulation/excitation.h"
 #include "backlash_diagnosis/simulation/integrator.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 /// Where the contact law depends on how a contact began, each touch of a flank is found, told to the gear
 /// train and started from; other laws are simply integrated through. Dry friction likewise: each standstill
 /// and each break-away is found, so that a body that sticks stays exactly where it is.
 class Plant {
  public:
-  using State = std::array<double, GearTrain::kMaxStates>;
+  using State = std::array<double, model::GearTrain::kMaxStates>;
 
-  Plant(const Rig& rig, const ExcitationSettings& excitation, const SolverSettings& solver);
+  Plant(const model::Rig& rig, const ExcitationSettings& excitation, const SolverSettings& solver);
   Plant(const Plant&) = delete;  // the integrator refers to this object
   Plant& operator=(const Plant&) = delete;
 
@@ -40,15 +40,15 @@ class Plant {
 
   double time() const { return time_; }
   const State& state() const { return state_; }
-  const GearTrain& gear_train() const { return gear_train_; }
+  const model::GearTrain& gear_train() const { return gear_train_; }
   double excitation_period() const { return excitation_->period(); }
-  AppliedTorque applied_torque() const { return applied_torque(time_); }
+  model::AppliedTorque applied_torque() const { return applied_torque(time_); }
   double motor_torque() const { return applied_torque().motor; }
-  Observation observe() const { return gear_train_.observe(state_.data(), applied_torque(), time_); }
+  model::Observation observe() const { return gear_train_.observe(state_.data(), applied_torque(), time_); }
   IntegratorStatistics statistics() const { return integrator_.statistics(); }
 
  private:
-  AppliedTorque applied_torque(double t) const;
+  model::AppliedTorque applied_torque(double t) const;
   State held(const double* state) const;
   void derivative(double t, const double* state, double* rate) const;
   void events(double t, const double* state, double* values) const;
@@ -57,7 +57,7 @@ class Plant {
   void begin();
   void integrate_to(double t);
 
-  GearTrain gear_train_;
+  model::GearTrain gear_train_;
   ExcitationSettings excitation_settings_;
   std::unique_ptr<Excitation> excitation_;
   Integrator integrator_;
@@ -67,4 +67,4 @@ class Plant {
   double initial_backlash_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -16,7 +16,7 @@
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 struct SensorSettings {
   double noise = 0;       // standard deviation, white Gaussian, unit of the channel
@@ -30,10 +30,12 @@ struct SensorSettings {
 struct SensorsSettings {
   double sampling_rate = 1000;  // Hz
   std::uint64_t seed = 1;
-  std::array<SensorSettings, kChannelCount> channels;  // indexed by Channel
+  std::array<SensorSettings, record::kChannelCount> channels;  // indexed by Channel
 
-  const SensorSettings& of(Channel channel) const { return channels[static_cast<std::size_t>(channel)]; }
-  SensorSettings& of(Channel channel) { return channels[static_cast<std::size_t>(channel)]; }
+  const SensorSettings& of(record::Channel channel) const {
+    return channels[static_cast<std::size_t>(channel)];
+  }
+  SensorSettings& of(record::Channel channel) { return channels[static_cast<std::size_t>(channel)]; }
 };
 
 SensorsSettings read_sensors(const YamlReader& yaml);
@@ -46,19 +48,20 @@ class SensorModel {
   void reset();
 
   /// Another standard deviation from the next value on; throws InvalidParameter unless it is >= 0.
-  void set_noise(Channel channel, double noise);
+  void set_noise(record::Channel channel, double noise);
   const SensorsSettings& settings() const { return settings_; }
 
-  double measure(Channel channel, double exact);
+  double measure(record::Channel channel, double exact);
 
   /// Every value of an observation through its sensor; a NaN (no such sensor) stays NaN.
-  Observation measure(const Observation& exact);
+  model::Observation measure(const model::Observation& exact);
 
  private:
   void seed(std::size_t channel);
 
   SensorsSettings settings_;
-  std::array<std::optional<Random>, kChannelCount> noise_;  // of channels that have noise: seeding costs
+  std::array<std::optional<Random>, record::kChannelCount>
+      noise_;  // of channels that have noise: seeding costs
 };
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "backlash_diagnosis/simulation/sensor_model.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 /// The test run that a rig file describes (`excitation`, `sensors`, `solver`).
 struct SimulationSettings {
@@ -27,11 +27,11 @@ SimulationSettings read_simulation_settings(const YamlReader& yaml);
 
 class Simulation {
  public:
-  Simulation(const Rig& rig, const SimulationSettings& settings);
+  Simulation(const model::Rig& rig, const SimulationSettings& settings);
 
   /// Measures sample number index() at time index() / sampling_rate, then moves on to the next one. The first
   /// sample is the rig at rest in the middle of its gap at time 0. Throws IntegrationError.
-  Observation step();
+  model::Observation step();
 
   long index() const { return index_; }
   double sampling_rate() const { return rate_; }
@@ -44,22 +44,22 @@ class Simulation {
   void reset();
 
  private:
-  Observation observe();
+  model::Observation observe();
   void forget();
 
   Plant plant_;
   SensorModel sensors_;
   double rate_;
-  double delay_;                  // s, Sensing::torque_delay
-  long late_samples_;             // |delay| is so many samples
-  double after_sample_;           // s, less this
-  std::deque<Observation> past_;  // the next late_samples_ as they were |delay| before their stamps
+  double delay_;                         // s, Sensing::torque_delay
+  long late_samples_;                    // |delay| is so many samples
+  double after_sample_;                  // s, less this
+  std::deque<model::Observation> past_;  // the next late_samples_ as they were |delay| before their stamps
   long index_ = 0;
 };
 
 /// Runs a rig for `duration` [s] and returns all that its sensors measured. Deterministic for a seed.
 /// Throws IntegrationError; Cancelled when `progress` returns false.
-Record simulate_record(const Rig& rig, const SimulationSettings& settings, double duration,
-                       const Progress& progress = nullptr);
+record::Record simulate_record(const model::Rig& rig, const SimulationSettings& settings, double duration,
+                               const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 struct CurveRequest {
   int points = 41;             // >= 2
@@ -29,12 +29,13 @@ double nominal_sampling_rate(double interval);
 
 /// Throws InvalidParameter (also where the rig declares no APD or an excitation without period),
 /// IntegrationError, Cancelled. Uses all processors; the result does not depend on their number.
-MonitoringCurve build_curve(const RigFile& file, const CurveRequest& request,
-                            const Progress& progress = nullptr);
+diagnosis::MonitoringCurve build_curve(const rig_file::RigFile& file, const CurveRequest& request,
+                                       const Progress& progress = nullptr);
 
 /// Warning about a curve that is used with a rig: empty, or that it was made from
 /// another version of the rig file. Throws BadData naming `source` where it contradicts the geometry of the
 /// rig.
-std::string check_curve(const MonitoringCurve& curve, const RigFile& rig, const std::string& source);
+std::string check_curve(const diagnosis::MonitoringCurve& curve, const rig_file::RigFile& rig,
+                        const std::string& source);
 
-}  // namespace backlash
+}  // namespace backlash::studies

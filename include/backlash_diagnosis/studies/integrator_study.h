@@ -15,7 +15,7 @@
 #include "backlash_diagnosis/studies/tooth_impact.h"
 #include "backlash_diagnosis/studies/work_precision.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 struct IntegratorStudySettings {
   std::vector<Tooth> teeth;
@@ -83,19 +83,19 @@ struct IntegratorStudy {
 /// comes back to the other flank; Cancelled.
 void study_tooth(const Tooth& tooth, const IntegratorStudySettings& settings, IntegratorStudy& study,
                  const std::function<void()>& tick = nullptr,
-                 const std::vector<std::string>& methods = integrator_methods());
+                 const std::vector<std::string>& methods = simulation::integrator_methods());
 
 /// End states of the impacts from all starts.
 WorkPrecision impact_work(const Tooth& tooth, int starts, const std::function<void()>& tick = nullptr);
 
 /// Signal of the input coupling (rigid: motor position) at the rig's sampling rate, from rest in the middle
 /// of the gap. The absolute tolerances keep their proportion to the relative one.
-WorkPrecision rig_work(const RigFile& file, double half_gap, double duration, WorkPoint& declared,
+WorkPrecision rig_work(const rig_file::RigFile& file, double half_gap, double duration, WorkPoint& declared,
                        const std::function<void()>& tick = nullptr,
-                       const std::vector<std::string>& methods = integrator_methods());
+                       const std::vector<std::string>& methods = simulation::integrator_methods());
 
 /// All of it. Deterministic but for the CPU times. Throws IntegrationError, InvalidParameter, Cancelled.
-IntegratorStudy study_integrators(const RigFile& file, const IntegratorStudySettings& settings,
+IntegratorStudy study_integrators(const rig_file::RigFile& file, const IntegratorStudySettings& settings,
                                   const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::studies

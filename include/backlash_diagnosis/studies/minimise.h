@@ -18,7 +18,7 @@
 
 #include "backlash_diagnosis/base/progress.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 struct MinimiseSettings {
   std::uint64_t seed = 1;
@@ -45,4 +45,4 @@ MinimiseResult minimise(const std::function<double(const std::vector<double>&)>&
                         std::size_t dimensions, const MinimiseSettings& settings,
                         const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::studies

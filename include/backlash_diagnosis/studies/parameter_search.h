@@ -20,7 +20,7 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/studies/minimise.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 /// A value of the rig file that the search may choose: within bounds, or one of a list.
 struct FreeParameter {
@@ -77,7 +77,7 @@ struct CurveFit {
 };
 
 /// Simulates and reads a rig with its own class layout. Throws InvalidParameter, IntegrationError.
-CurveFit fit_of(const RigFile& file, const CurveTarget& target);
+CurveFit fit_of(const rig_file::RigFile& file, const CurveTarget& target);
 
 struct SearchResult {
   std::string rig_text;  // the rig file found, without its head comment; comments mark the parameters that
@@ -92,4 +92,4 @@ struct SearchResult {
 /// Throws BadData (a parameter that the rig file does not know), InvalidParameter, Cancelled.
 SearchResult search_parameters(const SearchFile& search, const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -20,11 +20,11 @@
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 /// The machine that is recorded, other than the curve believes.
 struct DisturbedMachine {
-  RigFile file;
+  rig_file::RigFile file;
   double noise = 0;  // standard deviation, of the signal's rms
   double load = 0;   // constant torque on the motor from outside, which motor_torque does not show; of the
                      // largest motor torque of the curve
@@ -40,7 +40,7 @@ struct Disturbance {
 
 /// sensor_noise, motor_viscous_damping, load_torque, coupling_stiffness: those that the rig can have, with
 /// the levels of the map.
-std::vector<Disturbance> disturbances_of(const RigFile& file);
+std::vector<Disturbance> disturbances_of(const rig_file::RigFile& file);
 
 struct SeparabilityRequest {
   int backlash_values = 17;  // >= 2, evenly over the curve
@@ -52,12 +52,12 @@ struct SeparabilityRequest {
 
 /// What a method said about the records of a cell.
 struct SeparabilityAnswer {
-  int right = 0;               // status ok and the 95 % interval holds the truth
-  int wrong = 0;               // it does not; or above_range with a lower bound above the truth
-  int refused = 0;             // any other status
-  double error = kNaN;         // m, median of estimate (or that bound) - truth where not refused
-  Status status = Status::ok;  // the most frequent one
-  std::string reason;          // of the first record with it, where it is not ok
+  int right = 0;        // status ok and the 95 % interval holds the truth
+  int wrong = 0;        // it does not; or above_range with a lower bound above the truth
+  int refused = 0;      // any other status
+  double error = kNaN;  // m, median of estimate (or that bound) - truth where not refused
+  diagnosis::Status status = diagnosis::Status::ok;  // the most frequent one
+  std::string reason;                                // of the first record with it, where it is not ok
 };
 
 struct SeparabilityCell {
@@ -82,8 +82,8 @@ struct Separability {
 
 /// Records at the sampling rate of the curve. Throws InvalidParameter, IntegrationError, Cancelled.
 /// Deterministic for a seed, on any number of processors; a cell does not depend on the others.
-Separability map_separability(const RigFile& file, const MonitoringCurve& curve,
+Separability map_separability(const rig_file::RigFile& file, const diagnosis::MonitoringCurve& curve,
                               const std::vector<Disturbance>& disturbances,
                               const SeparabilityRequest& request, const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::studies

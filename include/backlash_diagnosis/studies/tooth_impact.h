@@ -15,7 +15,7 @@
 #include "backlash_diagnosis/model/contact_law.h"
 #include "backlash_diagnosis/simulation/integrator.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 /// What a tooth is and how it starts: `distance` before the forward flank, moving towards it with `speed`.
 struct Tooth {
@@ -63,15 +63,15 @@ class ToothSimulator {
   /// `samples` >= 1 after the start. Throws IntegrationError.
   ToothMotion run(int samples);
 
-  IntegratorStatistics statistics() const { return integrator_.statistics(); }
+  simulation::IntegratorStatistics statistics() const { return integrator_.statistics(); }
 
  private:
   double contact_force(double x, double speed) const;
   double energy(double x, double speed) const;
 
   Tooth tooth_;
-  std::shared_ptr<const ContactLaw> law_;
-  Integrator integrator_;
+  std::shared_ptr<const model::ContactLaw> law_;
+  simulation::Integrator integrator_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 struct StudyRequest {
   int records = 600;           // >= 1
@@ -32,12 +32,12 @@ struct StudyTrial {
   double noise = 0;     // of the signal's rms
   int periods = 0;
   bool position = true;  // false: the signal alone
-  std::vector<Estimate> estimates;
+  std::vector<diagnosis::Estimate> estimates;
 };
 
 /// Throws InvalidParameter, IntegrationError, Cancelled. Deterministic for a seed, on any number of
 /// processors.
-std::vector<StudyTrial> run_study(const RigFile& file, const MonitoringCurve& curve,
+std::vector<StudyTrial> run_study(const rig_file::RigFile& file, const diagnosis::MonitoringCurve& curve,
                                   const StudyRequest& request, const Progress& progress = nullptr);
 
 /// Results of a method over a group of trials.
@@ -58,7 +58,7 @@ std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, boo
 
 /// Records that were not taken under the conditions of the curve: amplitude, frequency, sampling, saturation,
 /// free output, constant torque, too short, above the range; `records` of each, with random backlash.
-std::vector<StudyTrial> run_variants(const RigFile& file, const MonitoringCurve& curve,
+std::vector<StudyTrial> run_variants(const rig_file::RigFile& file, const diagnosis::MonitoringCurve& curve,
                                      const StudyRequest& request, int records,
                                      const Progress& progress = nullptr);
 
@@ -71,4 +71,4 @@ struct VariantRow {
 };
 std::vector<VariantRow> summarise_variants(const std::vector<StudyTrial>& trials);
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/simulation/integrator.h"
 
-namespace backlash {
+namespace backlash::studies {
 
 struct WorkPoint {
   std::string method;
@@ -22,7 +22,7 @@ struct WorkPoint {
 
 /// What a solver at a relative tolerance makes of the problem: numbers of comparable size.
 using Solve = std::function<std::vector<double>(const std::string& method, double relative_tolerance,
-                                                IntegratorStatistics& statistics)>;
+                                                simulation::IntegratorStatistics& statistics)>;
 
 enum class Cost { evaluations, cpu_time };
 
@@ -32,7 +32,7 @@ class WorkPrecision {
   /// reference) / norm(reference) for the error. The reference is verner at 1e-13, agreement() its error
   /// against dormand_prince at 1e-13. `tick` is called after each method. Throws what `solve` throws.
   WorkPrecision(std::string problem, const Solve& solve, const std::function<void()>& tick,
-                const std::vector<std::string>& methods = integrator_methods());
+                const std::vector<std::string>& methods = simulation::integrator_methods());
 
   /// One more point with the same reference.
   WorkPoint measure(const Solve& solve, const std::string& method, double relative_tolerance) const;
@@ -56,4 +56,4 @@ class WorkPrecision {
   std::vector<WorkPoint> points_;  // method by method, from loose to tight
 };
 
-}  // namespace backlash
+}  // namespace backlash::studies

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/simulation/driven_load.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 double least_gain_in_noise(const RecordSet& records, const SearchSettings& settings) {
   const AcceptanceSettings& a = settings.acceptance;
@@ -23,7 +23,7 @@ std::string objection(const Gain& gain, const Machine& after, const RecordSet& r
   const bool clear = (gain.deflection ? left.deflection : left.torque) < a.near_floor;
   const bool noise = (gain.deflection ? left.deflection_share : left.torque_share) > a.noise;
   // Of a machine with one channel the friction is never quite what a term says, and that shows.
-  const bool one_channel = !load_moves_freely(after.rig);
+  const bool one_channel = !simulation::load_moves_freely(after.rig);
   const double least = !clear || one_channel ? settings.asked.least_gain_unclear
                        : noise               ? least_gain_in_noise(records, settings)
                                              : settings.asked.least_gain;
@@ -42,4 +42,4 @@ std::string objection(const Gain& gain, const Machine& after, const RecordSet& r
   return "";
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

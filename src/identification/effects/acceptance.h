@@ -6,7 +6,7 @@
 
 #include "hypothesis.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Gain that is enough in a residual that is mostly noise, where a clear effect is a small part of it: as
 /// much as noise itself hardly ever gains. Of n independent values of a channel noise gains sure^2 / (2 n).
@@ -16,4 +16,4 @@ double least_gain_in_noise(const RecordSet& records, const SearchSettings& setti
 std::string objection(const Gain& gain, const Machine& after, const RecordSet& records,
                       const SearchSettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::identification

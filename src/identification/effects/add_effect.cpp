@@ -8,7 +8,7 @@
 #include "steps.h"
 #include "trial.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 bool nothing_can_be_found(const Misfit& m, const SearchSettings& settings) {
@@ -92,4 +92,4 @@ Hypothesis add_effects_or_teeth(const Hypothesis& before, const SearchContext& c
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

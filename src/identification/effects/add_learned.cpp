@@ -8,7 +8,7 @@
 #include "steps.h"
 #include "trial.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 std::vector<std::string> nearest_effects(const Hypothesis& h, const SearchContext& context) {
@@ -22,7 +22,7 @@ std::vector<std::string> nearest_effects(const Hypothesis& h, const SearchContex
 /// such a rest.
 Hypothesis without_stand_ins(const Hypothesis& named, const SearchContext& context) {
   Hypothesis h = named;
-  if (!load_moves_freely(h.declared->rig)) return h;
+  if (!simulation::load_moves_freely(h.declared->rig)) return h;
   for (std::size_t i = h.effects.size(); i-- > 0;)
     if (i < h.effects.size() && h.effects[i].gain.evidence.gain < context.settings.revision.half)
       h = without_effect(h, i, context);
@@ -80,4 +80,4 @@ Hypothesis add_learned(const Hypothesis& named, const SearchContext& context) {
   return helped ? with_rejected(rest, map_term().id, "leaves hardly less than the named effects do") : rest;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

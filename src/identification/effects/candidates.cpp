@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "orthogonal_part.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 double deviation(const std::vector<double>& x) {
@@ -21,7 +21,8 @@ double deviation(const std::vector<double>& x) {
 }
 
 /// All values that one term is tried with, without strength and phase.
-std::vector<ParameterValues> combinations(const TermType& type, const MotionRange& range, bool load_moves) {
+std::vector<ParameterValues> combinations(const model::TermType& type, const model::MotionRange& range,
+                                          bool load_moves) {
   std::vector<ParameterValues> all(1);
   const auto extend = [&](const auto& options, const auto& set) {
     std::vector<ParameterValues> longer;
@@ -35,14 +36,15 @@ std::vector<ParameterValues> combinations(const TermType& type, const MotionRang
     if (!load_moves && spec.name == "body") words = {"motor"};
     extend(words, [&](ParameterValues& v, const std::string& word) { v.set_choice(spec.name, word); });
   }
-  for (const TermShape& shape : type.search->shapes)
+  for (const model::TermShape& shape : type.search->shapes)
     extend(shape.values(range), [&](ParameterValues& v, double value) { v[shape.name] = value; });
   return all;
 }
 
 /// The directions in which a combination can change the residuals: one, or sine and cosine.
-std::vector<ParameterValues> probes(const TermType& type, const ParameterValues& shape, double strength) {
-  const TermSearch& search = *type.search;
+std::vector<ParameterValues> probes(const model::TermType& type, const ParameterValues& shape,
+                                    double strength) {
+  const model::TermSearch& search = *type.search;
   std::vector<ParameterValues> all(search.phase.empty() ? 1 : 2, shape);
   for (ParameterValues& p : all) p[search.strength] = strength;
   if (all.size() == 1) return all;
@@ -52,7 +54,7 @@ std::vector<ParameterValues> probes(const TermType& type, const ParameterValues&
 }
 
 struct Probed {
-  const TermType* type;
+  const model::TermType* type;
   ParameterValues shape;
   std::string group;        // kind and choices
   double strength;          // of the probes
@@ -64,8 +66,8 @@ void probe(Probed& p, const MachineFit& fit, const RecordSet& records, const Ort
   const std::vector<ParameterValues> all = probes(*p.type, p.shape, p.strength);
   p.columns.resize(now.size(), Eigen::Index(all.size()));
   for (std::size_t i = 0; i < all.size(); ++i) {
-    Rig rig = fit.machine.rig;
-    rig.terms.push_back(make_term(p.type->id, all[i]));
+    model::Rig rig = fit.machine.rig;
+    rig.terms.push_back(model::make_term(p.type->id, all[i]));
     const Eigen::VectorXd change = records.rows(rig, fit.machine.calibrations) - now;
     Eigen::VectorXd left = orthogonal.of(change);
     if (left.norm() < telling * change.norm() || change.norm() == 0) left.setZero();
@@ -81,14 +83,14 @@ struct Explained {
 
 Explained explain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& left) {
   Explained e;
-  e.factors = solve_least_squares(columns, -left).x;
+  e.factors = signal::solve_least_squares(columns, -left).x;
   e.gain = 1 - (left + columns * e.factors).norm() / left.norm();
   return e;
 }
 
 /// Strength and phase from the factors of one term's probes; false where the strength cannot be negative.
 bool set_strength(const Probed& p, const double* factors, ParameterValues& values) {
-  const TermSearch& search = *p.type->search;
+  const model::TermSearch& search = *p.type->search;
   values = p.shape;
   if (p.columns.cols() == 2) {
     values[search.strength] = p.strength * std::hypot(factors[0], factors[1]);
@@ -125,10 +127,10 @@ void keep_better(std::map<std::string, Candidate>& best, const std::string& grou
   if (!first && candidate.gain > at->second.gain) at->second = candidate;
 }
 
-std::vector<Probed> all_probes(const Rig& rig, const MotionRange& range, double share) {
+std::vector<Probed> all_probes(const model::Rig& rig, const model::MotionRange& range, double share) {
   std::vector<Probed> all;
-  const bool load = load_moves_freely(rig);
-  for (const TermType& type : term_types()) {
+  const bool load = simulation::load_moves_freely(rig);
+  for (const model::TermType& type : model::term_types()) {
     if (!type.search) continue;
     if (rig.link_locked && type.search->needs_turning_link) continue;
     const double strength = share * type.search->typical(range);
@@ -144,8 +146,8 @@ std::vector<Probed> all_probes(const Rig& rig, const MotionRange& range, double 
 
 }  // namespace
 
-MotionRange motion_range(const std::vector<ServoData>& records) {
-  MotionRange range;
+model::MotionRange motion_range(const std::vector<ServoData>& records) {
+  model::MotionRange range;
   range.from = INFINITY, range.to = -INFINITY;
   for (const ServoData& d : records) {
     range.torque = std::max(range.torque, deviation(d.torque));
@@ -163,8 +165,8 @@ MotionRange motion_range(const std::vector<ServoData>& records) {
   return range;
 }
 
-std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range,
-                              const ScreenSettings& settings) {
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
+                              const model::MotionRange& range, const ScreenSettings& settings) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
   const OrthogonalPart orthogonal(fit, now.size());
   const Eigen::VectorXd& left = orthogonal.residuals();
@@ -193,17 +195,17 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, c
   return sorted;
 }
 
-Machine with_candidate(Machine machine, const Candidate& candidate, const MotionRange& range) {
-  const TermSearch& search = *term_type(candidate.id).search;
+Machine with_candidate(Machine machine, const Candidate& candidate, const model::MotionRange& range) {
+  const model::TermSearch& search = *model::term_type(candidate.id).search;
   for (const ParameterValues& values : candidate.terms) {
     const std::size_t place = machine.rig.terms.size();
-    machine.rig.terms.push_back(make_term(candidate.id, values));
+    machine.rig.terms.push_back(model::make_term(candidate.id, values));
     const auto fit = [&](const std::string& name, double scale) {
       machine.parameters.push_back(term_parameter(place, name, machine.rig, scale));
     };
     fit(search.strength, search.typical(range));
     if (!search.phase.empty()) fit(search.phase, 1);
-    for (const TermShape& shape : search.shapes) {
+    for (const model::TermShape& shape : search.shapes) {
       if (!shape.refined) continue;
       const std::vector<double> grid = shape.values(range);
       fit(shape.name, grid.size() > 1 ? std::fabs(grid[1] - grid[0]) : 1);
@@ -212,4 +214,4 @@ Machine with_candidate(Machine machine, const Candidate& candidate, const Motion
   return machine;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/model/term.h"
 #include "search_settings.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// One or two terms of the same kind, with a start for what is fitted.
 struct Candidate {
@@ -21,13 +21,13 @@ struct Candidate {
 
 /// The best candidate of each kind and choice, best first. `fit` is the present fit with its sensitivities.
 /// What a change of the fitted parameters explains is not counted as a gain of a candidate.
-std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records, const MotionRange& range,
-                              const ScreenSettings& settings);
+std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
+                              const model::MotionRange& range, const ScreenSettings& settings);
 
 /// The machine with this candidate's terms, whose strengths, phases and refined shapes are fitted as well.
-Machine with_candidate(Machine machine, const Candidate& candidate, const MotionRange& range);
+Machine with_candidate(Machine machine, const Candidate& candidate, const model::MotionRange& range);
 
 /// Of all records together.
-MotionRange motion_range(const std::vector<ServoData>& records);
+model::MotionRange motion_range(const std::vector<ServoData>& records);
 
-}  // namespace backlash
+}  // namespace backlash::identification

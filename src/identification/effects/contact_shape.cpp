@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-namespace backlash {
+namespace backlash::identification {
 
-std::optional<Rig> with_hertzian_teeth(const Rig& rig, double torque) {
-  const ContactSpec& linear = rig.mesh.contact_spec;
+std::optional<model::Rig> with_hertzian_teeth(const model::Rig& rig, double torque) {
+  const model::ContactSpec& linear = rig.mesh.contact_spec;
   if (rig.mesh.rigid || linear.law != "linear" || !(torque > 0)) return std::nullopt;
   const double stiffness = linear.values.at("stiffness"), damping = linear.values.at("damping");
   const double force = torque / rig.mesh.lever(), depth = force / stiffness;
@@ -14,10 +14,10 @@ std::optional<Rig> with_hertzian_teeth(const Rig& rig, double torque) {
   values["stiffness"] = stiffness / std::sqrt(depth);
   values["exponent"] = 1.5;
   values["alpha"] = damping / (1.5 * force);
-  Rig other = rig;
+  model::Rig other = rig;
   other.mesh.contact_spec = {"hunt_crossley", values};
-  other.mesh.contact = make_contact_law("hunt_crossley", values);
+  other.mesh.contact = model::make_contact_law("hunt_crossley", values);
   return other;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

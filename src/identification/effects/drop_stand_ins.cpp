@@ -4,14 +4,14 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 // Friction of a machine with one channel is never quite what a term says, and its residual never at the
 // floor; there what was found stands, and what remains is told beside it.
 Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context) {
   const double half = context.settings.revision.half;
   const Misfit& left = misfit(h);
-  if (!load_moves_freely(h.declared->rig) || h.effects.empty()) return h;
+  if (!simulation::load_moves_freely(h.declared->rig) || h.effects.empty()) return h;
   if (std::max(left.torque, left.deflection) < context.settings.acceptance.near_floor) return h;
   const bool telling = std::any_of(h.effects.begin(), h.effects.end(),
                                    [&](const Effect& effect) { return effect.gain.evidence.gain >= half; });
@@ -26,4 +26,4 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context) {
   return none;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,7 +4,7 @@
 #include "acceptance.h"
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// Whether the others, fitted with the same weights, leave so much more that the effect convinces beside
@@ -66,4 +66,4 @@ Hypothesis drop_superfluous(const Hypothesis& before, const SearchContext& conte
   return h;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

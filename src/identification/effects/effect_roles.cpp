@@ -3,22 +3,22 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 bool is_learned(const std::string& id) {
-  return term_type(id).map.has_value();
+  return model::term_type(id).map.has_value();
 }
 
 bool is_delay(const std::string& id) {
-  return term_type(id).calibrates == Calibrates::torque_delay;
+  return model::term_type(id).calibrates == model::Calibrates::torque_delay;
 }
 
 bool stands_in_for_contact_law(const std::string& id) {
-  return term_type(id).stands_in_for_contact_law;
+  return model::term_type(id).stands_in_for_contact_law;
 }
 
 bool shapes_friction(const std::string& id) {
-  return term_type(id).shapes_friction;
+  return model::term_type(id).shapes_friction;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

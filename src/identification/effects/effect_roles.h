@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Its law is learned from the records.
 bool is_learned(const std::string& id);
@@ -15,4 +15,4 @@ bool stands_in_for_contact_law(const std::string& id);
 /// Every machine's friction has some of it.
 bool shapes_friction(const std::string& id);
 
-}  // namespace backlash
+}  // namespace backlash::identification

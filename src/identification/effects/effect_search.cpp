@@ -14,7 +14,7 @@
 #include "traced_records.h"
 #include "unseen_record.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// Every friction builds up over some path; it is called missing only where that shows.
@@ -27,7 +27,7 @@ void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
   std::string note = "friction builds up after each reversal (" + at->id;
   for (const EffectParameter& p : at->parameters)
     note += fmt::format(", {} {:.3g} +- {:.2g} {}", p.name, p.measured.value, p.measured.standard_error,
-                        axis_unit(p.unit, trace.augmented.linear));
+                        model::axis_unit(p.unit, trace.augmented.linear));
   note += fmt::format("): {:.2g} % of the {}, so it is in the model but not called missing", 100 * share,
                       at->channel);
   trace.notes.push_back(note);
@@ -40,10 +40,11 @@ struct Records {
   ServoData test;
 };
 
-Records records_of(const Rig& rig, const std::vector<Record>& train, const Record& test) {
+Records records_of(const model::Rig& rig, const std::vector<record::Record>& train,
+                   const record::Record& test) {
   if (train.empty()) throw CannotIdentify("no training record");
   Records records;
-  for (const Record& record : train) records.train.push_back(traced_data(record, rig));
+  for (const record::Record& record : train) records.train.push_back(traced_data(record, rig));
   records.test = traced_data(test, rig);
   require_same_rate(records.train, records.test);
   return records;
@@ -85,9 +86,9 @@ void describe_errors(const SearchResult& result, const std::vector<ServoPredicti
 
 }  // namespace
 
-Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Record& test,
-                     const TraceSettings& asked, const Progress& progress) {
-  const Rig declared = load_side(raw);
+Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& train,
+                     const record::Record& test, const TraceSettings& asked, const Progress& progress) {
+  const model::Rig declared = model::load_side(raw);
   const Records records = records_of(raw, train, test);
   SearchSettings settings(asked);
   settings.fit = with_bands(settings.fit, declared, records.train);
@@ -114,4 +115,4 @@ Trace trace_residual(const Rig& raw, const std::vector<Record>& train, const Rec
   return trace;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

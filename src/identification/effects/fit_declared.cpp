@@ -5,13 +5,13 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// All that the rig declares, of the bodies and the mesh that it has.
-bool can_be_fitted(const RigParameter& p, const Rig& rig) {
-  if (p.kind == ParameterKind::start_in_gap || !p.known_to(rig)) return false;
-  if (p.part == RigPart::link && !load_moves_freely(rig)) return false;
+bool can_be_fitted(const rig_file::RigParameter& p, const model::Rig& rig) {
+  if (p.kind == rig_file::ParameterKind::start_in_gap || !p.known_to(rig)) return false;
+  if (p.part == rig_file::RigPart::link && !simulation::load_moves_freely(rig)) return false;
   return p.get(rig) != 0;
 }
 
@@ -28,9 +28,9 @@ void start_in_travel(Machine& machine, const std::vector<ServoData>& data) {
 
 }  // namespace
 
-std::vector<FitParameter> declared_parameters(const Rig& rig) {
+std::vector<FitParameter> declared_parameters(const model::Rig& rig) {
   std::vector<FitParameter> all;
-  for (const RigParameter& declared : servo_parameters()) {
+  for (const rig_file::RigParameter& declared : rig_file::servo_parameters()) {
     if (!can_be_fitted(declared, rig)) continue;
     FitParameter p = machine_parameter(declared.name, rig);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
@@ -44,7 +44,7 @@ std::vector<FitParameter> declared_parameters(const Rig& rig) {
   return all;
 }
 
-Hypothesis fit_declared(const Rig& declared, const SearchContext& context) {
+Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context) {
   Machine machine;
   machine.rig = declared;
   machine.calibrations.resize(context.data.size());
@@ -59,4 +59,4 @@ Hypothesis fit_declared(const Rig& declared, const SearchContext& context) {
   return h;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,22 +8,23 @@
 
 #include "learned.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kWorse = 1.05;  // choice: times the error on the test record: an effect that does harm
 
 /// Of a learned map: where its coordinate reaches and how large it gets.
-void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& effect) {
-  const TermMap& map = *term_type(term.id).map;
-  const MapKind& kind = kind_of(term.values);
+void describe_map(const model::Term& term, std::vector<signal::Measured>& fitted, FoundEffect& effect) {
+  const model::TermMap& map = *model::term_type(term.id).map;
+  const model::MapKind& kind = kind_of(term.values);
   effect.words = {{map.acts_on, kind.acts_on}, {map.coordinate, kind.coordinate}};
   effect.curve_x = term.values.list(map.points);
   effect.curve_y = term.values.list(map.values);
   const std::string &x = kind.coordinate, &unit = kind.coordinate_unit;
   const auto largest = std::max_element(effect.curve_y.begin(), effect.curve_y.end(),
                                         [](double a, double b) { return std::fabs(a) < std::fabs(b); });
-  const Measured at_largest{*largest, fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
+  const signal::Measured at_largest{*largest,
+                                    fitted[std::size_t(largest - effect.curve_y.begin())].standard_error};
   effect.parameters = {{x + "_from", unit, {effect.curve_x.front(), 0}},
                        {x + "_to", unit, {effect.curve_x.back(), 0}},
                        {"largest", kind.unit, at_largest}};
@@ -31,19 +32,19 @@ void describe_map(const Term& term, std::vector<Measured>& fitted, FoundEffect& 
 }
 
 /// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0.
-void describe(const Term& term, const std::string& suffix, std::vector<Measured>& fitted,
+void describe(const model::Term& term, const std::string& suffix, std::vector<signal::Measured>& fitted,
               FoundEffect& effect) {
-  const TermType& type = term_type(term.id);
+  const model::TermType& type = model::term_type(term.id);
   if (type.map) return describe_map(term, fitted, effect);
-  const TermSearch& search = *type.search;
-  std::map<std::string, Measured> found;
+  const model::TermSearch& search = *type.search;
+  std::map<std::string, signal::Measured> found;
   const auto take = [&](const std::string& name) {
     found[name] = fitted.front();
     fitted.erase(fitted.begin());
   };
   take(search.strength);
   if (!search.phase.empty()) take(search.phase);
-  for (const TermShape& shape : search.shapes)
+  for (const model::TermShape& shape : search.shapes)
     if (shape.refined) take(shape.name);
   for (const ParameterSpec& spec : type.parameters) {
     if (!spec.choices.empty()) {
@@ -51,7 +52,8 @@ void describe(const Term& term, const std::string& suffix, std::vector<Measured>
       continue;
     }
     const auto at = found.find(spec.name);
-    const Measured m = at != found.end() ? at->second : Measured{term.values.at(spec.name), 0};
+    const signal::Measured m =
+        at != found.end() ? at->second : signal::Measured{term.values.at(spec.name), 0};
     effect.parameters.push_back({spec.name + suffix, spec.unit, m});
   }
 }
@@ -73,7 +75,7 @@ FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
   const Unknowns unknowns(fitted.start);
   FittedValues out;
   for (std::size_t i = 0; i < fitted.start.parameters.size(); ++i) {
-    const Measured m = unknowns.parameter(fit.fit, i);
+    const signal::Measured m = unknowns.parameter(fit.fit, i);
     if (i < declared)
       out.machine[fitted.start.parameters[i].name] = m;
     else
@@ -82,7 +84,7 @@ FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
   return out;
 }
 
-std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<Measured> fitted,
+std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::Measured> fitted,
                                        const std::vector<ServoPrediction>& on_test) {
   std::vector<FoundEffect> all;
   const auto error = [](const ServoPrediction& p, const std::string& channel) {
@@ -124,4 +126,4 @@ std::vector<std::string> harm_warnings(const std::vector<FoundEffect>& steps) {
   return warnings;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -9,23 +9,23 @@
 
 #include "hypothesis.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Fitted values with standard errors: of the machine by name, of the effects in the order of their fitted
 /// parameters.
 struct FittedValues {
-  std::map<std::string, Measured> machine;
-  std::vector<Measured> effects;
+  std::map<std::string, signal::Measured> machine;
+  std::vector<signal::Measured> effects;
 };
 /// `declared`: how many of the first parameters are the machine's.
 FittedValues fitted_values(const BandFit& fitted, std::size_t declared);
 
 /// One step per effect; a second term of the same kind belongs to the step of the first. `on_test`: as
 /// predicted_by_all() gives it.
-std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<Measured> fitted,
+std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::Measured> fitted,
                                        const std::vector<ServoPrediction>& on_test);
 
 /// Effects are chosen by the training records alone; the test record only judges them.
 std::vector<std::string> harm_warnings(const std::vector<FoundEffect>& steps);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -2,29 +2,30 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// Friction below 0, of one direction or of both: it would drive the body.
-bool drives(const FitParameter& p, const Rig& rig) {
-  const RigParameter& friction = servo_parameter(p.name);
+bool drives(const FitParameter& p, const model::Rig& rig) {
+  const rig_file::RigParameter& friction = rig_file::servo_parameter(p.name);
   if (!friction.is_friction() || friction.is_asymmetry()) return false;
-  const RigParameter* asymmetry = asymmetry_of(friction);
+  const rig_file::RigParameter* asymmetry = rig_file::asymmetry_of(friction);
   return p.get(rig) < (asymmetry ? std::fabs(asymmetry->get(rig)) : 0);
 }
 
 /// The first friction that drives, or the difference of its directions where that is fitted.
 std::optional<FitParameter> negative_friction(const Hypothesis& h) {
   const std::vector<FitParameter>& all = h.declared->parameters;
-  const Rig& rig = h.fitted->fit.machine.rig;
+  const model::Rig& rig = h.fitted->fit.machine.rig;
   const auto negative =
       std::find_if(all.begin(), all.end(), [&](const FitParameter& p) { return drives(p, rig); });
   if (negative == all.end()) return std::nullopt;
   const auto difference = std::find_if(all.begin(), all.end(), [&](const FitParameter& p) {
-    return servo_parameter(p.name).mean == negative->name;
+    return rig_file::servo_parameter(p.name).mean == negative->name;
   });
   return difference != all.end() ? *difference : *negative;
 }
@@ -65,4 +66,4 @@ Hypothesis hold_friction(const Hypothesis& before, const SearchContext& context)
   return h;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

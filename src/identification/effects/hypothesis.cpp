@@ -7,7 +7,7 @@
 #include "effect_roles.h"
 #include "learned.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 bool has(const std::vector<Effect>& effects, const std::string& id) {
@@ -23,8 +23,8 @@ bool has(const std::vector<Effect>& effects, bool (*is)(const std::string& id)) 
 bool takes_noise_away(const std::vector<Effect>& effects, const Misfit& misfit, const MapSettings& settings) {
   return misfit.torque < settings.less_than_noise &&
          std::any_of(effects.begin(), effects.end(), [](const Effect& e) {
-           return is_learned(e.candidate.id) &&
-                  kind_of(e.candidate.terms.front()).coordinate == channel_name(Channel::motor_torque);
+           return is_learned(e.candidate.id) && kind_of(e.candidate.terms.front()).coordinate ==
+                                                    record::channel_name(record::Channel::motor_torque);
          });
 }
 
@@ -111,4 +111,4 @@ std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effe
   return other;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

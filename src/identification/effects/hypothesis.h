@@ -16,7 +16,7 @@
 #include "search_settings.h"
 #include "validation.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// An effect that is in the model.
 struct Effect {
@@ -40,7 +40,7 @@ struct Hypothesis {
 /// What all steps read, and whom they tell. `settings.fit` has its bands.
 struct SearchContext {
   const std::vector<ServoData>& data;
-  MotionRange range;
+  model::MotionRange range;
   SearchSettings settings;
   std::function<void(const std::string& phase)> tell;      // throws Cancelled
   std::function<void(const Hypothesis&)> tell_hypothesis;  // one that was fitted
@@ -79,4 +79,4 @@ auto attempted(const Fit& fit) -> std::optional<decltype(fit())> {
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

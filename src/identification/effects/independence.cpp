@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kBand = 2.576;  // theory: standard deviations of 99 %
@@ -47,4 +47,4 @@ double share_outside_band(const std::vector<double>& residual, const std::vector
   return double(outside) / double(2 * lags + 1);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Share of the lags 0, +-1 ... +-`lags` at which the correlation coefficient of residual and input lies
 /// outside its 99 % band. The band allows for the colour of both (Bartlett 1955): variance sum rho_r(k)
@@ -12,4 +12,4 @@ namespace backlash {
 /// not count is 0.
 double share_outside_band(const std::vector<double>& residual, const std::vector<double>& input, int lags);
 
-}  // namespace backlash
+}  // namespace backlash::identification

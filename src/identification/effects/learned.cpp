@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "orthogonal_part.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr int kPoints = 40;  // choice: of a map; its smoothness is found by cross-validation
@@ -47,9 +47,9 @@ std::vector<double> points_over(std::vector<double> values, double tail) {
   return points;
 }
 
-ParameterValues map_values(const MapKind& kind, const std::vector<double>& points,
+ParameterValues map_values(const model::MapKind& kind, const std::vector<double>& points,
                            std::vector<double> values) {
-  const TermMap& map = *map_term().map;
+  const model::TermMap& map = *map_term().map;
   ParameterValues p;
   p.set_choice(map.acts_on, kind.acts_on);
   p.set_choice(map.coordinate, kind.coordinate);
@@ -59,15 +59,15 @@ ParameterValues map_values(const MapKind& kind, const std::vector<double>& point
 }
 
 /// What is left of the sensitivities to each value of a map.
-Eigen::MatrixXd columns(const MapKind& kind, const std::vector<double>& points, double step,
+Eigen::MatrixXd columns(const model::MapKind& kind, const std::vector<double>& points, double step,
                         const MachineFit& fit, const RecordSet& records, const OrthogonalPart& orthogonal,
                         const Eigen::VectorXd& now) {
   Eigen::MatrixXd all(now.size(), kPoints);
   for_each_in_parallel(kPoints, [&](int i) {
     std::vector<double> values(kPoints, 0.0);
     values[i] = step;
-    Rig rig = fit.machine.rig;
-    rig.terms.push_back(make_term(map_term().id, map_values(kind, points, values)));
+    model::Rig rig = fit.machine.rig;
+    rig.terms.push_back(model::make_term(map_term().id, map_values(kind, points, values)));
     try {
       all.col(i) = orthogonal.of(records.rows(rig, fit.machine.calibrations) - now) / step;
     } catch (const Cancelled&) {
@@ -107,7 +107,7 @@ Blocks in_blocks(const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const Re
 Eigen::MatrixXd roughness() {
   Eigen::MatrixXd d = Eigen::MatrixXd::Zero(kPoints - 2, kPoints);
   for (int i = 0; i + 2 < kPoints; ++i) d(i, i) = 1, d(i, i + 1) = -2, d(i, i + 2) = 1;
-  return gram(d);
+  return signal::gram(d);
 }
 
 /// Squared norm of what is left in blocks that the map did not see.
@@ -115,14 +115,15 @@ double held_out_square(const Blocks& b, const Eigen::MatrixXd& all, const Eigen:
                        const Eigen::MatrixXd& prior) {
   double sum = 0;
   for (std::size_t k = 0; k < b.normal.size(); ++k) {
-    const Eigen::VectorXd v = solve_symmetric(all - b.normal[k] + prior, gradient - b.gradient[k]);
+    const Eigen::VectorXd v = signal::solve_symmetric(all - b.normal[k] + prior, gradient - b.gradient[k]);
     sum += b.square[k] - 2 * v.dot(b.gradient[k]) + v.dot(b.normal[k] * v);
   }
   return sum;
 }
 
-LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, const Eigen::MatrixXd& c,
-                       const Eigen::VectorXd& left, const RecordSet& records, const MapSettings& settings) {
+LearnedCandidate learn(const model::MapKind& kind, const std::vector<double>& points,
+                       const Eigen::MatrixXd& c, const Eigen::VectorXd& left, const RecordSet& records,
+                       const MapSettings& settings) {
   const Blocks blocks = in_blocks(c, left, records, settings.blocks);
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(kPoints, kPoints);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(kPoints);
@@ -139,7 +140,7 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
     const double square = held_out_square(blocks, all, gradient, prior);
     if (!(square < least)) continue;
     least = square;
-    Eigen::VectorXd v = solve_symmetric(all + prior, gradient);
+    Eigen::VectorXd v = signal::solve_symmetric(all + prior, gradient);
     v = v.cwiseMax(kind.least);
     best.values = map_values(kind, points, {v.begin(), v.end()});
     best.smoothness = weight;
@@ -150,26 +151,27 @@ LearnedCandidate learn(const MapKind& kind, const std::vector<double>& points, c
 
 }  // namespace
 
-const TermType& map_term() {
-  static const TermType& type = term_type_that([](const TermType& t) { return t.map.has_value(); });
+const model::TermType& map_term() {
+  static const model::TermType& type =
+      model::term_type_that([](const model::TermType& t) { return t.map.has_value(); });
   return type;
 }
 
-const MapKind& kind_of(const ParameterValues& values) {
-  const TermMap& map = *map_term().map;
-  for (const MapKind& kind : map.kinds)
+const model::MapKind& kind_of(const ParameterValues& values) {
+  const model::TermMap& map = *map_term().map;
+  for (const model::MapKind& kind : map.kinds)
     if (kind.acts_on == values.choice(map.acts_on) && kind.coordinate == values.choice(map.coordinate))
       return kind;
   throw InvalidParameter(map.coordinate, values.choice(map.coordinate), "is not one that is learned");
 }
 
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
-                                         const MotionRange& range, const MapSettings& settings) {
+                                         const model::MotionRange& range, const MapSettings& settings) {
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
   const OrthogonalPart orthogonal(fit, now.size());
   std::vector<LearnedCandidate> all;
-  for (const MapKind& kind : map_term().map->kinds) {
-    if (kind.needs_load && !load_moves_freely(fit.machine.rig)) continue;
+  for (const model::MapKind& kind : map_term().map->kinds) {
+    if (kind.needs_load && !simulation::load_moves_freely(fit.machine.rig)) continue;
     const std::vector<double> points =
         points_over(coordinate(kind.coordinate, records, fit.machine), settings.tail);
     if (points.empty()) continue;
@@ -184,12 +186,12 @@ std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet&
   return all;
 }
 
-Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range,
+Machine with_map(Machine machine, const LearnedCandidate& candidate, const model::MotionRange& range,
                  const MapSettings& settings) {
   const std::size_t place = machine.rig.terms.size();
   machine.has_map = true;
-  machine.rig.terms.push_back(make_term(map_term().id, candidate.values));
-  const TermMap& map = *map_term().map;
+  machine.rig.terms.push_back(model::make_term(map_term().id, candidate.values));
+  const model::TermMap& map = *map_term().map;
   const double scale = kind_of(candidate.values).typical(range);
   for (std::size_t i = 0; i < kPoints; ++i)
     machine.parameters.push_back(list_parameter(place, map.values, i, scale));
@@ -197,9 +199,9 @@ Machine with_map(Machine machine, const LearnedCandidate& candidate, const Motio
                ridge = std::sqrt(settings.ridge * candidate.smoothness);
   for (std::size_t i = 0; i < kPoints; ++i) {
     machine.priors.push_back(
-        [=, &map](const Rig& rig) { return ridge * rig.terms[place]->values.list(map.values)[i]; });
+        [=, &map](const model::Rig& rig) { return ridge * rig.terms[place]->values.list(map.values)[i]; });
     if (i + 2 < kPoints)
-      machine.priors.push_back([=, &map](const Rig& rig) {
+      machine.priors.push_back([=, &map](const model::Rig& rig) {
         const std::vector<double>& v = rig.terms[place]->values.list(map.values);
         return root * (v[i] - 2 * v[i + 1] + v[i + 2]);
       });
@@ -207,4 +209,4 @@ Machine with_map(Machine machine, const LearnedCandidate& candidate, const Motio
   return machine;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

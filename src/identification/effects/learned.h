@@ -6,7 +6,7 @@
 #include "backlash_diagnosis/model/term.h"
 #include "search_settings.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// The values of a map_term(), and how much it explains of blocks that it was not fitted to.
 struct LearnedCandidate {
@@ -16,18 +16,18 @@ struct LearnedCandidate {
 };
 
 /// The term whose law is learned.
-const TermType& map_term();
+const model::TermType& map_term();
 
 /// What the values of a learned map are and follow. Throws InvalidParameter for a kind that is never learned.
-const MapKind& kind_of(const ParameterValues& values);
+const model::MapKind& kind_of(const ParameterValues& values);
 
 /// A map over every coordinate, best first: values by least squares on what the machine's own parameters
 /// leave, as smooth as cross-validation over blocks of the records says.
 std::vector<LearnedCandidate> learn_maps(const MachineFit& fit, const RecordSet& records,
-                                         const MotionRange& range, const MapSettings& settings);
+                                         const model::MotionRange& range, const MapSettings& settings);
 
 /// The machine with this map, whose values are fitted as well, held as smooth as they are.
-Machine with_map(Machine machine, const LearnedCandidate& candidate, const MotionRange& range,
+Machine with_map(Machine machine, const LearnedCandidate& candidate, const model::MotionRange& range,
                  const MapSettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -6,7 +6,7 @@
 
 #include "../fit/joint_fit.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Projects rows onto what is orthogonal to the sensitivities of a fit: the first `rows` rows, those of the
 /// records.
@@ -23,4 +23,4 @@ class OrthogonalPart {
   Eigen::VectorXd residuals_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -6,14 +6,14 @@
 #include "effect_roles.h"
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// The declared machine with other teeth, a start for fits.
-Machine declared_with(const Rig& teeth, const Machine& declared) {
+Machine declared_with(const model::Rig& teeth, const Machine& declared) {
   Machine machine = declared;
   machine.rig = teeth;
-  for (const RigParameter& p : servo_parameters()) {
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     // Without the effects that it lacks the machine may have wanted less friction than none.
     if (p.is_friction() && p.get(teeth) <= 0) p.set(machine.rig, p.get(declared.rig));
   }
@@ -22,8 +22,8 @@ Machine declared_with(const Rig& teeth, const Machine& declared) {
 }
 
 /// The machine as it is fitted now, with other teeth.
-std::shared_ptr<const BandFit> with_teeth(BandFit fitted, const Mesh& teeth) {
-  Mesh& mesh = fitted.fit.machine.rig.mesh;
+std::shared_ptr<const BandFit> with_teeth(BandFit fitted, const model::Mesh& teeth) {
+  model::Mesh& mesh = fitted.fit.machine.rig.mesh;
   mesh.contact_spec = teeth.contact_spec;
   mesh.contact = teeth.contact;
   return std::make_shared<const BandFit>(std::move(fitted));
@@ -37,7 +37,7 @@ std::vector<Effect> without_stand_ins_for_teeth(std::vector<Effect> effects) {
   return effects;
 }
 
-Hypothesis fitted_with(const Rig& teeth, const std::vector<Effect>& effects, const Hypothesis& h,
+Hypothesis fitted_with(const model::Rig& teeth, const std::vector<Effect>& effects, const Hypothesis& h,
                        const SearchContext& context) {
   Hypothesis start = h;
   start.declared = std::make_shared<const Machine>(declared_with(teeth, *h.declared));
@@ -75,4 +75,4 @@ std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchCont
   return result;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

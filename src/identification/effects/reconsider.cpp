@@ -3,7 +3,7 @@
 
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 Hypothesis reconsider(const Hypothesis& before, const SearchContext& context) {
   Hypothesis h = before;
@@ -25,4 +25,4 @@ Hypothesis reconsider(const Hypothesis& before, const SearchContext& context) {
   return h;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

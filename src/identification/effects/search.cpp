@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/interruption.h"
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// What is told on the way: a share that never falls back when effects are taken out again, and the best so
@@ -46,7 +46,7 @@ class SearchProgress {
 
 }  // namespace
 
-SearchResult search_effects(const Rig& declared, const std::vector<ServoData>& data,
+SearchResult search_effects(const model::Rig& declared, const std::vector<ServoData>& data,
                             const SearchSettings& settings, const Progress& progress) {
   SearchProgress told(settings, progress);
   const Interruption interruption([&] { return told.goes_on(); });  // fits of minutes end when asked to
@@ -78,4 +78,4 @@ double share_of_signal(const Hypothesis& h, const std::string& id) {
                   change(less.deflection_share, with.deflection_share));
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

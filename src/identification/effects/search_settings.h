@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "backlash_diagnosis/identification/fit/fit_settings.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Which candidates there are, from sensitivities alone.
 struct ScreenSettings {
@@ -92,4 +92,4 @@ struct SearchSettings {
   double unexplained = 2;           // choice: times the floor, beyond which something is left
 };
 
-}  // namespace backlash
+}  // namespace backlash::identification

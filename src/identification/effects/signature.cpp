@@ -9,7 +9,7 @@
 
 #include "backlash_diagnosis/model/axis_unit.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr int kBins = 24,
@@ -111,7 +111,7 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   Unexplained u{deflection ? "deflection" : "torque",
                 fmt::format("{:.3g} {} rms, {:.1f} times the noise floor", s.rms,
-                            axis_unit(deflection ? "rad" : "N m", machine.rig.linear),
+                            model::axis_unit(deflection ? "rad" : "N m", machine.rig.linear),
                             deflection ? left.deflection : left.torque)};
   if (shares.front().first < kWorthNaming) {
     u.signature += "; follows no coordinate";
@@ -124,4 +124,4 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
   return u;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

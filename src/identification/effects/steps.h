@@ -6,12 +6,12 @@
 
 #include "hypothesis.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// The declared machine, fitted. Friction may come out below 0 here: the machine may lack an effect.
-Hypothesis fit_declared(const Rig& declared, const SearchContext& context);
+Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context);
 /// The parameters that the rig declares and such records can tell.
-std::vector<FitParameter> declared_parameters(const Rig& rig);
+std::vector<FitParameter> declared_parameters(const model::Rig& rig);
 
 /// One more named effect: the first of the best trials that convinces and that the machine can be fitted
 /// with.
@@ -50,4 +50,4 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 /// CannotIdentify where the machine cannot be fitted with that.
 Hypothesis hold_friction(const Hypothesis& h, const SearchContext& context);
 
-}  // namespace backlash
+}  // namespace backlash::identification

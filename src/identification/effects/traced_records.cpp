@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "candidates.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kLeastLoadTravel = 0.01;  // choice: of the motor's: less, and the link does not move freely
@@ -24,12 +24,12 @@ constexpr double kFaster = 1.5;            // choice: times speed or torque
 
 }  // namespace
 
-ServoData traced_data(const Record& record, const Rig& rig) {
+ServoData traced_data(const record::Record& record, const model::Rig& rig) {
   ServoData data = servo_data(record, rig);
-  if (load_moves_freely(rig)) {
+  if (simulation::load_moves_freely(rig)) {
     if (data.load.empty())
       throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");
-    if (peak_to_peak(data.load) < kLeastLoadTravel * peak_to_peak(data.motor))
+    if (signal::peak_to_peak(data.load) < kLeastLoadTravel * signal::peak_to_peak(data.motor))
       throw CannotIdentify(record.name +
                            ": the load stands still while the motor moves; the rig file has a link that " +
                            "moves freely (a gearbox with locked output: link: locked)");
@@ -53,21 +53,21 @@ void require_same_rate(const std::vector<ServoData>& train, const ServoData& tes
 
 std::vector<std::string> range_warnings(const std::vector<ServoData>& train, const ServoData& test,
                                         bool linear) {
-  const MotionRange known = motion_range(train), asked = motion_range({test});
+  const model::MotionRange known = motion_range(train), asked = motion_range({test});
   const double slack = kBeyond * (known.to - known.from);
   std::vector<std::string> warnings;
   if (asked.from < known.from - slack || asked.to > known.to + slack)
     warnings.push_back(fmt::format(
         "the test record moves from {:.3g} to {:.3g} {}, the training records from {:.3g} to {:.3g}",
-        asked.from, asked.to, axis_unit("rad", linear), known.from, known.to));
+        asked.from, asked.to, model::axis_unit("rad", linear), known.from, known.to));
   if (asked.speed > kFaster * known.speed || asked.torque > kFaster * known.torque)
     warnings.push_back(
         fmt::format("the test record is faster or stronger than the training records: speed {:.3g} against "
                     "{:.3g} {}, {} {:.3g} "
                     "against {:.3g} {} (standard deviations)",
-                    asked.speed, known.speed, axis_unit("rad/s", linear), linear ? "force" : "torque",
-                    asked.torque, known.torque, axis_unit("N m", linear)));
+                    asked.speed, known.speed, model::axis_unit("rad/s", linear), linear ? "force" : "torque",
+                    asked.torque, known.torque, model::axis_unit("N m", linear)));
   return warnings;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

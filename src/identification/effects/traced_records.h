@@ -5,14 +5,15 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/servo_data.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Throws CannotIdentify for a record without load position, which a rig with two inertias needs, with a load
 /// that stands, or of a motor so slow that its speed drowns in the noise of its encoder; and what
 /// servo_data() throws.
-ServoData traced_data(const Record& record, const Rig& rig);
+ServoData traced_data(const record::Record& record, const model::Rig& rig);
 
 /// Throws CannotIdentify where a record is sampled at another rate than `test`.
 void require_same_rate(const std::vector<ServoData>& train, const ServoData& test);
@@ -21,4 +22,4 @@ void require_same_rate(const std::vector<ServoData>& train, const ServoData& tes
 std::vector<std::string> range_warnings(const std::vector<ServoData>& train, const ServoData& test,
                                         bool linear);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// An entry of `terms:` whose comments have the units of a linear axis.
@@ -18,16 +18,16 @@ std::string linear_entry(const std::string& entry) {
   std::string out;
   for (std::string line; std::getline(in, line);) {
     const std::size_t comment = std::min(line.find("  # "), line.size());
-    out += line.substr(0, comment) + axis_unit(line.substr(comment), true) + "\n";
+    out += line.substr(0, comment) + model::axis_unit(line.substr(comment), true) + "\n";
   }
   return out;
 }
 
 /// The entries of all terms that the declared rig has not.
-std::vector<std::string> new_entries(const Rig& declared, const Rig& augmented) {
+std::vector<std::string> new_entries(const model::Rig& declared, const model::Rig& augmented) {
   std::vector<std::string> entries;
   for (std::size_t i = declared.terms.size(); i < augmented.terms.size(); ++i) {
-    const std::string entry = term_text(*augmented.terms[i]);
+    const std::string entry = model::term_text(*augmented.terms[i]);
     entries.push_back(declared.linear ? linear_entry(entry) : entry);
   }
   return entries;
@@ -35,14 +35,15 @@ std::vector<std::string> new_entries(const Rig& declared, const Rig& augmented) 
 
 }  // namespace
 
-std::string traced_rig_text(const RigFile& declared, const Trace& trace) {
+std::string traced_rig_text(const rig_file::RigFile& declared, const Trace& trace) {
   std::map<std::string, std::string> units;
-  for (const auto& [name, unit] : trace.units) units[name] = axis_unit(unit, declared.rig.linear);
-  RigDocument document(declared);
-  const ContactSpec& contact = trace.augmented.mesh.contact_spec;
+  for (const auto& [name, unit] : trace.units) units[name] = model::axis_unit(unit, declared.rig.linear);
+  rig_file::RigDocument document(declared);
+  const model::ContactSpec& contact = trace.augmented.mesh.contact_spec;
   if (!declared.rig.mesh.rigid && contact.law != declared.rig.mesh.contact_spec.law) {
     document.set_contact_law(contact);
-    units[servo_parameter(RigPart::mesh, ParameterKind::stiffness).name] += "^1.5";
+    units[rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).name] +=
+        "^1.5";
   }
   document.set_fitted({trace.augmented, declared.rig.motor_axis_ratio(), trace.parameters, units});
   document.set_whole_path_of_test_runs();
@@ -51,11 +52,11 @@ std::string traced_rig_text(const RigFile& declared, const Trace& trace) {
   return document.text();
 }
 
-void check_traced_rig_text(const RigFile& declared) {
-  RigDocument(declared).check_terms();
+void check_traced_rig_text(const rig_file::RigFile& declared) {
+  rig_file::RigDocument(declared).check_terms();
   Trace trace;
-  trace.augmented = load_side(declared.rig);
-  for (const RigParameter& p : servo_parameters()) {
+  trace.augmented = model::load_side(declared.rig);
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     if (!p.known_to(declared.rig) || p.get(declared.rig) == 0) continue;
     trace.parameters[p.name] = {p.get(trace.augmented), 0};
     trace.units[p.name] = p.unit;
@@ -63,4 +64,4 @@ void check_traced_rig_text(const RigFile& declared) {
   traced_rig_text(declared, trace);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

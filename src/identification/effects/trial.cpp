@@ -10,7 +10,7 @@
 #include "acceptance.h"
 #include "effect_roles.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// What the terms of a candidate have from their grids, in rising order.
@@ -18,7 +18,7 @@ std::vector<std::vector<double>> places(const Candidate& candidate) {
   std::vector<std::vector<double>> all;
   for (const ParameterValues& term : candidate.terms) {
     all.emplace_back();
-    for (const TermShape& shape : term_type(candidate.id).search->shapes)
+    for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
       if (!shape.refined) all.back().push_back(term.at(shape.name));
   }
   std::sort(all.begin(), all.end());
@@ -27,8 +27,8 @@ std::vector<std::vector<double>> places(const Candidate& candidate) {
 
 /// The same with its t-th term's shape some places farther in the grid; nothing where that ends or where two
 /// terms become one.
-std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, const TermShape& shape,
-                                   long step, const MotionRange& range) {
+std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, const model::TermShape& shape,
+                                   long step, const model::MotionRange& range) {
   const std::vector<double> grid = shape.values(range);
   const long at =
       std::find(grid.begin(), grid.end(), candidate.terms[t].at(shape.name)) - grid.begin() + step;
@@ -40,8 +40,8 @@ std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, co
   return other;
 }
 
-std::vector<Candidate> neighbours(const Candidate& candidate, const TermShape& shape,
-                                  const MotionRange& range) {
+std::vector<Candidate> neighbours(const Candidate& candidate, const model::TermShape& shape,
+                                  const model::MotionRange& range) {
   std::vector<Candidate> all;
   for (std::size_t t = 0; t < candidate.terms.size(); ++t)
     for (const long step : {-2L, -1L, 1L, 2L})
@@ -50,7 +50,7 @@ std::vector<Candidate> neighbours(const Candidate& candidate, const TermShape& s
 }
 
 std::size_t shape_count(const Trial& trial) {
-  return term_type(trial.candidate.id).search->shapes.size();
+  return model::term_type(trial.candidate.id).search->shapes.size();
 }
 
 }  // namespace
@@ -119,7 +119,7 @@ Trial best_neighbour(const Hypothesis& h, const Trial& trial, const SearchContex
   std::set<std::vector<std::vector<double>>> known;
   for (bool better = true; better;) {
     better = false;
-    for (const TermShape& shape : term_type(best.candidate.id).search->shapes) {
+    for (const model::TermShape& shape : model::term_type(best.candidate.id).search->shapes) {
       if (shape.refined || shape.values(context.range).size() < 2) continue;
       for (const Candidate& other : neighbours(best.candidate, shape, context.range)) {
         if (!known.insert(places(other)).second) continue;
@@ -134,4 +134,4 @@ Trial best_neighbour(const Hypothesis& h, const Trial& trial, const SearchContex
   return best;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,7 +8,7 @@
 
 #include "hypothesis.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct Trial {
   Candidate candidate;  // as fitted
@@ -34,4 +34,4 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
 /// grid of its shapes are fitted too, unless what it leaves is noise.
 Trial best_neighbour(const Hypothesis& h, const Trial& trial, const SearchContext& context);
 
-}  // namespace backlash
+}  // namespace backlash::identification

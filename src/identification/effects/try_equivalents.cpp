@@ -3,7 +3,7 @@
 
 #include "steps.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// The effects with an alternative in place of the i-th effect, which becomes an alternative of it.
@@ -37,4 +37,4 @@ Hypothesis try_equivalents(const Hypothesis& before, const SearchContext& contex
   return h;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -6,7 +6,7 @@
 
 #include "independence.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr int kLags = 25;  // choice: to either side, of the test for independence
@@ -94,4 +94,4 @@ std::vector<Independence> independence(const TraceSeries& s, const ServoData& da
   return all;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

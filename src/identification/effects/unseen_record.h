@@ -6,7 +6,7 @@
 
 #include "hypothesis.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// What a machine says of a record that it was not fitted to, with the record's own calibration. `settings`
 /// have their bands.
@@ -26,4 +26,4 @@ TraceSeries trace_series(const ServoData& data, const ServoPrediction& before, c
 /// Whether the residuals of both still follow torque or speed. `cutoff` [Hz] of the residuals.
 std::vector<Independence> independence(const TraceSeries& series, const ServoData& data, double cutoff);
 
-}  // namespace backlash
+}  // namespace backlash::identification

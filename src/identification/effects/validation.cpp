@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kRidge =
@@ -26,14 +26,14 @@ std::vector<Eigen::Index> rows_where(const RecordSet& records, const Wanted& wan
 }
 
 /// Fitted values without these rows, by a linear step from the fit.
-Eigen::VectorXd without(const LeastSquaresFit& fit, const Eigen::MatrixXd& normal,
+Eigen::VectorXd without(const signal::LeastSquaresFit& fit, const Eigen::MatrixXd& normal,
                         const std::vector<Eigen::Index>& rows) {
   const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
   const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd rest = unit.asDiagonal() * (normal - gram(j)) * unit.asDiagonal();
+  Eigen::MatrixXd rest = unit.asDiagonal() * (normal - signal::gram(j)) * unit.asDiagonal();
   rest.diagonal().array() += kRidge;
   const Eigen::VectorXd gradient = j.transpose() * fit.residuals(rows);
-  return unit.asDiagonal() * solve_symmetric(rest, unit.asDiagonal() * gradient);
+  return unit.asDiagonal() * signal::solve_symmetric(rest, unit.asDiagonal() * gradient);
 }
 
 void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& r,
@@ -43,13 +43,13 @@ void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows
         r[Eigen::Index(i)] * r[Eigen::Index(i)];
 }
 
-double gain(double before, double after) {
+double gain_of(double before, double after) {
   return before > 0 ? 1 - std::sqrt(after / before) : 0;
 }
 
 struct Squares {
   double before = 0, after = 0;
-  double gain() const { return backlash::gain(before, after); }
+  double gain() const { return gain_of(before, after); }
   double decrease() const { return before - after; }
   Squares operator+(const Squares& other) const { return {before + other.before, after + other.after}; }
 };
@@ -69,8 +69,8 @@ Squares all_but_worst(const std::vector<double>& before, const std::vector<doubl
 
 HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records,
                  const AcceptanceSettings& settings) {
-  const LeastSquaresFit& f = fit.fit;
-  const Eigen::MatrixXd normal = gram(f.jacobian);
+  const signal::LeastSquaresFit& f = fit.fit;
+  const Eigen::MatrixXd normal = signal::gram(f.jacobian);
   HeldOut out;
   const auto everything = rows_where(records, [](const RecordSet::Row&) { return true; });
   add_squares(records, everything, f.residuals(everything), out.torque_train, out.deflection_train);
@@ -112,8 +112,8 @@ Gain compare(const HeldOut& a, const HeldOut& b) {
   Evidence& e = g.evidence;
   e.gain = (g.deflection ? deflection_fit : torque_fit).gain();
   e.gain_held_out = std::min(e.gain, (g.deflection ? deflection : torque).gain());
-  e.gain_forward = g.deflection ? gain(a.deflection_forward, b.deflection_forward)
-                                : gain(a.torque_forward, b.torque_forward);
+  e.gain_forward = g.deflection ? gain_of(a.deflection_forward, b.deflection_forward)
+                                : gain_of(a.torque_forward, b.torque_forward);
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (before[i] == 0) continue;
     ++e.blocks;
@@ -123,4 +123,4 @@ Gain compare(const HeldOut& a, const HeldOut& b) {
   return g;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -6,7 +6,7 @@
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "search_settings.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Norms of the residuals of one fit, each block of the records predicted by what the other blocks say
 /// (linear about the fit), and the later part predicted by the earlier (simulated).
@@ -28,4 +28,4 @@ struct Gain {
 };
 Gain compare(const HeldOut& without, const HeldOut& with);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kHold =
@@ -48,11 +48,11 @@ void move_delay_to_term(Machine& machine, double interval) {
   double mean = 0;
   for (const Calibration& c : machine.calibrations)
     mean += c.torque_delay / double(machine.calibrations.size());
-  std::shared_ptr<const Term>& term = machine.rig.terms.back();
+  std::shared_ptr<const model::Term>& term = machine.rig.terms.back();
   ParameterValues values = term->values;
-  values[term_type(term->id).search->strength] += mean * interval;
-  term = make_term(term->id, values);
+  values[model::term_type(term->id).search->strength] += mean * interval;
+  term = model::make_term(term->id, values);
   without_calibration(machine);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

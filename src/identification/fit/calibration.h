@@ -4,7 +4,7 @@
 
 #include "joint_fit.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// A torque that seems to act more than a quarter of a sample before a held one would is that of the moment.
 void release_hold(Machine& machine);
@@ -23,4 +23,4 @@ void without_calibration(Machine& machine);
 /// `interval` [s] between samples.
 void move_delay_to_term(Machine& machine, double interval);
 
-}  // namespace backlash
+}  // namespace backlash::identification

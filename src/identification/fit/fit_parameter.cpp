@@ -5,49 +5,49 @@
 #include "backlash_diagnosis/model/term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
-namespace backlash {
+namespace backlash::identification {
 
-FitParameter machine_parameter(const std::string& name, const Rig& rig) {
-  const RigParameter& p = servo_parameter(name);
+FitParameter machine_parameter(const std::string& name, const model::Rig& rig) {
+  const rig_file::RigParameter& p = rig_file::servo_parameter(name);
   if (const double value = p.get(rig); p.positive() && !(value > 0))
     throw InvalidParameter(name, value, "must be > 0");
   return {p.name, p.unit, p.positive(), 1, p.get, p.set};
 }
 
-FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale) {
+FitParameter term_parameter(std::size_t term, const std::string& name, const model::Rig& rig, double scale) {
   const std::string id = rig.terms.at(term)->id;
-  for (const ParameterSpec& spec : term_type(id).parameters) {
+  for (const ParameterSpec& spec : model::term_type(id).parameters) {
     if (spec.name != name) continue;
-    const auto set = [term, name](Rig& changed, double value) {
+    const auto set = [term, name](model::Rig& changed, double value) {
       ParameterValues values = changed.terms[term]->values;
       values[name] = value;
-      changed.terms[term] = make_term(changed.terms[term]->id, values);
+      changed.terms[term] = model::make_term(changed.terms[term]->id, values);
     };
     const bool positive = spec.range.lower == 0 && rig.terms[term]->values.at(name) > 0;
     return {name,
             spec.unit,
             positive,
             scale,
-            [term, name](const Rig& r) { return r.terms[term]->values.at(name); },
+            [term, name](const model::Rig& r) { return r.terms[term]->values.at(name); },
             set};
   }
   throw InvalidParameter(name, id, "is not a parameter of this term");
 }
 
 FitParameter list_parameter(std::size_t term, const std::string& name, std::size_t index, double scale) {
-  const auto set = [term, name, index](Rig& changed, double value) {
+  const auto set = [term, name, index](model::Rig& changed, double value) {
     ParameterValues values = changed.terms[term]->values;
     std::vector<double> list = values.list(name);
     list[index] = value;
     values.set_list(name, list);
-    changed.terms[term] = make_term(changed.terms[term]->id, values);
+    changed.terms[term] = model::make_term(changed.terms[term]->id, values);
   };
   return {name,
           "",
           false,
           scale,
-          [term, name, index](const Rig& rig) { return rig.terms[term]->values.list(name)[index]; },
+          [term, name, index](const model::Rig& rig) { return rig.terms[term]->values.list(name)[index]; },
           set};
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,25 +8,25 @@
 
 #include "backlash_diagnosis/model/rig.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct FitParameter {
   std::string name;  // in reports
   std::string unit;
   bool positive;  // > 0: its logarithm is fitted
   double scale;   // a typical size, of one that is not positive
-  std::function<double(const Rig&)> get;
-  std::function<void(Rig&, double)> set;
+  std::function<double(const model::Rig&)> get;
+  std::function<void(model::Rig&, double)> set;
 };
 
 /// By its name among servo_parameters(). Throws InvalidParameter for one that must be > 0 and is not.
-FitParameter machine_parameter(const std::string& name, const Rig& rig);
+FitParameter machine_parameter(const std::string& name, const model::Rig& rig);
 
 /// A number of the term at this place of rig.terms; `scale` as above. One that may not be negative, and is
 /// not 0, stays above 0.
-FitParameter term_parameter(std::size_t term, const std::string& name, const Rig& rig, double scale);
+FitParameter term_parameter(std::size_t term, const std::string& name, const model::Rig& rig, double scale);
 
 /// Entry `index` of a list of that term.
 FitParameter list_parameter(std::size_t term, const std::string& name, std::size_t index, double scale);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 // In units of the mesh resonance; simulation.
@@ -25,19 +25,19 @@ constexpr double kPeriods = 100;  // choice: in the record: friction has more to
 double motion_cutoff(const std::vector<ServoData>& data) {
   double widest = 0;
   for (const ServoData& d : data)
-    widest =
-        std::max({widest, motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
+    widest = std::max(
+        {widest, signal::motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
   return widest;
 }
 
 }  // namespace
 
-FitSettings with_bands(FitSettings settings, const Rig& rig, const std::vector<ServoData>& data) {
+FitSettings with_bands(FitSettings settings, const model::Rig& rig, const std::vector<ServoData>& data) {
   const double highest = kHighestCutoff / data.front().interval;
   double torque = 0;
   for (const ServoData& d : data) torque = std::max(torque, usual_torque(d.torque));
   const double resonance = mesh_resonance(rig, torque);
-  const bool free = load_moves_freely(rig) && resonance > 0;
+  const bool free = simulation::load_moves_freely(rig) && resonance > 0;
   if (settings.cutoff == 0)
     settings.cutoff = std::min(free ? kCutoff * resonance : motion_cutoff(data), highest);
   if (settings.rough_cutoff == 0)
@@ -47,4 +47,4 @@ FitSettings with_bands(FitSettings settings, const Rig& rig, const std::vector<S
   return settings;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kFarthest = 30;  // choice: factor by which a positive parameter may differ from its start; a
@@ -79,11 +79,11 @@ RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double f
   for (const ServoData& d : data) {
     records_.emplace_back(d, cutoff, feedback);
     const PreparedServo& record = records_.back();
-    spreads_.push_back({spread(low_pass(d.torque, d.interval, cutoff), record.counts), 0});
+    spreads_.push_back({spread(signal::low_pass(d.torque, d.interval, cutoff), record.counts), 0});
     if (d.load.empty()) continue;
     std::vector<double> deflection(d.size());
     for (std::size_t k = 0; k < d.size(); ++k) deflection[k] = d.motor[k] - d.load[k];
-    spreads_.back().deflection = spread(low_pass(deflection, d.interval, cutoff), record.settled);
+    spreads_.back().deflection = spread(signal::low_pass(deflection, d.interval, cutoff), record.settled);
   }
   weights_.resize(data.size());
   for (std::size_t r = 0; r < records_.size(); ++r) {
@@ -132,7 +132,7 @@ Misfit RecordSet::misfit(const Machine& machine) const {
   return sum;
 }
 
-Eigen::VectorXd RecordSet::rows(const Rig& rig, const std::vector<Calibration>& calibrations) const {
+Eigen::VectorXd RecordSet::rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const {
   Eigen::VectorXd rows(layout_.size());
   Eigen::Index next = 0;
   for (std::size_t i = 0; i < records_.size(); ++i) {
@@ -177,8 +177,8 @@ Eigen::VectorXd Unknowns::scale() const {
   return s;
 }
 
-Rig Unknowns::rig(const Eigen::VectorXd& values) const {
-  Rig rig = start_.rig;
+model::Rig Unknowns::rig(const Eigen::VectorXd& values) const {
+  model::Rig rig = start_.rig;
   for (std::size_t i = 0; i < start_.parameters.size(); ++i) {
     const FitParameter& p = start_.parameters[i];
     const double value = values[Eigen::Index(i)];
@@ -213,8 +213,8 @@ Machine Unknowns::machine(const Eigen::VectorXd& values) const {
   return m;
 }
 
-Measured Unknowns::parameter(const LeastSquaresFit& fit, std::size_t i) const {
-  Measured m = fit.parameter(Eigen::Index(i));
+signal::Measured Unknowns::parameter(const signal::LeastSquaresFit& fit, std::size_t i) const {
+  signal::Measured m = fit.parameter(Eigen::Index(i));
   const FitParameter& p = start_.parameters[i];
   if (!p.positive) return m;
   const double slope = 1 - std::pow(limited(m.value) / std::log(kFarthest), 2);
@@ -223,18 +223,19 @@ Measured Unknowns::parameter(const LeastSquaresFit& fit, std::size_t i) const {
   return m;
 }
 
-std::map<std::string, Measured> Unknowns::parameters(const LeastSquaresFit& fit) const {
-  std::map<std::string, Measured> all;
+std::map<std::string, signal::Measured> Unknowns::parameters(const signal::LeastSquaresFit& fit) const {
+  std::map<std::string, signal::Measured> all;
   for (std::size_t i = 0; i < start_.parameters.size(); ++i)
     all[start_.parameters[i].name] = parameter(fit, i);
   return all;
 }
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options) {
+MachineFit fit_machine(const Machine& start, const RecordSet& records,
+                       const signal::NonlinearOptions& options) {
   const Unknowns unknowns(start);
   MachineFit out;
-  out.fit = fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
-                          unknowns.values(), unknowns.scale(), options);
+  out.fit = signal::fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
+                                  unknowns.values(), unknowns.scale(), options);
   out.machine = unknowns.machine(out.fit.values);
   return out;
 }
@@ -248,10 +249,10 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
     longest = std::max(longest, time_between_reversals(record.data()));
   const Eigen::Index wanted = std::max(1L, 2 * std::lround(longest / records.row_interval()));
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (kFewestBlocks * unknowns.size()), 1, wanted);
-  widen_jacobian(
+  signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);
-  take_larger(fit.fit.covariance, block_covariance(fit.fit, block, known));
+  take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

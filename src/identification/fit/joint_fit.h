@@ -11,15 +11,15 @@
 #include "fit_parameter.h"
 #include "servo_prediction.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// A rig, what is unknown of it, and what belongs to each record.
 struct Machine {
-  Rig rig;
+  model::Rig rig;
   std::vector<FitParameter> parameters;
   std::vector<Calibration> calibrations;
   /// What is known of the rig beside the records: one more row each, in standard deviations.
-  std::vector<std::function<double(const Rig&)>> priors = {};
+  std::vector<std::function<double(const model::Rig&)>> priors = {};
   double largest_delay = 3;  // samples; approached, never reached; 0: delays are not fitted
   bool has_map = false;      // a learned map with its many values is among the parameters
 };
@@ -50,7 +50,7 @@ class RecordSet {
   void weigh(const Machine& machine);
   Misfit misfit(const Machine& machine) const;
 
-  Eigen::VectorXd rows(const Rig& rig, const std::vector<Calibration>& calibrations) const;
+  Eigen::VectorXd rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const;
 
   struct Row {
     std::size_t record;
@@ -70,7 +70,7 @@ class RecordSet {
 
 struct MachineFit {
   Machine machine;
-  LeastSquaresFit fit;  // of the values of Unknowns(start)
+  signal::LeastSquaresFit fit;  // of the values of Unknowns(start)
 };
 
 /// The numbers that a fit changes: parameters (of those that are positive the logarithm, relative to the
@@ -82,13 +82,13 @@ class Unknowns {
   Eigen::VectorXd values() const;
   Eigen::VectorXd scale() const;
   /// Throws InvalidParameter for what is refused by the rig.
-  Rig rig(const Eigen::VectorXd& values) const;
+  model::Rig rig(const Eigen::VectorXd& values) const;
   std::vector<Calibration> calibrations(const Eigen::VectorXd& values) const;
   /// One row per value: a wide prior about its start, so that what the records do not tell stays there.
   Eigen::VectorXd prior(const Eigen::VectorXd& values) const;
   Machine machine(const Eigen::VectorXd& values) const;
-  std::map<std::string, Measured> parameters(const LeastSquaresFit& fit) const;
-  Measured parameter(const LeastSquaresFit& fit, std::size_t i) const;
+  std::map<std::string, signal::Measured> parameters(const signal::LeastSquaresFit& fit) const;
+  signal::Measured parameter(const signal::LeastSquaresFit& fit, std::size_t i) const;
 
  private:
   std::size_t records() const { return start_.calibrations.size(); }
@@ -100,11 +100,12 @@ class Unknowns {
   std::size_t per_record_;
 };
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records, const NonlinearOptions& options);
+MachineFit fit_machine(const Machine& start, const RecordSet& records,
+                       const signal::NonlinearOptions& options);
 
 /// Covariance of the fitted values from wide steps and from blocks of the records as long as the time between
 /// two reversals of the motor, the larger: until the next reversal what friction and play leave keeps its
 /// sign.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,10 +8,10 @@
 #include "backlash_diagnosis/base/random.h"
 #include "calibration.h"
 
-namespace backlash {
+namespace backlash::identification {
 
-NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map) {
-  NonlinearOptions options;
+signal::NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map) {
+  signal::NonlinearOptions options;
   options.iterations = with_map ? settings.iterations_of_map : settings.iterations;
   options.step = settings.step;
   options.tolerance = tolerance;
@@ -71,4 +71,4 @@ BandFit fit_to_records(const std::vector<ServoData>& data, const Machine& start,
   return fit(machine, settings.tolerance);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

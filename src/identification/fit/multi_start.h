@@ -6,10 +6,11 @@
 #include <functional>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/fit_settings.h"
 #include "joint_fit.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// A machine fitted in one band, and what belongs to it.
 struct BandFit {
@@ -23,7 +24,7 @@ struct BandFit {
 using BeforeFit = std::function<void()>;
 
 /// As the settings say, with another tolerance; `with_map`: of a machine with a learned map.
-NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map);
+signal::NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map);
 
 /// One fit with weights of its own, those of `start` in this band [Hz]. `settings` have their bands. `data`
 /// must outlive what is returned. Throws CannotIdentify.
@@ -45,4 +46,4 @@ BandFit fit_from_starts(const std::vector<ServoData>& data, const Machine& start
 BandFit fit_to_records(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
                        const BeforeFit& before_fit = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using Complex = std::complex<double>;
@@ -22,14 +22,15 @@ double low_pass_gain(double frequency, double cutoff, double interval) {
 }
 
 double noise_deviation(const std::vector<double>& position) {
-  const double step = resolution(position);
-  return step > 0 ? std::max(step / std::sqrt(12.0), white_noise(position)) : position_noise(position);
+  const double step = signal::resolution(position);
+  return step > 0 ? std::max(step / std::sqrt(12.0), signal::white_noise(position))
+                  : signal::position_noise(position);
 }
 
 /// Variance per line of the load position's noise at (i + 1/2) / (2 lines interval): white beyond the
 /// resolution, and the rounding of this motion.
 std::vector<double> load_noise(const ServoData& data, const std::vector<double>& load) {
-  const double step = resolution(data.load), noise = noise_deviation(data.load);
+  const double step = signal::resolution(data.load), noise = noise_deviation(data.load);
   std::size_t size = 2;
   while (size < load.size()) size *= 2;
   const double white = std::max(0.0, noise * noise - step * step / 12);
@@ -42,7 +43,7 @@ std::vector<double> load_noise(const ServoData& data, const std::vector<double>&
     mean += error[k] / double(load.size());
   }
   for (std::size_t k = 0; k < load.size(); ++k) error[k] -= mean;
-  const std::vector<Complex> lines = fourier_transform(error);
+  const std::vector<Complex> lines = signal::fourier_transform(error);
   for (std::size_t i = 0; i < power.size(); ++i)
     power[i] += 2 * std::norm(lines[i + 1]) / (double(size) * double(load.size()));
   return power;
@@ -53,9 +54,9 @@ struct Spring {
 };
 
 /// Of the teeth under the usual torque of a record, about which noise moves them.
-Spring mesh_spring(const Rig& rig, const std::vector<double>& torque) {
+Spring mesh_spring(const model::Rig& rig, const std::vector<double>& torque) {
   if (rig.mesh.rigid || !rig.mesh.contact->power_contact()) return {};
-  const PowerContact law = *rig.mesh.contact->power_contact();
+  const model::PowerContact law = *rig.mesh.contact->power_contact();
   const double lever = rig.mesh.lever(),
                depth = rig.mesh.contact->static_penetration(usual_torque(torque) / lever);
   const double force = law.stiffness * std::pow(depth, law.exponent);
@@ -65,10 +66,10 @@ Spring mesh_spring(const Rig& rig, const std::vector<double>& torque) {
 
 }  // namespace
 
-NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vector<double>& load,
+NoiseFloors noise_floors(const model::Rig& rig, const ServoData& data, const std::vector<double>& load,
                          double cutoff, double feedback) {
-  const GearTrain train(rig);
-  const bool free = load_moves_freely(rig);
+  const model::GearTrain train(rig);
+  const bool free = simulation::load_moves_freely(rig);
   const double motor_inertia = train.motor_inertia(), load_inertia = train.load_inertia();
   const auto [k, b] = mesh_spring(rig, data.torque);
   const double rate_cutoff = data.load_rate_cutoff;
@@ -76,7 +77,7 @@ NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vecto
       free ? load_noise(data, load) : std::vector<double>(data.size() / 2, 0.0);
   const double lines = double(load_power.size());
   const double motor_power = std::pow(noise_deviation(data.motor), 2) / lines,
-               torque_power = std::pow(white_noise(data.torque), 2) / lines;
+               torque_power = std::pow(signal::white_noise(data.torque), 2) / lines;
   double torque = 0, deflection = 0;
   for (std::size_t i = 0; i < load_power.size(); ++i) {
     const double f = 0.5 * (double(i) + 0.5) / (lines * data.interval);
@@ -96,4 +97,4 @@ NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vecto
   return {std::sqrt(torque), std::sqrt(deflection)};
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,19 +4,20 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "multi_start.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// The row of a finding: its distance from what the rig says, in standard errors.
-std::function<double(const Rig&)> prior_row(const Finding& finding) {
-  return [finding](const Rig& rig) {
+std::function<double(const model::Rig&)> prior_row(const Finding& finding) {
+  return [finding](const model::Rig& rig) {
     double value = 0;
-    for (const auto& [name, factor] : finding.combination) value += factor * servo_parameter(name).get(rig);
+    for (const auto& [name, factor] : finding.combination)
+      value += factor * rig_file::servo_parameter(name).get(rig);
     return (finding.measured.value - value) / finding.measured.standard_error;
   };
 }
 
-Machine start_machine(const Rig& rig, std::size_t records, const OutputErrorSettings& settings) {
+Machine start_machine(const model::Rig& rig, std::size_t records, const OutputErrorSettings& settings) {
   Machine machine;
   machine.rig = rig;
   machine.calibrations.resize(records);
@@ -28,7 +29,7 @@ Machine start_machine(const Rig& rig, std::size_t records, const OutputErrorSett
 
 }  // namespace
 
-OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& records,
+OutputError fit_output_error(const model::Rig& start, const std::vector<ServoData>& records,
                              const OutputErrorSettings& asked) {
   const FitSettings settings = with_bands(asked.fit, start, records);
   BandFit fitted = fit_to_records(records, start_machine(start, records.size(), asked), settings);
@@ -46,7 +47,7 @@ OutputError fit_output_error(const Rig& start, const std::vector<ServoData>& rec
   return result;
 }
 
-ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const FitSettings& asked,
+ServoPrediction predict_calibrated(const model::Rig& rig, const ServoData& data, const FitSettings& asked,
                                    Calibration& calibration) {
   OutputErrorSettings alone;
   alone.fit = with_bands(asked, rig, {data});
@@ -54,4 +55,4 @@ ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const 
   return predict_servo(rig, data, alone.fit, calibration);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

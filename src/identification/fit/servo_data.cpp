@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr std::size_t kStart = 10;        // samples, choice: of the line that the load's start is taken from
@@ -29,12 +29,12 @@ constexpr double kNarrower = 0.9;     // choice: from one band that is tried to 
 constexpr double kLeastPeriods = 10;  // choice: of the band, in the record: below, nothing is smoothed
 constexpr double kLoadRateBand = 120 / kTriedResonance;  // simulation: in units of the mesh resonance
 
-std::vector<double> scaled(const Record& record, Channel channel, double factor) {
+std::vector<double> scaled(const record::Record& record, record::Channel channel, double factor) {
   std::vector<double> values = record.column(channel);
   for (std::size_t k = 0; k < values.size(); ++k) {
     if (!std::isfinite(values[k]))
-      throw BadData(record.name,
-                    channel_name(channel) + " is not a number at t = " + time_text(record.time[k]) + " s");
+      throw BadData(record.name, record::channel_name(channel) +
+                                     " is not a number at t = " + record::time_text(record.time[k]) + " s");
     values[k] *= factor;
   }
   return values;
@@ -42,7 +42,7 @@ std::vector<double> scaled(const Record& record, Channel channel, double factor)
 
 /// Five points: at a tenth of the sampling rate the central difference already loses 6 %, this one 0.5 %.
 std::vector<double> fast_derivative(const std::vector<double>& x, double interval) {
-  std::vector<double> rate = derivative(x, interval);
+  std::vector<double> rate = signal::derivative(x, interval);
   for (std::size_t k = 2; k + 2 < x.size(); ++k)
     rate[k] = (x[k - 2] - 8 * x[k - 1] + 8 * x[k + 1] - x[k + 2]) / (12 * interval);
   return rate;
@@ -89,7 +89,7 @@ void smooth_slow_motion(ServoData& data) {
   const double position = data.rate_noise * data.interval / kRateNoise;
   const double narrowest = kLeastPeriods / (double(data.size()) * data.interval);
   for (double band = kWidestBand / data.interval; band > narrowest; band *= kNarrower) {
-    const std::vector<double> smooth = low_pass(data.motor, data.interval, band);
+    const std::vector<double> smooth = signal::low_pass(data.motor, data.interval, band);
     const std::vector<double> rate = fast_derivative(smooth, data.interval);
     const double noise = position * rate_of_noise(band, data.interval);
     if (noise > kClear * root_mean_square(rate)) continue;
@@ -114,44 +114,47 @@ double time_between_reversals(const ServoData& data) {
   return double(data.size()) * data.interval / (reversals + 1);
 }
 
-Record load_side(const Record& record, const Rig& rig) {
-  Record out = record;
+record::Record load_side(const record::Record& record, const model::Rig& rig) {
+  record::Record out = record;
   const double ratio = rig.motor_axis_ratio();
-  for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
+  for (const record::Channel channel : {record::Channel::motor_torque, record::Channel::sensor_torque})
     for (double& value : out.column(channel)) value *= ratio;
-  for (const Channel channel :
-       {Channel::motor_position, Channel::motor_velocity, Channel::reference_position})
+  for (const record::Channel channel : {record::Channel::motor_position, record::Channel::motor_velocity,
+                                        record::Channel::reference_position})
     for (double& value : out.column(channel)) value /= ratio;
   return out;
 }
 
-ServoData servo_data(const Record& raw, const Rig& rig) {
-  for (const Channel channel : {Channel::motor_torque, Channel::motor_position})
-    if (!raw.has(channel)) throw CannotIdentify(raw.name + " has no " + channel_name(channel));
-  const Record record = evenly_sampled(raw);
+ServoData servo_data(const record::Record& raw, const model::Rig& rig) {
+  for (const record::Channel channel : {record::Channel::motor_torque, record::Channel::motor_position})
+    if (!raw.has(channel)) throw CannotIdentify(raw.name + " has no " + record::channel_name(channel));
+  const record::Record record = record::evenly_sampled(raw);
   const double ratio = rig.motor_axis_ratio();
   ServoData data;
   data.interval = record.sampling_interval();
-  data.torque = scaled(record, Channel::motor_torque, ratio);
-  data.motor = scaled(record, Channel::motor_position, 1 / ratio);
+  data.torque = scaled(record, record::Channel::motor_torque, ratio);
+  data.motor = scaled(record, record::Channel::motor_position, 1 / ratio);
   data.motor_rate = fast_derivative(data.motor, data.interval);
-  if (data.size() >= kLeastToTell) data.rate_noise = kRateNoise * position_noise(data.motor) / data.interval;
-  if (!load_moves_freely(rig)) {
-    const double rounding = resolution(data.motor) / std::sqrt(12.0);  // of a slow motion not white
+  if (data.size() >= kLeastToTell)
+    data.rate_noise = kRateNoise * signal::position_noise(data.motor) / data.interval;
+  if (!simulation::load_moves_freely(rig)) {
+    const double rounding = signal::resolution(data.motor) / std::sqrt(12.0);  // of a slow motion not white
     data.rate_noise = std::max(data.rate_noise, kRateNoise * rounding / data.interval);
     smooth_slow_motion(data);
   }
   data.motor_acceleration = second_difference(data.motor, data.interval);
-  if (!record.has(Channel::load_position)) return data;
-  data.load = scaled(record, Channel::load_position, 1);
+  if (!record.has(record::Channel::load_position)) return data;
+  data.load = scaled(record, record::Channel::load_position, 1);
   const double highest = kWidestBand / data.interval;
-  const double resonance =
-      load_moves_freely(rig) ? mesh_resonance(load_side(rig), usual_torque(data.torque)) : 0;
+  const double resonance = simulation::load_moves_freely(rig)
+                               ? mesh_resonance(model::load_side(rig), usual_torque(data.torque))
+                               : 0;
   data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
-  data.load_rate = low_pass(fast_derivative(data.load, data.interval), data.interval, data.load_rate_cutoff);
+  data.load_rate =
+      signal::low_pass(fast_derivative(data.load, data.interval), data.interval, data.load_rate_cutoff);
   std::tie(data.first_load, data.first_load_rate) = start_of(data.load);
   data.first_load_rate /= data.interval;
   return data;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

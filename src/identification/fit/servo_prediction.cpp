@@ -14,7 +14,7 @@
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kEnds = 3;  // theory: periods of the cutoff at either end, where the filter has not settled
@@ -77,17 +77,17 @@ ChannelError relative(const std::vector<double>& measured, const std::vector<dou
 
 /// How a rig's load is driven by a record.
 struct Drive {
-  RecordedMotion motion;
+  simulation::RecordedMotion motion;
   double gain = 1;              // of the load encoder
   std::vector<double> changed;  // column that is not as recorded
 
-  Drive(const ServoData& data, const Rig& rig, const Calibration& calibration) {
+  Drive(const ServoData& data, const model::Rig& rig, const Calibration& calibration) {
     motion.interval = data.interval;
     motion.motor = &data.motor;
     motion.motor_rate = &data.motor_rate;
     if (!rig.terms.empty()) motion.motor_torque = &data.torque;
-    if (load_moves_freely(rig)) {
-      gain = sensing(rig.terms).load_position_gain;
+    if (simulation::load_moves_freely(rig)) {
+      gain = model::sensing(rig.terms).load_position_gain;
       motion.load_rate = &data.load_rate;
       motion.first_load = (data.first_load - calibration.encoder_offset) / gain;
       motion.first_load_rate = data.first_load_rate / gain;
@@ -105,9 +105,9 @@ struct Drive {
 };
 
 struct SimulatedLoad {
-  Rig rig;
+  model::Rig rig;
   double gain, offset;
-  DrivenLoad motion;
+  simulation::DrivenLoad motion;
   std::vector<double> deflection;  // simulated load minus recorded, without offset, low-passed; see Drive
 };
 
@@ -116,20 +116,20 @@ struct SimulatedLoad {
 /// The last loads that were simulated, the last that was asked for first.
 class SimulatedLoads {
  public:
-  std::shared_ptr<const SimulatedLoad> get(const PreparedServo& record, const Drive& drive, const Rig& rig,
-                                           const Calibration& calibration) {
+  std::shared_ptr<const SimulatedLoad> get(const PreparedServo& record, const Drive& drive,
+                                           const model::Rig& rig, const Calibration& calibration) {
     if (auto known = find(rig, drive.gain, calibration.encoder_offset)) return known;
     auto made = std::make_shared<SimulatedLoad>();
     made->rig = rig;
     made->gain = drive.gain;
     made->offset = calibration.encoder_offset;
-    made->motion = simulate_driven_load(rig, drive.motion, record.feedback);
-    if (load_moves_freely(rig)) {
+    made->motion = simulation::simulate_driven_load(rig, drive.motion, record.feedback);
+    if (simulation::load_moves_freely(rig)) {
       const ServoData& data = record.data();
       std::vector<double> difference(data.size());
       for (std::size_t k = 0; k < data.size(); ++k)
         difference[k] = drive.gain * made->motion.load[k] - data.load[k];
-      made->deflection = low_pass(difference, data.interval, record.cutoff);
+      made->deflection = signal::low_pass(difference, data.interval, record.cutoff);
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     kept_.push_front(made);
@@ -140,10 +140,11 @@ class SimulatedLoads {
  private:
   static constexpr std::size_t kKept = 8;  // that a Jacobian's columns come upon the load of its centre again
 
-  std::shared_ptr<const SimulatedLoad> find(const Rig& rig, double gain, double offset) {
+  std::shared_ptr<const SimulatedLoad> find(const model::Rig& rig, double gain, double offset) {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (auto at = kept_.begin(); at != kept_.end(); ++at) {
-      if ((*at)->gain != gain || (*at)->offset != offset || !moves_same_load((*at)->rig, rig)) continue;
+      if ((*at)->gain != gain || (*at)->offset != offset || !simulation::moves_same_load((*at)->rig, rig))
+        continue;
       kept_.splice(kept_.begin(), kept_, at);
       return kept_.front();
     }
@@ -173,34 +174,35 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
   }
 }
 
-std::vector<double> PreparedServo::acting_torque(const Rig& rig, const Calibration& calibration) const {
-  const double delay = calibration.torque_delay + sensing(rig.terms).torque_delay / data().interval;
-  return delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
+std::vector<double> PreparedServo::acting_torque(const model::Rig& rig,
+                                                 const Calibration& calibration) const {
+  const double delay = calibration.torque_delay + model::sensing(rig.terms).torque_delay / data().interval;
+  return signal::delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
 }
 
-ServoResiduals PreparedServo::residuals(const Rig& rig, const Calibration& calibration) const {
+ServoResiduals PreparedServo::residuals(const model::Rig& rig, const Calibration& calibration) const {
   const Drive drive(data(), rig, calibration);
   const auto load = loads_->get(*this, drive, rig, calibration);
-  const MotorTorques motor = motor_torques(rig, drive.motion, load->motion);
-  const double inertia = GearTrain(rig).motor_inertia();
+  const simulation::MotorTorques motor = simulation::motor_torques(rig, drive.motion, load->motion);
+  const double inertia = model::GearTrain(rig).motor_inertia();
   ServoResiduals r;
   r.load = {load, &load->motion};
   r.torque = acting_torque(rig, calibration);
   const std::vector<double> friction =
-      presliding_friction(data().motor, motor.friction, data().motor_rate, data().interval);
+      model::presliding_friction(data().motor, motor.friction, data().motor_rate, data().interval);
   for (std::size_t k = 0; k < data().size(); ++k) {
     if (direction[k] == 0)
       r.torque[k] = 0;  // friction takes what balances
     else
       r.torque[k] -= inertia * data().motor_acceleration[k] - motor.mean[k] + friction[k];
   }
-  r.torque = low_pass(r.torque, data().interval, cutoff);
+  r.torque = signal::low_pass(r.torque, data().interval, cutoff);
   r.deflection = load->deflection;
   for (double& value : r.deflection) value += calibration.encoder_offset;
   return r;
 }
 
-ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSettings& settings,
+ServoPrediction predict_servo(const model::Rig& rig, const ServoData& data, const FitSettings& settings,
                               const Calibration& calibration) {
   if (!(settings.cutoff > 0)) throw InvalidParameter("cutoff", settings.cutoff, "must be > 0 Hz");
   const PreparedServo prepared(data, settings.cutoff, settings.feedback);
@@ -210,12 +212,14 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSe
   p.settled = prepared.settled;
   const NoiseFloors floors = noise_floors(rig, data, r.load->load, settings.cutoff, settings.feedback);
   p.torque_floor = floors.torque;
-  p.measured_torque = low_pass(prepared.acting_torque(rig, calibration), data.interval, settings.cutoff);
+  p.measured_torque =
+      signal::low_pass(prepared.acting_torque(rig, calibration), data.interval, settings.cutoff);
   p.torque = difference(p.measured_torque, r.torque);
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
   if (!r.deflection.empty()) {
     p.deflection_floor = floors.deflection;
-    p.measured_deflection = low_pass(difference(data.motor, data.load), data.interval, settings.cutoff);
+    p.measured_deflection =
+        signal::low_pass(difference(data.motor, data.load), data.interval, settings.cutoff);
     p.deflection = difference(p.measured_deflection, r.deflection);
     p.deflection_error = relative(p.measured_deflection, p.deflection, p.settled, p.deflection_floor);
   }
@@ -223,4 +227,4 @@ ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSe
   return p;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

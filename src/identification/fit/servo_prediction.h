@@ -7,11 +7,11 @@
 
 #include "backlash_diagnosis/identification/fit/output_error.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Recorded minus predicted, low-passed. No deflection where the load has no motion of its own.
 struct ServoResiduals {
-  std::shared_ptr<const DrivenLoad> load;
+  std::shared_ptr<const simulation::DrivenLoad> load;
   std::vector<double> torque, deflection;  // N m, rad
 };
 
@@ -22,10 +22,10 @@ struct PreparedServo {
   PreparedServo(const ServoData& data, double cutoff, double feedback);
 
   /// What a second difference of the motor position sees of the motor's torque [N m].
-  std::vector<double> acting_torque(const Rig& rig, const Calibration& calibration) const;
+  std::vector<double> acting_torque(const model::Rig& rig, const Calibration& calibration) const;
   /// Safe to call from several threads. Simulated loads are cached: a rig that differs only in parameters
   /// that do not move the load is not simulated again.
-  ServoResiduals residuals(const Rig& rig, const Calibration& calibration) const;
+  ServoResiduals residuals(const model::Rig& rig, const Calibration& calibration) const;
 
   const ServoData& data() const { return *data_; }
   double cutoff, feedback;     // Hz, 1/s
@@ -39,4 +39,4 @@ struct PreparedServo {
   std::shared_ptr<SimulatedLoads> loads_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -7,13 +7,14 @@
 #include <cmath>
 #include <optional>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/flank_fit.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kCutoff = 3.85;      // simulation: times the frequency of the load on a flank
@@ -39,18 +40,18 @@ struct Run {
   double interval = 0;
 };
 
-Run prepare(const Record& given, const ClearanceSettings& settings) {
-  if (!given.has(Channel::motor_position) || !given.has(Channel::load_position))
+Run prepare(const record::Record& given, const ClearanceSettings& settings) {
+  if (!given.has(record::Channel::motor_position) || !given.has(record::Channel::load_position))
     throw CannotIdentify("the clearance needs the positions of motor and load");
-  const Record record = evenly_sampled(given);
+  const record::Record record = record::evenly_sampled(given);
   Run run;
   run.time = record.time;
-  run.motor = record.column(Channel::motor_position);
+  run.motor = record.column(record::Channel::motor_position);
   run.interval = record.sampling_interval();
-  const Values& load = record.column(Channel::load_position);
+  const Values& load = record.column(record::Channel::load_position);
   for (std::size_t i = 0; i < load.size(); ++i) run.relative.push_back(load[i] - run.motor[i]);
-  run.smooth = low_pass(run.relative, run.interval, std::min(settings.cutoff, 0.2 / run.interval));
-  run.fine = low_pass(run.relative, run.interval, std::min(settings.fine_cutoff, 0.4 / run.interval));
+  run.smooth = signal::low_pass(run.relative, run.interval, std::min(settings.cutoff, 0.2 / run.interval));
+  run.fine = signal::low_pass(run.relative, run.interval, std::min(settings.fine_cutoff, 0.4 / run.interval));
   return run;
 }
 
@@ -78,7 +79,7 @@ Stretch around(const Run& run, int change, int before, int after, double sign, d
 
 /// Passages of the middle of the travel.
 std::vector<Stretch> find_passages(const Run& run, double contact_time) {
-  const double low = quantile(run.smooth, 0.02), high = quantile(run.smooth, 0.98);
+  const double low = signal::quantile(run.smooth, 0.02), high = signal::quantile(run.smooth, 0.98);
   std::vector<int> changes;
   int side = 0;
   for (std::size_t i = 0; i < run.smooth.size(); ++i) {
@@ -174,7 +175,7 @@ PassageFit fit_all(const Run& run, const std::vector<Stretch>& stretches, double
   }
   FlankContact known;
   known.stiffness = stiffness;
-  return fit_flanks(passages, quantile(lows, 0.5), quantile(highs, 0.5), known);
+  return fit_flanks(passages, signal::quantile(lows, 0.5), signal::quantile(highs, 0.5), known);
 }
 
 /// Fits all, leaves out what does not fit, fits again.
@@ -194,7 +195,7 @@ Passages fit_without_outliers(const Run& run, std::vector<Stretch> stretches, do
       measured.push_back(measure(run, s, p.fit.contact, push));
       if (measured.back()) deviations.push_back(measured.back()->deviation);
     }
-    const double most = deviations.empty() ? 0 : kOutlier * quantile(deviations, 0.5);
+    const double most = deviations.empty() ? 0 : kOutlier * signal::quantile(deviations, 0.5);
     for (std::size_t i = 0; i < stretches.size(); ++i)
       if (measured[i] && measured[i]->deviation <= most) {
         p.stretches.push_back(stretches[i]);
@@ -207,10 +208,10 @@ Passages fit_without_outliers(const Run& run, std::vector<Stretch> stretches, do
 }
 
 /// Pushes that are no such polynomial show in the scatter of the passages, not in the noise.
-Measured gap_of(const Passages& p) {
-  std::vector<Measured> gaps;
+signal::Measured gap_of(const Passages& p) {
+  std::vector<signal::Measured> gaps;
   for (const GapPassage& passage : p.measured) gaps.push_back(passage.gap);
-  return {p.fit.gap.value, std::max(p.fit.gap.standard_error, robust_mean(gaps).standard_error)};
+  return {p.fit.gap.value, std::max(p.fit.gap.standard_error, signal::robust_mean(gaps).standard_error)};
 }
 
 }  // namespace
@@ -225,7 +226,7 @@ ClearanceSettings clearance_settings(double stiffness, double load_inertia) {
   return settings;
 }
 
-Clearance identify_clearance(const Record& record, const ClearanceSettings& settings) {
+Clearance identify_clearance(const record::Record& record, const ClearanceSettings& settings) {
   const double held = held_frequency(settings);
   const Run run = prepare(record, settings);
   std::vector<Stretch> stretches = find_passages(run, settings.contact_time);
@@ -241,7 +242,7 @@ Clearance identify_clearance(const Record& record, const ClearanceSettings& sett
   std::vector<Passages> by_push;
   for (const int push : kPushes)
     by_push.push_back(fit_without_outliers(run, stretches, held * held, push, settings.least_passages));
-  const Measured gaps[] = {gap_of(by_push[0]), gap_of(by_push[1])};
+  const signal::Measured gaps[] = {gap_of(by_push[0]), gap_of(by_push[1])};
   const double difference = std::fabs(gaps[0].value - gaps[1].value);
   const double noise = std::max(gaps[0].standard_error, gaps[1].standard_error);
   if (by_push[1].fit.without_flanks < kFlanks * by_push[1].fit.deviation)
@@ -261,9 +262,9 @@ Clearance identify_clearance(const Record& record, const ClearanceSettings& sett
   c.upper = c.lower + p.fit.flanks.gap;
   c.contact_frequency = std::sqrt(p.fit.contact.stiffness);
   c.damping_ratio = p.fit.contact.damping / (2 * c.contact_frequency);
-  std::vector<Measured> travels;
+  std::vector<signal::Measured> travels;
   for (const GapPassage& passage : c.passages) travels.push_back({passage.travel, passage.deviation});
-  c.travel = robust_mean(travels);
+  c.travel = signal::robust_mean(travels);
   if (2 * c.passages.size() < std::size_t(c.found))
     c.warnings.push_back(fmt::format("only {} of {} passages fit", c.passages.size(), c.found));
   if (p.fit.contact.damping == 0)
@@ -276,4 +277,4 @@ Clearance identify_clearance(const Record& record, const ClearanceSettings& sett
   return c;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

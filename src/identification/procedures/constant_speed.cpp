@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/blocks.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr std::size_t kLeastBlocks = 4;  // theory: for a standard error
@@ -24,10 +25,10 @@ void require(const ConstantSpeedOptions& options) {
   if (!(options.spread > 0)) throw InvalidParameter("spread", options.spread, "must be > 0");
 }
 
-std::vector<double> speed_of(const Record& record, double interval) {
-  if (record.has(Channel::motor_velocity)) return record.column(Channel::motor_velocity);
-  if (record.has(Channel::motor_position))
-    return derivative(record.column(Channel::motor_position), interval);
+std::vector<double> speed_of(const record::Record& record, double interval) {
+  if (record.has(record::Channel::motor_velocity)) return record.column(record::Channel::motor_velocity);
+  if (record.has(record::Channel::motor_position))
+    return signal::derivative(record.column(record::Channel::motor_position), interval);
   throw CannotIdentify(record.name + ": friction needs motor_velocity or motor_position");
 }
 
@@ -45,22 +46,23 @@ std::size_t stretch_end(const std::vector<double>& speed, std::size_t first, dou
 }
 
 /// Mean of the blocks `first` to `end`, each `length` samples long.
-Measured mean_of(const std::vector<double>& values, std::size_t first, std::size_t end, std::size_t length) {
-  return batch_mean({values.begin() + first * length, values.begin() + end * length});
+signal::Measured mean_of(const std::vector<double>& values, std::size_t first, std::size_t end,
+                         std::size_t length) {
+  return signal::batch_mean({values.begin() + first * length, values.begin() + end * length});
 }
 
 }  // namespace
 
-std::vector<ConstantSpeedRun> find_constant_speed(const Record& recorded,
+std::vector<ConstantSpeedRun> find_constant_speed(const record::Record& recorded,
                                                   const ConstantSpeedOptions& options) {
   require(options);
-  if (!recorded.has(Channel::motor_torque))
+  if (!recorded.has(record::Channel::motor_torque))
     throw CannotIdentify(recorded.name + ": friction needs motor_torque");
-  const Record record = evenly_sampled(recorded);
+  const record::Record record = record::evenly_sampled(recorded);
   const double interval = record.sampling_interval();
   const auto length = std::max<std::size_t>(1, std::lround(options.block / interval));
-  const std::vector<double> speed = speed_of(record, interval), blocks = block_means(speed, length);
-  const std::vector<double>& torque = record.column(Channel::motor_torque);
+  const std::vector<double> speed = speed_of(record, interval), blocks = signal::block_means(speed, length);
+  const std::vector<double>& torque = record.column(record::Channel::motor_torque);
   std::vector<ConstantSpeedRun> runs;
   for (std::size_t first = 0; first < blocks.size();) {
     const std::size_t end = stretch_end(blocks, first, options.spread);
@@ -69,7 +71,7 @@ std::vector<ConstantSpeedRun> find_constant_speed(const Record& recorded,
       continue;
     }
     const auto steady =
-        steady_range({blocks.begin() + first + 1, blocks.begin() + end - 1}, kMostSettling, kSettled);
+        signal::steady_range({blocks.begin() + first + 1, blocks.begin() + end - 1}, kMostSettling, kSettled);
     const std::size_t from = first + 1 + steady.first, to = first + 1 + steady.second;
     if (to < from + kLeastBlocks) {
       first = end;
@@ -87,4 +89,4 @@ std::vector<ConstantSpeedRun> find_constant_speed(const Record& recorded,
   return runs;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

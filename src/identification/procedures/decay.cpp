@@ -6,13 +6,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kSearched = 12;  // choice: periods after a step in which ringing may begin
@@ -28,13 +29,13 @@ using Values = std::vector<double>;
 /// Standard deviation of the noise from fourth differences, which slow signals do not reach; not below that
 /// of the sensor's steps, which a signal at rest does not show.
 double noise_of(const Values& y) {
-  const double step = smallest_step(y, 1e-9 * peak_to_peak(y));
-  return std::max(noise_from_differences(y, 4), step / std::sqrt(12.0));
+  const double step = signal::smallest_step(y, 1e-9 * signal::peak_to_peak(y));
+  return std::max(signal::noise_from_differences(y, 4), step / std::sqrt(12.0));
 }
 
 /// Where a two-level signal changes level, with a dead band of half its travel about the middle.
 std::vector<int> steps_of(const Values& y) {
-  const double low = quantile(y, 0.05), high = quantile(y, 0.95);
+  const double low = signal::quantile(y, 0.05), high = signal::quantile(y, 0.95);
   std::vector<int> steps;
   int level = 0;
   for (std::size_t i = 0; i < y.size(); ++i) {
@@ -53,58 +54,64 @@ Values difference(const Values& a, const Values& b) {
 
 /// What the search for stretches needs of a record.
 struct Run {
-  Record record;
+  record::Record record;
   Values signal, motor_speed, load_speed;
   std::vector<int> steps;
   double interval = 0, period = 0, noise = 0, torque_travel = 0;
 };
 
-Values speed_of(const Record& record, Channel speed, Channel position, double interval, double period) {
+Values speed_of(const record::Record& record, record::Channel speed, record::Channel position,
+                double interval, double period) {
   const double cutoff = std::min(4 / period, 0.4 / interval);
-  if (record.has(speed)) return low_pass(record.column(speed), interval, cutoff);
-  return derivative(low_pass(record.column(position), interval, cutoff), interval);
+  if (record.has(speed)) return signal::low_pass(record.column(speed), interval, cutoff);
+  return signal::derivative(signal::low_pass(record.column(position), interval, cutoff), interval);
 }
 
-RingingSignal signal_of(const Record& record, const DecaySettings& settings) {
-  const bool speeds = record.has(Channel::motor_velocity) && record.has(Channel::load_velocity);
-  const bool positions = record.has(Channel::motor_position) && record.has(Channel::load_position);
+RingingSignal signal_of(const record::Record& record, const DecaySettings& settings) {
+  const bool speeds =
+      record.has(record::Channel::motor_velocity) && record.has(record::Channel::load_velocity);
+  const bool positions =
+      record.has(record::Channel::motor_position) && record.has(record::Channel::load_position);
   const RingingSignal signal =
       settings.signal.value_or(speeds ? RingingSignal::speed_difference : RingingSignal::position_difference);
   if (signal == RingingSignal::speed_difference ? !speeds : !positions)
     throw CannotIdentify("damping from ringing needs the speeds or the positions of motor and load");
-  if (!positions && !record.has(Channel::motor_torque))
+  if (!positions && !record.has(record::Channel::motor_torque))
     throw CannotIdentify(
         "damping from ringing needs the motor's torque or both positions to find the engagements");
   return signal;
 }
 
-Run prepare(const Record& given, RingingSignal signal, double period) {
+Run prepare(const record::Record& given, RingingSignal signal, double period) {
   Run run;
-  run.record = evenly_sampled(given);
-  const Record& r = run.record;
+  run.record = record::evenly_sampled(given);
+  const record::Record& r = run.record;
   run.interval = r.sampling_interval();
   run.period = period;
   if (period < 8 * run.interval)
     throw CannotIdentify(
         fmt::format("ringing of {:.4g} Hz cannot be seen at {:.4g} Hz", 1 / period, 1 / run.interval));
   const bool speeds = signal == RingingSignal::speed_difference;
-  run.signal = difference(r.column(speeds ? Channel::motor_velocity : Channel::motor_position),
-                          r.column(speeds ? Channel::load_velocity : Channel::load_position));
+  run.signal =
+      difference(r.column(speeds ? record::Channel::motor_velocity : record::Channel::motor_position),
+                 r.column(speeds ? record::Channel::load_velocity : record::Channel::load_position));
   run.noise = noise_of(run.signal);
-  run.motor_speed = speed_of(r, Channel::motor_velocity, Channel::motor_position, run.interval, period);
-  run.load_speed = speed_of(r, Channel::load_velocity, Channel::load_position, run.interval, period);
-  const Values& torque = r.column(Channel::motor_torque);
-  run.steps = steps_of(!torque.empty()
-                           ? torque
-                           : difference(r.column(Channel::motor_position), r.column(Channel::load_position)));
-  if (!torque.empty()) run.torque_travel = quantile_range(torque, 0.05);
+  run.motor_speed =
+      speed_of(r, record::Channel::motor_velocity, record::Channel::motor_position, run.interval, period);
+  run.load_speed =
+      speed_of(r, record::Channel::load_velocity, record::Channel::load_position, run.interval, period);
+  const Values& torque = r.column(record::Channel::motor_torque);
+  run.steps = steps_of(!torque.empty() ? torque
+                                       : difference(r.column(record::Channel::motor_position),
+                                                    r.column(record::Channel::load_position)));
+  if (!torque.empty()) run.torque_travel = signal::quantile_range(torque, 0.05);
   return run;
 }
 
 /// The sample before which a stretch from `start` has to end: `limit`, or where a body turns back or the
 /// torque moves.
 int end_of(const Run& run, int start, int limit) {
-  const Values& torque = run.record.column(Channel::motor_torque);
+  const Values& torque = run.record.column(record::Channel::motor_torque);
   for (int i = start; i < limit; ++i) {
     if (run.motor_speed[i] * run.motor_speed[start] <= 0 || run.load_speed[i] * run.load_speed[start] <= 0)
       return i;
@@ -149,21 +156,21 @@ std::optional<Ringing> ringing_after(const Run& run, int step, int limit, const 
   return std::nullopt;
 }
 
-Measured of(const std::vector<Ringing>& ringings, Measured Ringing::*quantity) {
-  std::vector<Measured> values;
+signal::Measured of(const std::vector<Ringing>& ringings, signal::Measured Ringing::*quantity) {
+  std::vector<signal::Measured> values;
   for (const Ringing& r : ringings) values.push_back(r.*quantity);
-  return robust_mean(values);
+  return signal::robust_mean(values);
 }
 
-Measured of_peaks(const std::vector<Ringing>& ringings) {
-  std::vector<Measured> values;
+signal::Measured of_peaks(const std::vector<Ringing>& ringings) {
+  std::vector<signal::Measured> values;
   for (const Ringing& r : ringings)
     if (std::isfinite(r.peak_damping_ratio))
       values.push_back({r.peak_damping_ratio, r.damping_ratio.standard_error});
-  return values.size() < 2 ? Measured{} : robust_mean(values);
+  return values.size() < 2 ? signal::Measured{} : signal::robust_mean(values);
 }
 
-double relative_variance(const Measured& m) {
+double relative_variance(const signal::Measured& m) {
   return std::isfinite(m.standard_error) ? std::pow(m.standard_error / m.value, 2) : 0;
 }
 
@@ -189,7 +196,7 @@ void fill(DecayIdentification& d, const DecaySettings& s) {
   d.damping.standard_error =
       d.damping.value *
       std::sqrt(variance + (relative_variance(s.stiffness) + relative_variance(s.reduced_inertia)) / 4);
-  const Measured rate = of(d.ringings, &Ringing::rate);
+  const signal::Measured rate = of(d.ringings, &Ringing::rate);
   d.damping_by_rate.value = 2 * rate.value * j;
   d.damping_by_rate.standard_error =
       d.damping_by_rate.value * std::sqrt(relative_variance(rate) + relative_variance(s.reduced_inertia));
@@ -208,7 +215,7 @@ void fill(DecayIdentification& d, const DecaySettings& s) {
 
 }  // namespace
 
-DecayIdentification identify_decay(const Record& record, const DecaySettings& settings) {
+DecayIdentification identify_decay(const record::Record& record, const DecaySettings& settings) {
   check(settings);
   DecayIdentification d;
   d.signal = signal_of(record, settings);
@@ -229,4 +236,4 @@ DecayIdentification identify_decay(const Record& record, const DecaySettings& se
   return d;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <utility>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// Least squares over what is not known of the contact, at given flanks; damping >= 0.
@@ -17,12 +18,12 @@ FlankContact contact_of(const std::vector<FlankPassage>& passages, const Flanks&
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   for (const FlankPassage& p : passages) {
     const Eigen::MatrixXd c = p.columns(flanks);
-    normal += gram(c);
+    normal += signal::gram(c);
     right -= c.transpose() * p.measured();
   }
   if (std::isfinite(stiffness))
     return {stiffness, std::max(0.0, (right[1] - normal(0, 1) * stiffness) / normal(1, 1))};
-  const Eigen::Vector2d k = solve_square(normal, right);
+  const Eigen::Vector2d k = signal::solve_square(normal, right);
   if (k[1] < 0) return {right[0] / normal(0, 0), 0};
   return {k[0], k[1]};
 }
@@ -51,7 +52,7 @@ FlankPassage::FlankPassage(const Eigen::VectorXd& position, Eigen::VectorXd smoo
   const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(size(), -1, 1);
   powers.col(0).setOnes();
   for (int k = 1; k < polynomial; ++k) powers.col(k) = powers.col(k - 1).array() * t;
-  basis_ = orthonormal_basis(powers);
+  basis_ = signal::orthonormal_basis(powers);
   measured_ = without_polynomial(position);
 }
 
@@ -103,7 +104,8 @@ PassageFit fit_flanks(const std::vector<FlankPassage>& passages, double low, dou
       least = sum;
       start = p;
     }
-  const LeastSquaresFit fit = fit_nonlinear(residuals, start, Eigen::Vector2d::Constant(0.1 * travel));
+  const signal::LeastSquaresFit fit =
+      signal::fit_nonlinear(residuals, start, Eigen::Vector2d::Constant(0.1 * travel));
   PassageFit f;
   f.flanks = {fit.values[0], fit.values[1]};
   f.contact = contact_at(f.flanks);
@@ -118,4 +120,4 @@ PassageFit fit_flanks(const std::vector<FlankPassage>& passages, double low, dou
   return f;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

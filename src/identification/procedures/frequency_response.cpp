@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/stepped_sine.h"
 #include "backlash_diagnosis/record/resampling.h"
@@ -13,7 +14,7 @@
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using Complex = std::complex<double>;
@@ -33,30 +34,31 @@ struct Signals {
   bool from_position = false;
 };
 
-void require_finite(const std::vector<double>& values, Channel channel) {
+void require_finite(const std::vector<double>& values, record::Channel channel) {
   for (const double v : values)
-    if (!std::isfinite(v)) throw CannotIdentify(channel_name(channel) + " has values that are not finite");
+    if (!std::isfinite(v))
+      throw CannotIdentify(record::channel_name(channel) + " has values that are not finite");
 }
 
-Signals collect(const Record& given, ResponseSide side) {
+Signals collect(const record::Record& given, ResponseSide side) {
   const bool motor = side == ResponseSide::motor;
-  const Channel velocity = motor ? Channel::motor_velocity : Channel::load_velocity,
-                position = motor ? Channel::motor_position : Channel::load_position;
-  if (!given.has(Channel::motor_torque)) throw CannotIdentify("the record has no motor_torque");
+  const record::Channel velocity = motor ? record::Channel::motor_velocity : record::Channel::load_velocity,
+                        position = motor ? record::Channel::motor_position : record::Channel::load_position;
+  if (!given.has(record::Channel::motor_torque)) throw CannotIdentify("the record has no motor_torque");
   if (!given.has(velocity) && !given.has(position))
-    throw CannotIdentify("the record has neither " + channel_name(velocity) + " nor " +
-                         channel_name(position));
-  const Record record = evenly_sampled(given);
+    throw CannotIdentify("the record has neither " + record::channel_name(velocity) + " nor " +
+                         record::channel_name(position));
+  const record::Record record = record::evenly_sampled(given);
   Signals s;
-  s.torque = record.column(Channel::motor_torque);
+  s.torque = record.column(record::Channel::motor_torque);
   s.interval = (record.time.back() - record.time.front()) / double(record.size() - 1);
   s.from_position = !record.has(velocity);
-  const Channel source = s.from_position ? position : velocity;
-  require_finite(s.torque, Channel::motor_torque);
+  const record::Channel source = s.from_position ? position : velocity;
+  require_finite(s.torque, record::Channel::motor_torque);
   require_finite(record.column(source), source);
   const auto [least, most] = std::minmax_element(s.torque.begin(), s.torque.end());
   if (*least == *most) throw CannotIdentify("the torque does not vary");
-  s.speed = s.from_position ? derivative(record.column(source), s.interval) : record.column(source);
+  s.speed = s.from_position ? signal::derivative(record.column(source), s.interval) : record.column(source);
   return s;
 }
 
@@ -91,7 +93,7 @@ double inertance(const Signals& s, const ResponseSettings& settings, const Frequ
     a.row(i) << 1, std::pow(points.back().frequency / p.frequency, 2);
     b[i] = 2 * M_PI * p.frequency * std::abs(p.response) / (line.gain + line.images);
   }
-  return fit_robust(a, b).values[0];
+  return signal::fit_robust(a, b).values[0];
 }
 
 void correct_sampling(const Signals& s, const ResponseSettings& settings, FrequencyResponse& response) {
@@ -162,7 +164,7 @@ bool reverses(const std::vector<double>& speed) {
 
 FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) {
   const std::size_t segment = segment_length(s, settings.segment);
-  const WelchSpectra spectra = welch(s.torque, s.speed, s.interval, segment);
+  const signal::WelchSpectra spectra = signal::welch(s.torque, s.speed, s.interval, segment);
   const std::vector<double>& power = spectra.xx;
   const double largest = *std::max_element(power.begin() + kFirstLine, power.end());
   const bool both_signs = reverses(s.speed);
@@ -186,7 +188,7 @@ FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) 
     point.standard_error = std::sqrt((1 - point.coherence) / (2 * spectra.averages * point.coherence));
     point.reverses = both_signs;
     response.points.push_back(point);
-    if (single != k) response.variance_factor = kHannLines;
+    if (single != k) response.variance_factor = signal::kHannLines;
   }
   return response;
 }
@@ -205,7 +207,7 @@ void sort_by_frequency(FrequencyResponse& response) {
 
 }  // namespace
 
-FrequencyResponse estimate_response(const Record& record, const ResponseSettings& settings) {
+FrequencyResponse estimate_response(const record::Record& record, const ResponseSettings& settings) {
   check(settings);
   const Signals s = collect(record, settings.side);
   FrequencyResponse response;
@@ -232,10 +234,11 @@ FrequencyResponse estimate_response(const Record& record, const ResponseSettings
   return response;
 }
 
-FrequencyResponse estimate_response(const std::vector<Record>& records, const ResponseSettings& settings) {
+FrequencyResponse estimate_response(const std::vector<record::Record>& records,
+                                    const ResponseSettings& settings) {
   FrequencyResponse all;
   std::string reasons;
-  for (const Record& record : records) {
+  for (const record::Record& record : records) {
     try {
       const FrequencyResponse one = estimate_response(record, settings);
       all.points.insert(all.points.end(), one.points.begin(), one.points.end());
@@ -249,4 +252,4 @@ FrequencyResponse estimate_response(const std::vector<Record>& records, const Re
   return all;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -9,11 +9,12 @@
 #include <cstdint>
 #include <limits>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kSameSpeed = 0.01;  // choice: relative: speeds closer than this count as one
@@ -60,7 +61,7 @@ Line weighted_line(const Rows& rows, const Eigen::VectorXd& weight) {
   Eigen::MatrixXd a(rows.speed.size(), 2);
   a << Eigen::VectorXd::Ones(a.rows()), rows.speed;
   Line line;
-  line.covariance = symmetric_inverse(gram(weight.cwiseSqrt().asDiagonal() * a));
+  line.covariance = signal::symmetric_inverse(signal::gram(weight.cwiseSqrt().asDiagonal() * a));
   line.values = line.covariance * (a.transpose() * weight.cwiseProduct(rows.torque));
   line.chi2 = weight.dot((rows.torque - a * line.values).cwiseAbs2());
   return line;
@@ -91,7 +92,8 @@ std::pair<double, double> extra_term(const Rows& rows, const Eigen::VectorXd& we
   const Eigen::VectorXd root = weight.cwiseSqrt();
   Eigen::MatrixXd a(rows.speed.size(), 3);
   a << Eigen::VectorXd::Ones(a.rows()), rows.speed, column;
-  const Measured term = fit_linear(root.asDiagonal() * a, root.cwiseProduct(rows.torque)).parameter(2);
+  const signal::Measured term =
+      signal::fit_linear(root.asDiagonal() * a, root.cwiseProduct(rows.torque)).parameter(2);
   return {term.value, term.value / term.standard_error};
 }
 
@@ -100,15 +102,16 @@ void test_curvature(FrictionLine& line, const Rows& rows, const Eigen::VectorXd&
   Eigen::MatrixXd a(rows.speed.size(), 2);
   a << Eigen::VectorXd::Ones(a.rows()), root;
   const Eigen::VectorXd scale = weight.cwiseSqrt();
-  const LeastSquaresFit fit = fit_linear(scale.asDiagonal() * a, scale.cwiseProduct(rows.torque));
+  const signal::LeastSquaresFit fit =
+      signal::fit_linear(scale.asDiagonal() * a, scale.cwiseProduct(rows.torque));
   line.root_a = fit.values[0];
   line.root_b = fit.values[1];
   line.root_rms = std::sqrt((rows.torque - a * fit.values).squaredNorm() / double(a.rows()));
   std::tie(line.quadratic, line.quadratic_t) = extra_term(rows, weight, rows.speed.cwiseAbs2());
   line.root_t = extra_term(rows, weight, root).second;
   const int freedom = int(a.rows()) - 3;
-  if (std::min(student_t_two_sided(line.quadratic_t, freedom), student_t_two_sided(line.root_t, freedom)) >
-      kSurprise)
+  if (std::min(signal::student_t_two_sided(line.quadratic_t, freedom),
+               signal::student_t_two_sided(line.root_t, freedom)) > kSurprise)
     return;
   const bool concave = line.quadratic * sign < 0;
   line.warnings.push_back(
@@ -129,7 +132,7 @@ void name_far_rows(FrictionLine& line, const Rows& rows, const Eigen::VectorXd& 
     const double scaled = weight[i] * line.residual[i] * line.residual[i] / (1 - leverage);
     const double variance = (all.chi2 - scaled) / double(n - 3);
     const double t = std::sqrt(scaled / std::max(variance, 1e-12 * all.chi2));
-    if (double(n) * student_t_two_sided(t, int(n) - 3) < kSurprise)
+    if (double(n) * signal::student_t_two_sided(t, int(n) - 3) < kSurprise)
       line.warnings.push_back(
           fmt::format("the run at {:.3g} rad/s ({:.3g} N m) lies {:.3g} standard deviations off the line "
                       "through the others",
@@ -172,10 +175,10 @@ FrictionLine fit_friction_line(const std::vector<ConstantSpeedRun>& runs, Direct
 }
 
 LoadFriction load_friction(const FrictionLine& drive, const FrictionLine& motor) {
-  const auto difference = [](const Measured& a, const Measured& b) {
-    return Measured{a.value - b.value, std::hypot(a.standard_error, b.standard_error)};
+  const auto difference = [](const signal::Measured& a, const signal::Measured& b) {
+    return signal::Measured{a.value - b.value, std::hypot(a.standard_error, b.standard_error)};
   };
   return {difference(drive.coulomb, motor.coulomb), difference(drive.viscous, motor.viscous)};
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/harmonics.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/blocks.h"
@@ -16,7 +17,7 @@
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kTurn = 2 * M_PI;
@@ -38,19 +39,21 @@ using Values = std::vector<double>;
 struct Run {
   Values load, difference;  // rad
   double speed = 0;         // rad/s
-  Measured scale;
+  signal::Measured scale;
 };
 
-Run steady_part(const Record& given) {
-  if (!given.has(Channel::motor_position) || !given.has(Channel::load_position))
+Run steady_part(const record::Record& given) {
+  if (!given.has(record::Channel::motor_position) || !given.has(record::Channel::load_position))
     throw CannotIdentify(given.name + ": a gap map needs the positions of motor and load");
-  const Record record = evenly_sampled(given);
-  const Values &motor = record.column(Channel::motor_position), &load = record.column(Channel::load_position);
+  const record::Record record = record::evenly_sampled(given);
+  const Values &motor = record.column(record::Channel::motor_position),
+               &load = record.column(record::Channel::load_position);
   const double interval = record.sampling_interval();
-  const Values speed = derivative(low_pass(load, interval, std::min(kSpeedCutoff, 0.2 / interval)), interval);
+  const Values speed =
+      signal::derivative(signal::low_pass(load, interval, std::min(kSpeedCutoff, 0.2 / interval)), interval);
   Run run;
-  run.speed = median(speed);
-  const auto [from, to] = steady_range(speed, kMostStart, kSettled);
+  run.speed = signal::median(speed);
+  const auto [from, to] = signal::steady_range(speed, kMostStart, kSettled);
   int backwards = 0;
   for (std::size_t i = 0; i < speed.size(); ++i) {
     backwards += speed[i] * run.speed < -kSteady * run.speed * run.speed;
@@ -104,28 +107,28 @@ void measure_scale(Run& run, double width) {
     }
     b[row] = means[i].second;
   }
-  const LeastSquaresFit fit = fit_linear(a, b);
-  const Measured slope = fit.parameter(1);
-  const double root = std::sqrt(correlation_length({fit.residuals.begin(), fit.residuals.end()}));
+  const signal::LeastSquaresFit fit = signal::fit_linear(a, b);
+  const signal::Measured slope = fit.parameter(1);
+  const double root = std::sqrt(signal::correlation_length({fit.residuals.begin(), fit.residuals.end()}));
   run.scale = {1 + slope.value / travel, root * slope.standard_error / travel};
 }
 
 /// One run in the bins of a turn.
 struct Binned {
-  std::map<int, Measured> value;  // at the middle of the bin
+  std::map<int, signal::Measured> value;  // at the middle of the bin
   std::map<int, int> samples;
   std::map<int, double> place;  // rad, mean load position, turns not taken off
 };
 
 /// The line through the samples of a bin; nothing where they are too few or all at one place.
-LeastSquaresFit line_in_bin(const std::vector<int>& members, const Values& offset, const Values& y) {
+signal::LeastSquaresFit line_in_bin(const std::vector<int>& members, const Values& offset, const Values& y) {
   Eigen::MatrixXd a(members.size(), 2);
   Eigen::VectorXd b(members.size());
   for (std::size_t i = 0; i < members.size(); ++i) {
     a.row(Eigen::Index(i)) << 1, offset[members[i]];
     b[Eigen::Index(i)] = y[members[i]];
   }
-  return fit_linear(a, b);
+  return signal::fit_linear(a, b);
 }
 
 /// `level` and `slope` are taken off: y = d - level - slope q.
@@ -148,7 +151,7 @@ Binned bin_run(const Run& run, double level, double slope, int bins) {
     if (std::fabs(middle) > kLopsided * width)
       continue;  // a line to the middle would reach beyond its samples
     try {
-      const LeastSquaresFit fit = line_in_bin(list, offset, y);
+      const signal::LeastSquaresFit fit = line_in_bin(list, offset, y);
       binned.value[bin] = fit.parameter(0);
       binned.samples[bin] = int(list.size());
       for (const int i : list) binned.place[bin] += run.load[i] / double(list.size());
@@ -157,7 +160,7 @@ Binned bin_run(const Run& run, double level, double slope, int bins) {
       continue;
     }
   }
-  const double root = std::sqrt(correlation_length(residual));
+  const double root = std::sqrt(signal::correlation_length(residual));
   for (auto& [bin, value] : binned.value) value.standard_error *= root;
   return binned;
 }
@@ -167,7 +170,7 @@ std::vector<GapBin> common_bins(const Binned& forward, const Binned& reverse, in
   for (const auto& [bin, f] : forward.value) {
     const auto other = reverse.value.find(bin);
     if (other == reverse.value.end()) continue;
-    const Measured& r = other->second;
+    const signal::Measured& r = other->second;
     GapBin b;
     b.position = (bin + 0.5) * kTurn / bins;
     b.forward_samples = forward.samples.at(bin);
@@ -203,17 +206,19 @@ void fit_series(GapMap& map, const GapMapSettings& settings) {
   map.confidence = 1 - series.chance;
 }
 
-double relative(const Measured& m) {
+double relative(const signal::Measured& m) {
   return std::isfinite(m.standard_error) ? m.standard_error / m.value : 0;
 }
 
 void correct_wind_up(GapMap& map, const GapMapSettings& s) {
-  const Measured &f = s.friction_forward, &r = s.friction_reverse, &k = s.stiffness;
+  const signal::Measured &f = s.friction_forward, &r = s.friction_reverse, &k = s.stiffness;
   if (!std::isfinite(k.value) || !std::isfinite(f.value) || !std::isfinite(r.value)) {
     map.warnings.push_back("without stiffness and load friction the wind-up of the mesh stays in the gap");
     return;
   }
-  const auto error = [](const Measured& m) { return std::isfinite(m.standard_error) ? m.standard_error : 0; };
+  const auto error = [](const signal::Measured& m) {
+    return std::isfinite(m.standard_error) ? m.standard_error : 0;
+  };
   const double torque = f.value + r.value;
   map.wind_up.value = torque / k.value;
   map.wind_up.standard_error =
@@ -251,7 +256,7 @@ void check(const GapMapSettings& s) {
   if (!(s.false_alarm >= 1e-6 && s.false_alarm <= 0.5))
     throw InvalidParameter("false_alarm", s.false_alarm, "must be 1e-6 to 0.5");
   if (s.stiffness.value <= 0) throw InvalidParameter("stiffness", s.stiffness.value, "must be > 0");
-  for (const Measured& f : {s.friction_forward, s.friction_reverse})
+  for (const signal::Measured& f : {s.friction_forward, s.friction_reverse})
     if (f.value < 0) throw InvalidParameter("friction", f.value, "must be >= 0");
 }
 
@@ -263,7 +268,8 @@ double GapMap::gap_at(double position) const {
   return gap;
 }
 
-GapMap identify_gap_map(const Record& one_way, const Record& other_way, const GapMapSettings& settings) {
+GapMap identify_gap_map(const record::Record& one_way, const record::Record& other_way,
+                        const GapMapSettings& settings) {
   check(settings);
   Run forward = steady_part(one_way), reverse = steady_part(other_way);
   if (forward.speed < 0) std::swap(forward, reverse);
@@ -309,4 +315,4 @@ GapMap identify_gap_map(const Record& one_way, const Record& other_way, const Ga
   return map;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

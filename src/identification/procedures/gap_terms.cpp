@@ -9,21 +9,22 @@
 
 #include "backlash_diagnosis/base/error.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// The term of one order of the map.
 const std::string& order_term() {
-  static const std::string& id =
-      term_type_that([](const TermType& type) { return type.gap_variation == GapVariation::harmonic; }).id;
+  static const std::string& id = model::term_type_that([](const model::TermType& type) {
+                                   return type.gap_variation == model::GapVariation::harmonic;
+                                 }).id;
   return id;
 }
 
 bool varies_gap(const std::string& id) {
-  return term_type(id).gap_variation != GapVariation::none;
+  return model::term_type(id).gap_variation != model::GapVariation::none;
 }
 
-double mean_gap(const Rig& rig, const GapMap& map, GapUse use) {
+double mean_gap(const model::Rig& rig, const GapMap& map, GapUse use) {
   if (use == GapUse::variation) return rig.mesh.backlash / rig.mesh.lever();
   const bool corrected = use == GapUse::corrected && std::isfinite(map.mean_gap.value);
   return corrected ? map.mean_gap.value : map.mean_separation.value;
@@ -35,16 +36,16 @@ void check_mean(double mean) {
 
 }  // namespace
 
-bool gap_varies(const Rig& rig) {
+bool gap_varies(const model::Rig& rig) {
   return std::any_of(rig.terms.begin(), rig.terms.end(),
                      [](const auto& term) { return varies_gap(term->id); });
 }
 
-GapMap with_wind_up(GapMap map, const Rig& rig) {
+GapMap with_wind_up(GapMap map, const model::Rig& rig) {
   if (!rig.mesh.contact_spec.values.has("stiffness"))
     throw InvalidParameter("contact.law", rig.mesh.contact_spec.law, "has no stiffness to be wound up");
   const double lever = rig.mesh.lever(), k = rig.mesh.contact_spec.values.at("stiffness") * lever * lever;
-  const Body& load = rig.link;
+  const model::Body& load = rig.link;
   const double forward = load.coulomb_friction + load.coulomb_asymmetry +
                          (load.viscous_damping + load.viscous_asymmetry) * std::fabs(map.forward_speed);
   const double backward = load.coulomb_friction - load.coulomb_asymmetry +
@@ -54,20 +55,20 @@ GapMap with_wind_up(GapMap map, const Rig& rig) {
   return map;
 }
 
-Rig with_gap_map(Rig rig, const GapMap& map, GapUse use) {
+model::Rig with_gap_map(model::Rig rig, const GapMap& map, GapUse use) {
   const double mean = mean_gap(rig, map, use);
   check_mean(mean);
   rig.mesh.backlash = mean * rig.mesh.lever();
   const auto old = [](const auto& term) { return varies_gap(term->id); };
   rig.terms.erase(std::remove_if(rig.terms.begin(), rig.terms.end(), old), rig.terms.end());
   for (const Harmonic& h : map.harmonics)
-    rig.terms.push_back(make_term(
+    rig.terms.push_back(model::make_term(
         order_term(),
         {{"amplitude", h.amplitude.value / mean}, {"order", double(h.order)}, {"phase", h.phase.value}}));
   return rig;
 }
 
-void replace_gap_terms(RigDocument& document, const GapMap& map, double mean) {
+void replace_gap_terms(rig_file::RigDocument& document, const GapMap& map, double mean) {
   check_mean(mean);
   std::vector<std::string> entries;
   for (const Harmonic& h : map.harmonics)
@@ -79,4 +80,4 @@ void replace_gap_terms(RigDocument& document, const GapMap& map, double mean) {
   document.replace_terms(varies_gap, entries);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

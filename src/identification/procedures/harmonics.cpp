@@ -7,14 +7,14 @@
 
 #include "backlash_diagnosis/signal/least_squares.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 struct Points {
   const std::vector<double>&angle, &value;
 };
 
-LeastSquaresFit fit_orders(const Points& points, const std::vector<int>& orders) {
+signal::LeastSquaresFit fit_orders(const Points& points, const std::vector<int>& orders) {
   const auto n = Eigen::Index(points.value.size());
   Eigen::MatrixXd a(n, 1 + 2 * Eigen::Index(orders.size()));
   Eigen::VectorXd b(n);
@@ -27,7 +27,7 @@ LeastSquaresFit fit_orders(const Points& points, const std::vector<int>& orders)
       a(i, 2 + 2 * Eigen::Index(k)) = std::cos(angle);
     }
   }
-  return fit_linear(a, b);
+  return signal::fit_linear(a, b);
 }
 
 /// P(F > f) for 2 and `freedom` degrees: closed form.
@@ -71,7 +71,7 @@ Selection select_orders(const Points& points, std::vector<int> left, double fals
   return s;
 }
 
-Harmonic harmonic_of(const LeastSquaresFit& fit, std::size_t k, int order, double chance) {
+Harmonic harmonic_of(const signal::LeastSquaresFit& fit, std::size_t k, int order, double chance) {
   const auto at = 1 + 2 * Eigen::Index(k);
   const double s = fit.values[at], c = fit.values[at + 1], size = std::hypot(s, c);
   const Eigen::Matrix2d covariance = fit.covariance.block<2, 2>(at, at);
@@ -90,7 +90,7 @@ HarmonicSeries fit_harmonics(const std::vector<double>& angle, const std::vector
                              const std::vector<int>& orders, double false_alarm) {
   const Points points{angle, values};
   const Selection selection = select_orders(points, orders, false_alarm);
-  const LeastSquaresFit fit = fit_orders(points, selection.orders);
+  const signal::LeastSquaresFit fit = fit_orders(points, selection.orders);
   HarmonicSeries series;
   series.mean = fit.parameter(0);
   series.deviation = fit.deviation;
@@ -101,4 +101,4 @@ HarmonicSeries fit_harmonics(const std::vector<double>& angle, const std::vector
   return series;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -9,12 +9,13 @@
 #include <cmath>
 #include <complex>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/blocks.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using Complex = std::complex<double>;
@@ -48,7 +49,7 @@ Sine fit_sine(const std::vector<double>& values, std::size_t begin, std::size_t 
     a(k, polynomial + 1) = std::cos(w * double(begin + k));
     a(k, polynomial + 2) = -std::sin(w * double(begin + k));
   }
-  const LeastSquaresFit fit = fit_linear(a, b);
+  const signal::LeastSquaresFit fit = signal::fit_linear(a, b);
   sine.amplitude = {fit.values[polynomial + 1], fit.values[polynomial + 2]};
   sine.mean = fit.values[0];
   sine.slope = fit.values[1];
@@ -63,19 +64,19 @@ Eigen::VectorXcd changes_of(const Sine& sine, std::size_t groups) {
   const auto rows = static_cast<std::size_t>(sine.columns.rows());
   std::vector<std::size_t> block;
   for (std::size_t k = 0; k < rows; ++k) block.push_back(k * groups / rows);
-  const Eigen::MatrixXd changes = jackknife_changes(sine.columns, sine.residuals, block);
+  const Eigen::MatrixXd changes = signal::jackknife_changes(sine.columns, sine.residuals, block);
   const Eigen::Index last = changes.rows() - 1;
   return changes.row(last - 1).transpose() + Complex(0, 1) * changes.row(last).transpose();
 }
 
 /// The signal about its straight line, thinned to at most some 4000 values, under a Hann window.
 Eigen::VectorXd windowed(const std::vector<double>& values, std::size_t step) {
-  const std::vector<double> thin = block_means(values, step);
+  const std::vector<double> thin = signal::block_means(values, step);
   const auto n = static_cast<Eigen::Index>(thin.size());
   Eigen::MatrixXd a(n, 2);
   a << Eigen::VectorXd::Ones(n), Eigen::VectorXd::LinSpaced(n, -1, 1);
   const Eigen::ArrayXd phase = 2 * M_PI / double(n) * (Eigen::ArrayXd::LinSpaced(n, 0, double(n - 1)) + 0.5);
-  return fit_linear(a, Eigen::Map<const Eigen::VectorXd>(thin.data(), n)).residuals.array() *
+  return signal::fit_linear(a, Eigen::Map<const Eigen::VectorXd>(thin.data(), n)).residuals.array() *
          (1 - phase.cos());
 }
 
@@ -125,7 +126,8 @@ struct Section {
   double interval;  // s
 };
 
-Section choose(const Record& record, const LineInertiaOptions& options, const std::vector<double>& speed) {
+Section choose(const record::Record& record, const LineInertiaOptions& options,
+               const std::vector<double>& speed) {
   Section s;
   s.interval = record.sampling_interval();
   s.w = options.frequency > 0 ? 2 * M_PI * options.frequency * s.interval : largest_line(speed);
@@ -152,22 +154,22 @@ struct Impedance {
   Complex errors;  // of real and imaginary part
 };
 
-Impedance impedance(const Record& record, const Section& s, double delay) {
-  const bool by_position = record.has(Channel::motor_position);
-  const Sine torque = fit_sine(record.column(Channel::motor_torque), s.begin, s.count, s.w, 1);
-  const Sine motion = by_position
-                          ? fit_sine(record.column(Channel::motor_position), s.begin, s.count, s.w, 2)
-                          : fit_sine(record.column(Channel::motor_velocity), s.begin, s.count, s.w, 1);
+Impedance impedance(const record::Record& record, const Section& s, double delay) {
+  const bool by_position = record.has(record::Channel::motor_position);
+  const Sine torque = fit_sine(record.column(record::Channel::motor_torque), s.begin, s.count, s.w, 1);
+  const Sine motion =
+      by_position ? fit_sine(record.column(record::Channel::motor_position), s.begin, s.count, s.w, 2)
+                  : fit_sine(record.column(record::Channel::motor_velocity), s.begin, s.count, s.w, 1);
   const Complex turn = std::polar(1.0, -s.w * delay / s.interval) /
                        (by_position ? Complex(0, s.w / s.interval) : Complex(1, 0));
   const Complex z = torque.amplitude / motion.amplitude;
   const std::size_t groups = std::min(s.cycles, kMostGroups);
   const Eigen::VectorXcd changes =
       (changes_of(torque, groups) - z * changes_of(motion, groups)) * (turn / motion.amplitude);
-  return {z * turn, {jackknife_error(changes.real()), jackknife_error(changes.imag())}};
+  return {z * turn, {signal::jackknife_error(changes.real()), signal::jackknife_error(changes.imag())}};
 }
 
-void require_one_way(const Record& record, const Sine& speed) {
+void require_one_way(const record::Record& record, const Sine& speed) {
   const double least = std::fabs(speed.mean) - std::fabs(speed.slope) - std::abs(speed.amplitude);
   if (speed.explained < kLeastShare)
     throw CannotIdentify(
@@ -182,9 +184,10 @@ void require_one_way(const Record& record, const Sine& speed) {
 
 /// The motion of all that turns, as if it were the motor's: mean of motor and load, weighted with their
 /// inertias.
-Record weighted(Record record, double motor_share) {
-  const std::pair<Channel, Channel> pairs[] = {{Channel::motor_position, Channel::load_position},
-                                               {Channel::motor_velocity, Channel::load_velocity}};
+record::Record weighted(record::Record record, double motor_share) {
+  const std::pair<record::Channel, record::Channel> pairs[] = {
+      {record::Channel::motor_position, record::Channel::load_position},
+      {record::Channel::motor_velocity, record::Channel::load_velocity}};
   for (const auto& [motor, load] : pairs) {
     if (!record.has(motor) || !record.has(load)) continue;
     std::vector<double>& m = record.column(motor);
@@ -196,20 +199,20 @@ Record weighted(Record record, double motor_share) {
 
 }  // namespace
 
-LineInertia line_inertia(const Record& recorded, const LineInertiaOptions& options) {
+LineInertia line_inertia(const record::Record& recorded, const LineInertiaOptions& options) {
   if (!(options.frequency >= 0)) throw InvalidParameter("frequency", options.frequency, "must be >= 0 Hz");
   if (!(options.skip >= 0)) throw InvalidParameter("skip", options.skip, "must be >= 0 cycles");
   if (!(options.motor_share >= 0 && options.motor_share <= 1))
     throw InvalidParameter("motor_share", options.motor_share, "must be 0 to 1");
-  if (!recorded.has(Channel::motor_torque) ||
-      !(recorded.has(Channel::motor_position) || recorded.has(Channel::motor_velocity)))
+  if (!recorded.has(record::Channel::motor_torque) ||
+      !(recorded.has(record::Channel::motor_position) || recorded.has(record::Channel::motor_velocity)))
     throw CannotIdentify(recorded.name + ": inertia needs motor_torque and motor_position or motor_velocity");
-  Record record = evenly_sampled(recorded);
+  record::Record record = record::evenly_sampled(recorded);
   if (options.motor_share < 1) record = weighted(std::move(record), options.motor_share);
   const std::vector<double> speed =
-      record.has(Channel::motor_velocity)
-          ? record.column(Channel::motor_velocity)
-          : derivative(record.column(Channel::motor_position), record.sampling_interval());
+      record.has(record::Channel::motor_velocity)
+          ? record.column(record::Channel::motor_velocity)
+          : signal::derivative(record.column(record::Channel::motor_position), record.sampling_interval());
   const Section s = choose(record, options, speed);
   const Sine whole = fit_sine(speed, s.begin, s.count, s.w, 1);
   require_one_way(record, whole);
@@ -236,4 +239,4 @@ double inertia_from_amplitudes(double torque, double speed, double frequency, do
   return std::sqrt(torque * torque - damping * damping) / (2 * M_PI * frequency * speed);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

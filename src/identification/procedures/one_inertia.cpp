@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/blocks.h"
@@ -16,7 +17,7 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kLargestDelay = 2;   // choice: sampling intervals
@@ -62,8 +63,8 @@ std::vector<bool> standing(const std::vector<double>& speed, double threshold, d
   return out;
 }
 
-void require_channels(const Record& record) {
-  if (!record.has(Channel::motor_torque) || !record.has(Channel::motor_position))
+void require_channels(const record::Record& record) {
+  if (!record.has(record::Channel::motor_torque) || !record.has(record::Channel::motor_position))
     throw CannotIdentify(record.name + ": a machine with one inertia needs motor_torque and motor_position");
   if (record.size() < 64)
     throw CannotIdentify(record.name + ": only " + std::to_string(record.size()) + " samples");
@@ -81,29 +82,31 @@ double speed_bandwidth(double position_noise, const std::vector<double>& speed, 
   return std::pow(kSignNoise * size / speed_noise(position_noise, 1, interval), 2.0 / 3);
 }
 
-Signals prepare(const Record& record, double cutoff) {
+Signals prepare(const record::Record& record, double cutoff) {
   Signals s;
-  const std::vector<double>& position = record.column(Channel::motor_position);
+  const std::vector<double>& position = record.column(record::Channel::motor_position);
   const std::size_t n = record.size();
   const double t = s.interval = record.sampling_interval();
   if (cutoff != 0 && !(cutoff > 0 && cutoff <= 0.4 / t))
     throw InvalidParameter("cutoff", cutoff, "must be > 0 and at most 0.4 of the sampling rate");
-  s.cutoff = cutoff > 0 ? cutoff : std::max(motion_bandwidth(position, t), kPeriods / (double(n) * t));
+  s.cutoff =
+      cutoff > 0 ? cutoff : std::max(signal::motion_bandwidth(position, t), kPeriods / (double(n) * t));
   if (double(n) * t * s.cutoff < kLeastPeriods)
     throw CannotIdentify(fmt::format("{}: {:.3g} s are too short for a motion of {:.3g} Hz", record.name,
                                      double(n) * t, s.cutoff));
-  s.position_noise = position_noise(position);
+  s.position_noise = signal::position_noise(position);
   s.time = record.time;
-  s.torque = low_pass(record.column(Channel::motor_torque), t, s.cutoff);
-  const std::vector<double> speed = derivative(position, t);
+  s.torque = signal::low_pass(record.column(record::Channel::motor_torque), t, s.cutoff);
+  const std::vector<double> speed = signal::derivative(position, t);
   const double sharp_cutoff = std::clamp(speed_bandwidth(s.position_noise, speed, t),
                                          std::min(kSignBandwidth * s.cutoff, 0.4 / t), 0.4 / t);
-  const std::vector<double> sharp = low_pass(speed, t, sharp_cutoff);
+  const std::vector<double> sharp = signal::low_pass(speed, t, sharp_cutoff);
   std::vector<double> sign(n);
   for (std::size_t k = 0; k < n; ++k) sign[k] = (sharp[k] > 0) - (sharp[k] < 0);
   s.columns.resize(n, 4);
-  const std::vector<double> filtered[] = {low_pass(second_derivative(position, t), t, s.cutoff),
-                                          low_pass(speed, t, s.cutoff), low_pass(sign, t, s.cutoff)};
+  const std::vector<double> filtered[] = {signal::low_pass(second_derivative(position, t), t, s.cutoff),
+                                          signal::low_pass(speed, t, s.cutoff),
+                                          signal::low_pass(sign, t, s.cutoff)};
   for (int i = 0; i < 3; ++i)
     s.columns.col(i) = Eigen::Map<const Eigen::VectorXd>(filtered[i].data(), Eigen::Index(n));
   s.columns.col(3).setOnes();
@@ -139,9 +142,9 @@ void require_both_directions(const std::string& name, const Signals& s) {
 
 /// Delay [samples] with the smallest residual.
 double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
-  const Eigen::MatrixXd q = orthonormal_basis(a);
+  const Eigen::MatrixXd q = signal::orthonormal_basis(a);
   const auto left = [&](double delay) {
-    const Eigen::VectorXd b = picked(delayed(s.torque, delay), s.used);
+    const Eigen::VectorXd b = picked(signal::delayed(s.torque, delay), s.used);
     return (b - q * (q.transpose() * b)).squaredNorm();
   };
   return boost::math::tools::brent_find_minima(left, -kLargestDelay, kLargestDelay, kDelayBits).first;
@@ -150,7 +153,7 @@ double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
 /// The delay is one more column: what the torque would gain by one sample of it.
 Eigen::MatrixXd with_delay_column(const Signals& s, const Eigen::MatrixXd& a, double delay) {
   Eigen::MatrixXd all(a.rows(), a.cols() + 1);
-  all << a, picked(derivative(delayed(s.torque, delay), 1), s.used);
+  all << a, picked(signal::derivative(signal::delayed(s.torque, delay), 1), s.used);
   return all;
 }
 
@@ -163,23 +166,23 @@ std::vector<std::size_t> block_of_rows(const Signals& s) {
 /// Parameters at one delay, errors of the parameters and, where it is one of them, of the delay [samples].
 struct Solution {
   double delay = 0;
-  LeastSquaresFit fit;
+  signal::LeastSquaresFit fit;
   Eigen::VectorXd error;
 };
 
 Solution solve(const Signals& s, const Eigen::MatrixXd& a, double delay, bool estimated) {
   Solution out;
   out.delay = delay;
-  out.fit = fit_linear(a, picked(delayed(s.torque, delay), s.used));
+  out.fit = signal::fit_linear(a, picked(signal::delayed(s.torque, delay), s.used));
   const Eigen::MatrixXd all = estimated ? with_delay_column(s, a, delay) : a;
-  out.error = jackknife_covariance(all, out.fit.residuals, block_of_rows(s)).diagonal().cwiseSqrt();
+  out.error = signal::jackknife_covariance(all, out.fit.residuals, block_of_rows(s)).diagonal().cwiseSqrt();
   return out;
 }
 
 /// Relative error that noise alone would leave.
-double floor_of(const Record& record, const Signals& s, double inertia, double torque_size) {
-  const double left = noise_after_low_pass(s.interval, s.cutoff);
-  const double torque = white_noise(record.column(Channel::motor_torque)) * left;
+double floor_of(const record::Record& record, const Signals& s, double inertia, double torque_size) {
+  const double left = signal::noise_after_low_pass(s.interval, s.cutoff);
+  const double torque = signal::white_noise(record.column(record::Channel::motor_torque)) * left;
   const double acceleration = s.position_noise * std::pow(2 * M_PI * s.cutoff, 2) *
                               std::sqrt(2 * s.cutoff * s.interval / 5);  // noise with f^2 up to the cutoff
   return std::hypot(torque, inertia * acceleration) / torque_size;
@@ -191,9 +194,9 @@ double spread(const Eigen::VectorXd& values) {
 
 }  // namespace
 
-OneInertia identify_one_inertia(const Record& recorded, const OneInertiaOptions& options) {
+OneInertia identify_one_inertia(const record::Record& recorded, const OneInertiaOptions& options) {
   require_channels(recorded);
-  const Record record = evenly_sampled(recorded);
+  const record::Record record = record::evenly_sampled(recorded);
   const Signals s = prepare(record, options.cutoff);
   require_both_directions(record.name, s);
   if (options.delay && !(std::fabs(*options.delay) <= kLargestDelay * s.interval))
@@ -216,8 +219,8 @@ OneInertia identify_one_inertia(const Record& recorded, const OneInertiaOptions&
       out.delay = {0, std::numeric_limits<double>::quiet_NaN()};
     }
   }
-  const LeastSquaresFit& fit = solution.fit;
-  Measured* const parameters[] = {&out.inertia, &out.viscous, &out.coulomb, &out.offset};
+  const signal::LeastSquaresFit& fit = solution.fit;
+  signal::Measured* const parameters[] = {&out.inertia, &out.viscous, &out.coulomb, &out.offset};
   for (int i = 0; i < 4; ++i) *parameters[i] = {fit.values[i], solution.error[i]};
   out.cutoff = s.cutoff;
   out.used = double(s.used.size()) / double(s.time.size());
@@ -235,16 +238,16 @@ OneInertia identify_one_inertia(const Record& recorded, const OneInertiaOptions&
   return out;
 }
 
-double relative_error(const OneInertia& machine, const Record& recorded) {
+double relative_error(const OneInertia& machine, const record::Record& recorded) {
   require_channels(recorded);
-  const Record record = evenly_sampled(recorded);
+  const record::Record record = record::evenly_sampled(recorded);
   const Signals s = prepare(record, machine.cutoff);
   if (s.used.size() < 2) throw CannotIdentify(record.name + ": stands still");
-  const Eigen::VectorXd torque = picked(delayed(s.torque, machine.delay.value / s.interval), s.used);
+  const Eigen::VectorXd torque = picked(signal::delayed(s.torque, machine.delay.value / s.interval), s.used);
   const Eigen::Vector4d p(machine.inertia.value, machine.viscous.value, machine.coulomb.value,
                           machine.offset.value);
   const Eigen::VectorXd residual = torque - picked(s.columns, s.used) * p;
   return std::sqrt(residual.squaredNorm() / double(residual.size())) / spread(torque);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

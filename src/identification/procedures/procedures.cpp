@@ -5,27 +5,28 @@
 
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
-namespace backlash {
-std::string plus_minus(const Measured& m, const std::string& unit) {
+namespace backlash::identification {
+std::string plus_minus(const signal::Measured& m, const std::string& unit) {
   return fmt::format("{:.5g} +- {:.2g} {}", m.value, m.standard_error, unit);
 }
 
-Measured with_model_error(Measured m, double share) {
+signal::Measured with_model_error(signal::Measured m, double share) {
   m.standard_error = std::hypot(m.standard_error, share * m.value);
   return m;
 }
 
 void add_finding(IdentificationCase& c, const std::string& procedure,
-                 std::map<std::string, double> combination, const Measured& measured) {
+                 std::map<std::string, double> combination, const signal::Measured& measured) {
   if (std::isfinite(measured.value) && measured.standard_error > 0)
     c.result.findings.push_back({procedure, std::move(combination), measured});
 }
 
-Measured known(const IdentificationCase& c, const std::string& name) {
-  const double value = servo_parameter(name).get(c.result.rig);
+signal::Measured known(const IdentificationCase& c, const std::string& name) {
+  const double value = rig_file::servo_parameter(name).get(c.result.rig);
   const auto found = c.result.parameters.find(name);
   return {value,
           found == c.result.parameters.end() ? kDeclaredUncertainty * value : found->second.standard_error};
@@ -65,9 +66,9 @@ void update_from_findings(IdentificationCase& c) {
   c.result.parameters = combine_findings(c.result.findings, c.declared, c.names);
   c.result.rig = c.declared;
   for (const auto& [name, m] : c.result.parameters) {
-    const RigParameter& parameter = servo_parameter(name);
+    const rig_file::RigParameter& parameter = rig_file::servo_parameter(name);
     if (!parameter.positive() || m.value > 0) parameter.set(c.result.rig, m.value);
   }
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

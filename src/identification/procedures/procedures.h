@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/identify.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// A record with what can be seen of it at once.
 struct CaseRecord {
-  Record record;  // load side
+  record::Record record;  // load side
   bool has_load = false;
   bool motor_moves = true, load_moves = true;
   bool drive() const { return motor_moves && load_moves; }  // motor and load together
@@ -24,11 +25,12 @@ struct CaseRecord {
 struct IdentificationCase {
   std::vector<CaseRecord> records;
   std::vector<std::string> names;  // of the parameters to be found
-  Rig declared;
+  model::Rig declared;
   Identification result;  // result.rig: what is known by now
 };
 
-IdentificationCase identification_case(const Rig& declared, const std::vector<Record>& records);
+IdentificationCase identification_case(const model::Rig& declared,
+                                       const std::vector<record::Record>& records);
 
 struct Procedure {
   std::string name;
@@ -55,20 +57,20 @@ ProcedureReport run_one_inertia(IdentificationCase& c);
 
 // What the steps share.
 
-std::string plus_minus(const Measured& m, const std::string& unit);
+std::string plus_minus(const signal::Measured& m, const std::string& unit);
 
 /// With what the procedure's model leaves out, as a share of the value.
-Measured with_model_error(Measured m, double share);
+signal::Measured with_model_error(signal::Measured m, double share);
 
 void add_finding(IdentificationCase& c, const std::string& procedure,
-                 std::map<std::string, double> combination, const Measured& measured);
+                 std::map<std::string, double> combination, const signal::Measured& measured);
 
 /// A parameter as it is known by now.
-Measured known(const IdentificationCase& c, const std::string& name);
+signal::Measured known(const IdentificationCase& c, const std::string& name);
 
 /// Calls `body` on every record that `wanted` accepts and keeps the names of those that it can use; the
 /// reasons of the others make the message of the CannotIdentify where there is none.
 std::vector<std::string> on_each(const IdentificationCase& c, bool (CaseRecord::*wanted)() const,
                                  const std::function<void(const CaseRecord&)>& body);
 
-}  // namespace backlash
+}  // namespace backlash::identification

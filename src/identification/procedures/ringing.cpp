@@ -3,10 +3,11 @@
 
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr int kLinear = 4;            // c0, c1, p, q
@@ -21,7 +22,9 @@ class DampedSine {
 
   Eigen::VectorXd residuals(const Eigen::VectorXd& p) const { return y_ - basis(p) * coefficients(p); }
 
-  Eigen::VectorXd coefficients(const Eigen::VectorXd& p) const { return solve_least_squares(basis(p), y_).x; }
+  Eigen::VectorXd coefficients(const Eigen::VectorXd& p) const {
+    return signal::solve_least_squares(basis(p), y_).x;
+  }
 
  private:
   Eigen::MatrixXd basis(const Eigen::VectorXd& p) const {
@@ -68,9 +71,9 @@ void polar(Ringing& r, const Eigen::Matrix2d& covariance) {
 Ringing fit_ringing(const std::vector<double>& time, const std::vector<double>& values, double expected) {
   if (time.size() < 10) throw CannotIdentify("ringing of fewer than 10 samples");
   const DampedSine sine(time, values);
-  const LeastSquaresFit fit =
-      fit_nonlinear([&](const Eigen::VectorXd& p) { return sine.residuals(p); }, start_of(sine, expected),
-                    Eigen::Vector2d::Constant(0.1 * expected));
+  const signal::LeastSquaresFit fit =
+      signal::fit_nonlinear([&](const Eigen::VectorXd& p) { return sine.residuals(p); },
+                            start_of(sine, expected), Eigen::Vector2d::Constant(0.1 * expected));
   Ringing r;
   r.time = time;
   r.measured = values;
@@ -115,7 +118,7 @@ void measure_peaks(Ringing& r) {
       a.row(k + reach) << 1, k, double(k) * k;
       b[k + reach] = y[i + k];
     }
-    const Eigen::Vector3d c = solve_least_squares(a, b).x;
+    const Eigen::Vector3d c = signal::solve_least_squares(a, b).x;
     const double at = -c[1] / (2 * c[2]);
     if (!(std::fabs(at) <= reach)) continue;
     if (!r.peak.empty() && r.peak.back() * y[i] > 0) continue;  // a plateau
@@ -130,10 +133,10 @@ void measure_peaks(Ringing& r) {
     a.row(Eigen::Index(i)) << weight, weight * (r.peak_time[i] - r.peak_time[0]);
     logarithm[Eigen::Index(i)] = weight * std::log(std::fabs(r.peak[i]));
   }
-  const double tau = fit_linear(a, logarithm).values[1];
+  const double tau = signal::fit_linear(a, logarithm).values[1];
   const double wd = M_PI * double(r.peak.size() - 1) / (r.peak_time.back() - r.peak_time.front());
   const double ratio = -tau / wd;
   r.peak_damping_ratio = ratio / std::sqrt(1 + ratio * ratio);
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

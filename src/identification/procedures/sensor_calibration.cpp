@@ -7,12 +7,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/blocks.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kMoving = 0.1;       // choice: of the largest speed: slower does not count as moving one way
@@ -31,20 +32,21 @@ void require(const CalibrationOptions& options) {
 }
 
 /// Cuts the record where its motor slows down or reverses; runs of fewer than `least` blocks are left out.
-std::vector<OneWayRun> one_way_runs(const Record& recorded, Channel motor, Channel load,
-                                    const CalibrationOptions& options, std::size_t least) {
-  for (const Channel channel : {motor, load})
+std::vector<OneWayRun> one_way_runs(const record::Record& recorded, record::Channel motor,
+                                    record::Channel load, const CalibrationOptions& options,
+                                    std::size_t least) {
+  for (const record::Channel channel : {motor, load})
     if (!recorded.has(channel))
-      throw CannotIdentify(recorded.name + ": calibration needs " + channel_name(channel));
-  const Record record = evenly_sampled(recorded);
+      throw CannotIdentify(recorded.name + ": calibration needs " + record::channel_name(channel));
+  const record::Record record = record::evenly_sampled(recorded);
   const double interval = record.sampling_interval();
   const auto length = std::max<std::size_t>(1, std::lround(options.block / interval));
   const auto settle = static_cast<std::size_t>(std::ceil(options.settle / (double(length) * interval)));
-  const std::vector<double> m = block_means(record.column(motor), length),
-                            l = block_means(record.column(load), length);
-  const bool is_speed = motor == Channel::motor_velocity;
+  const std::vector<double> m = signal::block_means(record.column(motor), length),
+                            l = signal::block_means(record.column(load), length);
+  const bool is_speed = motor == record::Channel::motor_velocity;
   const std::vector<double> speed =
-      is_speed ? m : block_means(derivative(record.column(motor), interval), length);
+      is_speed ? m : signal::block_means(signal::derivative(record.column(motor), interval), length);
   double largest = 0;
   for (const double v : speed) largest = std::max(largest, std::fabs(v));
   const auto direction = [&](std::size_t k) {
@@ -97,13 +99,13 @@ Equations equations(const std::vector<OneWayRun>& runs, bool by_direction) {
 }
 
 /// Value and error of a weighted sum of the unknowns.
-Measured combination(const LeastSquaresFit& fit, const Eigen::VectorXd& weight) {
+signal::Measured combination(const signal::LeastSquaresFit& fit, const Eigen::VectorXd& weight) {
   return {weight.dot(fit.values), std::sqrt(weight.dot(fit.covariance * weight))};
 }
 
-LeastSquaresFit solve(const Equations& e) {
-  LeastSquaresFit fit = fit_linear(e.a, e.b);
-  fit.covariance = jackknife_covariance(e.a, fit.residuals, e.block);
+signal::LeastSquaresFit solve(const Equations& e) {
+  signal::LeastSquaresFit fit = signal::fit_linear(e.a, e.b);
+  fit.covariance = signal::jackknife_covariance(e.a, fit.residuals, e.block);
   return fit;
 }
 
@@ -114,9 +116,10 @@ std::vector<std::string> cut_warning(std::size_t runs, const std::string& name) 
 
 }  // namespace
 
-SpeedCalibration calibrate_speed(const Record& record, const CalibrationOptions& options) {
+SpeedCalibration calibrate_speed(const record::Record& record, const CalibrationOptions& options) {
   require(options);
-  const auto runs = one_way_runs(record, Channel::motor_velocity, Channel::load_velocity, options, 8);
+  const auto runs =
+      one_way_runs(record, record::Channel::motor_velocity, record::Channel::load_velocity, options, 8);
   if (runs.empty()) throw CannotIdentify(record.name + ": the motor does not turn one way for long enough");
   const Equations e = equations(runs, false);
   const double largest = std::max(std::fabs(e.least), std::fabs(e.most));
@@ -124,18 +127,19 @@ SpeedCalibration calibrate_speed(const Record& record, const CalibrationOptions&
     throw CannotIdentify(
         fmt::format("{}: speeds from {:.3g} to {:.3g} rad/s only: scale and offset cannot be told apart",
                     record.name, e.least, e.most));
-  const LeastSquaresFit fit = solve(e);
+  const signal::LeastSquaresFit fit = solve(e);
   return {fit.parameter(0), combination(fit, Eigen::Vector2d(-e.centre, 1)),
           cut_warning(runs.size(), record.name)};
 }
 
-PositionCalibration calibrate_position(const std::vector<Record>& records,
+PositionCalibration calibrate_position(const std::vector<record::Record>& records,
                                        const CalibrationOptions& options) {
   require(options);
   std::vector<OneWayRun> runs;
   PositionCalibration out;
-  for (const Record& record : records) {
-    const auto more = one_way_runs(record, Channel::motor_position, Channel::load_position, options, kParts);
+  for (const record::Record& record : records) {
+    const auto more = one_way_runs(record, record::Channel::motor_position, record::Channel::load_position,
+                                   options, kParts);
     for (const auto& warning : cut_warning(more.size(), record.name)) out.warnings.push_back(warning);
     runs.insert(runs.end(), more.begin(), more.end());
   }
@@ -145,7 +149,7 @@ PositionCalibration calibrate_position(const std::vector<Record>& records,
   const bool both =
       std::any_of(runs.begin(), runs.end(), forward) && !std::all_of(runs.begin(), runs.end(), forward);
   const Equations e = equations(runs, both);
-  const LeastSquaresFit fit = solve(e);
+  const signal::LeastSquaresFit fit = solve(e);
   out.scale = fit.parameter(0);
   out.travel = e.most - e.least;
   if (both) {
@@ -158,4 +162,4 @@ PositionCalibration calibrate_position(const std::vector<Record>& records,
   return out;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

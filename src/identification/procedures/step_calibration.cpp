@@ -3,19 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kSuspicious = 3;          // choice: standard errors
 constexpr std::size_t kTracePoints = 400;  // choice: of a plot
 
-CalibrationTrace thinned(const Record& record) {
+CalibrationTrace thinned(const record::Record& record) {
   CalibrationTrace trace{record.name, {}, {}};
-  const auto &motor = record.column(Channel::motor_position), &load = record.column(Channel::load_position);
+  const auto &motor = record.column(record::Channel::motor_position),
+             &load = record.column(record::Channel::load_position);
   for (std::size_t k = 0; k < motor.size(); k += motor.size() / kTracePoints + 1) {
     trace.motor.push_back(motor[k]);
     trace.difference.push_back(motor[k] - load[k]);
@@ -27,7 +29,7 @@ CalibrationTrace thinned(const Record& record) {
 
 ProcedureReport run_sensor_calibration(IdentificationCase& c) {
   ProcedureReport report{"sensor_calibration", {}, ""};
-  std::vector<Record> one_way;
+  std::vector<record::Record> one_way;
   report.records = on_each(c, &CaseRecord::drive, [&](const CaseRecord& r) {
     calibrate_position({r.record});
     one_way.push_back(r.record);
@@ -40,8 +42,8 @@ ProcedureReport run_sensor_calibration(IdentificationCase& c) {
       std::fabs(position.scale.value - 1) > 1e-5)
     c.result.warnings.push_back(
         "the position sensors differ in scale: load = " + plus_minus(position.scale, "") + "times motor");
-  for (const Record& record : one_way) {
-    if (!record.has(Channel::motor_velocity) || !record.has(Channel::load_velocity)) continue;
+  for (const record::Record& record : one_way) {
+    if (!record.has(record::Channel::motor_velocity) || !record.has(record::Channel::load_velocity)) continue;
     try {
       c.result.speed_calibration = calibrate_speed(record);
       break;
@@ -51,4 +53,4 @@ ProcedureReport run_sensor_calibration(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

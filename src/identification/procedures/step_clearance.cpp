@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kClearanceModel = 0.005;  // simulation: a push that is no polynomial, steps of the sensor
@@ -16,8 +17,8 @@ constexpr double kClearanceModel = 0.005;  // simulation: a push that is no poly
 
 ProcedureReport run_clearance(IdentificationCase& c) {
   ProcedureReport report{"clearance", {}, ""};
-  const ClearanceSettings settings =
-      clearance_settings(servo_parameter("mesh_stiffness").get(c.result.rig), c.result.rig.link.inertia);
+  const ClearanceSettings settings = clearance_settings(
+      rig_file::servo_parameter("mesh_stiffness").get(c.result.rig), c.result.rig.link.inertia);
   std::string reasons;
   for (const CaseRecord& r : c.records) {
     if (r.motor_moves || !r.load_moves) continue;
@@ -37,4 +38,4 @@ ProcedureReport run_clearance(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -3,22 +3,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kDecayModel = 0.01;  // simulation: the contact's own damping at the start of a ringing
 
-double relative(const Measured& m) {
+double relative(const signal::Measured& m) {
   return m.standard_error / m.value;
 }
 
 /// Torque that jumps by half of its range several times.
-bool is_square(const Record& record) {
-  const std::vector<double>& torque = record.column(Channel::motor_torque);
+bool is_square(const record::Record& record) {
+  const std::vector<double>& torque = record.column(record::Channel::motor_torque);
   const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
   int jumps = 0;
   for (std::size_t k = 1; k < torque.size(); ++k)
@@ -30,7 +31,7 @@ bool is_square(const Record& record) {
 
 ProcedureReport run_decay(IdentificationCase& c) {
   ProcedureReport report{"decay", {}, ""};
-  const Rig& rig = c.result.rig;
+  const model::Rig& rig = c.result.rig;
   const double motor = rig.motor.inertia, load = rig.link.inertia;
   DecaySettings settings;
   settings.stiffness = known(c, "mesh_stiffness");
@@ -54,4 +55,4 @@ ProcedureReport run_decay(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -3,31 +3,36 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// Friction of one direction: the mean, and half the difference with its sign.
-void add_directional(std::map<std::string, double>& combination, const RigParameter& mean, double sign) {
+void add_directional(std::map<std::string, double>& combination, const rig_file::RigParameter& mean,
+                     double sign) {
   combination[mean.name] = 1;
-  if (const RigParameter* asymmetry = asymmetry_of(mean)) combination[asymmetry->name] = sign;
+  if (const rig_file::RigParameter* asymmetry = rig_file::asymmetry_of(mean))
+    combination[asymmetry->name] = sign;
 }
 
 /// Both directions of one subject, and what they say about the bodies in `bodies`.
 void add_friction(IdentificationCase& c, const std::string& subject,
-                  const std::vector<ConstantSpeedRun>& runs, const std::vector<RigPart>& bodies) {
+                  const std::vector<ConstantSpeedRun>& runs, const std::vector<rig_file::RigPart>& bodies) {
   FrictionDetail detail{subject, {}};
   for (const Direction direction : {Direction::positive, Direction::negative}) {
     const double sign = direction == Direction::positive ? 1 : -1;
     try {
       const FrictionLine line = fit_friction_line(runs, direction);
       std::map<std::string, double> coulomb, viscous;
-      for (const RigPart body : bodies) {
-        add_directional(coulomb, servo_parameter(body, ParameterKind::coulomb_friction), sign);
-        add_directional(viscous, servo_parameter(body, ParameterKind::viscous_friction), sign);
+      for (const rig_file::RigPart body : bodies) {
+        add_directional(coulomb, rig_file::servo_parameter(body, rig_file::ParameterKind::coulomb_friction),
+                        sign);
+        add_directional(viscous, rig_file::servo_parameter(body, rig_file::ParameterKind::viscous_friction),
+                        sign);
       }
       add_finding(c, "friction_lines", coulomb, {sign * line.coulomb.value, line.coulomb.standard_error});
       add_finding(c, "friction_lines", viscous, line.viscous);
@@ -50,10 +55,11 @@ ProcedureReport run_friction_lines(IdentificationCase& c) {
   struct Subject {
     const char* name;
     bool (CaseRecord::*wanted)() const;
-    std::vector<RigPart> bodies;
+    std::vector<rig_file::RigPart> bodies;
   };
-  for (const Subject& s : {Subject{"motor", &CaseRecord::motor_alone, {RigPart::motor}},
-                           Subject{"drive", &CaseRecord::drive, {RigPart::motor, RigPart::link}}}) {
+  for (const Subject& s :
+       {Subject{"motor", &CaseRecord::motor_alone, {rig_file::RigPart::motor}},
+        Subject{"drive", &CaseRecord::drive, {rig_file::RigPart::motor, rig_file::RigPart::link}}}) {
     std::vector<ConstantSpeedRun> runs;
     try {
       const auto used = on_each(c, s.wanted, [&](const CaseRecord& r) {
@@ -74,4 +80,4 @@ ProcedureReport run_friction_lines(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -3,16 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// Friction of the load at a speed, from what is known by now [N m].
-Measured load_friction_at(const IdentificationCase& c, double speed) {
-  const Body& link = c.result.rig.link;
+signal::Measured load_friction_at(const IdentificationCase& c, double speed) {
+  const model::Body& link = c.result.rig.link;
   const double sign = speed > 0 ? 1 : -1;
   const double value = link.coulomb_friction + sign * link.coulomb_asymmetry +
                        (link.viscous_damping + sign * link.viscous_asymmetry) * std::fabs(speed);
@@ -31,7 +32,7 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
   std::vector<OneWay> runs;
   for (const CaseRecord& r : c.records) {
     if (!r.drive() || !r.has_load) continue;
-    const auto& q = r.record.column(Channel::load_position);
+    const auto& q = r.record.column(record::Channel::load_position);
     const auto [low, high] = std::minmax_element(q.begin(), q.end());
     const double travel = q.back() - q.front();
     if (std::fabs(travel) < 0.95 * (*high - *low)) continue;
@@ -70,4 +71,4 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

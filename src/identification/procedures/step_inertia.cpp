@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kLineModel =
@@ -17,11 +18,11 @@ constexpr double kLineModel =
 
 ProcedureReport run_line_inertia(IdentificationCase& c) {
   ProcedureReport report{"line_inertia", {}, ""};
-  const Rig& rig = c.result.rig;
+  const model::Rig& rig = c.result.rig;
   std::string reasons;
   for (const bool alone : {true, false}) {
     InertiaDetail detail{alone ? "motor" : "drive", {}, {}};
-    std::vector<Measured> values;
+    std::vector<signal::Measured> values;
     try {
       const auto used =
           on_each(c, alone ? &CaseRecord::motor_alone : &CaseRecord::drive, [&](const CaseRecord& r) {
@@ -31,7 +32,7 @@ ProcedureReport run_line_inertia(IdentificationCase& c) {
             detail.runs.push_back(line_inertia(r.record, options));
             values.push_back(detail.runs.back().inertia);
           });
-      detail.combined = robust_mean(values);
+      detail.combined = signal::robust_mean(values);
       std::map<std::string, double> sum = {{"motor_inertia", 1}};
       if (!alone) sum["load_inertia"] = 1;
       add_finding(c, "line_inertia", sum, with_model_error(detail.combined, kLineModel));
@@ -47,4 +48,4 @@ ProcedureReport run_line_inertia(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

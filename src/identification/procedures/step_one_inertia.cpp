@@ -4,15 +4,16 @@
 
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 /// The samples that were used, in their places.
-ChannelTrace trace_of(const OneInertia& found, const Record& record) {
+ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
   ChannelTrace trace;
   trace.record = record.name;
   trace.interval = record.sampling_interval();
@@ -54,12 +55,12 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
                          {"viscous", found.viscous},
                          {"coulomb", found.coulomb},
                          {"offset", found.offset}};
-  for (const RigParameter& p : servo_parameters())
-    if (!p.one_inertia.empty()) c.result.units[p.one_inertia] = axis_unit(p.unit, c.declared.linear);
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters())
+    if (!p.one_inertia.empty()) c.result.units[p.one_inertia] = model::axis_unit(p.unit, c.declared.linear);
   c.result.channels["torque"] = {found.relative_error, found.floor};
   c.result.delay = found.delay;
   c.result.warnings.insert(c.result.warnings.end(), found.warnings.begin(), found.warnings.end());
-  Body& body = c.result.rig.motor;
+  model::Body& body = c.result.rig.motor;
   body.inertia =
       found.inertia.value - c.declared.pinion.inertia - c.declared.gear.inertia - c.declared.link.inertia;
   body.viscous_damping = found.viscous.value;
@@ -71,4 +72,4 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

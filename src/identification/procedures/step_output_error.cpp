@@ -6,11 +6,12 @@
 #include <cmath>
 #include <numeric>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 // Errors fall with the root of the time, while another motion tells apart what one motion mixes. So the time
@@ -32,12 +33,12 @@ struct Stretch {
 /// The stretch of a record, at most so long, whose deflection varies most: the teeth change flanks there.
 Stretch most_telling(const CaseRecord& r, double seconds) {
   const double interval = r.record.sampling_interval();
-  const auto &motor = r.record.column(Channel::motor_position),
-             &load = r.record.column(Channel::load_position);
+  const auto &motor = r.record.column(record::Channel::motor_position),
+             &load = r.record.column(record::Channel::load_position);
   std::vector<double> deflection(motor.size());
   for (std::size_t k = 0; k < motor.size(); ++k) deflection[k] = motor[k] - load[k];
   const double cutoff = std::min(kTellingCutoff, kHighestCutoff / interval);
-  deflection = low_pass(deflection, interval, cutoff);
+  deflection = signal::low_pass(deflection, interval, cutoff);
   std::vector<double> sum(motor.size(), 0);
   for (std::size_t k = 1; k < sum.size(); ++k)
     sum[k] = sum[k - 1] + std::fabs(deflection[k] - deflection[k - 1]);
@@ -48,7 +49,7 @@ Stretch most_telling(const CaseRecord& r, double seconds) {
   return {&r, best, best + length, (sum[best + length - 1] - sum[best]) / (double(length) * interval)};
 }
 
-Record cut(const Stretch& s) {
+record::Record cut(const Stretch& s) {
   const std::vector<double>& t = s.record->record.time;
   const double end = s.to < t.size() ? t[s.to] : INFINITY;
   return s.record->record.slice(t[s.from], end);
@@ -87,7 +88,7 @@ double spread(const std::vector<double>& y) {
 }
 
 /// Two flanks that the zero of both encoders lies between.
-double start_in_gap(const Rig& rig, double encoder_offset) {
+double start_in_gap(const model::Rig& rig, double encoder_offset) {
   const double half = 0.5 * rig.mesh.backlash / rig.mesh.lever();
   return half > 0 ? std::clamp(rig.mesh.start_in_gap + encoder_offset / half, -1.0, 1.0) : 0;
 }
@@ -111,7 +112,8 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   c.result.rig = fit.rig;
   c.result.parameters = fit.parameters;
   c.result.rig.mesh.start_in_gap = start_in_gap(fit.rig, fit.calibrations.front().encoder_offset);
-  c.result.delay = Measured{fit.calibrations.front().torque_delay * data.front().interval, std::nan("")};
+  c.result.delay =
+      signal::Measured{fit.calibrations.front().torque_delay * data.front().interval, std::nan("")};
   std::vector<double> torque, deflection;
   for (std::size_t i = 0; i < data.size(); ++i) {
     const ServoPrediction p = predict_servo(fit.rig, data[i], settings.fit, fit.calibrations[i]);
@@ -129,4 +131,4 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

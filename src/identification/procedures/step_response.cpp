@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kResponseModel = 0.002;  // simulation: a mesh that is not quite linear
@@ -20,7 +21,7 @@ std::size_t reversing(const FrequencyResponse& response) {
 }
 
 /// Held between samples or not: as which the fitted delay vanishes.
-ResponseDetail respond(const Record& record) {
+ResponseDetail respond(const record::Record& record) {
   ResponseDetail best;
   double least = INFINITY;
   for (const bool held : {false, true}) {
@@ -45,8 +46,8 @@ ResponseDetail respond(const Record& record) {
     try {
       best.alternatives[letter] =
           split_stiffness(known, best.resonances, best.plateaus.total, best.plateaus.motor);
-    } catch (
-        const CannotIdentify&) {  // frequencies and inertias that contradict each other: the fit tells more
+    } catch (const CannotIdentify&) {  // frequencies and inertias that contradict each other: the fit
+                                       // tells more
     }
   }
   return best;
@@ -85,4 +86,4 @@ ProcedureReport run_frequency_response(IdentificationCase& c) {
   return report;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr std::size_t kFewestCycles = 4, kMostCycles = 200;
@@ -57,7 +57,7 @@ void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
       normal += b * b.transpose();
       right += b * u[k];
     }
-    const Eigen::Vector3d fit = solve_symmetric(normal, right);
+    const Eigen::Vector3d fit = signal::solve_symmetric(normal, right);
     const double early = std::atan2(fit[1], fit[2]) / (2 * M_PI);
     const bool found = std::isfinite(early) && std::fabs(early) < 0.25;
     refined.push_back(found ? Passage{rough - early * period, fit[0], std::hypot(fit[1], fit[2])}
@@ -69,8 +69,8 @@ void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
 std::vector<Passage> find_passages(const std::vector<double>& u) {
   std::vector<Passage> passages;
   if (u.size() < 8) return passages;
-  const double reach = quantile_range(u, 0.01);
-  const double noise = u.size() < kFewestForNoise ? 0 : white_noise(u);
+  const double reach = signal::quantile_range(u, 0.01);
+  const double noise = u.size() < kFewestForNoise ? 0 : signal::white_noise(u);
   const double turn = std::clamp(kNoiseTurn * noise, kTurn * reach, kMostTurn * reach);
   if (!(turn > 0)) return passages;
   std::optional<std::size_t> low;
@@ -98,8 +98,8 @@ double allowance(const std::vector<Passage>& p, std::size_t i) {
     third.push_back(std::fabs(p[k + 3].at - 3 * p[k + 2].at + 3 * p[k + 1].at - p[k].at) * 3 /
                     (p[k + 3].at - p[k].at));
   if (third.empty()) return kMostUneven;
-  const double deviation =
-      kNormalPerMedianDeviation * median(std::move(third)) / std::sqrt(20.0);  // 1 + 9 + 9 + 1
+  const double deviation = signal::kNormalPerMedianDeviation * signal::median(std::move(third)) /
+                           std::sqrt(20.0);  // 1 + 9 + 9 + 1
   return std::clamp(kJitter * deviation, kLeastUneven, kMostUneven);
 }
 
@@ -137,7 +137,7 @@ LineFit fit_line(const std::vector<double>& u, const std::vector<double>& y, con
     normal += a * a.transpose();
     right += a * Eigen::RowVector2d(u[k], y[k]);
   }
-  LineFit fit{solve_symmetric(normal, right), Eigen::RowVector2d::Zero(), Eigen::RowVector2d::Zero()};
+  LineFit fit{signal::solve_symmetric(normal, right), Eigen::RowVector2d::Zero(), Eigen::RowVector2d::Zero()};
   const double count = double(end - begin);
   for (std::size_t k = begin; k < end; ++k) {
     const Eigen::RowVector2d line = row(double(k), middle, half, run.frequency()).transpose() * fit.values;
@@ -172,7 +172,7 @@ double cycle_scatter(const std::vector<double>& u, const std::vector<double>& y,
       normal += b * b.transpose();
       right += b * (Eigen::RowVector2d(u[k], y[k]) - trend);
     }
-    const Eigen::Matrix<double, 3, 2> values = solve_symmetric(normal, right);
+    const Eigen::Matrix<double, 3, 2> values = signal::solve_symmetric(normal, right);
     found.push_back(amplitude(values.col(1).tail<2>()) / amplitude(values.col(0).tail<2>()));
     mean += found.back() / double(groups);
   }
@@ -227,4 +227,4 @@ ResponsePoint sine_response(const std::vector<double>& torque, const std::vector
   return point;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -6,9 +6,10 @@
 #include <functional>
 #include <string>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using Complex = std::complex<double>;
@@ -32,7 +33,7 @@ Impedances impedances(const TwoMass& m, double frequency) {
           m.load_inertia * s + m.load_viscous};
 }
 
-void require_positive(const Measured& m, const char* what) {
+void require_positive(const signal::Measured& m, const char* what) {
   if (!(m.value > 0) || !std::isfinite(m.value))
     throw CannotIdentify(std::string(what) + " = " + to_text(m.value) + ": must be > 0");
 }
@@ -74,9 +75,10 @@ Complex TwoMass::load_response(double frequency) const {
   return z.mesh / z.divisor();
 }
 
-StiffnessSplit split_stiffness(KnownInertia known, const Resonances& measured, const Measured& total_inertia,
-                               const Measured& motor_inertia) {
-  std::array<Measured, 4> given{measured.resonance, measured.anti_resonance, total_inertia, motor_inertia};
+StiffnessSplit split_stiffness(KnownInertia known, const Resonances& measured,
+                               const signal::Measured& total_inertia, const signal::Measured& motor_inertia) {
+  std::array<signal::Measured, 4> given{measured.resonance, measured.anti_resonance, total_inertia,
+                                        motor_inertia};
   require_positive(given[0], "resonance");
   require_positive(given[1], "anti-resonance");
   if (!(given[0].value > given[1].value))
@@ -102,8 +104,8 @@ StiffnessSplit split_stiffness(KnownInertia known, const Resonances& measured, c
     for (std::size_t k = 0; k < row.size(); ++k)
       variance[k] += std::pow((upper[k] - lower[k]) / (2 * step) * given[i].standard_error, 2);
   }
-  const auto cell = [&](std::size_t k) { return Measured{row[k], std::sqrt(variance[k])}; };
+  const auto cell = [&](std::size_t k) { return signal::Measured{row[k], std::sqrt(variance[k])}; };
   return {cell(0), cell(1), cell(2), cell(3), cell(4), cell(5), cell(6)};
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

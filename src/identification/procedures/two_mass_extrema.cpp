@@ -5,12 +5,13 @@
 #include <cmath>
 #include <functional>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using Points = std::vector<ResponsePoint>;
@@ -28,14 +29,15 @@ std::vector<double> smoothed(const Points& points, const std::function<double(co
     const std::size_t reach = std::min<std::size_t>({2, i, n - 1 - i});
     std::vector<double> near;
     for (std::size_t k = i - reach; k <= i + reach; ++k) near.push_back(value(points[k]));
-    out.push_back(median(std::move(near)));
+    out.push_back(signal::median(std::move(near)));
   }
   return out;
 }
 
 /// Minimum of |H|^2 (power 1) or 1/|H|^2 (power -1) near point `at`: vertex of the cubic c0 .. c3 in
 /// x = (f - f_at) / half width, from c1 + 2 c2 x + 3 c3 x^2 = 0.
-Measured vertex(const Points& points, std::size_t at, int power, double variance_factor, const char* what) {
+signal::Measured vertex(const Points& points, std::size_t at, int power, double variance_factor,
+                        const char* what) {
   const auto value = [&](std::size_t i) { return std::pow(std::norm(points[i].response), power); };
   std::size_t first = at, last = at;
   while (first > 0 && (at - first < kBeside || value(first - 1) < kWindow * value(at))) --first;
@@ -54,7 +56,7 @@ Measured vertex(const Points& points, std::size_t at, int power, double variance
     a.row(i) << 1 / error, x / error, x * x / error, x * x * x / error;
     b[i] = v / error;
   }
-  const LeastSquaresFit fit = fit_linear(a, b);
+  const signal::LeastSquaresFit fit = signal::fit_linear(a, b);
   const double c1 = fit.values[1], c2 = fit.values[2], c3 = fit.values[3];
   const double root = std::sqrt(c2 * c2 - 3 * c1 * c3), x = -c1 / (c2 + root);
   if (!(c2 > 0) || !(std::fabs(x) < 1)) throw CannotIdentify(where + ": no extremum there");
@@ -65,8 +67,8 @@ Measured vertex(const Points& points, std::size_t at, int power, double variance
   return {middle + half * x, half * least * std::sqrt(variance * variance_factor)};
 }
 
-Measured plateau(const FrequencyResponse& motor, double from, double to,
-                 const std::function<double(double frequency)>& factor) {
+signal::Measured plateau(const FrequencyResponse& motor, double from, double to,
+                         const std::function<double(double frequency)>& factor) {
   std::vector<double> inertia, error;
   for (const ResponsePoint& p : motor.points) {
     if (p.frequency < from || p.frequency > to) continue;
@@ -82,19 +84,19 @@ Measured plateau(const FrequencyResponse& motor, double from, double to,
     a(static_cast<Eigen::Index>(i), 0) = 1 / error[i];
     b[static_cast<Eigen::Index>(i)] = inertia[i] / error[i];
   }
-  Measured found = fit_robust(a, b).parameter(0);
+  signal::Measured found = signal::fit_robust(a, b).parameter(0);
   found.standard_error *= std::sqrt(motor.variance_factor);
   return found;
 }
 
 /// The plateau whose halves should agree: what they differ by is added to its error.
-Measured checked_plateau(const FrequencyResponse& motor, double from, double to,
-                         const std::function<double(double frequency)>& factor) {
-  Measured found = plateau(motor, from, to, factor);
+signal::Measured checked_plateau(const FrequencyResponse& motor, double from, double to,
+                                 const std::function<double(double frequency)>& factor) {
+  signal::Measured found = plateau(motor, from, to, factor);
   std::vector<double> inside;
   for (const ResponsePoint& p : motor.points)
     if (p.frequency >= from && p.frequency <= to) inside.push_back(p.frequency);
-  const double middle = median(std::move(inside));
+  const double middle = signal::median(std::move(inside));
   const double difference =
       plateau(motor, from, middle, factor).value - plateau(motor, middle, to, factor).value;
   found.standard_error = std::hypot(found.standard_error, difference);
@@ -124,7 +126,7 @@ Resonances find_resonances(const FrequencyResponse& motor) {
           vertex(points, bottom, 1, motor.variance_factor, "anti-resonance")};
 }
 
-Measured inertia_plateau(const FrequencyResponse& motor, double from, double to) {
+signal::Measured inertia_plateau(const FrequencyResponse& motor, double from, double to) {
   if (!(from >= 0)) throw InvalidParameter("from", from, "must be >= 0 Hz");
   if (!(to > from)) throw InvalidParameter("to", to, "must be > from");
   return plateau(motor, from, to, [](double) { return 1.0; });
@@ -138,4 +140,4 @@ InertiaPlateaus find_inertias(const FrequencyResponse& motor, const Resonances& 
           checked_plateau(motor, kAbove * r, infinite, [&](double f) { return off(ar / f) / off(r / f); })};
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

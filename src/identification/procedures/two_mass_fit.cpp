@@ -6,11 +6,12 @@
 #include <cmath>
 #include <functional>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kLeastError = 1e-3;   // choice: relative: what sampling and transients leave
@@ -55,13 +56,13 @@ Eigen::VectorXd residuals(const std::vector<Point>& points, const Eigen::VectorX
 }
 
 /// Without the points that miss the fit by far; at most a tenth of them goes.
-std::vector<Point> without_outliers(const std::vector<Point>& points, const LeastSquaresFit& fit) {
+std::vector<Point> without_outliers(const std::vector<Point>& points, const signal::LeastSquaresFit& fit) {
   std::vector<double> sizes;
   for (std::size_t i = 0; i < points.size(); ++i)
     sizes.push_back(fit.residuals.segment<2>(2 * static_cast<Eigen::Index>(i)).norm());
   // The median of the length of two normal residuals is sqrt(2 ln 2) of their deviation.
-  const double deviation = median(sizes) / std::sqrt(2 * std::log(2.0));
-  const double limit = std::max(kOutlier * deviation, quantile(sizes, 0.9));
+  const double deviation = signal::median(sizes) / std::sqrt(2 * std::log(2.0));
+  const double limit = std::max(kOutlier * deviation, signal::quantile(sizes, 0.9));
   std::vector<Point> kept;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (sizes[i] <= limit) kept.push_back(points[i]);
@@ -69,8 +70,8 @@ std::vector<Point> without_outliers(const std::vector<Point>& points, const Leas
 }
 
 /// A value that follows from the parameters, with its propagated error.
-Measured derived(const LeastSquaresFit& fit, const Eigen::VectorXd& scale, double variance_factor,
-                 const std::function<double(const Eigen::VectorXd&)>& value) {
+signal::Measured derived(const signal::LeastSquaresFit& fit, const Eigen::VectorXd& scale,
+                         double variance_factor, const std::function<double(const Eigen::VectorXd&)>& value) {
   Eigen::VectorXd gradient(fit.values.size());
   for (Eigen::Index i = 0; i < gradient.size(); ++i) {
     Eigen::VectorXd more = fit.values, less = fit.values;
@@ -104,9 +105,9 @@ TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse&
   add(points, motor, false);
   add(points, load, true);
   const auto fitted = [&](const Eigen::VectorXd& from) {
-    return fit_nonlinear([&](const Eigen::VectorXd& q) { return residuals(points, q); }, from, scale);
+    return signal::fit_nonlinear([&](const Eigen::VectorXd& q) { return residuals(points, q); }, from, scale);
   };
-  LeastSquaresFit fit = fitted(p);
+  signal::LeastSquaresFit fit = fitted(p);
   points = without_outliers(points, fit);
   fit = fitted(fit.values);
   if (!fit.values.allFinite() || !fit.covariance.allFinite())
@@ -115,7 +116,7 @@ TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse&
   const double least = 1 / std::min(1.0, fit.deviation);
   const double factor = std::max(motor.variance_factor, load.variance_factor) * least * least;
   const auto of = [&](const std::function<double(const Eigen::VectorXd&)>& value) {
-    Measured m = derived(fit, scale, factor, value);
+    signal::Measured m = derived(fit, scale, factor, value);
     m.standard_error = std::hypot(m.standard_error, kLeastError * m.value);
     return m;
   };
@@ -138,4 +139,4 @@ TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse&
   return found;
 }
 
-}  // namespace backlash
+}  // namespace backlash::identification

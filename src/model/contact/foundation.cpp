@@ -14,7 +14,7 @@
 #include "laws.h"
 #include "power.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Foundation : public PowerElastic {
@@ -46,4 +46,4 @@ ContactLawType foundation_contact() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

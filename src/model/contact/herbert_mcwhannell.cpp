@@ -8,7 +8,7 @@
 #include "laws.h"
 #include "restitution_damped.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class HerbertMcWhannell : public RestitutionDamped {
@@ -38,4 +38,4 @@ ContactLawType herbert_mcwhannell_contact() {
           make_falling_restitution<HerbertMcWhannell>};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

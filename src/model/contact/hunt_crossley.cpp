@@ -10,7 +10,7 @@
 #include "laws.h"
 #include "power.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class HuntCrossley : public PowerElastic {
@@ -42,4 +42,4 @@ ContactLawType hunt_crossley_contact() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -11,7 +11,7 @@
 #include "laws.h"
 #include "power.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Jankowski : public PowerElastic {
@@ -41,4 +41,4 @@ ContactLawType jankowski_contact() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

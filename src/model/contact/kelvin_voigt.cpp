@@ -10,7 +10,7 @@
 #include "laws.h"
 #include "power.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class KelvinVoigt : public PowerElastic {
@@ -32,4 +32,4 @@ ContactLawType kelvin_voigt_contact() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -8,7 +8,7 @@
 #include "laws.h"
 #include "restitution_damped.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class LankaraniNikravesh : public RestitutionDamped {
@@ -35,4 +35,4 @@ ContactLawType lankarani_nikravesh_contact() {
       }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

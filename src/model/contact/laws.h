@@ -4,7 +4,7 @@
 
 #include "backlash_diagnosis/model/contact_law.h"
 
-namespace backlash {
+namespace backlash::model {
 
 ContactLawType linear_contact();
 ContactLawType power_law_contact();
@@ -17,4 +17,4 @@ ContactLawType jankowski_contact();
 ContactLawType stereomechanical_contact();
 ContactLawType foundation_contact();
 
-}  // namespace backlash
+}  // namespace backlash::model

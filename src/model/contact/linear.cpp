@@ -8,7 +8,7 @@
 
 #include "laws.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Linear : public ContactLaw {
@@ -37,4 +37,4 @@ ContactLawType linear_contact() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/model/contact_law.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// d^n for d >= 0, with the two exponents that occur in practice done without pow().
 inline double contact_power(double d, double n) {
@@ -40,4 +40,4 @@ inline ParameterSpec power_exponent() {
   return {"exponent", "1", Range::between(1, 1.5), "n"};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

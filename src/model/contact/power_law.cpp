@@ -6,7 +6,7 @@
 #include "laws.h"
 #include "power.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class PowerLaw : public PowerElastic {
@@ -26,4 +26,4 @@ ContactLawType power_law_contact() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

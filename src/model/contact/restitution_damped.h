@@ -11,7 +11,7 @@
 
 #include "power.h"
 
-namespace backlash {
+namespace backlash::model {
 
 class RestitutionDamped : public PowerElastic {
  public:
@@ -56,4 +56,4 @@ std::unique_ptr<ContactLaw> make_falling_restitution(const ParameterValues& p) {
                                FallingRestitution{p.at("alpha"), p.at("beta")});
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -13,7 +13,7 @@
 #include "laws.h"
 #include "power.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Stereomechanical : public PowerElastic {
@@ -50,4 +50,4 @@ ContactLawType stereomechanical_contact() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -8,7 +8,7 @@
 #include "laws.h"
 #include "restitution_damped.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class YangSun : public RestitutionDamped {
@@ -28,4 +28,4 @@ ContactLawType yang_sun_contact() {
   return {"yang_sun", falling_restitution_parameters(), make_falling_restitution<YangSun>};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -8,7 +8,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class AsymmetricCoulomb : public EndFrictionTerm {
@@ -34,4 +34,4 @@ TermType asymmetric_coulomb_term() {
           TermSearch{"torque", "", clear_torque, {}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

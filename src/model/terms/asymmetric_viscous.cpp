@@ -9,7 +9,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class AsymmetricViscous : public EndTorqueTerm {
@@ -39,4 +39,4 @@ TermType asymmetric_viscous_term() {
       TermSearch{"damping", "", clear_damping, {}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

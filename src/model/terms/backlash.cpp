@@ -5,7 +5,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Backlash : public Term {
@@ -30,4 +30,4 @@ TermType backlash_term() {
           TermSearch{"angle", "", clear_angle, {}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 struct Point {
@@ -88,4 +88,4 @@ TermType backlash_map_term() {
   return type;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -8,7 +8,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Cogging : public Term {
@@ -37,4 +37,4 @@ TermType cogging_term() {
           TermSearch{"amplitude", "phase", clear_torque, {orders<80>()}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

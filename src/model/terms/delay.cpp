@@ -6,7 +6,7 @@
 // whichever of the two comes late (see Simulation).
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Delay : public Term {
@@ -32,4 +32,4 @@ TermType delay_term() {
   return type;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -11,7 +11,7 @@
 
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Eccentricity : public Term {
@@ -44,4 +44,4 @@ TermType eccentricity_term() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -5,7 +5,7 @@
 
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class EncoderScale : public Term {
@@ -35,4 +35,4 @@ TermType encoder_scale_term() {
           TermSearch{"scale", "", typical, {}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 
 inline ParameterSpec body_parameter() {
   return {"body", "-", Range::any(), "the end that it acts on", false, {"motor", "load"}};
@@ -52,4 +52,4 @@ class EndTorqueTerm : public Term {
   EndOfTrain end_;
 };
 
-}  // namespace backlash
+}  // namespace backlash::model

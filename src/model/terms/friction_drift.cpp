@@ -11,7 +11,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 /// (1 - exp(-r t)) / (1 - exp(-r s)), without overflow for t <= s.
@@ -54,4 +54,4 @@ TermType friction_drift_term() {
       TermSearch{"change", "", clear_torque, {{"span", span, false}, {"rate", rates, true}}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

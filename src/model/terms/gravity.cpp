@@ -7,7 +7,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Gravity : public Term {
@@ -32,4 +32,4 @@ TermType gravity_term() {
           TermSearch{"amplitude", "phase", clear_torque, {}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -18,7 +18,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Curve {
@@ -228,4 +228,4 @@ TermType learned_map_term() {
   return type;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

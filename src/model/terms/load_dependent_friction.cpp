@@ -8,7 +8,7 @@
 #include "end_of_train.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class LoadDependentFriction : public EndFrictionTerm {
@@ -38,4 +38,4 @@ TermType load_dependent_friction_term() {
           TermSearch{"coefficient", "", clear_coefficient, {}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

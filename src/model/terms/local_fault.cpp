@@ -11,7 +11,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class LocalFault : public Term {
@@ -68,4 +68,4 @@ TermType local_fault_term() {
           TermSearch{"amplitude", "", clear_angle, {{"position", positions, true}, {"width", widths, true}}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -10,7 +10,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class MeshHardening : public Term {
@@ -54,4 +54,4 @@ TermType mesh_hardening_term() {
   return type;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -9,7 +9,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class PositionDependentFriction : public EndFrictionTerm {
@@ -38,4 +38,4 @@ TermType position_dependent_friction_term() {
           TermSearch{"amplitude", "phase", clear_torque, {orders<80>()}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

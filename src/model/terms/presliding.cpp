@@ -6,7 +6,7 @@
 
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class PreslidingTerm : public Term {
@@ -54,4 +54,4 @@ TermType presliding_term() {
   return type;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -9,7 +9,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class QuadraticDrag : public EndTorqueTerm {
@@ -38,4 +38,4 @@ TermType quadratic_drag_term() {
       TermSearch{"drag", "", clear_drag, {}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

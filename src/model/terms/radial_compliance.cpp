@@ -10,7 +10,7 @@
 
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class RadialCompliance : public Term {
@@ -40,4 +40,4 @@ TermType radial_compliance_term() {
           }};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 
 /// Large compared with a torque noise of 1 %, small compared with the torque that moves the machine.
 inline double clear_torque(const MotionRange& range) {
@@ -29,4 +29,4 @@ TermShape orders() {
           false};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -9,7 +9,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class Stribeck : public EndFrictionTerm {
@@ -48,4 +48,4 @@ TermType stribeck_term() {
           TermSearch{"torque", "", clear_torque, {{"speed", speeds, true}, {"exponent", exponents, false}}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -4,7 +4,7 @@
 
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash {
+namespace backlash::model {
 
 TermType asymmetric_coulomb_term();
 TermType asymmetric_viscous_term();
@@ -29,4 +29,4 @@ TermType transmission_error_term();
 TermType varying_backlash_term();
 TermType varying_reduction_ratio_term();
 
-}  // namespace backlash
+}  // namespace backlash::model

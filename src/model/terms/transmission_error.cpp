@@ -7,7 +7,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class TransmissionError : public Term {
@@ -39,4 +39,4 @@ TermType transmission_error_term() {
           TermSearch{"amplitude", "phase", clear_angle, {orders<80>()}}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -7,7 +7,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class VaryingBacklash : public Term {
@@ -42,4 +42,4 @@ TermType varying_backlash_term() {
   return type;
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

@@ -11,7 +11,7 @@
 #include "search_values.h"
 #include "terms.h"
 
-namespace backlash {
+namespace backlash::model {
 namespace {
 
 class VaryingReductionRatio : public Term {
@@ -45,4 +45,4 @@ TermType varying_reduction_ratio_term() {
           TermSearch{"change", "", clear_change, {}, false, true}};
 }
 
-}  // namespace backlash
+}  // namespace backlash::model

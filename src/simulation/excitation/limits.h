@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 
-namespace backlash {
+namespace backlash::simulation {
 
 constexpr int kFewestLines = 16, kMostLines = 10'000;  // of random torque
 
@@ -15,4 +15,4 @@ inline void require(const char* name, double value, const Range& range) {
   if (!range.contains(value)) throw InvalidParameter(std::string("excitation.") + name, value, range.text());
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/simulation/excitation.h"
 #include "limits.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 using Reference = std::function<double(double)>;  // rad/s at time t [s]
@@ -22,7 +22,7 @@ class SpeedLoop : public Excitation {
   double torque(double, long) const override { return torque_; }
   double segment_end(long segment) const override { return double(segment + 1) / controller_.rate; }
 
-  void begin_segment(long segment, const Observation& machine) override {
+  void begin_segment(long segment, const model::Observation& machine) override {
     if (segment == sampled_) return;  // the machine was changed between two samples
     sampled_ = segment;
     const double error = reference_(double(segment) / controller_.rate) - machine.motor_velocity;
@@ -83,4 +83,4 @@ std::unique_ptr<Excitation> sine_speed_excitation(const SpeedController& control
   });
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

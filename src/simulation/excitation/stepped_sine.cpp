@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/simulation/excitation.h"
 #include "limits.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr double kMostSteps = 100'000;
@@ -59,4 +59,4 @@ std::unique_ptr<Excitation> stepped_sine_excitation(double amplitude, double sta
   return std::make_unique<SteppedSine>(amplitude, std::move(frequencies), cycles, bias);
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/simulation/excitation.h"
 #include "limits.h"
 
-namespace backlash {
+namespace backlash::simulation {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -174,4 +174,4 @@ std::unique_ptr<Excitation> external_excitation() {
   return std::make_unique<External>();
 }
 
-}  // namespace backlash
+}  // namespace backlash::simulation

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 /// Runs `name --out OUT -- DATA`; `what` is in the data file, whatever happens to the picture.
 void draw(const std::string& name, const std::string& out, const std::string& data, const std::string& what) {
-  const int code = run_script(name, {"--out", out, "--", data});
+  const int code = report::run_script(name, {"--out", out, "--", data});
   if (code == kCannotWrite) throw CannotWrite(out + ": cannot be written; " + what + " itself is in " + data);
   if (code != kHealthy)
     throw Error(name + " failed (exit code " + std::to_string(code) + "); " + what + " itself is in " + data);

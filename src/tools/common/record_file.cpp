@@ -52,16 +52,16 @@ void check_record_path(const std::string& path) {
     throw UsageError("'" + printable(path, 4096) + "': a record must end in .csv or .bag");
 }
 
-Record read_record(const std::string& path, const BagPlace& place) {
-  return is_bag(path) ? read_bag(path, place.joint, place.topic) : read_csv(path);
+record::Record read_record(const std::string& path, const BagPlace& place) {
+  return is_bag(path) ? ros_bridge::read_bag(path, place.joint, place.topic) : record::read_csv(path);
 }
 
-void write_record(const Record& record, const std::string& path, const std::string& joint) {
+void write_record(const record::Record& record, const std::string& path, const std::string& joint) {
   const SignalsBlocked blocked;
   if (is_bag(path))
-    write_bag(record, path, joint);
+    ros_bridge::write_bag(record, path, joint);
   else
-    write_csv(record, path);
+    record::write_csv(record, path);
 }
 
 void write_text(const std::string& path, const std::string& text) {

@@ -21,10 +21,10 @@ struct BagPlace {
 void check_record_path(const std::string& path);
 
 /// Throws UsageError as above and what read_csv and read_bag throw.
-Record read_record(const std::string& path, const BagPlace& place = {});
+record::Record read_record(const std::string& path, const BagPlace& place = {});
 
 /// Not interrupted by Ctrl-C: the file is written whole or not at all. Throws as write_csv and write_bag.
-void write_record(const Record& record, const std::string& path, const std::string& joint);
+void write_record(const record::Record& record, const std::string& path, const std::string& joint);
 
 /// The same for any text file.
 void write_text(const std::string& path, const std::string& text);

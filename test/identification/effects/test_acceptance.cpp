@@ -8,7 +8,7 @@
 #include "identification/effects/steps.h"
 #include "support/one_inertia_bench.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 // Squares of four blocks; torque gains, deflection is absent.
@@ -113,4 +113,4 @@ TEST_F(Objection, HeldOutGainIsThatOfTheFitWhereItIsReal) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -13,16 +13,16 @@
 #include "backlash_diagnosis/model/term.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 struct Records {
-  Record train, test;
+  record::Record train, test;
 };
 
-Records records_of(const Rig& machine, double duration = 6) {
-  Records r{simulate_record(machine, test::servo_run(11), duration),
-            simulate_record(machine, test::servo_run(12), duration)};
+Records records_of(const model::Rig& machine, double duration = 6) {
+  Records r{simulation::simulate_record(machine, test::servo_run(11), duration),
+            simulation::simulate_record(machine, test::servo_run(12), duration)};
   r.train.name = "train";
   r.test.name = "test";
   return r;
@@ -38,7 +38,7 @@ std::set<std::string> found(const Trace& trace) {
   return ids;
 }
 
-const Measured& parameter(const Trace& trace, const std::string& effect, const std::string& name) {
+const signal::Measured& parameter(const Trace& trace, const std::string& effect, const std::string& name) {
   for (const FoundEffect& e : trace.steps)
     for (const EffectParameter& p : e.parameters)
       if (e.id == effect && p.name == name) return p.measured;
@@ -62,21 +62,21 @@ TEST(EffectSearch, NothingIsMissing) {
       {"motor_inertia", 7.8}, {"load_inertia", 84}, {"motor_coulomb", 47},      {"motor_viscous", 10},
       {"load_coulomb", 18},   {"load_viscous", 7},  {"backlash_angle", 6.3e-4}, {"mesh_stiffness", 400e3}};
   for (const auto& [name, value] : truth) {
-    const Measured& m = trace.parameters.at(name);
+    const signal::Measured& m = trace.parameters.at(name);
     EXPECT_NEAR(m.value, value, 4 * m.standard_error + 0.003 * value) << name;
   }
 }
 
-std::shared_ptr<const Term> bristles(const std::string& body, double distance, double damping) {
+std::shared_ptr<const model::Term> bristles(const std::string& body, double distance, double damping) {
   ParameterValues values{{"distance", distance}, {"damping", damping}};
   values.set_choice("body", body);
-  return make_term("presliding", values);
+  return model::make_term("presliding", values);
 }
 
 // Every friction begins along some path. Of a path that hardly shows the model must know, or the rest looks
 // like other effects; as long as the load turns within it, it is an effect.
 TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
-  Rig machine = test::other_servo();
+  model::Rig machine = test::other_servo();
   machine.terms = {bristles("load", 2e-5, 8000)};
   const Trace shape = traced(records_of(machine));
   EXPECT_EQ(shape.verdict, TraceVerdict::nothing_missing);
@@ -94,17 +94,17 @@ TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
 }
 
 /// Hertzian teeth, about as stiff as those of other_servo() under 300 N m.
-Rig hertzian_servo() {
-  Rig machine = test::other_servo();
+model::Rig hertzian_servo() {
+  model::Rig machine = test::other_servo();
   machine.mesh.contact_spec = {"hunt_crossley", {{"stiffness", 1.5e7}, {"exponent", 1.5}, {"alpha", 1.0}}};
-  machine.mesh.contact = make_contact_law("hunt_crossley", machine.mesh.contact_spec.values);
+  machine.mesh.contact = model::make_contact_law("hunt_crossley", machine.mesh.contact_spec.values);
   return machine;
 }
 
 // What linear teeth leave looks like hardening, of which there is none.
 TEST(EffectSearch, TeethOfAnotherShapeAreNoEffect) {
-  Rig machine = hertzian_servo();
-  machine.terms.push_back(make_term("gravity", {{"amplitude", 40}, {"phase", 0.4}}));
+  model::Rig machine = hertzian_servo();
+  machine.terms.push_back(model::make_term("gravity", {{"amplitude", 40}, {"phase", 0.4}}));
   const Trace trace = traced(records_of(machine));
   EXPECT_EQ(found(trace), std::set<std::string>{"gravity"});
   ASSERT_EQ(trace.notes.size(), 1u);
@@ -118,15 +118,15 @@ TEST(EffectSearch, TeethOfAnotherShapeAreNoEffect) {
 }
 
 TEST(EffectSearch, TwoEffectsAtOnce) {
-  Rig machine = test::other_servo();
-  machine.terms.push_back(make_term("cogging", {{"amplitude", 14}, {"order", 23}, {"phase", 0.7}}));
-  machine.terms.push_back(make_term("gravity", {{"amplitude", 40}, {"phase", 0.4}}));
+  model::Rig machine = test::other_servo();
+  machine.terms.push_back(model::make_term("cogging", {{"amplitude", 14}, {"order", 23}, {"phase", 0.7}}));
+  machine.terms.push_back(model::make_term("gravity", {{"amplitude", 40}, {"phase", 0.4}}));
   const Trace trace = traced(records_of(machine));
   EXPECT_EQ(trace.verdict, TraceVerdict::effect_found);
   EXPECT_EQ(found(trace), (std::set<std::string>{"cogging", "gravity"}));
   EXPECT_EQ(parameter(trace, "cogging", "order").value, 23);
   for (const auto& [effect, value] : {std::pair{"cogging", 14.0}, {"gravity", 40.0}}) {
-    const Measured m = parameter(trace, effect, "amplitude");
+    const signal::Measured m = parameter(trace, effect, "amplitude");
     EXPECT_NEAR(std::fabs(m.value), value, 4 * m.standard_error + 0.003 * value) << effect;
   }
   expect_at_floor(trace);
@@ -142,8 +142,9 @@ TEST(EffectSearch, TwoEffectsAtOnce) {
 }
 
 /// A drive that gives less than it is asked for: of a recorded torque u the machine feels T0 tanh(u / T0).
-Record with_saturation(Record record, double limit) {
-  for (double& torque : record.column(Channel::motor_torque)) torque = limit * std::atanh(torque / limit);
+record::Record with_saturation(record::Record record, double limit) {
+  for (double& torque : record.column(record::Channel::motor_torque))
+    torque = limit * std::atanh(torque / limit);
   return record;
 }
 
@@ -151,8 +152,8 @@ TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
   // Long enough that the torque of the motor and that through the teeth, which is its larger part, differ.
   Records r = records_of(test::other_servo(), 10);
   double largest = 0;
-  for (const Record* record : {&r.train, &r.test})
-    for (const double torque : record->column(Channel::motor_torque))
+  for (const record::Record* record : {&r.train, &r.test})
+    for (const double torque : record->column(record::Channel::motor_torque))
       largest = std::max(largest, std::fabs(torque));
   r.train = with_saturation(r.train, 1.15 * largest);
   r.test = with_saturation(r.test, 1.15 * largest);
@@ -167,12 +168,13 @@ TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
 TEST(EffectSearch, SaysWhenItCannotNameWhatIsMissing) {
   // A coupling that slips now and then: the load encoder is ahead by more and more.
   Records r = records_of(test::other_servo());
-  for (Record* record : {&r.train, &r.test}) {
+  for (record::Record* record : {&r.train, &r.test}) {
     double slipped = 0;
     std::size_t last = 0;
     for (std::size_t k = 0; k < record->size(); ++k) {
-      if (k > last + 400 && record->column(Channel::motor_torque)[k] > 350) slipped += 1.5e-4, last = k;
-      record->column(Channel::load_position)[k] += slipped;
+      if (k > last + 400 && record->column(record::Channel::motor_torque)[k] > 350)
+        slipped += 1.5e-4, last = k;
+      record->column(record::Channel::load_position)[k] += slipped;
     }
   }
   const Trace trace = traced(r);
@@ -183,8 +185,8 @@ TEST(EffectSearch, SaysWhenItCannotNameWhatIsMissing) {
 }
 
 TEST(EffectSearch, IsTheSameEveryTime) {
-  Rig machine = test::other_servo();
-  machine.terms.push_back(make_term("gravity", {{"amplitude", 40}, {"phase", 0.4}}));
+  model::Rig machine = test::other_servo();
+  machine.terms.push_back(model::make_term("gravity", {{"amplitude", 40}, {"phase", 0.4}}));
   const Records r = records_of(machine);
   const Trace a = traced(r), b = traced(r);
   EXPECT_EQ(a.channels.at("torque").after, b.channels.at("torque").after);
@@ -193,7 +195,7 @@ TEST(EffectSearch, IsTheSameEveryTime) {
 
 // A drive that pushes a little: what comes out below 0 is held at 0, where a rig file can be written.
 TEST(EffectSearch, FrictionIsNeverNegative) {
-  Rig machine = test::other_servo();
+  model::Rig machine = test::other_servo();
   machine.link.viscous_damping = -6;
   const Trace trace = traced(records_of(machine));
   EXPECT_LT(trace.base_parameters.at("load_viscous").value, 0);
@@ -202,26 +204,26 @@ TEST(EffectSearch, FrictionIsNeverNegative) {
 }
 
 TEST(EffectSearch, RefusesRecordsThatCannotTell) {
-  const Rig rig = test::servo_file().rig;
-  const Record record = simulate_record(rig, test::servo_run(11), 3);
+  const model::Rig rig = test::servo_file().rig;
+  const record::Record record = simulation::simulate_record(rig, test::servo_run(11), 3);
   EXPECT_THROW(trace_residual(rig, {}, record), CannotIdentify);
-  Record without_load = record;
-  without_load.column(Channel::load_position).clear();
+  record::Record without_load = record;
+  without_load.column(record::Channel::load_position).clear();
   EXPECT_THROW(trace_residual(rig, {without_load}, record), CannotIdentify);
-  Record standing = record;
-  for (double& position : standing.column(Channel::load_position)) position = 0.1;
+  record::Record standing = record;
+  for (double& position : standing.column(record::Channel::load_position)) position = 0.1;
   EXPECT_THROW(trace_residual(rig, {standing}, record), CannotIdentify);
-  SimulationSettings faster = test::servo_run(11);
+  simulation::SimulationSettings faster = test::servo_run(11);
   faster.sensors.sampling_rate = 2000;
-  EXPECT_THROW(trace_residual(rig, {record}, simulate_record(rig, faster, 3)), CannotIdentify);
+  EXPECT_THROW(trace_residual(rig, {record}, simulation::simulate_record(rig, faster, 3)), CannotIdentify);
 }
 
 TEST(EffectSearch, CanBeStopped) {
-  const Rig rig = test::servo_file().rig;
-  const Record record = simulate_record(rig, test::servo_run(11), 3);
+  const model::Rig rig = test::servo_file().rig;
+  const record::Record record = simulation::simulate_record(rig, test::servo_run(11), 3);
   EXPECT_THROW(trace_residual(rig, {record}, record, {}, [](double, const std::string&) { return false; }),
                Cancelled);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

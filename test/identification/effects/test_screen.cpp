@@ -9,7 +9,7 @@
 #include "identification/effects/trial.h"
 #include "support/one_inertia_bench.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using test::cogging_torque;
@@ -86,4 +86,4 @@ TEST(Trial, WhatIsPredictedToGainLittleIsNotFitted) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -13,7 +13,7 @@
 #include "support/one_inertia_bench.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using test::cogging_effect;
@@ -159,10 +159,10 @@ TEST(TryEquivalents, TakesTheAlternativeThatExplainsMore) {
 }
 
 TEST(OtherTeeth, AreAsStiffAndDampedUnderTheSameTorque) {
-  const Rig rig = test::servo_file().rig;
+  const model::Rig rig = test::servo_file().rig;
   const auto other = with_hertzian_teeth(rig, 200);
   ASSERT_TRUE(other);
-  const ContactLaw &linear = *rig.mesh.contact, &hertz = *other->mesh.contact;
+  const model::ContactLaw &linear = *rig.mesh.contact, &hertz = *other->mesh.contact;
   const double depth = 200 / 460e3;  // rad
   EXPECT_NEAR(hertz.force(depth, 0, 0), 200, 1e-6);
   EXPECT_NEAR(hertz.force(depth, 0.01, 0) - 200, linear.force(depth, 0.01, 0) - 200, 1e-6);
@@ -212,7 +212,7 @@ TEST(AddLearned, NothingWhereNothingIsLeft) {
 }
 
 /// A fit that left so much; two inertias, or one.
-Hypothesis that_leaves(double before, double after, const Rig& rig, const SearchBench& bench) {
+Hypothesis that_leaves(double before, double after, const model::Rig& rig, const SearchBench& bench) {
   const auto fit = [&](double left) {
     return std::make_shared<const BandFit>(
         BandFit{{}, {}, RecordSet(bench.data, 5, 50), Misfit{left, 0, 0.1, 0.1}});
@@ -229,7 +229,7 @@ Hypothesis that_leaves(double before, double after, const Rig& rig, const Search
 
 TEST(DropStandIns, OfTwoInertiasWhatLeavesMoreThanItExplains) {
   const SearchBench bench{OneInertiaMachine()};
-  const Rig servo = test::servo_file().rig;
+  const model::Rig servo = test::servo_file().rig;
   Hypothesis h = that_leaves(20, 15, servo, bench);
   const Hypothesis none = drop_stand_ins(h, bench.context);
   EXPECT_TRUE(none.effects.empty());
@@ -285,4 +285,4 @@ TEST(SearchEffects, CanBeStoppedAndIsTheSameEveryTime) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -11,13 +11,13 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "support/data.h"
 
-namespace backlash::test {
+namespace backlash::identification {
 namespace {
 
 constexpr double kWritten = 1e-5;  // relative, of a value written with six digits
 
 std::string config(const std::string& name) {
-  std::ifstream in(package_file("config/" + name + ".yaml"));
+  std::ifstream in(test::package_file("config/" + name + ".yaml"));
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
@@ -28,12 +28,12 @@ std::string replaced(const std::string& text, const std::string& from, const std
 }
 
 /// A trace that found all that the rig declares 3 % larger, and the terms.
-Trace found(const Rig& declared, const std::vector<std::string>& names,
-            const std::vector<std::shared_ptr<const Term>>& terms) {
+Trace found(const model::Rig& declared, const std::vector<std::string>& names,
+            const std::vector<std::shared_ptr<const model::Term>>& terms) {
   Trace trace;
-  trace.augmented = load_side(declared);
+  trace.augmented = model::load_side(declared);
   for (const std::string& name : names) {
-    const RigParameter& p = servo_parameter(name);
+    const rig_file::RigParameter& p = rig_file::servo_parameter(name);
     p.set(trace.augmented, 1.03 * p.get(trace.augmented));
     trace.parameters[name] = {p.get(trace.augmented), 0.01 * p.get(trace.augmented)};
     trace.units[name] = p.unit;
@@ -46,45 +46,45 @@ const std::vector<std::string> kServo = {"motor_inertia", "load_inertia",   "mes
                                          "mesh_damping",  "backlash_angle", "motor_coulomb",
                                          "motor_viscous", "load_coulomb",   "load_viscous"};
 
-std::shared_ptr<const Term> gravity() {
-  return make_term("gravity", {{"amplitude", 12.5}, {"phase", 0.3}});
+std::shared_ptr<const model::Term> gravity() {
+  return model::make_term("gravity", {{"amplitude", 12.5}, {"phase", 0.3}});
 }
 
-std::shared_ptr<const Term> learned() {
+std::shared_ptr<const model::Term> learned() {
   ParameterValues values;
   values.set_choice("acts_on", "motor");
   values.set_choice("coordinate", "motor_torque");
   values.set_list("points", {-100, 0, 100});
   values.set_list("values", {3, 0, -2});
-  return make_term("learned_map", values);
+  return model::make_term("learned_map", values);
 }
 
-std::vector<std::string> ids(const Rig& rig) {
+std::vector<std::string> ids(const model::Rig& rig) {
   std::vector<std::string> all;
   for (const auto& term : rig.terms) all.push_back(term->id);
   return all;
 }
 
 /// Writes, reads, compares with the trace and simulates.
-RigFile round_trip(const std::string& text, const std::vector<std::string>& names,
-                   const std::vector<std::shared_ptr<const Term>>& terms) {
-  const RigFile declared = rig_file_from_text(text, "rig.yaml");
+rig_file::RigFile round_trip(const std::string& text, const std::vector<std::string>& names,
+                             const std::vector<std::shared_ptr<const model::Term>>& terms) {
+  const rig_file::RigFile declared = rig_file::rig_file_from_text(text, "rig.yaml");
   const Trace trace = found(declared.rig, names, terms);
   const std::string written = traced_rig_text(declared, trace);
-  const RigFile file = rig_file_from_text(written, "rig.yaml");
-  const Rig rig = load_side(file.rig);
+  const rig_file::RigFile file = rig_file::rig_file_from_text(written, "rig.yaml");
+  const model::Rig rig = model::load_side(file.rig);
   for (const std::string& name : names) {
-    const double expected = servo_parameter(name).get(trace.augmented);
-    EXPECT_NEAR(servo_parameter(name).get(rig) / expected, 1, kWritten) << name << "\n" << written;
+    const double expected = rig_file::servo_parameter(name).get(trace.augmented);
+    EXPECT_NEAR(rig_file::servo_parameter(name).get(rig) / expected, 1, kWritten) << name << "\n" << written;
   }
   EXPECT_EQ(ids(rig), ids(trace.augmented)) << written;
-  const Record record = simulate_record(file.rig, file.simulation, 0.1);
+  const record::Record record = simulation::simulate_record(file.rig, file.simulation, 0.1);
   EXPECT_EQ(record.size(), std::size_t(std::lround(0.1 * file.simulation.sensors.sampling_rate)));
   return file;
 }
 
 TEST(TracedRig, OfAServoHoldsMachineAndTerms) {
-  const RigFile file = round_trip(config("two_inertia_servo"), kServo, {gravity(), learned()});
+  const rig_file::RigFile file = round_trip(config("two_inertia_servo"), kServo, {gravity(), learned()});
   EXPECT_EQ(file.rig.terms[0]->values.at("amplitude"), 12.5);
   EXPECT_EQ(file.rig.terms[1]->values.list("values"), (std::vector<double>{3, 0, -2}));
   EXPECT_EQ(file.text.find("# Geared servo with two inertias"), 0u);  // comments stay
@@ -100,7 +100,7 @@ TEST(TracedRig, OfTheMotorSideIsWrittenInItsUnitsAndItsTermsAreNot) {
   text = replaced(text, "viscous_damping: 13 ", "viscous_damping: 1.0744e-3 ");
   text = replaced(text, "coulomb_friction: 63 ", "coulomb_friction: 0.57273 ");
   text = replaced(text, "amplitude: 400 ", "amplitude: 3.64 ");
-  const RigFile file = round_trip(text, kServo, {gravity()});
+  const rig_file::RigFile file = round_trip(text, kServo, {gravity()});
   EXPECT_NEAR(file.rig.motor.inertia, 1.03 * 5.2066e-4, 1e-5 * 5.2066e-4);
   EXPECT_NEAR(file.rig.motor.coulomb_friction, 1.03 * 0.57273, 1e-5);
   EXPECT_EQ(file.rig.terms[0]->values.at("amplitude"), 12.5);
@@ -111,9 +111,9 @@ TEST(TracedRig, OfOneInertiaAndOfALockedLink) {
   const auto asymmetric = [](const char* id, const char* parameter) {
     ParameterValues values = {{parameter, 0.7}};
     values.set_choice("body", "motor");
-    return make_term(id, values);
+    return model::make_term(id, values);
   };
-  const RigFile emps = round_trip(
+  const rig_file::RigFile emps = round_trip(
       config("emps"), {"motor_inertia", "motor_coulomb", "motor_coulomb_asymmetry", "motor_viscous"},
       {asymmetric("asymmetric_viscous", "damping"), gravity()});
   EXPECT_NE(emps.text.find("damping: 0.7  # N s/m"), std::string::npos) << emps.text;
@@ -124,7 +124,7 @@ TEST(TracedRig, OfOneInertiaAndOfALockedLink) {
 }
 
 TEST(TracedRig, OtherTeethReplaceTheDeclaredLaw) {
-  const RigFile declared = rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
+  const rig_file::RigFile declared = rig_file::rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
   Trace trace = found(declared.rig, kServo, {gravity()});
   trace.augmented.mesh.contact_spec = {"hunt_crossley",
                                        {{"stiffness", 2.1e7}, {"exponent", 1.5}, {"alpha", 0.8}}};
@@ -132,13 +132,13 @@ TEST(TracedRig, OtherTeethReplaceTheDeclaredLaw) {
   trace.parameters["mesh_stiffness"] = {2.1e7, 1e5};
   trace.parameters["mesh_alpha"] = {0.8, 0.01};
   trace.units["mesh_alpha"] = "s/rad";
-  const RigFile file = rig_file_from_text(traced_rig_text(declared, trace), "rig.yaml");
+  const rig_file::RigFile file = rig_file::rig_file_from_text(traced_rig_text(declared, trace), "rig.yaml");
   EXPECT_EQ(file.rig.mesh.contact_spec.law, "hunt_crossley");
   EXPECT_EQ(file.rig.mesh.contact_spec.values, trace.augmented.mesh.contact_spec.values);
   EXPECT_EQ(file.text.find("damping: 483"), std::string::npos) << file.text;
   EXPECT_NE(file.text.find("# N m/rad^1.5, fitted +- 1e+05"), std::string::npos) << file.text;
   EXPECT_NE(file.text.find("# s/rad, fitted +- 0.01"), std::string::npos) << file.text;
-  EXPECT_EQ(simulate_record(file.rig, file.simulation, 0.1).size(), 100u);
+  EXPECT_EQ(simulation::simulate_record(file.rig, file.simulation, 0.1).size(), 100u);
 }
 
 TEST(TracedRig, DeclaredTermsStayAsTheyAre) {
@@ -154,7 +154,7 @@ TEST(TracedRig, DeclaredTermsStayAsTheyAre) {
     // In the middle of the file and at its end.
     for (const std::string& text :
          {servo + terms, replaced(servo, "\nexcitation:", terms + "\nexcitation:")}) {
-      const RigFile file = round_trip(text, kServo, {gravity(), learned()});
+      const rig_file::RigFile file = round_trip(text, kServo, {gravity(), learned()});
       EXPECT_NE(file.text.find(declared), std::string::npos) << file.text;
       EXPECT_NE(file.text.find(tail), std::string::npos) << file.text;
       EXPECT_EQ(ids(file.rig).back(), "learned_map");
@@ -164,22 +164,24 @@ TEST(TracedRig, DeclaredTermsStayAsTheyAre) {
 }
 
 TEST(TracedRig, WithoutEffectsHasNoTerms) {
-  const RigFile declared = rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
+  const rig_file::RigFile declared = rig_file::rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
   EXPECT_EQ(traced_rig_text(declared, found(declared.rig, {}, {})), declared.text);
 }
 
 TEST(TracedRig, FindsTheTestRunsFromAnotherFolder) {
-  const RigFile declared = load_rig_file(package_file("config/yumrukcal_2013.yaml"));
+  const rig_file::RigFile declared =
+      rig_file::load_rig_file(test::package_file("config/yumrukcal_2013.yaml"));
   const std::string text = traced_rig_text(declared, found(declared.rig, {}, {gravity()}));
-  EXPECT_EQ(rig_file_from_text(text, "/somewhere/else/rig.yaml").test_runs.size(), declared.test_runs.size());
+  EXPECT_EQ(rig_file::rig_file_from_text(text, "/somewhere/else/rig.yaml").test_runs.size(),
+            declared.test_runs.size());
   EXPECT_GT(declared.test_runs.size(), 0u);
 }
 
 TEST(TracedRig, RefusesBeforehandWhatItCannotWrite) {
   for (const char* name :
        {"two_inertia_servo", "emps", "cycloidal", "yumrukcal_2013", "yumrukcal_2013_varying"})
-    EXPECT_NO_THROW(
-        check_traced_rig_text(load_rig_file(package_file("config/" + std::string(name) + ".yaml"))))
+    EXPECT_NO_THROW(check_traced_rig_text(
+        rig_file::load_rig_file(test::package_file("config/" + std::string(name) + ".yaml"))))
         << name;
   const std::string servo = config("two_inertia_servo");
   const std::string contact =
@@ -187,8 +189,8 @@ TEST(TracedRig, RefusesBeforehandWhatItCannotWrite) {
                          "    contact: {law: linear, stiffness: 460e3, damping: 483}\n");
   EXPECT_NE(contact, servo);
   for (const std::string& text : {contact, servo + "terms: [{id: gravity, amplitude: 1, phase: 0}]\n"})
-    EXPECT_THROW(check_traced_rig_text(rig_file_from_text(text, "rig.yaml")), BadData);
+    EXPECT_THROW(check_traced_rig_text(rig_file::rig_file_from_text(text, "rig.yaml")), BadData);
 }
 
 }  // namespace
-}  // namespace backlash::test
+}  // namespace backlash::identification

@@ -8,16 +8,16 @@
 #include "support/one_inertia_bench.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 // sqrt(k (1 / J_M + 1 / J_L)) / 2 pi of config/two_inertia_servo.yaml, by hand.
 constexpr double kServoResonance = 44.24;  // Hz
 
 TEST(MeshResonance, IsThatOfTwoInertiasAndASpring) {
-  const Rig servo = test::servo_file().rig;
+  const model::Rig servo = test::servo_file().rig;
   EXPECT_NEAR(mesh_resonance(servo, 100), kServoResonance, 0.01);
-  Rig locked = servo;
+  model::Rig locked = servo;
   locked.link_locked = true;
   EXPECT_NEAR(mesh_resonance(locked, 100), std::sqrt(460e3 / 6.3) / (2 * M_PI), 0.01);
   EXPECT_EQ(mesh_resonance(test::one_inertia_rig(), 100), 0);
@@ -25,9 +25,9 @@ TEST(MeshResonance, IsThatOfTwoInertiasAndASpring) {
 
 // F = K d^1.5: dF/dd = 1.5 K^(2/3) F^(1/3), so eight times the torque is sqrt(2) times the frequency.
 TEST(MeshResonance, OfHertzianTeethRisesWithTheTorque) {
-  Rig rig = test::servo_file().rig;
+  model::Rig rig = test::servo_file().rig;
   rig.mesh.contact_spec = {"hunt_crossley", {{"stiffness", 1.5e7}, {"exponent", 1.5}, {"alpha", 0.0}}};
-  rig.mesh.contact = make_contact_law("hunt_crossley", rig.mesh.contact_spec.values);
+  rig.mesh.contact = model::make_contact_law("hunt_crossley", rig.mesh.contact_spec.values);
   const double stiffness = 1.5 * std::pow(1.5e7, 2.0 / 3) * std::cbrt(100.0);
   EXPECT_NEAR(mesh_resonance(rig, 100), std::sqrt(stiffness * (1 / 6.3 + 1 / 108.0)) / (2 * M_PI), 0.1);
   EXPECT_NEAR(mesh_resonance(rig, 800) / mesh_resonance(rig, 100), std::sqrt(2.0), 1e-3);
@@ -44,7 +44,7 @@ ServoData shaken() {
 }
 
 TEST(FitSettings, BandsFollowTheMeshResonance) {
-  Rig rig = test::servo_file().rig;
+  model::Rig rig = test::servo_file().rig;
   const FitSettings s = with_bands({}, rig, {shaken()});
   // The bands that were found for this machine.
   EXPECT_NEAR(s.cutoff, 60, 0.01);
@@ -90,4 +90,4 @@ TEST(ServoData, TimeBetweenReversals) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,7 +8,7 @@
 #include "identification/fit/multi_start.h"
 #include "support/one_inertia_bench.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 Machine declared_machine() {
@@ -60,7 +60,7 @@ TEST(MultiStart, TriesOtherStartsWhereMoreThanNoiseIsLeft) {
 TEST(MultiStart, MoreIsKnownOfAMachineBesideTheRecords) {
   const test::SearchBench bench{test::OneInertiaMachine()};
   Machine machine = declared_machine();
-  machine.priors.push_back([](const Rig& rig) { return (rig.motor.inertia - 2.1) / 1e-6; });
+  machine.priors.push_back([](const model::Rig& rig) { return (rig.motor.inertia - 2.1) / 1e-6; });
   const BandFit fit = fit_to_records(bench.data, machine, bench.context.settings.fit);
   EXPECT_NEAR(fit.fit.machine.rig.motor.inertia, 2.1, 1e-5);
 }
@@ -101,7 +101,7 @@ TEST(Calibration, ALongDelayIsNoCalibration) {
 
 TEST(Calibration, BecomesPartOfADelayThatIsATerm) {
   Machine machine = with_delay(2, true);
-  machine.rig.terms.push_back(make_term("delay", {{"delay", 0.001}}));
+  machine.rig.terms.push_back(model::make_term("delay", {{"delay", 0.001}}));
   move_delay_to_term(machine, 0.01);
   EXPECT_NEAR(machine.rig.terms.back()->values.at("delay"), 0.021, 1e-12);
   EXPECT_EQ(machine.calibrations[0].torque_delay, 0);
@@ -109,4 +109,4 @@ TEST(Calibration, BecomesPartOfADelayThatIsATerm) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "support/servo.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using test::other_servo;
@@ -24,11 +24,11 @@ OutputErrorSettings all_parameters() {
 }
 
 TEST(OutputError, FindsAMachineThirtyPercentAway) {
-  const Rig truth = other_servo(), declared = servo_file().rig;
-  const Record record = simulate_record(truth, test::servo_run(1), 20);
+  const model::Rig truth = other_servo(), declared = servo_file().rig;
+  const record::Record record = simulation::simulate_record(truth, test::servo_run(1), 20);
   const OutputError fit = fit_output_error(declared, {servo_data(record, declared)}, all_parameters());
   for (const auto& [name, estimate] : fit.parameters) {
-    const double value = servo_parameter(name).get(truth);
+    const double value = rig_file::servo_parameter(name).get(truth);
     // Sampling at 1 kHz places an impact to part of a sample; that leaves up to 1 % (damping 4 %: it acts for
     // one sample at each touch).
     const double limit = name == "mesh_damping"                      ? 0.04
@@ -44,13 +44,13 @@ TEST(OutputError, FindsAMachineThirtyPercentAway) {
 }
 
 TEST(OutputError, StandardErrorsCoverTheScatter) {
-  const Rig truth = other_servo();
+  const model::Rig truth = other_servo();
   OutputErrorSettings settings = all_parameters();
   std::map<std::string, double> sum, stated, mean;
   constexpr int kSeeds = 12;
-  std::vector<std::map<std::string, Measured>> fits;
+  std::vector<std::map<std::string, signal::Measured>> fits;
   for (int seed = 0; seed < kSeeds; ++seed) {
-    const Record record = simulate_record(truth, test::servo_run(100 + seed), 6);
+    const record::Record record = simulation::simulate_record(truth, test::servo_run(100 + seed), 6);
     fits.push_back(fit_output_error(truth, {servo_data(record, truth)}, settings).parameters);
     for (const auto& [name, m] : fits.back()) mean[name] += m.value / kSeeds;
   }
@@ -68,9 +68,9 @@ TEST(OutputError, StandardErrorsCoverTheScatter) {
 }
 
 TEST(OutputError, StartOffsetOfTheEncodersIsCalibration) {
-  const Rig truth = other_servo();
-  Record record = simulate_record(truth, test::servo_run(1), 10);
-  for (double& q : record.column(Channel::load_position)) q += 3e-4;
+  const model::Rig truth = other_servo();
+  record::Record record = simulation::simulate_record(truth, test::servo_run(1), 10);
+  for (double& q : record.column(record::Channel::load_position)) q += 3e-4;
   const OutputError fit = fit_output_error(truth, {servo_data(record, truth)}, all_parameters());
   EXPECT_NEAR(fit.calibrations[0].encoder_offset, 3e-4, 2e-6);
   EXPECT_NEAR(fit.parameters.at("backlash_angle").value, 6.3e-4, 0.01 * 6.3e-4);
@@ -81,9 +81,9 @@ TEST(OutputError, MachineOfTheSeparateProgram) {
              test_file = test::find_data("undeclared/dev1/test.csv"),
              truth_file = test::find_data("undeclared/dev1/truth.json");
   if (!train || !test_file || !truth_file) GTEST_SKIP() << "the records of undeclared/dev1 are not here";
-  const Rig declared = servo_file().rig;
+  const model::Rig declared = servo_file().rig;
   const OutputError fit =
-      fit_output_error(declared, {servo_data(read_csv(*train), declared)}, all_parameters());
+      fit_output_error(declared, {servo_data(record::read_csv(*train), declared)}, all_parameters());
   std::ifstream in = open_input(*truth_file);
   const nlohmann::json truth = nlohmann::json::parse(in).at("rig");
   const std::map<std::string, double> goals = {{"motor_inertia", 0.03},  {"load_inertia", 0.03},
@@ -93,10 +93,10 @@ TEST(OutputError, MachineOfTheSeparateProgram) {
     EXPECT_NEAR(fit.parameters.at(name).value / truth.at(name).at("value").get<double>(), 1, goal) << name;
   Calibration calibration;
   const ServoPrediction unseen =
-      predict_calibrated(fit.rig, servo_data(read_csv(*test_file), declared), {}, calibration);
+      predict_calibrated(fit.rig, servo_data(record::read_csv(*test_file), declared), {}, calibration);
   EXPECT_LT(unseen.deflection_error.error, 0.004);
   EXPECT_LT(unseen.torque_error.error, 0.008);  // noise alone leaves 0.006
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

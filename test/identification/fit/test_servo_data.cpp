@@ -6,27 +6,27 @@
 #include "backlash_diagnosis/identification/fit/servo_data.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kInterval = 0.0025, kSlow = 0.01, kFast = 1, kStep = 1e-4;  // s, rad, rad, rad
 
 /// A sine of 0.25 Hz, rounded to the resolution of the encoder.
-Record rounded_sine(double amplitude) {
-  Record record;
+record::Record rounded_sine(double amplitude) {
+  record::Record record;
   record.name = "sine";
   for (int k = 0; k < 8000; ++k) {
     const double t = k * kInterval;
     record.time.push_back(t);
-    record.column(Channel::motor_torque).push_back(std::cos(0.5 * M_PI * t));
-    record.column(Channel::motor_position)
+    record.column(record::Channel::motor_torque).push_back(std::cos(0.5 * M_PI * t));
+    record.column(record::Channel::motor_position)
         .push_back(kStep * std::round(amplitude * std::sin(0.5 * M_PI * t) / kStep));
   }
   return record;
 }
 
-Rig locked() {
-  Rig rig;
+model::Rig locked() {
+  model::Rig rig;
   rig.motor.inertia = 1;
   rig.link_locked = true;
   return rig;
@@ -58,22 +58,22 @@ TEST(ServoData, TellsTheSpeedOfALockedMotorThatCrawls) {
 }
 
 TEST(ServoData, LeavesAClearSpeedAlone) {
-  const Record record = rounded_sine(kFast);
+  const record::Record record = rounded_sine(kFast);
   const ServoData data = servo_data(record, locked());
-  EXPECT_EQ(data.motor, record.column(Channel::motor_position));
+  EXPECT_EQ(data.motor, record.column(record::Channel::motor_position));
   // At least that of the rounding; the step is told from the record to the last digits.
   EXPECT_GE(data.rate_noise, 0.9999 * 0.95 * kStep / std::sqrt(12.0) / kInterval);
 }
 
 TEST(ServoData, LeavesThePositionThatDrivesALoadAlone) {
-  Record record = rounded_sine(kSlow);
-  Rig rig = locked();
+  record::Record record = rounded_sine(kSlow);
+  model::Rig rig = locked();
   rig.link_locked = false;
   rig.link.inertia = 10;
-  rig.mesh.contact = make_contact_law("linear", {{"stiffness", 1e5}, {"damping", 100}});
-  record.column(Channel::load_position) = record.column(Channel::motor_position);
-  EXPECT_EQ(servo_data(record, rig).motor, record.column(Channel::motor_position));
+  rig.mesh.contact = model::make_contact_law("linear", {{"stiffness", 1e5}, {"damping", 100}});
+  record.column(record::Channel::load_position) = record.column(record::Channel::motor_position);
+  EXPECT_EQ(servo_data(record, rig).motor, record.column(record::Channel::motor_position));
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

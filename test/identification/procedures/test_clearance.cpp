@@ -4,10 +4,11 @@
 #include <cmath>
 #include <functional>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/clearance.h"
 #include "support/two_mass.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using test::simulate;
@@ -28,12 +29,12 @@ TwoMass pushed(double inertia, double torque, double frequency) {
   return machine;
 }
 
-Record record_of(const std::function<double(double)>& load, double duration) {
-  Record r;
+record::Record record_of(const std::function<double(double)>& load, double duration) {
+  record::Record r;
   for (int i = 0; i < int(1000 * duration); ++i) {
     r.time.push_back(1e-3 * i);
-    r.column(Channel::load_position).push_back(load(1e-3 * i));
-    r.column(Channel::motor_position).push_back(0.1);
+    r.column(record::Channel::load_position).push_back(load(1e-3 * i));
+    r.column(record::Channel::motor_position).push_back(0.1);
   }
   return r;
 }
@@ -88,9 +89,9 @@ TEST(Clearance, StiffnessAndInertiaMayBeGiven) {
 TEST(Clearance, SpringBackOfTheMotorIsTakenOff) {
   // The brake gives way by thirty steps of the motor's sensor on either side, and the flanks with it.
   const TwoMass machine = pushed(42, 80, 1.5);
-  Record record = simulate(machine, 6);
-  auto& motor = record.column(Channel::motor_position);
-  auto& load = record.column(Channel::load_position);
+  record::Record record = simulate(machine, 6);
+  auto& motor = record.column(record::Channel::motor_position);
+  auto& load = record.column(record::Channel::load_position);
   for (std::size_t i = 0; i < motor.size(); ++i) {
     const double x = load[i], step = 0.0055 / 110 * M_PI / 180;
     const double give = 30 * step * (x > kGap / 2 ? 1 : x < -kGap / 2 ? -1 : 0);
@@ -107,7 +108,7 @@ TEST(Clearance, StandardErrorCoversTheScatter) {
   double squares = 0, stated = 0;
   for (int seed = 0; seed < runs; ++seed) {
     TwoMass machine = pushed(42, 50 + 3 * seed, 1.5 + 0.05 * seed);  // steps of a sensor repeat, hands do not
-    const Measured gap = identify_clearance(simulate(machine, 4)).gap;
+    const signal::Measured gap = identify_clearance(simulate(machine, 4)).gap;
     squares += std::pow(gap.value - kGap, 2) / runs;
     stated += std::pow(gap.standard_error, 2) / runs;
   }
@@ -118,14 +119,14 @@ TEST(Clearance, StandardErrorCoversTheScatter) {
 
 TEST(Clearance, WhatCannotBeToldIsRefused) {
   const TwoMass machine = pushed(42, 80, 1.5);
-  const Record record = simulate(machine, 4);
-  Record blind = record;
-  blind.column(Channel::motor_position).clear();
+  const record::Record record = simulate(machine, 4);
+  record::Record blind = record;
+  blind.column(record::Channel::motor_position).clear();
   EXPECT_THROW(identify_clearance(blind), CannotIdentify);
   EXPECT_THROW(identify_clearance(record.slice(0, 0.6)), CannotIdentify);  // one or two passages
-  Record free = record;                                                    // the motor follows half way
+  record::Record free = record;                                            // the motor follows half way
   for (std::size_t i = 0; i < free.size(); ++i)
-    free.column(Channel::motor_position)[i] = -0.5 * free.column(Channel::load_position)[i];
+    free.column(record::Channel::motor_position)[i] = -0.5 * free.column(record::Channel::load_position)[i];
   EXPECT_THROW(identify_clearance(free), CannotIdentify);
   // A load that swings inside the gap and never meets a flank.
   const double step = 7e-6;
@@ -138,4 +139,4 @@ TEST(Clearance, WhatCannotBeToldIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

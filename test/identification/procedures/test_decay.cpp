@@ -4,10 +4,11 @@
 #include <cmath>
 #include <random>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/decay.h"
 #include "support/two_mass.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using test::simulate;
@@ -33,8 +34,8 @@ DecaySettings settings_of(const TwoMass& machine) {
 }
 
 /// Ringing as a formula after every torque step, motor and load turning one way: z, w0 as given.
-Record closed_form(double z, double w0, double noise, unsigned seed, int steps = 9) {
-  Record r;
+record::Record closed_form(double z, double w0, double noise, unsigned seed, int steps = 9) {
+  record::Record r;
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   const double wd = w0 * std::sqrt(1 - z * z);
@@ -43,9 +44,9 @@ Record closed_form(double z, double w0, double noise, unsigned seed, int steps =
     const double y =
         0.01 + 0.02 * since + sign * 0.1 * std::exp(-z * w0 * since) * std::sin(wd * since + 0.3);
     r.time.push_back(t);
-    r.column(Channel::motor_torque).push_back(150 * sign);
-    r.column(Channel::motor_velocity).push_back(1 + 0.8 * y + noise * normal(random));
-    r.column(Channel::load_velocity).push_back(1 - 0.2 * y);
+    r.column(record::Channel::motor_torque).push_back(150 * sign);
+    r.column(record::Channel::motor_velocity).push_back(1 + 0.8 * y + noise * normal(random));
+    r.column(record::Channel::load_velocity).push_back(1 - 0.2 * y);
   }
   return r;
 }
@@ -81,7 +82,8 @@ TEST(Decay, StandardErrorIsThatOfTheScatter) {
   const int runs = 40;
   double sum = 0, squares = 0, stated = 0;
   for (int seed = 0; seed < runs; ++seed) {
-    const Measured z = identify_decay(closed_form(0.15, 230, 2e-3, seed), settings_of(230)).damping_ratio;
+    const signal::Measured z =
+        identify_decay(closed_form(0.15, 230, 2e-3, seed), settings_of(230)).damping_ratio;
     sum += z.value;
     squares += z.value * z.value;
     stated += z.standard_error / runs;
@@ -128,9 +130,9 @@ TEST(Decay, BearingDampingIsTakenOff) {
 
 TEST(Decay, PassagesOfTheGapServeWithoutATorque) {
   const TwoMass machine = square_wave(200, 1);
-  Record record = simulate(machine, 4);
-  record.column(Channel::motor_torque).clear();
-  record.column(Channel::motor_velocity).clear();
+  record::Record record = simulate(machine, 4);
+  record.column(record::Channel::motor_torque).clear();
+  record.column(record::Channel::motor_velocity).clear();
   const DecayIdentification d = identify_decay(record, settings_of(machine));
   EXPECT_EQ(d.signal, RingingSignal::position_difference);
   EXPECT_GE(d.ringings.size(), 5u);
@@ -139,11 +141,11 @@ TEST(Decay, PassagesOfTheGapServeWithoutATorque) {
 
 TEST(Decay, LostContactIsNotUsed) {
   const TwoMass machine = square_wave(300, 0.5, 50);  // bounces several times
-  const Record record = simulate(machine, 4, kPerfect);
+  const record::Record record = simulate(machine, 4, kPerfect);
   const DecayIdentification d = identify_decay(record, settings_of(machine));
   EXPECT_NEAR(d.damping.value, machine.damping, 1e-3 * machine.damping);
-  const auto& motor = record.column(Channel::motor_position);
-  const auto& load = record.column(Channel::load_position);
+  const auto& motor = record.column(record::Channel::motor_position);
+  const auto& load = record.column(record::Channel::load_position);
   const auto in_contact = [&](double t) {
     const auto i = std::size_t(std::lround(1000 * t));
     return std::fabs(motor[i] - load[i]) > machine.gap(0) / 2;
@@ -159,7 +161,8 @@ TEST(Decay, LostContactIsNotUsed) {
   std::vector<double> time, speed;
   for (std::size_t i = from; i < from + 140; ++i) {
     time.push_back(record.time[i]);
-    speed.push_back(record.column(Channel::motor_velocity)[i] - record.column(Channel::load_velocity)[i]);
+    speed.push_back(record.column(record::Channel::motor_velocity)[i] -
+                    record.column(record::Channel::load_velocity)[i]);
   }
   EXPECT_GT(std::fabs(fit_ringing(time, speed, machine.natural_frequency()).damping_ratio.value /
                           machine.damping_ratio() -
@@ -179,11 +182,14 @@ TEST(Decay, WrongStiffnessIsTold) {
 
 TEST(Decay, WhatCannotBeToldIsRefused) {
   const DecaySettings settings = settings_of(230);
-  EXPECT_THROW(identify_decay(closed_form(0.15, 230, 0.2, 1), settings), CannotIdentify);   // below the noise
-  EXPECT_THROW(identify_decay(closed_form(0.15, 230, 0, 1, 2), settings), CannotIdentify);  // two steps
-  EXPECT_THROW(identify_decay(closed_form(0.15, 100, 0, 1), settings), CannotIdentify);     // rings elsewhere
-  Record record = closed_form(0.15, 230, 0, 1);
-  record.column(Channel::load_velocity).clear();
+  EXPECT_THROW(identify_decay(closed_form(0.15, 230, 0.2, 1), settings),
+               CannotIdentify);  // below the noise
+  EXPECT_THROW(identify_decay(closed_form(0.15, 230, 0, 1, 2), settings),
+               CannotIdentify);  // two steps
+  EXPECT_THROW(identify_decay(closed_form(0.15, 100, 0, 1), settings),
+               CannotIdentify);  // rings elsewhere
+  record::Record record = closed_form(0.15, 230, 0, 1);
+  record.column(record::Channel::load_velocity).clear();
   EXPECT_THROW(identify_decay(record, settings), CannotIdentify);
   DecaySettings bad = settings;
   bad.stiffness.value = 0;
@@ -194,4 +200,4 @@ TEST(Decay, WhatCannotBeToldIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/frequency_response.h"
 #include "backlash_diagnosis/identification/procedures/stepped_sine.h"
 #include "support/two_mass_record.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using test::kConfiguration2;
@@ -45,8 +46,8 @@ double pull(const FrequencyResponse& response, double from, double to) {
   return std::sqrt(errors / stated);
 }
 
-const Record& sweep() {
-  static const Record record =
+const record::Record& sweep() {
+  static const record::Record record =
       test::two_mass_record(kConfiguration2, SteppedSine().torque(), SteppedSine().duration());
   return record;
 }
@@ -57,7 +58,7 @@ ResponseSettings held() {
   return settings;
 }
 
-Record held_noise_record(double duration, unsigned seed, double deviation = 300) {
+record::Record held_noise_record(double duration, unsigned seed, double deviation = 300) {
   return test::two_mass_record(kConfiguration2,
                                test::held_noise(deviation, std::lround(1000 * duration), seed), duration);
 }
@@ -116,9 +117,9 @@ TEST(SteppedSineResponse, ReversalIsMarkedAndABiasAvoidsIt) {
   rubbing.motor_coulomb = 60;
   SteppedSine sines;
   sines.first = 1, sines.last = 5, sines.amplitude = 120;
-  const Record reversing = test::two_mass_record(rubbing, sines.torque(), sines.duration());
+  const record::Record reversing = test::two_mass_record(rubbing, sines.torque(), sines.duration());
   sines.bias = 90;  // 30 N m against 21 N m s/rad: 1.4 rad/s, the sine moves 0.17 rad/s at 1 Hz
-  const Record biased = test::two_mass_record(rubbing, sines.torque(), sines.duration());
+  const record::Record biased = test::two_mass_record(rubbing, sines.torque(), sines.duration());
   for (const ResponsePoint& p : estimate_response(reversing).points) {
     EXPECT_TRUE(p.reverses);
     EXPECT_GT(std::abs(error(p)), 0.1) << p.frequency;  // Coulomb friction is half of the torque
@@ -145,7 +146,7 @@ TEST(SteppedSineResponse, OtherTorquesAreNoSines) {
 }
 
 TEST(BroadbandResponse, OfHeldNoiseWithAndWithoutItsHold) {
-  const Record record = test::with_noise(held_noise_record(120, 5, 30), 7);
+  const record::Record record = test::with_noise(held_noise_record(120, 5, 30), 7);
   const FrequencyResponse response = estimate_response(record, held());
   ASSERT_GT(response.points.size(), 1000u);
   // Windows smear what is narrow (anti-resonance) and what drifts, so only away from them. 1500 lines of
@@ -161,9 +162,9 @@ TEST(BroadbandResponse, OfHeldNoiseWithAndWithoutItsHold) {
 }
 
 TEST(BroadbandResponse, OfThePositionIsThatOfTheSpeed) {
-  Record record = held_noise_record(60, 6);
+  record::Record record = held_noise_record(60, 6);
   const FrequencyResponse speed = estimate_response(record, held());
-  record.column(Channel::motor_velocity).clear();
+  record.column(record::Channel::motor_velocity).clear();
   const FrequencyResponse position = estimate_response(record, held());
   double difference = 0;
   ASSERT_EQ(speed.points.size(), position.points.size());
@@ -202,28 +203,29 @@ TEST(BroadbandResponse, OfAChirp) {
 TEST(Response, OfSeveralRecordsIsOneSortedList) {
   SteppedSine low, high;
   low.first = 2, low.last = 5, high.first = 5.25, high.last = 8;
-  Record still;
+  record::Record still;
   still.name = "still";
   for (int k = 0; k < 5000; ++k) {
     still.time.push_back(0.001 * k);
-    still.column(Channel::motor_torque).push_back(3);
-    still.column(Channel::motor_velocity).push_back(0);
+    still.column(record::Channel::motor_torque).push_back(3);
+    still.column(record::Channel::motor_velocity).push_back(0);
   }
-  const std::vector<Record> records{test::two_mass_record(kConfiguration2, high.torque(), high.duration()),
-                                    still,
-                                    test::two_mass_record(kConfiguration2, low.torque(), low.duration())};
+  const std::vector<record::Record> records{
+      test::two_mass_record(kConfiguration2, high.torque(), high.duration()), still,
+      test::two_mass_record(kConfiguration2, low.torque(), low.duration())};
   const FrequencyResponse all = estimate_response(records);
   EXPECT_TRUE(std::is_sorted(all.points.begin(), all.points.end(),
                              [](const auto& a, const auto& b) { return a.frequency < b.frequency; }));
   EXPECT_NEAR(all.points.front().frequency, 2, 0.01);
   EXPECT_NEAR(all.points.back().frequency, 8, 0.1);
-  EXPECT_THROW(estimate_response(std::vector<Record>{still}), CannotIdentify);
-  EXPECT_THROW(estimate_response(std::vector<Record>{}), CannotIdentify);
+  EXPECT_THROW(estimate_response(std::vector<record::Record>{still}), CannotIdentify);
+  EXPECT_THROW(estimate_response(std::vector<record::Record>{}), CannotIdentify);
 }
 
 TEST(Response, SaysWhatIsMissing) {
-  const Record good = held_noise_record(5, 1);
-  const auto expect = [](const Record& record, const std::string& part, ResponseSettings settings = {}) {
+  const record::Record good = held_noise_record(5, 1);
+  const auto expect = [](const record::Record& record, const std::string& part,
+                         ResponseSettings settings = {}) {
     try {
       estimate_response(record, settings);
       ADD_FAILURE() << part;
@@ -232,22 +234,22 @@ TEST(Response, SaysWhatIsMissing) {
     }
   };
   EXPECT_NO_THROW(estimate_response(good));
-  Record bad = good;
-  bad.column(Channel::motor_torque).clear();
+  record::Record bad = good;
+  bad.column(record::Channel::motor_torque).clear();
   expect(bad, "no motor_torque");
   bad = good;
-  bad.column(Channel::motor_torque).assign(bad.size(), 7);
+  bad.column(record::Channel::motor_torque).assign(bad.size(), 7);
   expect(bad, "does not vary");
   bad = good;
-  bad.column(Channel::motor_velocity)[99] = NAN;
+  bad.column(record::Channel::motor_velocity)[99] = NAN;
   expect(bad, "motor_velocity has values that are not finite");
   bad = good;
-  bad.column(Channel::motor_velocity).clear();
-  bad.column(Channel::motor_position).clear();
+  bad.column(record::Channel::motor_velocity).clear();
+  bad.column(record::Channel::motor_position).clear();
   expect(bad, "neither motor_velocity nor motor_position");
   bad = good;
-  bad.column(Channel::motor_velocity).assign(bad.size(), 0);
-  test::add_noise(bad.column(Channel::motor_velocity), 1, 77);
+  bad.column(record::Channel::motor_velocity).assign(bad.size(), 0);
+  test::add_noise(bad.column(record::Channel::motor_velocity), 1, 77);
   // Of 14 averages one line in 300 reaches 0.35 by chance, none 0.9.
   ResponseSettings strict;
   strict.least_coherence = 0.9;
@@ -265,4 +267,4 @@ TEST(Response, SaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

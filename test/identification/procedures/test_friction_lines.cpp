@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/friction_lines.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
@@ -160,10 +160,10 @@ struct Drive {
 };
 
 // Constant speeds of 5 s each, ramps of 0.5 s between them, 500 Hz.
-Record staircase(const std::vector<double>& speeds, unsigned seed, const Drive& drive = {}) {
+record::Record staircase(const std::vector<double>& speeds, unsigned seed, const Drive& drive = {}) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  Record record;
+  record::Record record;
   record.name = "staircase";
   constexpr double kRate = 500, kStay = 5, kRamp = 0.5;
   double before = 0, coloured = 0;
@@ -174,9 +174,9 @@ Record staircase(const std::vector<double>& speeds, unsigned seed, const Drive& 
       const double w = before + u * (target - before), a = u < 1 ? (target - before) / kRamp : 0;
       coloured = keep * coloured + std::sqrt(1 - keep * keep) * drive.noise * normal(random);
       record.time.push_back(t);
-      record.column(Channel::motor_velocity).push_back(w + 2e-3 * std::sin(2 * M_PI * 7.3 * t));
+      record.column(record::Channel::motor_velocity).push_back(w + 2e-3 * std::sin(2 * M_PI * 7.3 * t));
       const double sign = (w > 0) - (w < 0);
-      record.column(Channel::motor_torque)
+      record.column(record::Channel::motor_torque)
           .push_back(drive.inertia * a + drive.viscous * w + drive.coulomb * sign +
                      drive.ripple * std::sin(2 * M_PI * 7.3 * t) + coloured);
     }
@@ -219,9 +219,9 @@ TEST(ConstantSpeed, StandardErrorsAreHonestForCorrelatedTorque) {
 }
 
 TEST(ConstantSpeed, PositionServesWithoutSpeed) {
-  Record record = staircase({0.5, -0.5}, 2);
-  auto& speed = record.column(Channel::motor_velocity);
-  auto& position = record.column(Channel::motor_position);
+  record::Record record = staircase({0.5, -0.5}, 2);
+  auto& speed = record.column(record::Channel::motor_velocity);
+  auto& position = record.column(record::Channel::motor_position);
   double x = 0;
   for (const double w : speed) position.push_back(x += w / 500);
   speed.clear();
@@ -231,15 +231,15 @@ TEST(ConstantSpeed, PositionServesWithoutSpeed) {
 }
 
 TEST(ConstantSpeed, RefusesARecordWithoutIt) {
-  Record sine;
+  record::Record sine;
   sine.name = "sine";
   for (int i = 0; i < 5000; ++i) {
     sine.time.push_back(i * 2e-3);
-    sine.column(Channel::motor_velocity).push_back(1 + 0.5 * std::sin(i * 2e-3));
-    sine.column(Channel::motor_torque).push_back(1);
+    sine.column(record::Channel::motor_velocity).push_back(1 + 0.5 * std::sin(i * 2e-3));
+    sine.column(record::Channel::motor_torque).push_back(1);
   }
   EXPECT_THROW(find_constant_speed(sine), CannotIdentify);
-  sine.column(Channel::motor_velocity).clear();
+  sine.column(record::Channel::motor_velocity).clear();
   EXPECT_THROW(find_constant_speed(sine), CannotIdentify);
   ConstantSpeedOptions options;
   options.block = 0;
@@ -247,4 +247,4 @@ TEST(ConstantSpeed, RefusesARecordWithoutIt) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

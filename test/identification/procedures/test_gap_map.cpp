@@ -4,10 +4,11 @@
 #include <cmath>
 #include <random>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/gap_map.h"
 #include "support/two_mass.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kTurn = 2 * M_PI;
@@ -28,8 +29,8 @@ struct Recipe {
 };
 
 /// A run as a formula, with the sensors of the thesis; speed < 0: reverse, from the far end.
-Record run(const Recipe& r, double speed) {
-  Record record;
+record::Record run(const Recipe& r, double speed) {
+  record::Record record;
   std::mt19937 random(r.seed + (speed > 0 ? 0 : 1000));
   std::normal_distribution<double> normal;
   const double sign = speed > 0 ? 1 : -1;
@@ -39,9 +40,9 @@ Record run(const Recipe& r, double speed) {
     const double q = sign > 0 ? r.start + travel : r.start + r.turns * kTurn - travel;
     const double motor = r.scale * (q + Recipe::centre(q) + sign * (r.at(q) / 2 + r.wind_up) + 0.01);
     record.time.push_back(1e-3 * i);
-    record.column(Channel::motor_position)
+    record.column(record::Channel::motor_position)
         .push_back(kMotorStep * std::round((motor + r.noise * normal(random)) / kMotorStep));
-    record.column(Channel::load_position).push_back(kLoadStep * std::round(q / kLoadStep));
+    record.column(record::Channel::load_position).push_back(kLoadStep * std::round(q / kLoadStep));
   }
   return record;
 }
@@ -207,24 +208,24 @@ TEST(GapMap, PartOfATurnIsSaid) {
 
 TEST(GapMap, WhatCannotBeToldIsRefused) {
   const Recipe r;
-  const Record forward = run(r, r.speed), reverse = run(r, -r.speed);
+  const record::Record forward = run(r, r.speed), reverse = run(r, -r.speed);
   EXPECT_NO_THROW(identify_gap_map(reverse, forward));  // either order
   EXPECT_THROW(identify_gap_map(forward, forward), CannotIdentify);
   Recipe elsewhere = r;
   elsewhere.turns = 0.2;
-  const Record here = run(elsewhere, r.speed);
+  const record::Record here = run(elsewhere, r.speed);
   elsewhere.start += 2;
   EXPECT_THROW(identify_gap_map(here, run(elsewhere, -r.speed)), CannotIdentify);
-  Record there_and_back = forward;
+  record::Record there_and_back = forward;
   const double end = there_and_back.time.back();
   for (std::size_t i = 0; i < reverse.size(); ++i) {
     there_and_back.time.push_back(end + 1e-3 * double(i + 1));
-    for (const Channel c : {Channel::motor_position, Channel::load_position})
+    for (const record::Channel c : {record::Channel::motor_position, record::Channel::load_position})
       there_and_back.column(c).push_back(reverse.column(c)[i]);
   }
   EXPECT_THROW(identify_gap_map(there_and_back, reverse), CannotIdentify);
-  Record blind = forward;
-  blind.column(Channel::load_position).clear();
+  record::Record blind = forward;
+  blind.column(record::Channel::load_position).clear();
   EXPECT_THROW(identify_gap_map(blind, reverse), CannotIdentify);
   GapMapSettings bad;
   bad.bins = 4;
@@ -235,4 +236,4 @@ TEST(GapMap, WhatCannotBeToldIsRefused) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

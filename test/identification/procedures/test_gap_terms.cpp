@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 const std::string kVarying = test::package_file("config/yumrukcal_2013_varying.yaml");
@@ -31,8 +31,8 @@ double gap_of(double mean, double q) {
 }
 
 /// Distance between the flanks where the load is at q, from two penetrations and the stiffness alone.
-double gap_in_train(const Rig& rig, double q) {
-  const GearTrain train(rig);
+double gap_in_train(const model::Rig& rig, double q) {
+  const model::GearTrain train(rig);
   const double far = 1e-3;  // rad, deep in contact on either side
   double open = 0;
   for (const double side : {1.0, -1.0}) {
@@ -43,11 +43,11 @@ double gap_in_train(const Rig& rig, double q) {
 }
 
 TEST(GapTerms, TheGapOfTheModelIsThatOfTheMap) {
-  const Rig varying = load_rig_file(kVarying).rig;
+  const model::Rig varying = rig_file::load_rig_file(kVarying).rig;
   ASSERT_TRUE(gap_varies(varying));
   for (const auto& [use, mean] : {std::pair{GapUse::corrected, 5.5e-4}, std::pair{GapUse::directly, 6e-4},
                                   std::pair{GapUse::variation, 5.358e-4}}) {
-    const Rig rig = with_gap_map(varying, hand_made_map(), use);
+    const model::Rig rig = with_gap_map(varying, hand_made_map(), use);
     EXPECT_EQ(rig.terms.size(), 2u);
     for (const double q : {0.0, 0.7, 2.0, 3.3, 5.9, 8.1})
       EXPECT_NEAR(gap_in_train(rig, q), gap_of(mean, q), 1e-12) << q;  // rounding of 1 rad / 1e-3 rad
@@ -57,43 +57,43 @@ TEST(GapTerms, TheGapOfTheModelIsThatOfTheMap) {
 TEST(GapTerms, AMapThatDoesNotVaryGivesAConstantGap) {
   GapMap map = hand_made_map();
   map.harmonics.clear();
-  const Rig rig = with_gap_map(load_rig_file(kVarying).rig, map);
+  const model::Rig rig = with_gap_map(rig_file::load_rig_file(kVarying).rig, map);
   EXPECT_FALSE(gap_varies(rig));
   EXPECT_NEAR(gap_in_train(rig, 1), 5.5e-4, 1e-12);
 }
 
 TEST(GapTerms, WindUpFromTheRigByHand) {
-  const GapMap map = with_wind_up(hand_made_map(), load_rig_file(kVarying).rig);
+  const GapMap map = with_wind_up(hand_made_map(), rig_file::load_rig_file(kVarying).rig);
   const double torque = 16.8 + 7.6 * 0.2 + 13.3 + 11.5 * 0.1;  // N m, load's friction both ways [5.2]
   EXPECT_NEAR(map.wind_up.value, torque / kStiffness, 1e-12);
   EXPECT_NEAR(map.mean_gap.value, 6e-4 - torque / kStiffness, 1e-12);
 }
 
 TEST(GapTerms, RigFileGetsTheEntriesAndKeepsTheRest) {
-  RigDocument document(load_rig_file(kVarying));
+  rig_file::RigDocument document(rig_file::load_rig_file(kVarying));
   replace_gap_terms(document, hand_made_map(), 5.358e-4);
   const std::string changed = document.text();
-  const RigFile file = document.read();
+  const rig_file::RigFile file = document.read();
   EXPECT_EQ(file.rig.terms.size(), 2u);
   // The text has five decimals of the relative amplitude, four of the phase: 5e-6 of 5.4e-4 and 5e-5 of 4e-5.
   for (const double q : {0.0, 0.7, 2.0, 3.3, 5.9})
     EXPECT_NEAR(gap_in_train(file.rig, q), gap_of(5.358e-4, q), 1e-8) << q;
   for (const char* part : {"# As a look-up table", "\nexcitation:", "15 % at most.\nterms:\n  - id: "})
     EXPECT_NE(changed.find(part), std::string::npos) << part;
-  RigDocument none("terms: []\n", "x.yaml");
+  rig_file::RigDocument none("terms: []\n", "x.yaml");
   EXPECT_THROW(replace_gap_terms(none, hand_made_map(), 5e-4), BadData);
 }
 
 TEST(GapTerms, RefusesAGapThatIsNone) {
   GapMap map = hand_made_map();
   map.mean_gap.value = -1e-6;
-  EXPECT_THROW(with_gap_map(load_rig_file(kVarying).rig, map), InvalidParameter);
-  RigDocument document(load_rig_file(kVarying));
+  EXPECT_THROW(with_gap_map(rig_file::load_rig_file(kVarying).rig, map), InvalidParameter);
+  rig_file::RigDocument document(rig_file::load_rig_file(kVarying));
   EXPECT_THROW(replace_gap_terms(document, map, 0), InvalidParameter);
-  EXPECT_THROW(make_term("varying_backlash", {{"amplitude", 0.1}, {"order", -1}, {"phase", 0}}),
+  EXPECT_THROW(model::make_term("varying_backlash", {{"amplitude", 0.1}, {"order", -1}, {"phase", 0}}),
                InvalidParameter);
-  EXPECT_THROW(make_term("no such", {}), InvalidParameter);
+  EXPECT_THROW(model::make_term("no such", {}), InvalidParameter);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/identification/procedures/line_inertia.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
@@ -28,8 +28,8 @@ const std::vector<PrintedRow> kTableB2 = {
     {10.63, 1, 47.9, 42.1}, {11.79, 1, 46.5, 36.8}, {15.58, 1, 60.2, 36.1}, {15.60, 1, 66.9, 40.0},
     {20.03, 1, 82.0, 38.2}, {31.11, 1, 127.0, 38.1}};
 
-std::vector<Measured> printed(const std::vector<PrintedRow>& rows) {
-  std::vector<Measured> values;
+std::vector<signal::Measured> printed(const std::vector<PrintedRow>& rows) {
+  std::vector<signal::Measured> values;
   for (const auto& row : rows) values.push_back({row.inertia});
   return values;
 }
@@ -74,7 +74,7 @@ TEST(InertiaFromAmplitudes, RefusesWhatCannotBe) {
 }
 
 TEST(RobustMean, TheHighRowOfTableB1DoesNotDecide) {
-  const RobustMean driver = robust_mean(printed(kTableB1));
+  const signal::RobustMean driver = signal::robust_mean(printed(kTableB1));
   // Mean 7.10 with, 6.98 without the row 7.8; the robust value must be nearer to the latter.
   EXPECT_NEAR(driver.value, 6.98, 0.05);
   ASSERT_EQ(driver.outliers.size(), 1u);
@@ -82,13 +82,13 @@ TEST(RobustMean, TheHighRowOfTableB1DoesNotDecide) {
 }
 
 TEST(RobustMean, TableB2) {
-  const RobustMean total = robust_mean(printed(kTableB2));
+  const signal::RobustMean total = signal::robust_mean(printed(kTableB2));
   // 14 rows of standard deviation 2.6: the mean 38.7 and the robust value differ by a fraction of 2.6 /
   // sqrt(14).
   EXPECT_NEAR(total.value, 38.7, 0.35);
   EXPECT_NEAR(total.standard_error, 2.6 / std::sqrt(14.0), 0.2);
-  EXPECT_THROW(robust_mean({}), CannotIdentify);
-  EXPECT_EQ(robust_mean({{7, 0.1}}).standard_error, 0.1);
+  EXPECT_THROW(signal::robust_mean({}), CannotIdentify);
+  EXPECT_EQ(signal::robust_mean({{7, 0.1}}).standard_error, 0.1);
 }
 
 struct SineRecipe {
@@ -98,10 +98,10 @@ struct SineRecipe {
   bool position = true, velocity = true;
 };
 
-Record sine_run(const SineRecipe& run, unsigned seed = 1) {
+record::Record sine_run(const SineRecipe& run, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  Record record;
+  record::Record record;
   record.name = "sine";
   const double w = 2 * M_PI * run.frequency, keep = std::exp(-0.001 / 0.02);
   double coloured = 0;
@@ -113,11 +113,11 @@ Record sine_run(const SineRecipe& run, unsigned seed = 1) {
     const double a = run.acceleration + w * run.amplitude * std::cos(w * before), v = speed(before);
     coloured = keep * coloured + std::sqrt(1 - keep * keep) * run.noise * normal(random);
     record.time.push_back(t);
-    record.column(Channel::motor_torque)
+    record.column(record::Channel::motor_torque)
         .push_back(run.inertia * a + run.viscous * v + run.coulomb * ((v > 0) - (v < 0)) + coloured);
-    if (run.velocity) record.column(Channel::motor_velocity).push_back(speed(t));
+    if (run.velocity) record.column(record::Channel::motor_velocity).push_back(speed(t));
     if (run.position)
-      record.column(Channel::motor_position)
+      record.column(record::Channel::motor_position)
           .push_back(run.mean * t + 0.5 * run.acceleration * t * t - run.amplitude / w * std::cos(w * t));
   }
   return record;
@@ -140,17 +140,17 @@ TEST(LineInertia, ComplexFormGivesInertiaAndDamping) {
 }
 
 TEST(LineInertia, ASineThatIsFadedInIsLeftOut) {
-  Record record = sine_run({});
+  record::Record record = sine_run({});
   // T = 7 a + 13.7 v + 63, v = 0.6 + 0.35 r sin(w t) with r = t / 3 s at first.
   const double w = 2 * M_PI * 1.03;
   for (std::size_t k = 0; k < record.size(); ++k) {
     const double t = record.time[k], r = std::min(1.0, t / 3), slope = t < 3 ? 1.0 / 3 : 0;
     const double v = 0.6 + 0.35 * r * std::sin(w * t);
     const double a = 0.35 * (slope * std::sin(w * t) + r * w * std::cos(w * t));
-    record.column(Channel::motor_velocity)[k] = v;
-    record.column(Channel::motor_torque)[k] = 7 * a + 13.7 * v + 63;
+    record.column(record::Channel::motor_velocity)[k] = v;
+    record.column(record::Channel::motor_torque)[k] = 7 * a + 13.7 * v + 63;
   }
-  record.column(Channel::motor_position).clear();
+  record.column(record::Channel::motor_position).clear();
   LineInertiaOptions options;
   options.frequency = 1.03;
   const LineInertia line = line_inertia(record, options);
@@ -161,16 +161,17 @@ TEST(LineInertia, ASineThatIsFadedInIsLeftOut) {
 TEST(LineInertia, OfADriveByTheMeanMotion) {
   // Closed form with the elasticity of configuration 2: J1 = 6.3, J2 = 108.3 kg m^2, F_AR = 10.4 Hz, no
   // friction but 63 N m: V2 = V1 / (1 - (f / F_AR)^2), T = i w (J1 V1 + J2 V2).
-  Record record = sine_run({});
+  record::Record record = sine_run({});
   const double w = 2 * M_PI * 1.03, more = 1 / (1 - std::pow(1.03 / 10.4, 2));
-  for (const Channel channel : {Channel::motor_velocity, Channel::load_velocity, Channel::motor_torque})
+  for (const record::Channel channel :
+       {record::Channel::motor_velocity, record::Channel::load_velocity, record::Channel::motor_torque})
     record.column(channel).assign(record.size(), 0);
-  record.column(Channel::motor_position).clear();
+  record.column(record::Channel::motor_position).clear();
   for (std::size_t k = 0; k < record.size(); ++k) {
     const double sine = 0.35 * std::sin(w * record.time[k]), cosine = 0.35 * w * std::cos(w * record.time[k]);
-    record.column(Channel::motor_velocity)[k] = 0.6 + sine;
-    record.column(Channel::load_velocity)[k] = 0.6 + more * sine;
-    record.column(Channel::motor_torque)[k] = 63 + (6.3 + more * 108.3) * cosine;
+    record.column(record::Channel::motor_velocity)[k] = 0.6 + sine;
+    record.column(record::Channel::load_velocity)[k] = 0.6 + more * sine;
+    record.column(record::Channel::motor_torque)[k] = 63 + (6.3 + more * 108.3) * cosine;
   }
   LineInertiaOptions options;
   options.frequency = 1.03;
@@ -242,4 +243,4 @@ TEST(LineInertia, RefusesWhatTheRecordCannotSay) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

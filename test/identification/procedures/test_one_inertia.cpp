@@ -13,7 +13,7 @@
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "support/data.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 // An axis like the EMPS under a position controller whose command is held for one interval; integrated here
@@ -48,10 +48,10 @@ struct Body {
   }
 };
 
-Record simulate(const Axis& axis, unsigned seed = 1) {
+record::Record simulate(const Axis& axis, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  Record record;
+  record::Record record;
   record.name = "axis";
   Body body;
   constexpr int kSteps = 50;
@@ -66,14 +66,14 @@ Record simulate(const Axis& axis, unsigned seed = 1) {
     command = 95 * (1600 * (reference(axis, t) - body.x) + 80 * (wanted - body.v));
     coloured = keep * coloured + std::sqrt(1 - keep * keep) * axis.disturbance * normal(random);
     record.time.push_back(t);
-    record.column(Channel::motor_torque).push_back(command + axis.force_noise * normal(random));
-    record.column(Channel::motor_position).push_back(body.x + axis.position_noise * normal(random));
+    record.column(record::Channel::motor_torque).push_back(command + axis.force_noise * normal(random));
+    record.column(record::Channel::motor_position).push_back(body.x + axis.position_noise * normal(random));
     for (int i = 0; i < kSteps; ++i) body.step(axis, (i * h < axis.delay ? previous : command) + coloured, h);
   }
   return record;
 }
 
-void expect_near(const Measured& m, double truth, double relative, const char* name) {
+void expect_near(const signal::Measured& m, double truth, double relative, const char* name) {
   EXPECT_NEAR(m.value, truth, relative * std::fabs(truth)) << name;
   // 5 standard errors; the second term is the discretisation of this test's integration at the reversals.
   EXPECT_NEAR(m.value, truth, 5 * m.standard_error + 1e-3 * std::fabs(truth)) << name;
@@ -127,7 +127,7 @@ TEST(OneInertia, StandardErrorsAreHonestForCorrelatedForces) {
     OneInertiaOptions options;
     options.cutoff = 10;
     const OneInertia m = identify_one_inertia(simulate(axis, seed), options);
-    const Measured measured[] = {m.inertia, m.coulomb, m.offset};
+    const signal::Measured measured[] = {m.inertia, m.coulomb, m.offset};
     const double truth[] = {95, 20, -3};
     for (int i = 0; i < 3; ++i) {
       squares[i] += std::pow(measured[i].value - truth[i], 2);
@@ -142,15 +142,15 @@ TEST(OneInertia, StandardErrorsAreHonestForCorrelatedForces) {
 TEST(OneInertia, JitterOfTheStampsAt100Hz) {
   Axis axis;
   axis.duration = 40;
-  const Record even = simulate(axis);
+  const record::Record even = simulate(axis);
   std::mt19937 random(5);
   std::uniform_int_distribution<int> shift(-2, 2);
-  Record record;
+  record::Record record;
   record.name = "jitter";
   for (int k = 5; k + 10 < int(even.size()); k += 10) {
     const int j = k + shift(random);
     record.time.push_back(even.time[j]);
-    for (const Channel c : {Channel::motor_torque, Channel::motor_position})
+    for (const record::Channel c : {record::Channel::motor_torque, record::Channel::motor_position})
       record.column(c).push_back(even.column(c)[j]);
   }
   const OneInertia m = identify_one_inertia(record);
@@ -162,10 +162,10 @@ TEST(OneInertia, JitterOfTheStampsAt100Hz) {
 }
 
 TEST(OneInertia, WhatTheModelLacksIsSaid) {
-  Record record = simulate({});
-  const auto& x = record.column(Channel::motor_position);
+  record::Record record = simulate({});
+  const auto& x = record.column(record::Channel::motor_position);
   for (std::size_t k = 0; k < x.size(); ++k)
-    record.column(Channel::motor_torque)[k] += 80 * std::sin(25 * x[k]);
+    record.column(record::Channel::motor_torque)[k] += 80 * std::sin(25 * x[k]);
   const OneInertia m = identify_one_inertia(record);
   EXPECT_GT(m.relative_error, 0.2);
   ASSERT_FALSE(m.warnings.empty());
@@ -173,7 +173,7 @@ TEST(OneInertia, WhatTheModelLacksIsSaid) {
 }
 
 TEST(OneInertia, RefusesWhatTheRecordCannotSay) {
-  Record record = simulate({});
+  record::Record record = simulate({});
   EXPECT_THROW(identify_one_inertia(record.slice(0, 0.4)), CannotIdentify);   // one way
   EXPECT_THROW(identify_one_inertia(record.slice(0, 0.05)), CannotIdentify);  // 50 samples
   OneInertiaOptions options;
@@ -182,10 +182,10 @@ TEST(OneInertia, RefusesWhatTheRecordCannotSay) {
   options.cutoff = 0;
   options.delay = 3e-3;
   EXPECT_THROW(identify_one_inertia(record, options), InvalidParameter);
-  std::fill(record.column(Channel::motor_position).begin(), record.column(Channel::motor_position).end(),
-            0.1);
+  std::fill(record.column(record::Channel::motor_position).begin(),
+            record.column(record::Channel::motor_position).end(), 0.1);
   EXPECT_THROW(identify_one_inertia(record), CannotIdentify);
-  record.column(Channel::motor_torque).clear();
+  record.column(record::Channel::motor_torque).clear();
   EXPECT_THROW(identify_one_inertia(record), CannotIdentify);
 }
 
@@ -193,7 +193,7 @@ TEST(OneInertia, EmpsAsPublished) {
   const auto train = test::find_data("measured/emps_train.csv");
   const auto validation = test::find_data("measured/emps_validation.csv");
   if (!train || !validation) GTEST_SKIP() << "measured/emps_*.csv absent";
-  const OneInertia m = identify_one_inertia(read_csv(*train));
+  const OneInertia m = identify_one_inertia(record::read_csv(*train));
   // Janot, Gautier, Brunot (2019), as stated with the data; 1 % is the requirement.
   EXPECT_NEAR(m.inertia.value, 95.1, 0.01 * 95.1);
   EXPECT_NEAR(m.viscous.value, 203.5, 0.01 * 203.5);
@@ -201,7 +201,7 @@ TEST(OneInertia, EmpsAsPublished) {
   EXPECT_NEAR(m.offset.value, -3.2, 0.01 * 3.2);
   // A least-squares prototype had 0.0365 and 0.0435 (of the norm with mean); 5 % for another cutoff.
   EXPECT_LT(m.relative_error, 0.0365 * 1.05);
-  EXPECT_LT(relative_error(m, read_csv(*validation)), 0.0435 * 1.05);
+  EXPECT_LT(relative_error(m, record::read_csv(*validation)), 0.0435 * 1.05);
   EXPECT_LT(m.floor, 0.1 * m.relative_error);
   EXPECT_GT(m.delay.value, 0);
   EXPECT_LT(m.delay.value, 1e-3);
@@ -211,9 +211,9 @@ TEST(OneInertia, TheTwoEmpsRecordsAgreeWithinTheirErrors) {
   const auto train = test::find_data("measured/emps_train.csv");
   const auto validation = test::find_data("measured/emps_validation.csv");
   if (!train || !validation) GTEST_SKIP() << "measured/emps_*.csv absent";
-  const OneInertia a = identify_one_inertia(read_csv(*train)),
-                   b = identify_one_inertia(read_csv(*validation));
-  const auto agree = [](const Measured& x, const Measured& y, const char* name) {
+  const OneInertia a = identify_one_inertia(record::read_csv(*train)),
+                   b = identify_one_inertia(record::read_csv(*validation));
+  const auto agree = [](const signal::Measured& x, const signal::Measured& y, const char* name) {
     EXPECT_LT(std::fabs(x.value - y.value), 4 * std::hypot(x.standard_error, y.standard_error)) << name;
   };
   agree(a.inertia, b.inertia, "inertia");
@@ -225,7 +225,7 @@ TEST(OneInertia, TheTwoEmpsRecordsAgreeWithinTheirErrors) {
 TEST(OneInertia, Ur5NeedsMoreThanFriction) {
   const auto path = test::find_data("measured/ur5_joint3.csv");
   if (!path) GTEST_SKIP() << "measured/ur5_joint3.csv absent";
-  const OneInertia m = identify_one_inertia(read_csv(*path));
+  const OneInertia m = identify_one_inertia(record::read_csv(*path));
   EXPECT_GT(m.relative_error, 0.3);  // gravity is not in this model: the prototype had 0.70 of the norm
   EXPECT_LT(m.floor, 0.05);
   EXPECT_TRUE(std::isnan(m.delay.standard_error));
@@ -239,8 +239,8 @@ TEST(Bandwidth, WhiteNoiseUnderAMotion) {
   for (int k = 0; k < 8192; ++k) x.push_back(0.2 * std::sin(2e-3 * k) + 1e-3 * k + 1e-5 * normal(random));
   // The median of 1200 lines: 1 / sqrt(1200) * 1 / (2 ln 2) * ... about 4 % of the power, 2 % of the
   // deviation.
-  EXPECT_NEAR(white_noise(x), 1e-5, 6e-7);
-  EXPECT_NEAR(position_noise(x), 1e-5, 2e-6);  // the largest of eight bands of some 400 lines
+  EXPECT_NEAR(signal::white_noise(x), 1e-5, 6e-7);
+  EXPECT_NEAR(signal::position_noise(x), 1e-5, 2e-6);  // the largest of eight bands of some 400 lines
 }
 
 TEST(Bandwidth, OfTwoSines) {
@@ -255,19 +255,20 @@ TEST(Bandwidth, OfTwoSines) {
     };
     x.push_back(part(1, 3) + part(0.5, 7) + part(0.02, 40) + 1e-8 * normal(random));
   }
-  EXPECT_NEAR(motion_bandwidth(x, 1e-3), 7, 0.2);  // lines are 0.06 Hz apart, the window is three wide
+  EXPECT_NEAR(signal::motion_bandwidth(x, 1e-3), 7,
+              0.2);  // lines are 0.06 Hz apart, the window is three wide
   std::vector<double> noise;
   for (int k = 0; k < 4096; ++k) noise.push_back(normal(random));
-  EXPECT_THROW(motion_bandwidth(noise, 1e-3), CannotIdentify);
-  EXPECT_THROW(motion_bandwidth({1, 2, 3}, 1e-3), InvalidParameter);
-  EXPECT_THROW(motion_bandwidth(noise, 0), InvalidParameter);
+  EXPECT_THROW(signal::motion_bandwidth(noise, 1e-3), CannotIdentify);
+  EXPECT_THROW(signal::motion_bandwidth({1, 2, 3}, 1e-3), InvalidParameter);
+  EXPECT_THROW(signal::motion_bandwidth(noise, 0), InvalidParameter);
 }
 
 TEST(Bandwidth, NoiseAfterTheFilter) {
   // Integral of 1 / (1 + x^8)^2 from 0 to infinity: (1 - 1 / 8) (pi / 8) / sin(pi / 8) = 0.8979.
   const double density = 0.875 * (M_PI / 8) / std::sin(M_PI / 8);
-  EXPECT_NEAR(noise_after_low_pass(1e-3, 10), std::sqrt(2 * 10e-3 * density), 1e-4);
+  EXPECT_NEAR(signal::noise_after_low_pass(1e-3, 10), std::sqrt(2 * 10e-3 * density), 1e-4);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

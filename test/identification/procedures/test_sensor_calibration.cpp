@@ -7,7 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/sensor_calibration.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 // A motor that turns forward and back, a load behind it by half the play and the wind-up of its friction; the
@@ -25,7 +25,8 @@ double quantised(double x, double step) {
 }
 
 /// One way for 10 s from `start` with 1 s of ramp at both ends, `rate` Hz; ends where it returns.
-void run_one_way(Record& record, const SensorRig& rig, double speed, std::mt19937& random, double& position) {
+void run_one_way(record::Record& record, const SensorRig& rig, double speed, std::mt19937& random,
+                 double& position) {
   std::normal_distribution<double> normal;
   constexpr double kInterval = 2e-3;
   const double t0 = record.time.empty() ? 0 : record.time.back() + kInterval;
@@ -37,18 +38,18 @@ void run_one_way(Record& record, const SensorRig& rig, double speed, std::mt1993
     const double behind = sign * (0.5 * rig.gap + rig.wind_up) * std::min(1.0, 2 * t / 0.15 - 1);
     const double twist = rig.torque_ripple * std::sin(2 * M_PI * 5.3 * (t0 + t));
     record.time.push_back(t0 + t);
-    record.column(Channel::motor_position).push_back(quantised(position, 8.7e-7));
-    record.column(Channel::load_position)
+    record.column(record::Channel::motor_position).push_back(quantised(position, 8.7e-7));
+    record.column(record::Channel::load_position)
         .push_back(quantised(rig.scale * position + rig.offset - behind + twist, 7e-6));
-    record.column(Channel::motor_velocity).push_back(w + rig.noise * normal(random));
-    record.column(Channel::load_velocity)
+    record.column(record::Channel::motor_velocity).push_back(w + rig.noise * normal(random));
+    record.column(record::Channel::load_velocity)
         .push_back(rig.speed_scale * w + rig.speed_offset + rig.noise * normal(random));
   }
 }
 
-Record runs(const SensorRig& rig, const std::vector<double>& speeds, unsigned seed = 1) {
+record::Record runs(const SensorRig& rig, const std::vector<double>& speeds, unsigned seed = 1) {
   std::mt19937 random(seed);
-  Record record;
+  record::Record record;
   record.name = "runs";
   double position = 0.1 * seed;
   for (const double speed : speeds) run_one_way(record, rig, speed, random, position);
@@ -71,7 +72,7 @@ TEST(PositionCalibration, RunsMayBeRecordsOfTheirOwn) {
   const SensorRig rig;
   std::mt19937 random(1);
   double position = 0;
-  Record forward, back;
+  record::Record forward, back;
   run_one_way(forward, rig, 0.3, random, position);
   run_one_way(back, rig, -0.3, random, position);
   const PositionCalibration c = calibrate_position({forward, back});
@@ -94,11 +95,11 @@ TEST(PositionCalibration, StandardErrorsAreHonestForErrorsOfTheSensors) {
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     SensorRig rig;
     rig.torque_ripple = 0;
-    Record record = runs(rig, {0.3, -0.3}, seed);
+    record::Record record = runs(rig, {0.3, -0.3}, seed);
     std::mt19937 random(1000 + seed);
     std::normal_distribution<double> normal;
     double coloured = 0;  // 20 ms memory: shorter than the parts that are left out
-    for (double& x : record.column(Channel::load_position))
+    for (double& x : record.column(record::Channel::load_position))
       x += coloured = 0.9 * coloured + 1e-4 * normal(random);
     const PositionCalibration c = calibrate_position({record});
     squares += std::pow(c.scale.value - rig.scale, 2);
@@ -113,15 +114,15 @@ TEST(PositionCalibration, StandardErrorsAreHonestForErrorsOfTheSensors) {
 }
 
 TEST(PositionCalibration, RefusesWhatDoesNotTurnOneWay) {
-  Record shaking;
+  record::Record shaking;
   for (int i = 0; i < 5000; ++i) {
     shaking.time.push_back(i * 2e-3);
-    shaking.column(Channel::motor_position).push_back(0.1 * std::sin(i * 2e-2));
-    shaking.column(Channel::load_position).push_back(0.1 * std::sin(i * 2e-2));
+    shaking.column(record::Channel::motor_position).push_back(0.1 * std::sin(i * 2e-2));
+    shaking.column(record::Channel::load_position).push_back(0.1 * std::sin(i * 2e-2));
   }
   EXPECT_THROW(calibrate_position({shaking}), CannotIdentify);
   EXPECT_THROW(calibrate_position({}), CannotIdentify);
-  shaking.column(Channel::load_position).clear();
+  shaking.column(record::Channel::load_position).clear();
   EXPECT_THROW(calibrate_position({shaking}), CannotIdentify);
   CalibrationOptions options;
   options.block = 0;
@@ -150,17 +151,17 @@ TEST(SpeedCalibration, StandardErrorsAreHonest) {
 }
 
 TEST(SpeedCalibration, OneSpeedCannotTellScaleFromOffset) {
-  Record record;
+  record::Record record;
   record.name = "even";
   for (int i = 0; i < 5000; ++i) {
     record.time.push_back(i * 2e-3);
-    record.column(Channel::motor_velocity).push_back(0.3);
-    record.column(Channel::load_velocity).push_back(0.31);
+    record.column(record::Channel::motor_velocity).push_back(0.3);
+    record.column(record::Channel::load_velocity).push_back(0.31);
   }
   EXPECT_THROW(calibrate_speed(record), CannotIdentify);
-  record.column(Channel::load_velocity).clear();
+  record.column(record::Channel::load_velocity).clear();
   EXPECT_THROW(calibrate_speed(record), CannotIdentify);
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,17 +4,18 @@
 #include <cmath>
 #include <random>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/simulation/simulation.h"
 #include "support/two_mass_record.h"
 
-namespace backlash {
+namespace backlash::identification {
 namespace {
 
 using test::kConfiguration2;
 using test::SteppedSine;
 
-constexpr Measured sure(double value) {
+constexpr signal::Measured sure(double value) {
   return {value, 0};
 }
 
@@ -107,13 +108,15 @@ TEST(TwoMass, ResponseIsEquations232And235) {
 
 TEST(TwoMass, SplitPropagatesErrors) {
   const Resonances measured{{37.75, 0.2}, {10.5, 0.05}};
-  const Measured total{114.6, 1.0}, motor{6.3, 0.2};
+  const signal::Measured total{114.6, 1.0}, motor{6.3, 0.2};
   for (const KnownInertia known :
        {KnownInertia::total_inertia, KnownInertia::motor_inertia, KnownInertia::both_inertias}) {
     const StiffnessSplit stated = split_stiffness(known, measured, total, motor);
     std::mt19937_64 random(4);
     std::normal_distribution<double> normal;
-    const auto draw = [&](const Measured& m) { return sure(m.value + m.standard_error * normal(random)); };
+    const auto draw = [&](const signal::Measured& m) {
+      return sure(m.value + m.standard_error * normal(random));
+    };
     constexpr int kDraws = 4000;
     double square[3]{};
     for (int i = 0; i < kDraws; ++i) {
@@ -132,7 +135,7 @@ TEST(TwoMass, SplitPropagatesErrors) {
 }
 
 TEST(TwoMass, SplitRefusesWhatCannotBe) {
-  const Measured total{50, 1}, motor{6, 1};
+  const signal::Measured total{50, 1}, motor{6, 1};
   EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(10), sure(12)}, total, motor),
                CannotIdentify);
   EXPECT_THROW(split_stiffness(KnownInertia::both_inertias, {sure(12), sure(10)}, motor, total),
@@ -183,7 +186,7 @@ TEST(Resonances, StandardErrorsHoldTheNoise) {
     for (ResponsePoint& p : noisy.points)
       p.response *= std::complex<double>(1 + normal(random), normal(random));
     const Resonances found = find_resonances(noisy);
-    const Measured both[] = {found.resonance, found.anti_resonance};
+    const signal::Measured both[] = {found.resonance, found.anti_resonance};
     for (int k = 0; k < 2; ++k) {
       sum[k] += both[k].value / kSeeds;
       squares[k] += both[k].value * both[k].value / kSeeds;
@@ -215,7 +218,7 @@ TEST(InertiaPlateau, OfTheThesisReadsTooLittleNextToTheResonance) {
 
 void expect_configuration_2(const TwoMassFit& fit, const char* what) {
   SCOPED_TRACE(what);
-  const auto expect = [](const Measured& m, double exact, double tolerance) {
+  const auto expect = [](const signal::Measured& m, double exact, double tolerance) {
     EXPECT_NEAR(m.value, exact, tolerance * exact);
     EXPECT_NEAR(m.value, exact, 4 * m.standard_error);
     EXPECT_LT(m.standard_error, tolerance * exact);
@@ -232,9 +235,9 @@ void expect_configuration_2(const TwoMassFit& fit, const char* what) {
 }
 
 TEST(TwoMassFit, RecoversTheMachineFromTheSweep) {
-  const Record clean =
+  const record::Record clean =
       test::two_mass_record(kConfiguration2, SteppedSine().torque(), SteppedSine().duration());
-  const Record record = test::with_noise(clean, 1);
+  const record::Record record = test::with_noise(clean, 1);
   const FrequencyResponse motor = estimate_response(record);
   const TwoMassFit fit = fit_two_mass(motor);
   expect_configuration_2(fit, "motor");
@@ -248,14 +251,14 @@ TEST(TwoMassFit, RecoversTheMachineFromTheSweep) {
 }
 
 TEST(TwoMassFit, RecoversTheMachineFromHeldNoise) {
-  Record record =
+  record::Record record =
       test::with_noise(test::two_mass_record(kConfiguration2, test::held_noise(300, 300000, 9), 300), 2);
   ResponseSettings held;
   held.held = true;
   expect_configuration_2(fit_two_mass(estimate_response(record, held)), "speed");
   // Position in steps of 0.0055 deg at the motor, 110 times less at the load.
-  for (double& x : record.column(Channel::motor_position)) x = std::round(x / 8.7e-7) * 8.7e-7;
-  record.column(Channel::motor_velocity).clear();
+  for (double& x : record.column(record::Channel::motor_position)) x = std::round(x / 8.7e-7) * 8.7e-7;
+  record.column(record::Channel::motor_velocity).clear();
   expect_configuration_2(fit_two_mass(estimate_response(record, held)), "position");
 }
 
@@ -281,7 +284,8 @@ TEST(TwoMassFit, StandardErrorsHoldTheNoise) {
     for (ResponsePoint& p : noisy.points)
       p.response *= std::complex<double>(1 + normal(random), normal(random));
     const TwoMassFit fit = fit_two_mass(noisy);
-    const Measured all[] = {fit.motor_inertia, fit.load_inertia, fit.stiffness, fit.damping, fit.viscous};
+    const signal::Measured all[] = {fit.motor_inertia, fit.load_inertia, fit.stiffness, fit.damping,
+                                    fit.viscous};
     for (int k = 0; k < kValues; ++k) {
       sum[k] += all[k].value / kSeeds;
       squares[k] += all[k].value * all[k].value / kSeeds;
@@ -297,12 +301,12 @@ TEST(TwoMassFit, StandardErrorsHoldTheNoise) {
 TEST(TwoMassFit, OfTheSimulatorsOwnRecord) {
   // The package's gear train and SUNDIALS instead of the test's own integration: no gap, and so much load
   // that no flank parts. Bias on viscous friction keeps the contact closed.
-  Rig rig;
+  model::Rig rig;
   rig.name = "linear";
   rig.motor = {8.9, 12};
   rig.link = {105.8, 9};
-  rig.mesh.contact = make_contact_law("kelvin_voigt", {{"stiffness", 460e3}, {"damping", 483}});
-  SimulationSettings settings;
+  rig.mesh.contact = model::make_contact_law("kelvin_voigt", {{"stiffness", 460e3}, {"damping", 483}});
+  simulation::SimulationSettings settings;
   settings.excitation.type = "chirp";
   settings.excitation.amplitude = 20;
   settings.excitation.start_frequency = 0.5;
@@ -310,7 +314,7 @@ TEST(TwoMassFit, OfTheSimulatorsOwnRecord) {
   settings.excitation.duration = 60;
   settings.excitation.bias = 60;
   settings.sensors.sampling_rate = 500;
-  const FrequencyResponse response = estimate_response(simulate_record(rig, settings, 120));
+  const FrequencyResponse response = estimate_response(simulation::simulate_record(rig, settings, 120));
   const TwoMassFit fit = fit_two_mass(response);
   EXPECT_NEAR(fit.motor_inertia.value, 8.9, 0.02 * 8.9);
   EXPECT_NEAR(fit.load_inertia.value, 105.8, 0.02 * 105.8);
@@ -328,4 +332,4 @@ TEST(TwoMassFit, RefusesOneInertia) {
 }
 
 }  // namespace
-}  // namespace backlash
+}  // namespace backlash::identification

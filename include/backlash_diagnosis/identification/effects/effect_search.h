@@ -18,11 +18,12 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/identification/fit/output_error.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct TraceSettings {
   double cutoff = 0;         // Hz, low-pass of all residuals; 0: that of the machine (fit_settings.h)
@@ -36,7 +37,7 @@ struct TraceSettings {
 /// A parameter of an effect, as found.
 struct EffectParameter {
   std::string name, unit;
-  Measured measured;
+  signal::Measured measured;
 };
 
 /// Why an effect is believed. Gains are relative decreases of the norm of the residual of the channel that
@@ -100,9 +101,10 @@ enum class TraceVerdict { effect_found, nothing_missing, unexplained };
 
 struct Trace {
   TraceVerdict verdict = TraceVerdict::nothing_missing;
-  double cutoff = 0;                                            // Hz
-  Rig base, augmented;                                          // fitted, load side
-  std::map<std::string, Measured> base_parameters, parameters;  // of the machine, without and with effects
+  double cutoff = 0;           // Hz
+  model::Rig base, augmented;  // fitted, load side
+  std::map<std::string, signal::Measured> base_parameters,
+      parameters;  // of the machine, without and with effects
   std::map<std::string, std::string> units;
   std::map<std::string, TraceChannel> channels;
   std::vector<Independence> independence;
@@ -115,7 +117,8 @@ struct Trace {
 };
 
 /// Throws CannotIdentify for a rig or records that this cannot be done with, BadData, Cancelled.
-Trace trace_residual(const Rig& declared, const std::vector<Record>& train, const Record& test,
-                     const TraceSettings& settings = {}, const Progress& progress = nullptr);
+Trace trace_residual(const model::Rig& declared, const std::vector<record::Record>& train,
+                     const record::Record& test, const TraceSettings& settings = {},
+                     const Progress& progress = nullptr);
 
-}  // namespace backlash
+}  // namespace backlash::identification

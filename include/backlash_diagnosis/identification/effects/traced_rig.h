@@ -8,14 +8,14 @@
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Fitted values are in the units of the file (of the motor shaft where it says motor_side: true), each with
 /// its standard error as comment; terms are always at the load side. Layout, other values, declared terms and
 /// comments stay. Throws BadData where the file writes a map that has to change, or its terms, on one line.
-std::string traced_rig_text(const RigFile& declared, const Trace& trace);
+std::string traced_rig_text(const rig_file::RigFile& declared, const Trace& trace);
 
 /// Throws what traced_rig_text() would, before the long work.
-void check_traced_rig_text(const RigFile& declared);
+void check_traced_rig_text(const rig_file::RigFile& declared);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -5,9 +5,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/servo_data.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Each value with its unit and its origin: theory, simulation (tried on simulated machines whose truth is
 /// known) or choice (what is asked for, or the time that a fit may take).
@@ -39,6 +40,6 @@ struct FitSettings {
 ///   cutoff 1.36 f, rough cutoff 0.34 f, feedback 0.18 (2 pi f).
 /// Without a load that moves freely: cutoff is the bandwidth of the motion, and at least 100 periods of it
 /// are in the record. Throws CannotIdentify for records in which nothing moves.
-FitSettings with_bands(FitSettings settings, const Rig& rig, const std::vector<ServoData>& data);
+FitSettings with_bands(FitSettings settings, const model::Rig& rig, const std::vector<ServoData>& data);
 
-}  // namespace backlash
+}  // namespace backlash::identification

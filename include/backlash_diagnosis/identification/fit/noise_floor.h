@@ -16,7 +16,7 @@
 
 #include "backlash_diagnosis/identification/fit/servo_data.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct NoiseFloors {
   double torque = 0, deflection = 0;  // N m, rad; standard deviations after the low-pass
@@ -24,7 +24,7 @@ struct NoiseFloors {
 
 /// `load` [rad]: the simulated motion. Of a contact law that is not linear the noise of the positions counts
 /// without the mesh.
-NoiseFloors noise_floors(const Rig& rig, const ServoData& data, const std::vector<double>& load,
+NoiseFloors noise_floors(const model::Rig& rig, const ServoData& data, const std::vector<double>& load,
                          double cutoff, double feedback);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -17,13 +17,14 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/identification/fit/fit_settings.h"
 #include "backlash_diagnosis/identification/fit/servo_data.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct OutputErrorSettings {
   FitSettings fit;
@@ -45,15 +46,15 @@ struct Calibration {
 };
 
 struct OutputError {
-  Rig rig;                                       // fitted
-  std::map<std::string, Measured> parameters;    // in the units of the rig file
-  std::vector<Calibration> calibrations;         // one per record
-  std::vector<ChannelError> torque, deflection;  // one per record
+  model::Rig rig;                                      // fitted
+  std::map<std::string, signal::Measured> parameters;  // in the units of the rig file
+  std::vector<Calibration> calibrations;               // one per record
+  std::vector<ChannelError> torque, deflection;        // one per record
 };
 
 /// What a rig predicts for a record; no deflection where the load has no motion of its own.
 struct ServoPrediction {
-  DrivenLoad load;
+  simulation::DrivenLoad load;
   std::vector<double> torque, measured_torque;          // N m, both low-passed
   std::vector<double> deflection, measured_deflection;  // rad
   std::vector<char> settled, counts;                    // whether the sample of deflection and torque counts
@@ -62,16 +63,16 @@ struct ServoPrediction {
 };
 
 /// `settings` have their bands, see with_bands(); throws InvalidParameter for a cutoff that is not > 0.
-ServoPrediction predict_servo(const Rig& rig, const ServoData& data, const FitSettings& settings,
+ServoPrediction predict_servo(const model::Rig& rig, const ServoData& data, const FitSettings& settings,
                               const Calibration& calibration);
 
 /// Fits the calibration alone and predicts: what a rig says of a record that it has not seen.
-ServoPrediction predict_calibrated(const Rig& rig, const ServoData& data, const FitSettings& settings,
+ServoPrediction predict_calibrated(const model::Rig& rig, const ServoData& data, const FitSettings& settings,
                                    Calibration& calibration);
 
 /// Starts from the values in `rig`; bands that the settings do not have are those of `rig`. Throws
 /// CannotIdentify, InvalidParameter.
-OutputError fit_output_error(const Rig& rig, const std::vector<ServoData>& records,
+OutputError fit_output_error(const model::Rig& rig, const std::vector<ServoData>& records,
                              const OutputErrorSettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,10 +4,11 @@
 
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/rig.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// All at the load side of the reduction; columns of equal length, empty where the record has no such
 /// channel.
@@ -24,7 +25,7 @@ struct ServoData {
 };
 
 /// The record with all channels at the load side of the reduction.
-Record load_side(const Record& record, const Rig& rig);
+record::Record load_side(const record::Record& record, const model::Rig& rig);
 
 /// s: duration of a record over one more than how often the motor turns round, beyond the noise of its speed.
 double time_between_reversals(const ServoData& data);
@@ -40,6 +41,6 @@ double time_between_reversals(const ServoData& data);
 ///
 /// Needs motor_torque and motor_position; load_position where the record has it. Throws CannotIdentify
 /// without them, BadData for gaps or values that are not finite (naming channel and time).
-ServoData servo_data(const Record& record, const Rig& rig);
+ServoData servo_data(const record::Record& record, const model::Rig& rig);
 
-}  // namespace backlash
+}  // namespace backlash::identification

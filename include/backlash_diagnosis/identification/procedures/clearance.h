@@ -16,10 +16,11 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct ClearanceSettings {
   /// Both > 0: w = sqrt(stiffness / load_inertia) is held, which helps where flanks are touched for less than
@@ -42,7 +43,7 @@ ClearanceSettings clearance_settings(double stiffness, double load_inertia);
 struct GapPassage {
   std::vector<double> time, measured, fitted;  // s; rad, load minus motor
   double lower = 0, upper = 0;                 // rad, the flanks, in the same coordinate
-  Measured gap;                                // rad
+  signal::Measured gap;                        // rad
   double travel = 0;                           // rad, of `measured`: gap and deflection
   double motor_travel = 0;                     // rad
   double speed = 0;                            // rad/s, fastest, signed
@@ -50,8 +51,8 @@ struct GapPassage {
 };
 
 struct Clearance {
-  Measured gap;                  // rad, without force, over the passages
-  Measured travel;               // rad, mean of the travels: what the thesis reads
+  signal::Measured gap;          // rad, without force, over the passages
+  signal::Measured travel;       // rad, mean of the travels: what the thesis reads
   double lower = 0, upper = 0;   // rad, the flanks, load minus motor
   double contact_frequency = 0;  // rad/s, w, as given or found (with the cubic, as all below and the flanks)
   double damping_ratio = 0;      // z, of the load on a flank
@@ -62,6 +63,6 @@ struct Clearance {
 
 /// Throws CannotIdentify without the two positions, where the motor is not braked, with fewer than
 /// `least_passages` passages that fit or an error beyond a quarter of the gap; InvalidParameter for settings.
-Clearance identify_clearance(const Record& record, const ClearanceSettings& settings = {});
+Clearance identify_clearance(const record::Record& record, const ClearanceSettings& settings = {});
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -4,15 +4,16 @@
 
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Mean speed [rad/s] and mean torque [N m] of one run. Without standard errors (NaN) the scatter of the rows
 /// about the line decides.
 struct ConstantSpeedRun {
-  Measured speed, torque;
+  signal::Measured speed, torque;
   double from = 0, to = 0;  // s, in the record
 };
 
@@ -27,7 +28,7 @@ struct ConstantSpeedOptions {
 /// and further ones while the speed still settles: an inertia of 115 kg m^2 makes 1 N m of 0.01 rad/s^2.
 /// Standard errors from batches of at least one block. Standing still is no run. Throws CannotIdentify where
 /// there is none or a channel is missing, InvalidParameter for options <= 0.
-std::vector<ConstantSpeedRun> find_constant_speed(const Record& record,
+std::vector<ConstantSpeedRun> find_constant_speed(const record::Record& record,
                                                   const ConstantSpeedOptions& options = {});
 
-}  // namespace backlash
+}  // namespace backlash::identification

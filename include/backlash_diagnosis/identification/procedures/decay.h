@@ -14,17 +14,18 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/ringing.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 enum class RingingSignal { speed_difference, position_difference };  // motor minus load
 
 struct DecaySettings {
-  Measured stiffness;                   // N m/rad, > 0; standard error may be NaN: taken as exact
-  Measured reduced_inertia;             // kg m^2, > 0
+  signal::Measured stiffness;           // N m/rad, > 0; standard error may be NaN: taken as exact
+  signal::Measured reduced_inertia;     // kg m^2, > 0
   double bearing_damping = 0;           // N m s/rad, >= 0: Jp^2 (c1/J1^2 + c2/J2^2), taken off the damping
   std::optional<RingingSignal> signal;  // absent: the speeds where both are recorded
   double longest = 5, shortest = 1.5;   // periods of sqrt(k / Jp), of the stretch that is fitted
@@ -33,10 +34,10 @@ struct DecaySettings {
 
 struct DecayIdentification {
   RingingSignal signal = RingingSignal::speed_difference;
-  Measured damping_ratio, natural_frequency;  // -, rad/s, over the engagements
-  Measured damping;                           // N m s/rad, by 5.10, of the mesh
-  Measured damping_by_rate;                   // N m s/rad, 2 z w0 Jp, needs no stiffness
-  Measured peak_damping_ratio;                // cross-check; NaN with less than two engagements
+  signal::Measured damping_ratio, natural_frequency;  // -, rad/s, over the engagements
+  signal::Measured damping;                           // N m s/rad, by 5.10, of the mesh
+  signal::Measured damping_by_rate;                   // N m s/rad, 2 z w0 Jp, needs no stiffness
+  signal::Measured peak_damping_ratio;                // cross-check; NaN with less than two engagements
   std::vector<Ringing> ringings;
   int steps = 0;  // torque steps, or passages of the gap, of which `ringings` could be used
   std::vector<std::string> warnings;
@@ -46,6 +47,6 @@ struct DecayIdentification {
 /// % of its amplitude): not before the last loss of contact; it ends at the next step or where motor or load
 /// turn back. Throws CannotIdentify without the channels, with fewer than `least_engagements` stretches, each
 /// with an amplitude of five deviations of the residuals, InvalidParameter for settings.
-DecayIdentification identify_decay(const Record& record, const DecaySettings& settings);
+DecayIdentification identify_decay(const record::Record& record, const DecaySettings& settings);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -7,9 +7,10 @@
 #include <limits>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct Flanks {
   double lower = 0, gap = 0;  // rad
@@ -47,7 +48,7 @@ class FlankPassage {
 struct PassageFit {
   Flanks flanks;
   FlankContact contact;
-  Measured gap;               // rad
+  signal::Measured gap;       // rad
   double deviation = 0;       // rad, of the residuals
   double without_flanks = 0;  // rad, the same for the polynomials alone
   Eigen::VectorXd residuals;  // rad, passage after passage
@@ -59,4 +60,4 @@ struct PassageFit {
 PassageFit fit_flanks(const std::vector<FlankPassage>& passages, double low, double high,
                       const FlankContact& known);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -30,10 +30,11 @@
 #include <complex>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct ResponsePoint {
   double frequency = 0;           // Hz
@@ -64,11 +65,11 @@ struct ResponseSettings {
 /// Points with coherence >= least_coherence below a quarter of the sampling rate. Throws CannotIdentify where
 /// a column is missing or not finite, the torque does not vary, the record is too short, or no point is left;
 /// BadData for gaps in time; InvalidParameter for a negative segment or a least_coherence outside 0 to 1.
-FrequencyResponse estimate_response(const Record& record, const ResponseSettings& settings = {});
+FrequencyResponse estimate_response(const record::Record& record, const ResponseSettings& settings = {});
 
 /// The same from several runs: points of all, sorted. Records that cannot be used are left out; throws
 /// CannotIdentify with all the reasons where none can.
-FrequencyResponse estimate_response(const std::vector<Record>& records,
+FrequencyResponse estimate_response(const std::vector<record::Record>& records,
                                     const ResponseSettings& settings = {});
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -12,16 +12,17 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/constant_speed.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 enum class Direction { positive, negative };
 
 /// T_f = coulomb + viscous w over the rows of one direction; for w < 0 coulomb < 0, viscous > 0.
 struct FrictionLine {
-  Measured coulomb, viscous;                    // N m, N m s/rad
+  signal::Measured coulomb, viscous;            // N m, N m s/rad
   double covariance = 0;                        // of the two
   std::vector<double> speed, torque, residual;  // one per row, N m measured minus line
   double rms = 0;                               // N m, of the residuals, root of the mean square
@@ -39,8 +40,8 @@ FrictionLine fit_friction_line(const std::vector<ConstantSpeedRun>& runs, Direct
 
 /// Coulomb and viscous part of the load: whole drive minus motor alone, independent errors.
 struct LoadFriction {
-  Measured coulomb, viscous;
+  signal::Measured coulomb, viscous;
 };
 LoadFriction load_friction(const FrictionLine& drive, const FrictionLine& motor);
 
-}  // namespace backlash
+}  // namespace backlash::identification

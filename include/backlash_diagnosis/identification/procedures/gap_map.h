@@ -18,18 +18,20 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/harmonics.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct GapMapSettings {
-  Measured stiffness;                           // N m/rad; NaN: no correction of the wind-up
-  Measured friction_forward, friction_reverse;  // N m, of the load, both > 0, at the speed of the runs
-  int bins = 180;                               // per turn, 8 to 3600
-  int highest_order = 20;                       // 0 to bins / 4
-  double false_alarm = 0.01;                    // of "the gap varies", 1e-6 to 0.5
+  signal::Measured stiffness;  // N m/rad; NaN: no correction of the wind-up
+  signal::Measured friction_forward,
+      friction_reverse;       // N m, of the load, both > 0, at the speed of the runs
+  int bins = 180;             // per turn, 8 to 3600
+  int highest_order = 20;     // 0 to bins / 4
+  double false_alarm = 0.01;  // of "the gap varies", 1e-6 to 0.5
 };
 
 /// Values at the middle of the bin; standard errors from the scatter inside, its correlation in time
@@ -37,20 +39,20 @@ struct GapMapSettings {
 struct GapBin {
   double position;  // rad, load, 0 to 2 pi
   int forward_samples, reverse_samples;
-  Measured forward, reverse;  // rad, motor minus load, less s q and the mean of both runs
-  Measured separation;        // rad, forward minus reverse, not corrected
-  Measured centre;            // rad, mean of both
+  signal::Measured forward, reverse;  // rad, motor minus load, less s q and the mean of both runs
+  signal::Measured separation;        // rad, forward minus reverse, not corrected
+  signal::Measured centre;            // rad, mean of both
 };
 
 struct GapMap {
-  std::vector<GapBin> bins;                      // by position, those that both runs visited
-  double coverage = 0;                           // of the turn, that these are
-  Measured mean_separation;                      // rad, equal weight for equal angles, not for equal times
-  Measured wind_up, mean_gap;                    // rad; NaN where stiffness or friction is not given
-  Measured scale_forward, scale_reverse, scale;  // motor travel per load travel of the runs, and mean
-  double forward_speed = 0, reverse_speed = 0;   // rad/s, of the load, medians
-  std::vector<Harmonic> harmonics;               // by order, those above a thousandth of the mean
-  double deviation = 0;                          // rad, of the bins from the series
+  std::vector<GapBin> bins;            // by position, those that both runs visited
+  double coverage = 0;                 // of the turn, that these are
+  signal::Measured mean_separation;    // rad, equal weight for equal angles, not for equal times
+  signal::Measured wind_up, mean_gap;  // rad; NaN where stiffness or friction is not given
+  signal::Measured scale_forward, scale_reverse, scale;  // motor travel per load travel of the runs, and mean
+  double forward_speed = 0, reverse_speed = 0;           // rad/s, of the load, medians
+  std::vector<Harmonic> harmonics;                       // by order, those above a thousandth of the mean
+  double deviation = 0;                                  // rad, of the bins from the series
   bool varies = false;
   double confidence = 0;  // that it varies: 1 - chance of the strongest harmonic
   std::string statement;  // the same in words
@@ -66,6 +68,7 @@ struct GapMap {
 /// median. With less than a turn orders below 1 / coverage are not sought. Throws CannotIdentify without the
 /// channels, where both runs go one way, one reverses or is not steady for half of its time, or with fewer
 /// than 8 common bins; InvalidParameter for settings.
-GapMap identify_gap_map(const Record& one_way, const Record& other_way, const GapMapSettings& settings = {});
+GapMap identify_gap_map(const record::Record& one_way, const record::Record& other_way,
+                        const GapMapSettings& settings = {});
 
-}  // namespace backlash
+}  // namespace backlash::identification

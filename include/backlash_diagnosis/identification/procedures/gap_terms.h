@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/model/rig.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Which mean gap goes with the orders of the map.
 enum class GapUse {
@@ -24,19 +24,19 @@ enum class GapUse {
 /// The map with the wind-up that the friction of the rig's load and its contact stiffness make at the speeds
 /// of the runs: for a rig that was fitted after the map was made. Errors of the rig are not known here and
 /// not included. Throws InvalidParameter for a contact law without stiffness.
-GapMap with_wind_up(GapMap map, const Rig& rig);
+GapMap with_wind_up(GapMap map, const model::Rig& rig);
 
 /// Whether a term says how the backlash depends on the position of the load: varying_backlash, backlash_map.
-bool gap_varies(const Rig& rig);
+bool gap_varies(const model::Rig& rig);
 
 /// The rig (load side) with the orders of the map as terms varying_backlash instead of any that gap_varies()
 /// asks for, and the mean gap as `use` says; the other terms stay. Throws InvalidParameter where the mean is
 /// not > 0.
-Rig with_gap_map(Rig rig, const GapMap& map, GapUse use = GapUse::corrected);
+model::Rig with_gap_map(model::Rig rig, const GapMap& map, GapUse use = GapUse::corrected);
 
 /// Puts one term varying_backlash per order of the map into a rig file, in place of those that gap_varies()
 /// asks for. `mean_gap` [rad] is the backlash_angle of the document. Throws InvalidParameter where it is not
 /// > 0, BadData where there are no such terms in block style.
-void replace_gap_terms(RigDocument& document, const GapMap& map, double mean_gap);
+void replace_gap_terms(rig_file::RigDocument& document, const GapMap& map, double mean_gap);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -5,18 +5,19 @@
 
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct Harmonic {
   int order;
-  Measured amplitude, phase;  // of sin(order angle + phase): unit of the values, rad
-  double chance;              // of so much or more by noise alone, all orders considered
+  signal::Measured amplitude, phase;  // of sin(order angle + phase): unit of the values, rad
+  double chance;                      // of so much or more by noise alone, all orders considered
 };
 
 struct HarmonicSeries {
-  Measured mean;
+  signal::Measured mean;
   std::vector<Harmonic> harmonics;  // by order
   double deviation = 0;             // of the residuals
   double chance = 1;                // of the strongest order, taken or not
@@ -28,4 +29,4 @@ struct HarmonicSeries {
 HarmonicSeries fit_harmonics(const std::vector<double>& angle, const std::vector<double>& values,
                              const std::vector<int>& orders, double false_alarm);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -17,10 +17,11 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct LineInertiaOptions {
   double frequency = 0;     // Hz; 0: the largest line of the speed
@@ -33,11 +34,11 @@ struct LineInertiaOptions {
 
 /// What one run gives.
 struct LineInertia {
-  Measured inertia, viscous;     // kg m^2, N m s/rad
-  double frequency = 0;          // Hz
-  double torque = 0, speed = 0;  // amplitudes, N m, rad/s
-  double mean_speed = 0;         // rad/s
-  std::size_t cycles = 0;        // used
+  signal::Measured inertia, viscous;  // kg m^2, N m s/rad
+  double frequency = 0;               // Hz
+  double torque = 0, speed = 0;       // amplitudes, N m, rad/s
+  double mean_speed = 0;              // rad/s
+  std::size_t cycles = 0;             // used
 };
 
 /// One run: least squares of mean, slope and sine over whole cycles (from the position, where recorded, mean,
@@ -46,10 +47,10 @@ struct LineInertia {
 /// CannotIdentify with fewer than four cycles after the skipped ones, where the speed reverses or stops, no
 /// line stands out (the sine explains less than half of the speed about its mean), or a channel is missing;
 /// InvalidParameter for options < 0.
-LineInertia line_inertia(const Record& record, const LineInertiaOptions& options = {});
+LineInertia line_inertia(const record::Record& record, const LineInertiaOptions& options = {});
 
 /// The magnitude form. Throws InvalidParameter where an argument is not > 0 (viscous: >= 0) or the viscous
 /// part exceeds the torque. [N m, rad/s, Hz, N m s/rad]
 double inertia_from_amplitudes(double torque, double speed, double frequency, double viscous = 0);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -13,10 +13,11 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct OneInertiaOptions {
   double cutoff = 0;  // Hz; 0: the bandwidth of the motion (bandwidth.h), at least 100 periods in the record
@@ -24,10 +25,10 @@ struct OneInertiaOptions {
 };
 
 struct OneInertia {
-  Measured inertia, viscous, coulomb, offset;  // kg m^2, N m s/rad, N m, N m (kg, N s/m, N, N)
-  Measured delay;     // s: the torque acts that much later than its stamp says, seen from the position; a
-                      // command that is held until the next sample has half an interval of it
-  double cutoff = 0;  // Hz
+  signal::Measured inertia, viscous, coulomb, offset;  // kg m^2, N m s/rad, N m, N m (kg, N s/m, N, N)
+  signal::Measured delay;  // s: the torque acts that much later than its stamp says, seen from the position;
+                           // a command that is held until the next sample has half an interval of it
+  double cutoff = 0;       // Hz
   double relative_error = 0;                      // norm(residual) / norm(torque - its mean), both filtered
   double floor = 0;                               // of that, by the white noise of torque and position alone
   double used = 0;                                // share of the samples
@@ -45,11 +46,11 @@ struct OneInertia {
 /// CannotIdentify where motor_torque or motor_position is missing, the record is shorter than 64 samples or
 /// 40 periods of the cutoff, or one direction has less than 5 % of the samples; InvalidParameter for a cutoff
 /// beyond 0.4 of the sampling rate or a delay beyond two intervals.
-OneInertia identify_one_inertia(const Record& record, const OneInertiaOptions& options = {});
+OneInertia identify_one_inertia(const record::Record& record, const OneInertiaOptions& options = {});
 
 /// Relative error with which the identified machine predicts another record, at its own cutoff and delay,
 /// over all samples of that record that identify_one_inertia would use. Throws as above, but needs no second
 /// direction.
-double relative_error(const OneInertia& machine, const Record& record);
+double relative_error(const OneInertia& machine, const record::Record& record);
 
-}  // namespace backlash
+}  // namespace backlash::identification

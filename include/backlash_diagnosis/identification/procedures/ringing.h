@@ -5,16 +5,17 @@
 
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct Ringing {
-  std::vector<double> time, measured, fitted;  // s, unit of the signal
-  double level = 0, slope = 0;                 // c0, c1 [1/s], t from the first sample
-  double amplitude = 0, deviation = 0;         // largest excursion of the sine; of the residuals
-  Measured rate, frequency;                    // a [1/s], wd [rad/s]
-  Measured damping_ratio, natural_frequency;   // z [-], w0 [rad/s]
+  std::vector<double> time, measured, fitted;         // s, unit of the signal
+  double level = 0, slope = 0;                        // c0, c1 [1/s], t from the first sample
+  double amplitude = 0, deviation = 0;                // largest excursion of the sine; of the residuals
+  signal::Measured rate, frequency;                   // a [1/s], wd [rad/s]
+  signal::Measured damping_ratio, natural_frequency;  // z [-], w0 [rad/s]
   /// Extremes measured from the line c0 + c1 t, in turn above and below, and the damping ratio they give; NaN
   /// with fewer than three.
   std::vector<double> peak_time, peak;
@@ -31,4 +32,4 @@ Ringing fit_ringing(const std::vector<double>& time, const std::vector<double>& 
 /// noise and left out.
 void measure_peaks(Ringing& ringing);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -8,7 +8,7 @@
 
 #include "backlash_diagnosis/identification/procedures/frequency_response.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 /// Whole cycles of one sine, from a rising passage of its mean to another; in samples, may be fractions.
 struct SineRun {
@@ -38,4 +38,4 @@ SineRuns find_sine_runs(const std::vector<double>& torque);
 ResponsePoint sine_response(const std::vector<double>& torque, const std::vector<double>& speed,
                             const SineRun& run);
 
-}  // namespace backlash
+}  // namespace backlash::identification

@@ -16,10 +16,11 @@
 #include <complex>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/procedures/frequency_response.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash {
+namespace backlash::identification {
 
 struct TwoMass {
   double motor_inertia = 0, load_inertia = 0;  // kg m^2, > 0
@@ -38,7 +39,7 @@ struct TwoMass {
 };
 
 struct Resonances {
-  Measured resonance, anti_resonance;  // Hz
+  signal::Measured resonance, anti_resonance;  // Hz
 };
 
 /// Where |wM/T| has its maximum above and its minimum below: extrema of the cubics through 1/|H|^2 (maximum)
@@ -53,7 +54,7 @@ Resonances find_resonances(const FrequencyResponse& motor);
 /// 40 to 60 Hz next to a resonance at 36 Hz gives half of the motor inertia. Friction c adds (c / (w J))^2
 /// / 2. Throws CannotIdentify with fewer than three points in the band, InvalidParameter unless 0 <= from <
 /// to.
-Measured inertia_plateau(const FrequencyResponse& motor, double from, double to);
+signal::Measured inertia_plateau(const FrequencyResponse& motor, double from, double to);
 
 /// The same with the undamped response to either side of known frequencies taken out:
 ///   total inertia |1 - (f/F_AR)^2| / |1 - (f/F_R)^2|,   motor inertia |1 - (F_AR/f)^2| / |1 - (F_R/f)^2|
@@ -61,7 +62,7 @@ Measured inertia_plateau(const FrequencyResponse& motor, double from, double to)
 /// leaves out still makes some per cent. The standard error holds what the two halves of the band
 /// differ by. Throws CannotIdentify with fewer than five points in a band.
 struct InertiaPlateaus {
-  Measured total, motor;  // kg m^2
+  signal::Measured total, motor;  // kg m^2
 };
 InertiaPlateaus find_inertias(const FrequencyResponse& motor, const Resonances& resonances);
 
@@ -74,26 +75,26 @@ enum class KnownInertia {
 
 /// A row of Table 5.1.
 struct StiffnessSplit {
-  Measured motor_inertia, load_inertia, reduced_inertia;   // kg m^2
-  Measured stiffness_anti_resonance, stiffness_resonance;  // N m/rad, Ks1 from F_AR and Ks2 from F_R
-  Measured resonance, anti_resonance;                      // Hz, F_R from Ks1 and F_AR from Ks2
+  signal::Measured motor_inertia, load_inertia, reduced_inertia;   // kg m^2
+  signal::Measured stiffness_anti_resonance, stiffness_resonance;  // N m/rad, Ks1 from F_AR and Ks2 from F_R
+  signal::Measured resonance, anti_resonance;                      // Hz, F_R from Ks1 and F_AR from Ks2
 };
 
 /// Standard errors by linear propagation, inputs taken for independent. Inertias that the choice does not
 /// keep are not read. Throws CannotIdentify where a needed value is not > 0, the resonance not above the
 /// anti-resonance, or the total not above the motor inertia.
-StiffnessSplit split_stiffness(KnownInertia known, const Resonances& measured, const Measured& total_inertia,
-                               const Measured& motor_inertia);
+StiffnessSplit split_stiffness(KnownInertia known, const Resonances& measured,
+                               const signal::Measured& total_inertia, const signal::Measured& motor_inertia);
 
 /// All parameters from the whole response at once.
 struct TwoMassFit {
-  Measured motor_inertia, load_inertia, total_inertia;  // kg m^2
-  Measured stiffness;                                   // N m/rad
-  Measured damping, damping_ratio;                      // N m s/rad, -
-  Measured motor_viscous, load_viscous, viscous;        // N m s/rad; `viscous` is their sum
-  Measured delay;                                       // s, of the speed against the torque
-  Measured resonance, anti_resonance;                   // Hz, of the undamped system
-  double misfit = 0;                                    // rms of the residuals in units of their errors
+  signal::Measured motor_inertia, load_inertia, total_inertia;  // kg m^2
+  signal::Measured stiffness;                                   // N m/rad
+  signal::Measured damping, damping_ratio;                      // N m s/rad, -
+  signal::Measured motor_viscous, load_viscous, viscous;        // N m s/rad; `viscous` is their sum
+  signal::Measured delay;                                       // s, of the speed against the torque
+  signal::Measured resonance, anti_resonance;                   // Hz, of the undamped system
+  double misfit = 0;  // rms of the residuals in units of their errors
 
   TwoMass model() const;
 };
@@ -108,4 +109,4 @@ struct TwoMassFit {
 /// CannotIdentify where find_resonances or find_inertias do, or where the fit ends nowhere.
 TwoMassFit fit_two_mass(const FrequencyResponse& motor, const FrequencyResponse& load = {});
 
-}  // namespace backlash
+}  // namespace backlash::identification
