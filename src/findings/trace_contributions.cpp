@@ -21,8 +21,8 @@ double opening(const model::Term& term, const model::Motion& m, double half_gap,
 }
 
 model::Motion motion(const identification::TraceSeries& s, std::size_t k) {
-  return {s.time[k],          s.motor_position[k], s.motor_velocity[k], s.load_position[k],
-          s.load_velocity[k], s.mesh_torque[k],    s.motor_torque[k]};
+  return {s.time[k],          s.motor_position[k], s.motor_velocity[k],
+          s.load_position[k], s.load_velocity[k],  s.mesh_torque[k]};
 }
 
 bool changes(const Contribution& c) {

@@ -10,6 +10,8 @@
 namespace backlash::model {
 namespace {
 
+constexpr int kMostSteps = 60;        // theory: 2^-60 where friction grows by half of the torque
+constexpr double kSettled = 1e-12;    // theory: relative, above roundings
 constexpr double kWithinReach = 0.1;  // share of the half gap; a flank that moves by less cannot touch
 
 /// A load with rigid couplings behind a mesh that gives way: node 0 is the motor, node 1 the load.
@@ -68,6 +70,7 @@ GearTrain::GearTrain(const Rig& rig)
     throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
   set_backlash(rig.mesh.backlash);
   sum_inertia(rig);
+  check_what_follows_torque();
   bool dry = false;
   EndFriction at_rest;
   for (const auto& term : terms_) {
@@ -75,6 +78,7 @@ GearTrain::GearTrain(const Rig& rig)
     shaped_ |= term->shapes_flanks() || term->loads_flanks();
     shape_follows_torque_ |= term->shape_follows_torque();
     dry |= term->has_dry_friction();
+    friction_of_load_ |= one_body() && term->follows_mesh_torque();
     term->add_friction({}, at_rest);
     const bool acts_on_flanks = term->shapes_flanks() || term->loads_flanks();
     if (term->shapes_flanks()) flank_terms_.push_back(term.get());
@@ -86,6 +90,14 @@ GearTrain::GearTrain(const Rig& rig)
   if (dry || rubs(coulomb_.motor) || (load_rubs && one_body())) dry_ends_.push_back({kMotor, {}});
   if (load_rubs && !one_body()) dry_ends_.push_back({kLink, {}});
   smooth_ = contact_ && !contact_->needs_impact_speed() && !variation_ && terms_.empty() && dry_ends_.empty();
+}
+
+void GearTrain::check_what_follows_torque() const {
+  if (contact_) return;
+  for (const auto& term : terms_)
+    if (term->follows_mesh_torque() && !(one_body() && term->has_dry_friction()))
+      throw InvalidParameter("terms", term->id,
+                             "follows the torque through the teeth, which a rigid mesh lacks");
 }
 
 void GearTrain::brake_motor() {
@@ -108,6 +120,8 @@ void GearTrain::sum_inertia(const Rig& rig) {
                                       rig.link.inertia + 0.5 * rig.output_coupling.inertia};
   for (int part = 0; part < kPartCount; ++part)
     if (moves(part)) inertia_[layout_.node[part]] += of_part[part];
+  const double of_load = of_part[kGear] + of_part[kLink];
+  if (one_body() && of_load > 0) share_of_load_ = of_load / inertia_[layout_.node[kMotor]];
   for (int node = 0; node < layout_.dof; ++node) {
     if (!(inertia_[node] > 0))
       throw InvalidParameter("inertia", inertia_[node], "every moving part needs inertia");
@@ -237,6 +251,36 @@ EndFriction GearTrain::friction(const Motion& motion) const {
   return sum;
 }
 
+double GearTrain::torque_of_load(const Motion& motion, double acceleration) const {
+  EndTorques ends;
+  for (const auto& term : terms_) term->add(motion, ends);
+  return share_of_load_ * inertia_[layout_.node[kMotor]] * acceleration - ends.load;
+}
+
+/// Under these torques without dry friction. Of one body, friction that follows what the load takes is found
+/// with the acceleration that it leaves, for either direction; each step comes nearer by the factor by which
+/// friction grows with that torque. The sign of what is left is that at rest, so sticking needs no other
+/// value.
+EndFriction GearTrain::friction_under(const Motion& motion, const double* net) const {
+  if (!friction_of_load_) return friction(motion);
+  const double all = net[layout_.node[kMotor]], inertia = inertia_[layout_.node[kMotor]];
+  Motion loaded = motion;
+  const auto settled = [&](int direction, double FrictionLimits::*limit) {
+    double rubs = 0;
+    for (int i = 0; i < kMostSteps; ++i) {
+      loaded.mesh_torque = torque_of_load(motion, (all - direction * rubs) / inertia);
+      const double before = rubs;
+      rubs = friction(loaded).motor.*limit;
+      if (std::fabs(rubs - before) <= kSettled * rubs) break;
+    }
+    return rubs;
+  };
+  EndFriction both = friction(motion);
+  both.motor.forward = settled(1, &FrictionLimits::forward);
+  both.motor.backward = settled(-1, &FrictionLimits::backward);
+  return both;
+}
+
 /// Adds what the teeth do to pinion and gear and returns the mesh torque.
 inline double GearTrain::add_teeth(const PartMotion& s, double* torque) const {
   if (shaped_ && contact_) return add_shaped_teeth(s, torque);
@@ -252,7 +296,7 @@ inline double GearTrain::net_torques(double t, const PartMotion& s, AppliedTorqu
   const auto teeth_and_terms = [&](double* torque) {
     mesh_torque = add_teeth(s, torque);
     if (terms_.empty()) return;
-    const Motion motion = motion_of(t, s, mesh_torque, applied);
+    const Motion motion = motion_of(t, s, mesh_torque);
     EndTorques ends;
     for (const auto& term : terms_) term->add(motion, ends);
     torque[kMotor] += ends.motor;
@@ -266,7 +310,7 @@ GearTrain::Balance GearTrain::balance(double t, const double* state, AppliedTorq
   const PartMotion s = part_motion(state);
   Balance b;
   b.mesh_torque = net_torques(t, s, applied, b.net);
-  if (!dry_ends_.empty()) b.friction = friction(motion_of(t, s, b.mesh_torque, applied));
+  if (!dry_ends_.empty()) b.friction = friction_under(motion_of(t, s, b.mesh_torque), b.net);
   return b;
 }
 
@@ -287,7 +331,7 @@ void GearTrain::derivative(double t, const double* state, AppliedTorque applied,
     rate[layout_.dof + node] = net[node] / inertia_[node];
   }
   if (dry_ends_.empty()) return;
-  const EndFriction rubbing = friction(motion_of(t, s, mesh_torque, applied));
+  const EndFriction rubbing = friction_under(motion_of(t, s, mesh_torque), net);
   for (const DryEnd& end : dry_ends_) {
     const int node = layout_.node[end.part], speed = layout_.dof + node;
     if (end.mode.stuck())

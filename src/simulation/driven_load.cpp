@@ -41,20 +41,18 @@ Cubic between(const std::vector<double>& y, std::size_t k) {
 struct Moment {
   double time;
   double motor, motor_rate, load_rate;
-  double motor_torque;
 };
 
 /// Motion within one sample.
 struct Segment {
   Cubic motor, motor_rate, load_rate;
-  double motor_torque;
   double start, interval;
 
   Moment at(double u) const {
     const double t = start + u * interval;
-    if (u == 0) return {t, motor.y0, motor_rate.y0, load_rate.y0, motor_torque};
-    if (u == 1) return {t, motor.y1, motor_rate.y1, load_rate.y1, motor_torque};
-    return {t, motor(u), motor_rate(u), load_rate(u), motor_torque};
+    if (u == 0) return {t, motor.y0, motor_rate.y0, load_rate.y0};
+    if (u == 1) return {t, motor.y1, motor_rate.y1, load_rate.y1};
+    return {t, motor(u), motor_rate(u), load_rate(u)};
   }
 };
 
@@ -70,13 +68,6 @@ struct Halves {
   }
 };
 
-/// Whether terms push the load, which may follow the torque of the motor; flanks do not.
-bool pushed(const model::Rig& rig) {
-  return std::any_of(rig.terms.begin(), rig.terms.end(), [](const auto& term) {
-    return term->moves_load() && !term->shapes_flanks() && !term->loads_flanks();
-  });
-}
-
 class Load {
  public:
   Load(const model::Rig& rig, double feedback)
@@ -84,7 +75,6 @@ class Load {
         inertia_(train_.load_inertia()),
         feedback_(feedback),
         rubs_(train_.friction_event_count() > 0),
-        may_follow_torque_(pushed(rig)),
         shaped_(train_.flanks_shift_with_position()) {}
 
   double q = 0, w = 0;
@@ -99,7 +89,6 @@ class Load {
   /// part. `sum` gathers the mesh torque on the motor; returns that through the teeth at the end.
   double step(const Segment& s, Halves& sum) {
     double u = 0;
-    if (may_follow_torque_) last_ = forces(s.at(0), q, w, flanks_);  // the motor torque has jumped
     Forces f = last_;
     for (int piece = 0; u < 1; ++piece) {
       const bool divide = piece < kMostPieces;
@@ -132,7 +121,7 @@ class Load {
 
   /// `flanks`: where they are at nearly this position, if known.
   Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
-    const model::Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0, m.motor_torque};
+    const model::Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0};
     Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position, rate};
     f.net += inertia_ * feedback_ * (m.load_rate - rate);
     return f;
@@ -236,7 +225,7 @@ class Load {
 
   model::GearTrain train_;
   double inertia_, feedback_;
-  bool rubs_, may_follow_torque_, shaped_;
+  bool rubs_, shaped_;
   model::StickSlip mode_;
   Forces last_{};  // at the end of the sample before
   Flanks flanks_;  // there, if known
@@ -259,7 +248,7 @@ class LockedLoad {
 
  private:
   model::GearTrain::LoadForces forces(const Moment& m) const {
-    return train_.load_forces({m.time, m.motor, m.motor_rate, 0, 0, 0, m.motor_torque});
+    return train_.load_forces({m.time, m.motor, m.motor_rate, 0, 0, 0});
   }
 
   model::GearTrain train_;
@@ -288,7 +277,6 @@ DrivenLoad follow(Body& load, const RecordedMotion& motion) {
     const Segment segment{{q[k], q[j], motion.interval * w[k], motion.interval * w[j]},
                           between(w, k),
                           motion.load_rate ? between(*motion.load_rate, k) : Cubic{0, 0, 0, 0},
-                          motion.motor_torque ? (*motion.motor_torque)[k] : 0,
                           double(k) * motion.interval,
                           motion.interval};
     if (k == 0) mesh_torque = load.begin(segment);
@@ -354,25 +342,19 @@ DrivenLoad simulate_driven_load(const model::Rig& rig, const RecordedMotion& mot
 MotorTorques motor_torques(const model::Rig& rig, const RecordedMotion& motion, const DrivenLoad& load) {
   const model::GearTrain train(rig);
   const std::size_t n = motion.motor->size();
-  const auto held = [&](std::size_t k) { return motion.motor_torque ? (*motion.motor_torque)[k] : 0.0; };
-  const auto forces = [&](std::size_t k, double torque) {
-    const double mesh_torque = rig.mesh.rigid ? torque : load.mesh_torque[k];
-    return train.motor_forces({double(k) * motion.interval, (*motion.motor)[k], (*motion.motor_rate)[k],
-                               load.load[k], load.load_rate[k], mesh_torque, torque});
-  };
-  MotorTorques out{load.mesh_on_motor, std::vector<model::FrictionLimits>(n)};
-  // Of each sample with the torque held before it and after it. Each interval's triangular weights give 1/2
-  // of the mean, by Simpson's weights (1 + 5) / 12 if what is held does not jump within.
+  MotorTorques out{load.mesh_on_motor, std::vector<model::FrictionLimits>(n), load.mesh_torque};
   for (std::size_t k = 0; k < n; ++k) {
-    const double first = held(k == 0 ? 0 : k - 1), second = held(k);
-    const model::GearTrain::MotorForces after = forces(k, second);
-    const model::GearTrain::MotorForces before = first == second ? after : forces(k, first);
-    out.mean[k] += 5.0 / 12 * (before.net + after.net);
-    out.mean[k == 0 ? 0 : k - 1] += before.net / 12;
-    out.mean[k + 1 == n ? k : k + 1] += after.net / 12;
-    out.friction[k] = {0.5 * (before.friction.forward + after.friction.forward),
-                       0.5 * (before.friction.backward + after.friction.backward), after.friction.presliding,
-                       after.friction.presliding_damping};
+    model::Motion m{double(k) * motion.interval, (*motion.motor)[k], (*motion.motor_rate)[k], load.load[k],
+                    load.load_rate[k],           load.mesh_torque[k]};
+    if (rig.mesh.rigid)
+      out.mesh_torque[k] = m.mesh_torque =
+          train.torque_of_load(m, motion.acceleration ? (*motion.acceleration)[k] : 0);
+    const model::GearTrain::MotorForces forces = train.motor_forces(m);
+    // The triangular weights of two intervals, by Simpson's rule for what is smooth.
+    out.mean[k] += 10.0 / 12 * forces.net;
+    out.mean[k == 0 ? 0 : k - 1] += forces.net / 12;
+    out.mean[k + 1 == n ? k : k + 1] += forces.net / 12;
+    out.friction[k] = forces.friction;
   }
   return out;
 }

@@ -260,7 +260,7 @@ TEST(FlankTerms, RefusalsNameWhatIsWrong) {
       {"id: local_fault, flank: both, amplitude: 1, position: 0, width: 0", "width = 0: must be > 0"},
       {gap + "load_velocity", "coordinate = load_velocity: a gap follows"},
       {gap + "motor_velocity", "coordinate = motor_velocity: a gap follows"},
-      {gap + "motor_torque", "coordinate = motor_torque: a gap follows"},
+      {gap + "motor_torque", "coordinate = motor_torque: must be one of"},
       {gap + "time", "coordinate = time: a gap follows"},
       {gap + "temperature", "coordinate = temperature: must be one of motor_position, load_position"},
       {map + "points: [0, 1], values: [0]", "values = [...]: one value per point, not 1"},

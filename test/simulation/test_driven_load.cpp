@@ -111,20 +111,21 @@ TEST(DrivenLoad, RigidMeshTakesTheLoadAlong) {
   EXPECT_EQ(motor.friction[2].forward, 47 + 18);
 }
 
-TEST(DrivenLoad, TermsSeeTheRecordedTorque) {
+// T = J a less the torques on the load: 0.1 of it more friction, with J = 6.1 + 108 kg m^2 less the motor's
+// own.
+TEST(DrivenLoad, FrictionOfOneInertiaFollowsWhatItsLoadTakes) {
   model::Rig rig = other_servo();
   rig.mesh.rigid = true;
-  struct Follows : model::Term {
-    void add(const model::Motion& motion, model::EndTorques& torques) const override {
-      torques.motor += 0.1 * motion.motor_torque + 0.01 * motion.mesh_torque;
-    }
-  };
-  rig.terms.push_back(std::make_shared<Follows>());
-  const std::vector<double> still(4, 0.0), torque = {0, 100, 300, 300};
-  const RecordedMotion motion{1e-3, &still, &still, nullptr, 0, 0, &torque};
-  // Held from sample to sample, and the mean over the intervals on either side of the sample.
-  EXPECT_NEAR(motor_torques(rig, motion, simulate_driven_load(rig, motion)).mean[2], 0.11 * 0.5 * (100 + 300),
-              1e-9);
+  ParameterValues values = {{"coefficient", 0.1}};
+  values.set_choice("body", "motor");
+  rig.terms.push_back(model::make_term("load_dependent_friction", values));
+  rig.terms.push_back(model::make_term("gravity", {{"amplitude", 40}, {"phase", M_PI / 2}}));
+  const std::vector<double> still(4, 0.0), acceleration = {0, 2, -3, 0};
+  const RecordedMotion motion{1e-3, &still, &still, nullptr, 0, 0, &acceleration};
+  const MotorTorques motor = motor_torques(rig, motion, simulate_driven_load(rig, motion));
+  for (std::size_t k = 0; k < still.size(); ++k)
+    EXPECT_NEAR(motor.friction[k].forward, 47 + 18 + 0.1 * std::fabs(rig.link.inertia * acceleration[k] + 40),
+                1e-9);
 }
 
 // Flanks are looked up less often than forces.

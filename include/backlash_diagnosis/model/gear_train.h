@@ -11,7 +11,13 @@
 // sticking, see StickSlip; a braked motor sticks whatever the torque. Terms may shift either flank by an
 // opening o(q_M, q_L, torque); then its penetration is side x - backlash / 2 - r o, and the mesh torque acts
 // on both ends through the slopes of o, so that no energy is lost or gained (but see terms that follow the
-// torque). After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute instead of relative
+// torque).
+//
+// Where mesh and couplings are rigid, what terms take for the torque through the teeth is what the load
+// takes,
+//   T = J a - terms on the load        J of gear and link; where the file gives them none, of all of it
+// without friction of its own. Friction may follow it (T and friction are found together), smooth torques may
+// not. After Sarkar, Ellis and Moore (1997), Eqs. 1 to 5 and Table 1, with absolute instead of relative
 // coordinates.
 #pragma once
 
@@ -84,6 +90,9 @@ class GearTrain : private TrainParts {
   bool flanks_shift_with_position() const { return shaped_ && !shape_follows_torque_; }
   Flanks flanks(double motor_position, double load_position) const;
   LoadForces load_forces(const Motion& motion, const Flanks& flanks) const;
+
+  /// N m: what the load of one body takes at this acceleration [rad/s^2], the T above.
+  double torque_of_load(const Motion& motion, double acceleration) const;
 
   /// What acts on the motor with rigid couplings beside mesh and motor torque; where the link is one body
   /// with it, on both.
@@ -175,11 +184,8 @@ class GearTrain : private TrainParts {
   bool moves(int part) const { return layout_.node[part] != TrainLayout::kFixed; }
   bool one_body() const { return layout_.node[kLink] == layout_.node[kMotor]; }
   PartMotion part_motion(const double* state) const { return equations_.part_motion(layout_, state); }
-  Motion motion_of(double t, const PartMotion& s, double mesh_torque, AppliedTorque applied) const {
-    const double motor_torque = applied.motor * ratio_;
-    return {t,           s.q[kMotor], s.w[kMotor],
-            s.q[kLink],  s.w[kLink],  contact_ ? mesh_torque : motor_torque,
-            motor_torque};
+  static Motion motion_of(double t, const PartMotion& s, double mesh_torque) {
+    return {t, s.q[kMotor], s.w[kMotor], s.q[kLink], s.w[kLink], mesh_torque};
   }
   double add_teeth(const PartMotion& s, double* torque) const;
   double net_torques(double t, const PartMotion& s, AppliedTorque applied, double* net) const;
@@ -198,6 +204,8 @@ class GearTrain : private TrainParts {
   template <typename AddTeeth>
   LoadForces load_forces(const Motion& motion, const PartMotion& s, const AddTeeth& add_teeth) const;
   EndFriction friction(const Motion& motion) const;
+  EndFriction friction_under(const Motion& motion, const double* net) const;
+  void check_what_follows_torque() const;
   const FrictionLimits& limits(const DryEnd& end, const EndFriction& friction) const;
   double penetration(const PartMotion& s, Flank flank) const;
   double approach(const PartMotion& s, Flank flank) const;
@@ -211,10 +219,12 @@ class GearTrain : private TrainParts {
   TrainLayout layout_;
   EquationsOfMotion<double> equations_;
   std::array<double, kPartCount> inertia_{};  // per degree of freedom, kg m^2
+  double share_of_load_ = 1;                  // of the inertia of one body
   double sensed_damping_;  // N m s/rad, the part of the sensor's damper that sensor_torque shows
   double half_gap_, lever_;
   EndFriction coulomb_;
   bool shaped_ = false, shape_follows_torque_ = false, loaded_ = false;
+  bool friction_of_load_ = false;  // of one body, follows what its load takes
   bool braked_ = false;
   bool smooth_;
   bool presliding_ = false;  // either end has a presliding distance, which does not change

@@ -23,9 +23,8 @@ struct Motion {
   double motor_velocity;  // rad/s
   double load_position;   // rad
   double load_velocity;   // rad/s
-  // N m, through the teeth, > 0 drives the load forward; of a rigid mesh that of the motor
+  // N m, through the teeth, > 0 drives the load forward; of one inertia what its load takes (GearTrain)
   double mesh_torque = 0;
-  double motor_torque = 0;  // N m, that the motor applies
 };
 
 /// Torques on the two ends of the gear train [N m], load-side; positive torque accelerates in positive
@@ -106,6 +105,10 @@ class Term {
   /// the sum is limited to >= 0.
   virtual bool loads_flanks() const { return false; }
   virtual void load_flank(const FlankLoad&, double& /*torque*/) const {}
+
+  /// Whether it reads Motion::mesh_torque. The torque of the motor is none of a term's business: the model
+  /// predicts it.
+  virtual bool follows_mesh_torque() const { return false; }
 
   virtual void sense(Sensing&) const {}
 

@@ -28,9 +28,8 @@ struct RecordedMotion {
   const std::vector<double>* motor_rate = nullptr;  // rad/s
   const std::vector<double>* load_rate = nullptr;   // rad/s, draws the simulated load; null: it runs free
   double first_load = 0, first_load_rate = 0;       // rad, rad/s: where the load starts
-  // N m of the motor, load-side, held from sample to sample, for terms that follow it; null: 0. It does not
-  // move anything.
-  const std::vector<double>* motor_torque = nullptr;
+  // rad/s^2 of the motor, smooth, for friction of one inertia that follows what its load takes; null: 0
+  const std::vector<double>* acceleration = nullptr;
 };
 
 struct DrivenLoad {
@@ -45,6 +44,7 @@ struct DrivenLoad {
 struct MotorTorques {
   std::vector<double> mean;  // N m, with the mesh, without dry friction; weighted as above
   std::vector<model::FrictionLimits> friction;
+  std::vector<double> mesh_torque;  // N m, as terms see it: of one inertia what its load takes
 };
 
 /// Typical k [1/s].

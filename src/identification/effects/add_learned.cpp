@@ -52,7 +52,7 @@ Hypothesis add_map(const Hypothesis& before, const SearchContext& context) {
       std::vector<Effect> effects = h.effects;
       effects.push_back({trial->candidate, gain, {}, nearest_effects(h, context), {}});
       if (auto with = refitted(h, std::move(effects), context)) return *with;
-      reason = "takes the noise away with the torque, or the machine cannot be fitted with it";
+      reason = "the machine cannot be fitted with it at new weights";
     }
     h = with_rejected(std::move(h), map_term().id, reason);
   }

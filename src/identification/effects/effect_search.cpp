@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "effect_roles.h"
 #include "found_effects.h"
@@ -45,7 +46,9 @@ Records records_of(const model::Rig& rig, const std::vector<record::Record>& tra
   if (train.empty()) throw CannotIdentify("no training record");
   Records records;
   for (const record::Record& record : train) records.train.push_back(traced_data(record, rig));
-  records.test = traced_data(test, rig);
+  double torque = 0;  // what the model says of the test record knows nothing of that record's torque
+  for (const ServoData& data : records.train) torque = std::max(torque, usual_torque(data.torque));
+  records.test = traced_data(test, rig, torque);
   require_same_rate(records.train, records.test);
   return records;
 }

@@ -18,16 +18,6 @@ bool has(const std::vector<Effect>& effects, bool (*is)(const std::string& id)) 
   return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return is(e.candidate.id); });
 }
 
-/// A map over the recorded torque can cancel that torque together with the inertia; the residual is then
-/// smaller than the noise.
-bool takes_noise_away(const std::vector<Effect>& effects, const Misfit& misfit, const MapSettings& settings) {
-  return misfit.torque < settings.less_than_noise &&
-         std::any_of(effects.begin(), effects.end(), [](const Effect& e) {
-           return is_learned(e.candidate.id) && kind_of(e.candidate.terms.front()).coordinate ==
-                                                    record::channel_name(record::Channel::motor_torque);
-         });
-}
-
 BandFit fit_with_effects(Machine machine, bool delay, const SearchContext& context) {
   const FitSettings& settings = context.settings.fit;
   if (delay)
@@ -98,7 +88,7 @@ std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effe
                                    const SearchContext& context) {
   auto fit = attempted(
       [&] { return fit_with_effects(start_with(h, effects, context), has(effects, is_delay), context); });
-  if (!fit || takes_noise_away(effects, fit->misfit, context.settings.maps)) return std::nullopt;
+  if (!fit) return std::nullopt;
   Hypothesis other = h;
   other.fitted = std::make_shared<const BandFit>(std::move(*fit));
   const Machine& machine = other.fitted->fit.machine;

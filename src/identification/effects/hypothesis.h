@@ -62,8 +62,7 @@ Machine extended(Machine machine, const Candidate& candidate, const SearchContex
 /// The machine with these effects alone, at the values that it has now: a start for a fit.
 Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, const SearchContext& context);
 
-/// The same machine with these effects instead, fitted at weights of its own. Nothing where that fails, or
-/// where a map over the torque takes the noise away with it.
+/// The same machine with these effects instead, fitted at weights of its own. Nothing where that fails.
 std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
                                    const SearchContext& context);
 

@@ -22,7 +22,6 @@ std::vector<double> coordinate(const std::string& name, const RecordSet& records
     const auto take = [&](const std::vector<double>& x) { all.insert(all.end(), x.begin(), x.end()); };
     if (name == "motor_position") take(d.motor);
     if (name == "motor_velocity") take(d.motor_rate);
-    if (name == "motor_torque") take(d.torque);
     if (name == "load_position") take(d.load);
     if (name == "load_velocity") take(d.load_rate);
     if (name == "mesh_torque")

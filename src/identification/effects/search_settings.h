@@ -59,7 +59,6 @@ struct MapSettings {
   double something_left = 1.25;  // simulation: times the floor
   std::size_t trials = 2;        // choice (time): maps that are fitted with the machine
   std::size_t nearest = 3;       // choice: named effects that are told beside a map
-  double less_than_noise = 0.8;  // theory: times the floor: a residual cannot be that small
   double probe = 0.05;           // theory: of a strength that shows clearly, as ScreenSettings::probe
   double tail = 0.002;           // choice: of the samples, beyond the outer points
   double ridge = 1e-6;           // theory: of the mean squared sensitivity: decides what nothing else does

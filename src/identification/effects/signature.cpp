@@ -41,8 +41,8 @@ Samples samples(const Machine& machine, const RecordSet& records, bool deflectio
       if (!(deflection ? record.settled : record.counts)[k]) continue;
       s.residual.push_back(channel[k]);
       s.fold.push_back(int(std::min<std::size_t>(kFolds - 1, kFolds * k / d.size())));
-      const double values[] = {d.motor[k],  d.motor_rate[k],        d.motor_acceleration[k],
-                               d.torque[k], r.load->mesh_torque[k], double(k) * d.interval};
+      const double values[] = {d.motor[k],  d.motor_rate[k],  d.motor_acceleration[k],
+                               d.torque[k], r.mesh_torque[k], double(k) * d.interval};
       for (std::size_t c = 0; c < s.coordinates.size(); ++c) s.coordinates[c].second.push_back(values[c]);
     }
   }

@@ -24,8 +24,8 @@ constexpr double kFaster = 1.5;            // choice: times speed or torque
 
 }  // namespace
 
-ServoData traced_data(const record::Record& record, const model::Rig& rig) {
-  ServoData data = servo_data(record, rig);
+ServoData traced_data(const record::Record& record, const model::Rig& rig, double torque) {
+  ServoData data = servo_data(record, rig, torque);
   if (simulation::load_moves_freely(rig)) {
     if (data.load.empty())
       throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");

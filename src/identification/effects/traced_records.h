@@ -13,7 +13,7 @@ namespace backlash::identification {
 /// Throws CannotIdentify for a record without load position, which a rig with two inertias needs, with a load
 /// that stands, or of a motor so slow that its speed drowns in the noise of its encoder; and what
 /// servo_data() throws.
-ServoData traced_data(const record::Record& record, const model::Rig& rig);
+ServoData traced_data(const record::Record& record, const model::Rig& rig, double usual_torque = 0);
 
 /// Throws CannotIdentify where a record is sampled at another rate than `test`.
 void require_same_rate(const std::vector<ServoData>& train, const ServoData& test);

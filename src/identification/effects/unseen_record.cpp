@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "backlash_diagnosis/simulation/driven_load.h"
 #include "independence.h"
 
 namespace backlash::identification {
@@ -15,6 +17,8 @@ constexpr double kIndependent =
 
 }  // namespace
 
+// The encoders are calibrated by the deflection alone and the delay of the torque moves what was measured, so
+// that the prediction holds nothing of the record's torque.
 ServoPrediction predicted(Machine machine, const ServoData& record, const FitSettings& settings) {
   const std::vector<ServoData> data = {record};
   const Calibration like = machine.calibrations.front();
@@ -22,10 +26,21 @@ ServoPrediction predicted(Machine machine, const ServoData& record, const FitSet
   machine.priors.clear();
   machine.has_map = false;
   machine.calibrations = {like};
-  for (const double band : {settings.rough_cutoff, settings.cutoff}) {
-    if (Unknowns(machine).size() == 0) break;
-    machine = fit_in_band(data, machine, band, settings.tolerance, settings).fit.machine;
+  const auto calibrate = [&] {
+    for (const double band : {settings.rough_cutoff, settings.cutoff}) {
+      if (Unknowns(machine).size() == 0) break;
+      machine = fit_in_band(data, machine, band, settings.tolerance, settings).fit.machine;
+    }
+  };
+  if (simulation::load_moves_freely(machine.rig)) {  // else the torque alone tells where the gap is
+    const double delay = std::exchange(machine.largest_delay, 0);
+    machine.deflection_only = true;
+    calibrate();
+    machine.deflection_only = false;
+    machine.encoders_known = true;
+    machine.largest_delay = delay;
   }
+  calibrate();
   return predict_servo(machine.rig, record, settings, machine.calibrations.front());
 }
 

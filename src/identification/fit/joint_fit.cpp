@@ -104,7 +104,7 @@ void RecordSet::weigh(const Machine& machine) {
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
         noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
-    weights_[i] = {std::max(floor.torque, rms(r.torque, record.counts)),
+    weights_[i] = {machine.deflection_only ? INFINITY : std::max(floor.torque, rms(r.torque, record.counts)),
                    std::max(floor.deflection, rms(r.deflection, record.settled))};
   }
 }
@@ -150,7 +150,7 @@ Eigen::VectorXd RecordSet::rows(const model::Rig& rig, const std::vector<Calibra
 Unknowns::Unknowns(const Machine& start)
     : start_(start),
       delays_(start.largest_delay > 0),
-      offsets_(!start.rig.mesh.rigid),
+      offsets_(!start.rig.mesh.rigid && !start.encoders_known),
       per_record_(std::size_t(delays_) + std::size_t(offsets_)) {}
 
 Eigen::VectorXd Unknowns::values() const {

@@ -20,8 +20,10 @@ struct Machine {
   std::vector<Calibration> calibrations;
   /// What is known of the rig beside the records: one more row each, in standard deviations.
   std::vector<std::function<double(const model::Rig&)>> priors = {};
-  double largest_delay = 3;  // samples; approached, never reached; 0: delays are not fitted
-  bool has_map = false;      // a learned map with its many values is among the parameters
+  double largest_delay = 3;      // samples; approached, never reached; 0: delays are not fitted
+  bool deflection_only = false;  // the torque of the records does not count
+  bool encoders_known = false;   // encoder offsets are not fitted
+  bool has_map = false;          // a learned map with its many values is among the parameters
 };
 
 /// Standard deviation of either residual of one record [N m, rad].

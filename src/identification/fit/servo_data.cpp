@@ -82,6 +82,23 @@ double rate_of_noise(double cutoff, double interval) {
   return 2 * M_PI * cutoff * std::sqrt(2 * cutoff * interval / 3);
 }
 
+/// The same of the second derivative: (2 pi f)^2 integrated up to the cutoff.
+double acceleration_of_noise(double cutoff, double interval) {
+  return std::pow(2 * M_PI * cutoff, 2) * std::sqrt(2 * cutoff * interval / 5);
+}
+
+/// In the widest band in which noise does not hide it, or the narrowest that is tried.
+std::vector<double> smooth_acceleration(const ServoData& data, double position_noise) {
+  const double narrowest = kLeastPeriods / (double(data.size()) * data.interval);
+  std::vector<double> smooth = data.motor_acceleration;
+  for (double band = kWidestBand / data.interval; band > narrowest; band *= kNarrower) {
+    smooth = signal::low_pass(data.motor_acceleration, data.interval, band);
+    if (position_noise * acceleration_of_noise(band, data.interval) <= kClear * root_mean_square(smooth))
+      break;
+  }
+  return smooth;
+}
+
 /// Repeats with narrower bands: where the machine stands most of the time, the root mean square of the rate
 /// is mostly noise.
 void smooth_slow_motion(ServoData& data) {
@@ -125,7 +142,7 @@ record::Record load_side(const record::Record& record, const model::Rig& rig) {
   return out;
 }
 
-ServoData servo_data(const record::Record& raw, const model::Rig& rig) {
+ServoData servo_data(const record::Record& raw, const model::Rig& rig, double torque) {
   for (const record::Channel channel : {record::Channel::motor_torque, record::Channel::motor_position})
     if (!raw.has(channel)) throw CannotIdentify(raw.name + " has no " + record::channel_name(channel));
   const record::Record record = record::evenly_sampled(raw);
@@ -135,20 +152,22 @@ ServoData servo_data(const record::Record& raw, const model::Rig& rig) {
   data.torque = scaled(record, record::Channel::motor_torque, ratio);
   data.motor = scaled(record, record::Channel::motor_position, 1 / ratio);
   data.motor_rate = fast_derivative(data.motor, data.interval);
-  if (data.size() >= kLeastToTell)
-    data.rate_noise = kRateNoise * signal::position_noise(data.motor) / data.interval;
+  const double noise = data.size() >= kLeastToTell ? signal::position_noise(data.motor) : 0;
+  data.rate_noise = kRateNoise * noise / data.interval;
   if (!simulation::load_moves_freely(rig)) {
     const double rounding = signal::resolution(data.motor) / std::sqrt(12.0);  // of a slow motion not white
     data.rate_noise = std::max(data.rate_noise, kRateNoise * rounding / data.interval);
     smooth_slow_motion(data);
   }
   data.motor_acceleration = second_difference(data.motor, data.interval);
+  if (rig.mesh.rigid) data.smooth_acceleration = smooth_acceleration(data, noise);
   if (!record.has(record::Channel::load_position)) return data;
   data.load = scaled(record, record::Channel::load_position, 1);
   const double highest = kWidestBand / data.interval;
-  const double resonance = simulation::load_moves_freely(rig)
-                               ? mesh_resonance(model::load_side(rig), usual_torque(data.torque))
-                               : 0;
+  const double resonance =
+      simulation::load_moves_freely(rig)
+          ? mesh_resonance(model::load_side(rig), torque > 0 ? torque : usual_torque(data.torque))
+          : 0;
   data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
   data.load_rate =
       signal::low_pass(fast_derivative(data.load, data.interval), data.interval, data.load_rate_cutoff);

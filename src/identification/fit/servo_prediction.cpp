@@ -85,7 +85,7 @@ struct Drive {
     motion.interval = data.interval;
     motion.motor = &data.motor;
     motion.motor_rate = &data.motor_rate;
-    if (!rig.terms.empty()) motion.motor_torque = &data.torque;
+    if (!data.smooth_acceleration.empty()) motion.acceleration = &data.smooth_acceleration;
     if (simulation::load_moves_freely(rig)) {
       gain = model::sensing(rig.terms).load_position_gain;
       motion.load_rate = &data.load_rate;
@@ -183,24 +183,56 @@ std::vector<double> PreparedServo::acting_torque(const model::Rig& rig,
 ServoResiduals PreparedServo::residuals(const model::Rig& rig, const Calibration& calibration) const {
   const Drive drive(data(), rig, calibration);
   const auto load = loads_->get(*this, drive, rig, calibration);
-  const simulation::MotorTorques motor = simulation::motor_torques(rig, drive.motion, load->motion);
+  simulation::MotorTorques motor = simulation::motor_torques(rig, drive.motion, load->motion);
   const double inertia = model::GearTrain(rig).motor_inertia();
   ServoResiduals r;
   r.load = {load, &load->motion};
+  r.mesh_torque = std::move(motor.mesh_torque);
   r.torque = acting_torque(rig, calibration);
   const std::vector<double> friction =
       model::presliding_friction(data().motor, motor.friction, data().motor_rate, data().interval);
+  r.predicted_torque.assign(data().size(), 0);
   for (std::size_t k = 0; k < data().size(); ++k) {
-    if (direction[k] == 0)
+    if (direction[k] == 0) {
       r.torque[k] = 0;  // friction takes what balances
-    else
-      r.torque[k] -= inertia * data().motor_acceleration[k] - motor.mean[k] + friction[k];
+      continue;
+    }
+    r.predicted_torque[k] = inertia * data().motor_acceleration[k] - motor.mean[k] + friction[k];
+    r.torque[k] -= r.predicted_torque[k];
   }
   r.torque = signal::low_pass(r.torque, data().interval, cutoff);
   r.deflection = load->deflection;
   for (double& value : r.deflection) value += calibration.encoder_offset;
   return r;
 }
+
+namespace {
+
+constexpr double kLeastCounts = 0.5;  // choice: of the low-pass's weight, on samples that count
+
+/// Measured and predicted torque low-passed apart, by what each shows where the motor slides: the prediction
+/// holds nothing of the record's torque.
+void low_pass_torques(const PreparedServo& prepared, const std::vector<double>& acting,
+                      const std::vector<double>& predicted, ServoPrediction& p) {
+  const double interval = prepared.data().interval;
+  const std::size_t n = acting.size();
+  std::vector<double> slides(n), measured(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    slides[k] = prepared.direction[k] != 0;
+    measured[k] = slides[k] * acting[k];
+  }
+  const std::vector<double> weight = signal::low_pass(slides, interval, prepared.cutoff);
+  p.measured_torque = signal::low_pass(measured, interval, prepared.cutoff);
+  p.torque = signal::low_pass(predicted, interval, prepared.cutoff);
+  for (std::size_t k = 0; k < n; ++k) {
+    p.counts[k] = p.counts[k] && weight[k] >= kLeastCounts;
+    if (!p.counts[k]) continue;
+    p.measured_torque[k] /= weight[k];
+    p.torque[k] /= weight[k];
+  }
+}
+
+}  // namespace
 
 ServoPrediction predict_servo(const model::Rig& rig, const ServoData& data, const FitSettings& settings,
                               const Calibration& calibration) {
@@ -212,9 +244,7 @@ ServoPrediction predict_servo(const model::Rig& rig, const ServoData& data, cons
   p.settled = prepared.settled;
   const NoiseFloors floors = noise_floors(rig, data, r.load->load, settings.cutoff, settings.feedback);
   p.torque_floor = floors.torque;
-  p.measured_torque =
-      signal::low_pass(prepared.acting_torque(rig, calibration), data.interval, settings.cutoff);
-  p.torque = difference(p.measured_torque, r.torque);
+  low_pass_torques(prepared, prepared.acting_torque(rig, calibration), r.predicted_torque, p);
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
   if (!r.deflection.empty()) {
     p.deflection_floor = floors.deflection;
@@ -224,6 +254,7 @@ ServoPrediction predict_servo(const model::Rig& rig, const ServoData& data, cons
     p.deflection_error = relative(p.measured_deflection, p.deflection, p.settled, p.deflection_floor);
   }
   p.load = *r.load;
+  p.load.mesh_torque = std::move(r.mesh_torque);
   return p;
 }
 

@@ -13,6 +13,10 @@ namespace backlash::identification {
 struct ServoResiduals {
   std::shared_ptr<const simulation::DrivenLoad> load;
   std::vector<double> torque, deflection;  // N m, rad
+  // N m, as it is without the low-pass, 0 where dry friction takes any value. Never reads the recorded
+  // torque.
+  std::vector<double> predicted_torque;
+  std::vector<double> mesh_torque;  // N m, as terms see it (driven_load.h)
 };
 
 class SimulatedLoads;

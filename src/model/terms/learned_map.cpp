@@ -9,7 +9,8 @@
 // neighbour before to that after, 0 at the first and last. Beyond these f is constant. So f has no corners
 // and is linear in its values. A gap that follows a position is conservative, and moves both ends through its
 // slope; one that follows the torque through the mesh is a spring in series, which must not give way in the
-// wrong direction faster than the teeth. It cannot follow speeds, time or motor torque.
+// wrong direction faster than the teeth. It cannot follow speeds or time. Nothing follows the torque of the
+// motor, which the model predicts.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -52,15 +53,14 @@ enum class Coordinate {
   load_position,
   motor_velocity,
   load_velocity,
-  motor_torque,
   mesh_torque,
   time
 };
 
 /// In the order of Coordinate.
 std::vector<std::string> coordinates() {
-  return {"motor_position", "load_position", "motor_velocity", "load_velocity", "motor_torque",
-          "mesh_torque",    "time"};
+  return {"motor_position", "load_position", "motor_velocity", "load_velocity", "mesh_torque",
+          "time"};
 }
 
 Coordinate coordinate_of(const ParameterValues& p) {
@@ -76,6 +76,7 @@ class LearnedTorque : public Term {
         coordinate_(coordinate_of(p)),
         curve_(p.list("points"), p.list("values")) {}
   bool moves_load() const override { return on_load_; }
+  bool follows_mesh_torque() const override { return coordinate_ == Coordinate::mesh_torque; }
   void add(const Motion& motion, EndTorques& ends) const override {
     (on_load_ ? ends.load : ends.motor) += curve_.at(coordinate(motion)).value;
   }
@@ -91,8 +92,6 @@ class LearnedTorque : public Term {
         return m.motor_velocity;
       case Coordinate::load_velocity:
         return m.load_velocity;
-      case Coordinate::motor_torque:
-        return m.motor_torque;
       case Coordinate::mesh_torque:
         return m.mesh_torque;
       case Coordinate::time:
@@ -179,13 +178,12 @@ double clear_stiffness(const MotionRange&) {
   return kClearStiffness;
 }
 
-// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, the torque
-// itself would explain everything, and so would time where the torque is commanded in ramps.
+// Motor and load position differ by the deflection only, and so do the speeds. Of one channel, time would
+// explain everything where the torque is commanded in ramps.
 std::vector<MapKind> kinds() {
   return {
       {"motor", "motor_position", "rad", "N m", false, clear_torque, kAnyValue},
       {"motor", "motor_velocity", "rad/s", "N m", false, clear_torque, kAnyValue},
-      {"motor", "motor_torque", "N m", "N m", true, clear_torque, kAnyValue},
       {"motor", "mesh_torque", "N m", "N m", true, clear_torque, kAnyValue},
       {"motor", "time", "s", "N m", true, clear_torque, kAnyValue},
       {"load", "load_position", "rad", "N m", true, clear_torque, kAnyValue},

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Dry friction in proportion to the torque that the teeth carry (loss of the gear under load):
-//   added friction = mu |T|        mu [-], T torque through the mesh [N m]; of a rigid mesh that of the motor
+//   added friction = mu |T|        mu [-], T torque through the mesh [N m]
+// Of one inertia (mesh: rigid) T is what the load takes, J a less the torques of its terms (GearTrain).
 // Hamon, Gautier and Garrec (2010, IROS), "Dynamic identification of robots with a dry friction model
-// depending on load and velocity". mu < 0: friction falls under load; the sum of all is never below 0.
+// depending on load and velocity". A loss is never negative, and below 1 something arrives at the load.
 #include <cmath>
 
 #include "end_of_train.h"
@@ -15,6 +16,7 @@ class LoadDependentFriction : public EndFrictionTerm {
  public:
   explicit LoadDependentFriction(const ParameterValues& p)
       : EndFrictionTerm(p), coefficient_(p.at("coefficient")) {}
+  bool follows_mesh_torque() const override { return true; }
   void add_friction(const Motion& motion, EndFriction& friction) const override {
     end_.rub(coefficient_ * std::fabs(motion.mesh_torque), friction);
   }
@@ -31,7 +33,7 @@ double clear_coefficient(const MotionRange&) {
 
 TermType load_dependent_friction_term() {
   return {"load_dependent_friction",
-          {body_parameter(), {"coefficient", "-", Range::any(), "mu, friction per torque through the mesh"}},
+          {body_parameter(), {"coefficient", "-", Range::between(0, 0.95), "mu, friction per torque through the mesh"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<LoadDependentFriction>(p);
           },

@@ -33,7 +33,7 @@ double clear_drag(const MotionRange& range) {
 TermType quadratic_drag_term() {
   return {
       "quadratic_drag",
-      {body_parameter(), {"drag", "N m s^2/rad^2", Range::any(), "A"}},
+      {body_parameter(), {"drag", "N m s^2/rad^2", Range::not_negative(), "A"}},
       [](const ParameterValues& p) -> std::unique_ptr<Term> { return std::make_unique<QuadraticDrag>(p); },
       TermSearch{"drag", "", clear_drag, {}}};
 }

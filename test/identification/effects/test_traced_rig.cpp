@@ -53,7 +53,7 @@ std::shared_ptr<const model::Term> gravity() {
 std::shared_ptr<const model::Term> learned() {
   ParameterValues values;
   values.set_choice("acts_on", "motor");
-  values.set_choice("coordinate", "motor_torque");
+  values.set_choice("coordinate", "motor_velocity");
   values.set_list("points", {-100, 0, 100});
   values.set_list("values", {3, 0, -2});
   return model::make_term("learned_map", values);

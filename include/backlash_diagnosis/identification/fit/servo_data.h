@@ -17,6 +17,7 @@ struct ServoData {
   std::vector<double> torque;                  // N m, of the motor
   std::vector<double> motor, motor_rate;       // rad, rad/s (five-point difference)
   std::vector<double> motor_acceleration;      // rad/s^2 (second difference)
+  std::vector<double> smooth_acceleration;     // rad/s^2, of a machine with one inertia: see servo_data()
   double rate_noise = 0;                       // rad/s, standard deviation of the noise of motor_rate
   std::vector<double> load, load_rate;         // rad, rad/s (low-passed)
   double load_rate_cutoff = 0;                 // Hz, of that low-pass
@@ -35,12 +36,16 @@ double time_between_reversals(const ServoData& data);
 /// its root mean square the motor position is low-passed, in the widest band in which it is not. With two
 /// inertias the position stays as it is: there it drives a load.
 ///
+/// Friction of one inertia may follow what its load takes, which the acceleration tells (gear_train.h). That
+/// of the second difference is mostly noise: low-passed in the widest band in which a fiftieth of it is.
+///
 /// The recorded speed of the load draws a simulated one (driven_load.h); what its low-pass takes away counts
 /// there like a friction. So its cutoff is 2.7 times the mesh resonance (mesh_resonance.h), or 0.2 of the
-/// sampling rate if that is less.
+/// sampling rate if that is less. `usual_torque` [N m] sets that resonance where it depends on the torque; 0:
+/// the record's own.
 ///
 /// Needs motor_torque and motor_position; load_position where the record has it. Throws CannotIdentify
 /// without them, BadData for gaps or values that are not finite (naming channel and time).
-ServoData servo_data(const record::Record& record, const model::Rig& rig);
+ServoData servo_data(const record::Record& record, const model::Rig& rig, double usual_torque = 0);
 
 }  // namespace backlash::identification
