@@ -174,11 +174,11 @@ EngagementPeak compare_peaks(const ComparedRecord& record, const Values& predict
 }
 
 double natural_frequency(const model::Rig& rig) {
-  if (!rig.mesh.contact_spec.values.has("stiffness"))
-    throw InvalidParameter("contact.law", rig.mesh.contact_spec.law, "needs a stiffness to be compared");
+  if (!rig.mesh.contact_spec().values.has("stiffness"))
+    throw InvalidParameter("contact.law", rig.mesh.contact_spec().law, "needs a stiffness to be compared");
   const model::GearTrain train(rig);
   const double m = train.motor_inertia(), l = train.load_inertia();
-  return std::sqrt(rig.mesh.contact_spec.values.at("stiffness") * (m + l) / (m * l));
+  return std::sqrt(rig.mesh.contact_spec().values.at("stiffness") * (m + l) / (m * l));
 }
 
 void compare_followed(const ServoPrediction& p, const ComparedRecord& record, ModelComparison& result) {
