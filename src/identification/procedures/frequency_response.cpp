@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/identification/procedures/stepped_sine.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
@@ -56,8 +57,7 @@ Signals collect(const record::Record& given, ResponseSide side) {
   const record::Channel source = s.from_position ? position : velocity;
   require_finite(s.torque, record::Channel::motor_torque);
   require_finite(record.column(source), source);
-  const auto [least, most] = std::minmax_element(s.torque.begin(), s.torque.end());
-  if (*least == *most) throw CannotIdentify("the torque does not vary");
+  if (signal::peak_to_peak(s.torque) == 0) throw CannotIdentify("the torque does not vary");
   s.speed = s.from_position ? signal::derivative(record.column(source), s.interval) : record.column(source);
   return s;
 }
