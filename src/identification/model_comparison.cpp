@@ -183,11 +183,12 @@ double natural_frequency(const model::Rig& rig) {
 
 void compare_followed(const ServoPrediction& p, const ComparedRecord& record, ModelComparison& result) {
   result.followed["torque"] = compare(p.measured_torque, p.torque, "N m", p.torque_floor, p.counts);
-  result.followed["deflection"] = compare(record.deflection, p.deflection, "rad", p.deflection_floor);
+  result.followed["deflection"] =
+      compare(record.deflection, p.deflection, "rad", p.deflection_floor, p.settled);
   // The motor is the recorded one in both.
   result.followed["speed_difference"] =
       compare(record.speed_difference, difference(record.motor_speed, p.load.load_rate), "rad/s",
-              signal::white_noise(record.load_speed));
+              signal::white_noise(record.load_speed), p.settled);
   result.traces.deflection = p.deflection;
 }
 
