@@ -27,8 +27,8 @@ struct Equations {
         c_out(rig.output_coupling.damping),
         radius(rig.mesh.lever()),
         half_gap(0.5 * rig.mesh.backlash),
-        stiffness(rig.mesh.contact_spec.values.at("stiffness")),
-        loss(1.5 * rig.mesh.contact_spec.values.at("alpha")) {}
+        stiffness(rig.mesh.contact_spec().values.at("stiffness")),
+        loss(1.5 * rig.mesh.contact_spec().values.at("alpha")) {}
 
   void operator()(const State& s, State& d, double) const {
     const double in = k_in * (s[0] - s[1]) + c_in * (s[3] - s[4]), out = k_out * s[2] + c_out * s[5];

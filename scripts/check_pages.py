@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks the pages: every link leads to a file (and heading) of the repository, every page is reached from doc/index.md.
 
-Exit code 1 where one is not. Usage: check_links.py [REPOSITORY]
+Exit code 1 where one is not. Usage: check_pages.py [REPOSITORY]
 """
 import re
 import sys

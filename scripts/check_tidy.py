@@ -96,10 +96,16 @@ def main():
         units = alone(changed_files(source, arguments.changed_since), units, source)
     units.sort(key=lambda unit: -len(unit[1]))
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        answers = list(pool.map(lambda unit: tidy(unit[0], unit[2], source), units))
-    found = sorted(set(re.findall(r"^\S+: (?:error|warning): .*", "".join(answers), re.MULTILINE)))
-    print("\n".join(found) or "%d files: as they should be" % sum(len(files) for _, files, _ in units))
-    return 1 if any(answers) else 0
+        answers = [pool.submit(tidy, path, flags, source) for path, _, flags in units]
+        found = set()
+        for answer in concurrent.futures.as_completed(answers):  # shown at once: all files take long
+            new = set(re.findall(r"^\S+: (?:error|warning): .*", answer.result(), re.MULTILINE)) - found
+            print("".join(line + "\n" for line in sorted(new)), end="", flush=True)
+            found |= new
+    bad = any(answer.result() for answer in answers)
+    if not bad:
+        print("%d files: as they should be" % sum(len(files) for _, files, _ in units))
+    return 1 if bad else 0
 
 
 if __name__ == "__main__":

@@ -33,13 +33,20 @@ outside=()  # results that no file of the test runners holds
 check() {
   if quietly "$@"; then outside+=(--passed "$1"); else outside+=(--failed "$1: see above"); fi
 }
-# run_tests KIND JOBS: the gtests or the rostests. The exit code says nothing about the tests, only about the run.
+# run_tests WHAT JOBS TARGET...: the exit code says nothing about the tests, only about the run.
 run_tests() {
-  echo "Running the $1s; their output goes to ${WS}/log/run_$1s.log"
-  quietly "run_$1s" make -C "${WS}/build" "-j$2" "run_tests_${PACKAGE}_$1" || outside+=(--failed "run_$1s: the run broke off")
+  echo "Running the $1; their output goes to ${WS}/log/run_$1.log"
+  quietly "run_$1" make -C "${WS}/build" "-j$2" "${@:3}" || outside+=(--failed "run_$1: the run broke off")
 }
-run_tests gtest "$(nproc)"
-run_tests rostest 1  # they measure rates
+# rostest_targets -l|-L: the rostests whose file says that they run beside others, or those that measure rates.
+rostest_targets() {
+  (cd "${REPO}" && grep "$1" 'Runs beside others' test/ros/*.test | sed "s/^/run_tests_${PACKAGE}_rostest_/; s,/,_,g")
+}
+mapfile -t beside < <(rostest_targets -l)
+mapfile -t alone < <(rostest_targets -L)
+run_tests gtests "$(nproc)" "run_tests_${PACKAGE}_gtest"
+run_tests rostests_beside_others 2 "${beside[@]}"
+run_tests rostests_alone 1 "${alone[@]}"
 
 echo "Checking style, documentation, installation and faults"
 check catkin_lint catkin_lint --strict "${REPO}"

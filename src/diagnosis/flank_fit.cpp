@@ -39,13 +39,13 @@ double scaled(double n, double count) {
 /// Piecewise linear functions of q, one per column.
 MatrixXd hats(const std::vector<double>& q, int knots) {
   MatrixXd h = MatrixXd::Zero(static_cast<Eigen::Index>(q.size()), knots);
-  const auto [low, high] = std::minmax_element(q.begin(), q.end());
+  const auto [low, high] = signal::extent(q);
   for (std::size_t i = 0; i < q.size(); ++i) {
     if (knots == 1) {
       h(i, 0) = 1;
       continue;
     }
-    const double x = (knots - 1) * (q[i] - *low) / (*high - *low);
+    const double x = (knots - 1) * (q[i] - low) / (high - low);
     const int k = std::clamp(static_cast<int>(x), 0, knots - 2);
     h(i, k) = 1 - (x - k);
     h(i, k + 1) = x - k;
@@ -93,9 +93,9 @@ class Fitter {
     phi_ = Eigen::Map<const VectorXd>(w_.deflection.data(), n_);
     inertia_ = model.inertia;
     slow_ = model.moving ? kSlow * rms(w_.speed) : -1;
-    const auto [least, most] = std::minmax_element(w_.torque.begin(), w_.torque.end());
+    const auto [least, most] = signal::extent(w_.torque);
     const double torque = std::max(rms(w_.torque), 1e-300);
-    slope_.emplace(model.elastic, 2 * std::max({torque, -*least, *most}), kTorqueStep * torque);
+    slope_.emplace(model.elastic, 2 * std::max({torque, -least, most}), kTorqueStep * torque);
   }
 
   FlankFit fit();
@@ -341,8 +341,7 @@ FlankFit Fitter::fit() {
   }
   fit.compliance_from_record = held;
   if (model_.moving && common_.cols() > 1) {
-    const auto [low, high] = std::minmax_element(w_.load.begin(), w_.load.end());
-    fit.scale_error = (p_[common_.cols() - 1] - p_[0]) / (*high - *low);
+    fit.scale_error = (p_[common_.cols() - 1] - p_[0]) / signal::peak_to_peak(w_.load);
   }
   return fit;
 }

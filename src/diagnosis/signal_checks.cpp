@@ -85,8 +85,8 @@ std::optional<double> detect_period(const std::vector<double>& time, const std::
   if (time.size() < 8 || signal.size() != time.size()) return std::nullopt;
   for (const double v : signal)
     if (!std::isfinite(v)) return std::nullopt;
-  const auto [low, high] = std::minmax_element(signal.begin(), signal.end());
-  if (!(*high - *low > 1e-9 * (std::fabs(*high) + std::fabs(*low)))) return std::nullopt;  // constant
+  const auto [low, high] = signal::extent(signal);
+  if (!(high - low > 1e-9 * (std::fabs(high) + std::fabs(low)))) return std::nullopt;  // constant
   const double interval = record::median_interval(time), span = time.back() - time.front();
   if (!(interval > 0)) return std::nullopt;
   const double samples = span / interval + 1;
@@ -149,10 +149,10 @@ Runs runs_at(const std::vector<double>& signal, double value, double step) {
 
 bool looks_saturated(const std::vector<double>& signal) {
   if (signal.size() < 8) return false;
-  const auto [low, high] = std::minmax_element(signal.begin(), signal.end());
-  if (*low == *high) return false;
+  const auto [low, high] = signal::extent(signal);
+  if (low == high) return false;
   const double step = signal::smallest_step(signal);
-  for (const double extreme : {*low, *high}) {
+  for (const double extreme : {low, high}) {
     const Runs runs = runs_at(signal, extreme, step);
     // Some runs begin slowly also with a saturated sensor, where the signal happens to turn near its limit.
     if (runs.hard > 0 && 3 * runs.hard >= runs.count && runs.samples * 200 > signal.size()) return true;

@@ -101,9 +101,9 @@ void require_servo(const model::Rig& rig) {
         "identify knows machines of one inertia (mesh: rigid) and of two (rigid couplings, free link); "
         "this rig is neither");
   for (const char* name : {"stiffness", "damping"})
-    if (!rig.mesh.contact_spec.values.has(name))
+    if (!rig.mesh.contact_spec().values.has(name))
       throw CannotIdentify("identify needs a contact law with stiffness and damping, not '" +
-                           rig.mesh.contact_spec.law + "'");
+                           rig.mesh.contact_spec().law + "'");
 }
 
 }  // namespace

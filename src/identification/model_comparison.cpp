@@ -174,20 +174,21 @@ EngagementPeak compare_peaks(const ComparedRecord& record, const Values& predict
 }
 
 double natural_frequency(const model::Rig& rig) {
-  if (!rig.mesh.contact_spec.values.has("stiffness"))
-    throw InvalidParameter("contact.law", rig.mesh.contact_spec.law, "needs a stiffness to be compared");
+  if (!rig.mesh.contact_spec().values.has("stiffness"))
+    throw InvalidParameter("contact.law", rig.mesh.contact_spec().law, "needs a stiffness to be compared");
   const model::GearTrain train(rig);
   const double m = train.motor_inertia(), l = train.load_inertia();
-  return std::sqrt(rig.mesh.contact_spec.values.at("stiffness") * (m + l) / (m * l));
+  return std::sqrt(rig.mesh.contact_spec().values.at("stiffness") * (m + l) / (m * l));
 }
 
 void compare_followed(const ServoPrediction& p, const ComparedRecord& record, ModelComparison& result) {
   result.followed["torque"] = compare(p.measured_torque, p.torque, "N m", p.torque_floor, p.counts);
-  result.followed["deflection"] = compare(record.deflection, p.deflection, "rad", p.deflection_floor);
+  result.followed["deflection"] =
+      compare(record.deflection, p.deflection, "rad", p.deflection_floor, p.settled);
   // The motor is the recorded one in both.
   result.followed["speed_difference"] =
       compare(record.speed_difference, difference(record.motor_speed, p.load.load_rate), "rad/s",
-              signal::white_noise(record.load_speed));
+              signal::white_noise(record.load_speed), p.settled);
   result.traces.deflection = p.deflection;
 }
 

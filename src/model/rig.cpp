@@ -68,8 +68,8 @@ Mesh read_mesh(const YamlReader& yaml) {
   const double factor = key == "half_gap" ? 2 : key == "backlash_angle" ? mesh.lever() : 1;
   mesh.backlash = factor * yaml.number(key, Range::not_negative());
   mesh.start_in_gap = yaml.number_or("start_in_gap", 0, Range::between(-1, 1));
-  mesh.contact_spec = read_contact_spec(yaml.map("contact"));
-  mesh.contact = make_contact_law(mesh.contact_spec.law, mesh.contact_spec.values);
+  const ContactSpec contact = read_contact_spec(yaml.map("contact"));
+  mesh.contact = make_contact_law(contact.law, contact.values);
   if (const auto variation = yaml.optional_map("stiffness_variation"))
     mesh.variation = read_stiffness_variation(*variation, mesh.base_radius);
   return mesh;
@@ -115,6 +115,11 @@ class NoContact : public ContactLaw {
 };
 
 }  // namespace
+
+const ContactSpec& Mesh::contact_spec() const {
+  static const ContactSpec none;
+  return contact ? contact->made_of : none;
+}
 
 Rig without_load(Rig rig) {
   rig.mesh.contact = std::make_shared<NoContact>();

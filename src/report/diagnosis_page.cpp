@@ -141,8 +141,7 @@ std::string diagnosis_page(const DiagnosisReport& report, const rig_file::RigFil
                      {"estimates", estimates(report.diagnosis, linear)},
                      {"plots", plots_of(report, rig)},
                      {"facts", facts(report)},
-                     {"has_warnings", !report.warnings.empty()},
-                     {"warnings", report.warnings},
+                     {"warnings", warnings_section(report.warnings)},
                      {"provenance", provenance_sections(provenance)}};
   return report_page("Backlash of " + of, filled(kDiagnosisTemplate, data));
 }

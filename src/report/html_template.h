@@ -23,6 +23,7 @@ namespace backlash::report {
 extern const char* const kPageTemplate;
 extern const char* const kProvenanceTemplate;
 extern const char* const kFiguresTemplate;
+extern const char* const kWarningsTemplate;
 extern const char* const kTraceTemplate;
 extern const char* const kDiagnosisTemplate;
 

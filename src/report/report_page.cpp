@@ -58,6 +58,10 @@ std::string provenance_sections(const Provenance& p) {
   return filled(kProvenanceTemplate, data);
 }
 
+std::string warnings_section(const std::vector<std::string>& warnings) {
+  return filled(kWarningsTemplate, {{"has_warnings", !warnings.empty()}, {"warnings", warnings}});
+}
+
 std::string drawn_figures(const std::string& script, const std::vector<std::string>& arguments) {
   try {
     const ScratchFolder scratch;

@@ -9,13 +9,13 @@ namespace {
 using Kind = ParameterKind;
 
 void set_contact(model::Rig& rig, const char* name, double value) {
-  model::Mesh& mesh = rig.mesh;
-  mesh.contact_spec.values[name] = value;
-  mesh.contact = model::make_contact_law(mesh.contact_spec.law, mesh.contact_spec.values);
+  model::ContactSpec changed = rig.mesh.contact_spec();
+  changed.values[name] = value;
+  rig.mesh.contact = model::make_contact_law(changed.law, changed.values);
 }
 
 double contact_value(const model::Rig& rig, const char* name) {
-  const ParameterValues& values = rig.mesh.contact_spec.values;
+  const ParameterValues& values = rig.mesh.contact_spec().values;
   return values.has(name) ? values.at(name) : 0;  // no law has all of them
 }
 
@@ -83,7 +83,7 @@ std::vector<RigParameter> make_parameters() {
 
 bool RigParameter::known_to(const model::Rig& rig) const {
   if (part != RigPart::mesh) return true;
-  return !rig.mesh.rigid && (contact.empty() || rig.mesh.contact_spec.values.has(contact));
+  return !rig.mesh.rigid && (contact.empty() || rig.mesh.contact_spec().values.has(contact));
 }
 
 const std::vector<RigParameter>& servo_parameters() {

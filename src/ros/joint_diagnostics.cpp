@@ -59,9 +59,9 @@ JointDiagnostics::JointDiagnostics(const JointMonitor& monitor, const JointHisto
   update();
 }
 
-void JointDiagnostics::add_to(diagnostic_updater::Updater& updater) {
+void JointDiagnostics::add_to(diagnostic_updater::DiagnosticTaskVector& tasks) {
   for (Concern& concern : concerns_)
-    updater.add(concern.name, [this, &concern](Status& status) {
+    tasks.add(concern.name, [this, &concern](Status& status) {
       const std::lock_guard<std::mutex> lock(mutex_);
       status.level = concern.status.level;
       status.message = concern.status.message;

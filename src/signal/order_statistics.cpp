@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 #include "backlash_diagnosis/base/not_a_number.h"
 
@@ -42,10 +41,20 @@ double quantile_range(std::vector<double> values, double tail) {
   return upper - at_rank(values, tail * last);
 }
 
+Extent extent(const std::vector<double>& values) {
+  return extent(values, 0, values.size());
+}
+
+Extent extent(const std::vector<double>& values, std::size_t begin, std::size_t end) {
+  if (begin >= end) return {};
+  const auto first = values.begin();
+  const auto [low, high] = std::minmax_element(first + static_cast<std::ptrdiff_t>(begin),
+                                               first + static_cast<std::ptrdiff_t>(end));
+  return {*low, *high};
+}
+
 double peak_to_peak(const std::vector<double>& values) {
-  if (values.empty()) return 0;
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  return *high - *low;
+  return extent(values).size();
 }
 
 double smallest_step(const std::vector<double>& values, double rounding) {

@@ -7,11 +7,11 @@
 #include <fstream>
 #include <functional>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 
 namespace backlash {
@@ -347,17 +347,17 @@ TEST(YamlReader, HugeTextsAreRefused) {
 
 // Whatever the bytes are: a reader or a BadData, nothing else.
 TEST(YamlReader, RandomDocumentsEndInAReaderOrBadData) {
-  std::mt19937 random(20240501);
+  Random random(20240501);
   const std::string alphabet = "ab1:-?,[]{}&*!|>'\"%@`#~ \n\n\t\r.<\\";
   const std::string source = kRig;
   int read = 0, refused = 0;
   for (int i = 0; i < 20000; ++i) {
-    std::string text = i % 2 == 0 ? source : std::string(random() % 60, ' ');
-    const std::size_t changes = i % 2 == 0 ? 1 + random() % 4 : text.size();
+    std::string text = i % 2 == 0 ? source : std::string(random.below(60), ' ');
+    const std::size_t changes = i % 2 == 0 ? 1 + random.below(4) : text.size();
     for (std::size_t k = 0; k < changes; ++k) {
-      const char c =
-          random() % 8 == 0 ? static_cast<char>(random() % 256) : alphabet[random() % alphabet.size()];
-      if (!text.empty()) text[i % 2 == 0 ? random() % text.size() : k] = c;
+      const char c = random.below(8) == 0 ? static_cast<char>(random.below(256))
+                                          : alphabet[random.below(alphabet.size())];
+      if (!text.empty()) text[i % 2 == 0 ? random.below(text.size()) : k] = c;
     }
     try {
       const YamlReader reader = parse(text);

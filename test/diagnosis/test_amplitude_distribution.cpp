@@ -3,11 +3,11 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 
 namespace backlash::diagnosis {
@@ -140,10 +140,9 @@ TEST(AmplitudeDistribution, TriangleIsUniform) {
 
 TEST(AmplitudeDistribution, MergeIsTheSameAsAddingAll) {
   AmplitudeDistribution first({5, 0, 1}), second({5, 0, 1}), all({5, 0, 1});
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> uniform(-0.2, 1.2);
+  Random random(1);
   for (int i = 0; i < 1000; ++i) {
-    const double value = uniform(random);
+    const double value = random.uniform(-0.2, 1.2);
     (i % 3 ? first : second).add(value);
     all.add(value);
   }
@@ -190,11 +189,11 @@ TEST(ApdLayout, ReadsAndNamesTheKey) {
 TEST(RunningMoments, AgreeWithTwoPasses) {
   RunningMoments moments;
   EXPECT_EQ(moments.standard_deviation(), 0);
-  std::mt19937 random(2);
-  std::normal_distribution<double> normal(1e6, 3);  // a large mean is where the naive formula fails
+  Random random(2);
   std::vector<double> values(5000);
   double sum = 0, squares = 0;
-  for (double& v : values) sum += v = normal(random);
+  // A large mean is where the naive formula fails.
+  for (double& v : values) sum += v = 1e6 + 3 * random.normal();
   for (const double v : values) squares += (v - sum / values.size()) * (v - sum / values.size());
   for (const double v : values) moments.add(v);
   EXPECT_EQ(moments.count(), values.size());

@@ -4,19 +4,18 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/coherence.h"
 
 namespace backlash::diagnosis {
 namespace {
 
 std::vector<double> white(std::size_t count, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
+  Random random(seed);
   std::vector<double> x(count);
-  for (double& v : x) v = normal(random);
+  for (double& v : x) v = random.normal();
   return x;
 }
 

@@ -16,9 +16,9 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/diagnosis/history.h"
 
@@ -275,7 +275,7 @@ TEST_F(HistoryTest, DamagedLinesAreNamedAndLeftOut) {
   }
   const std::string whole = content();
   const std::size_t second = whole.find("1800000000.1");
-  std::mt19937 random(1);
+  Random random(1);
   const auto spoil = [&](const std::string& by) {
     std::string text = whole;
     put(text.replace(second + 3, by.size(), by));
@@ -293,8 +293,8 @@ TEST_F(HistoryTest, DamagedLinesAreNamedAndLeftOut) {
   // Wherever bytes flip, the lines before and after are there.
   for (int trial = 0; trial < 300; ++trial) {
     std::string text = whole;
-    const std::size_t place = second + random() % (text.find('\n', second) - second);
-    text[place] = static_cast<char>(text[place] ^ (1 << random() % 8));
+    const std::size_t place = second + random.below(text.find('\n', second) - second);
+    text[place] = static_cast<char>(text[place] ^ (1 << random.below(8)));
     put(text);
     const HistoryFile file = read_history(path());
     ASSERT_GE(file.entries.size(), 2u);
@@ -415,7 +415,7 @@ TEST_F(HistoryTest, BehindALinkTheFileItselfIsRotated) {
 }
 
 TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
-  std::mt19937 random(7);
+  Random random(7);
   int next = 0;
   std::vector<int> told;
   for (int round = 0; round < 40; ++round) {
@@ -425,13 +425,13 @@ TEST_F(HistoryTest, NoKillCostsAnEntryThatWasWritten) {
     ASSERT_GE(child, 0);
     if (child == 0) write_on(path(), next, ends[1]);
     ::close(ends[1]);
-    const int until = static_cast<int>(random() % 25);  // as many are waited for, then it may die anywhere
+    const int until = static_cast<int>(random.below(25));  // as many are waited for, then it may die anywhere
     int number = 0;
     for (int i = 0; i < until; ++i) {
       ASSERT_EQ(::read(ends[0], &number, sizeof number), static_cast<ssize_t>(sizeof number));
       told.push_back(number);
     }
-    ::usleep(random() % 3000);
+    ::usleep(random.below(3000));
     ::kill(child, SIGKILL);
     int status = 0;
     ASSERT_EQ(::waitpid(child, &status, 0), child);

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "../support/data.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/lost_motion.h"
 #include "backlash_diagnosis/record/csv.h"
 
@@ -61,18 +61,18 @@ struct Experiment {
 
 record::Record run(Machine machine, const Experiment& e) {
   record::Record record;
-  std::mt19937 generator(e.seed);
-  std::normal_distribution<double> normal;
+  Random generator(e.seed);
   const auto samples = static_cast<std::size_t>(e.duration * e.rate);
   for (std::size_t i = 0; i < samples; ++i) {
     const double time = static_cast<double>(i) / e.rate;
     const double torque = e.amplitude * wave(e.shape, time * e.frequency);
-    double position = machine.step(torque) + e.offset + e.drift * time + e.position_noise * normal(generator);
+    double position =
+        machine.step(torque) + e.offset + e.drift * time + e.position_noise * generator.normal();
     for (const auto& [from, size] : e.slips) {
       if (time >= from && time < from + 0.5 / e.frequency) position += size;
     }
     record.time.push_back(time);
-    record.column(record::Channel::motor_torque).push_back(torque + e.torque_noise * normal(generator));
+    record.column(record::Channel::motor_torque).push_back(torque + e.torque_noise * generator.normal());
     record.column(record::Channel::motor_position).push_back(position);
   }
   return record;
@@ -173,9 +173,8 @@ TEST(LostMotionRamp, IntervalContainsTheTruthAsOftenAsItSays) {
     Experiment experiment;
     experiment.rate = 100;
     experiment.seed = static_cast<unsigned>(k);
-    std::mt19937 generator(1000 + experiment.seed);
-    std::normal_distribution<double> scatter(0, 1e-3);
-    for (int half = 0; half < 10; ++half) experiment.slips.push_back({2.0 * half, scatter(generator)});
+    Random generator(1000 + experiment.seed);
+    for (int half = 0; half < 10; ++half) experiment.slips.push_back({2.0 * half, 1e-3 * generator.normal()});
     const Estimate estimate = estimate_lost_motion(run(machine, experiment), at(3.4));
     const double truth = machine.play(3.4, 4);
     inside += estimate.angle_lower <= truth && truth <= estimate.angle_upper;

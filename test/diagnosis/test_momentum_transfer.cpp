@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 
 namespace backlash::diagnosis {
@@ -18,8 +18,7 @@ constexpr double kRate = 10000;    // Hz
 /// it crosses the gap with constant acceleration and hits with w^2 = 2 kTorque gap / kInertia.
 record::Record crossing(double gap, double noise = 0, double torque_bias = 0) {
   record::Record r;
-  std::mt19937 random(5);
-  std::normal_distribution<double> normal;
+  Random random(5);
   for (int i = 0; i < kRate; ++i) {
     const double t = i / kRate, half = std::floor(20 * t + 1e-9), since = t - half / 20;
     const double sign = std::fmod(half, 2) == 0 ? 1 : -1;
@@ -28,7 +27,7 @@ record::Record crossing(double gap, double noise = 0, double torque_bias = 0) {
     r.time.push_back(t);
     r.column(record::Channel::motor_torque).push_back(torque_bias + sign * kTorque);
     r.column(record::Channel::motor_velocity)
-        .push_back((flies ? sign * acceleration * since : 0) + noise * normal(random));
+        .push_back((flies ? sign * acceleration * since : 0) + noise * random.normal());
     r.column(record::Channel::motor_position)
         .push_back(sign * (flies ? 0.5 * acceleration * since * since - 0.5 * gap : 0.5 * gap));
   }

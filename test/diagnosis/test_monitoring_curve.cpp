@@ -6,11 +6,11 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/monitoring_curve.h"
 #include "support/curve.h"
 
@@ -180,14 +180,14 @@ TEST(MonitoringCurve, FinishAddsTheRoughnessThatTheGridDoesNotResolve) {
     EXPECT_TRUE(point.monotonic);
   }
   // A value scattered with standard deviation s lies s sqrt(1.5) from the mean of two others.
-  std::mt19937 random(11);
-  std::normal_distribution<double> normal(0, 0.05);
+  Random random(11);
   std::vector<double> means;
-  for (int i = 0; i < 2000; ++i) means.push_back(-0.001 * i + normal(random));
+  for (int i = 0; i < 2000; ++i) means.push_back(-0.001 * i + 0.05 * random.normal());
   MonitoringCurve rough = curve_through(means, 0);
   std::vector<std::vector<SkewnessCell>> middle = straight_middle(rough);
   for (std::size_t i = 0; i < middle.size(); ++i)
-    for (SkewnessCell& cell : middle[i]) cell.mean = -0.001 * (static_cast<double>(i) + 0.5) + normal(random);
+    for (SkewnessCell& cell : middle[i])
+      cell.mean = -0.001 * (static_cast<double>(i) + 0.5) + 0.05 * random.normal();
   rough.finish(middle);
   double squares = 0;
   for (const CurvePoint& point : rough.points) squares += point.cells[1].between * point.cells[1].between;
@@ -256,15 +256,13 @@ TEST(MonitoringCurve, AnAngularCurveGivesAnglesOnly) {
 
 /// Share of `trials` of the statistical model itself in which the answer holds the truth.
 double coverage(const MonitoringCurve& curve, int periods, int trials, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> truth(curve.points.front().backlash, curve.points.back().backlash);
+  Random random(seed);
   int covered = 0;
   for (int trial = 0; trial < trials; ++trial) {
-    const double b = truth(random);
+    const double b = random.uniform(curve.points.front().backlash, curve.points.back().backlash);
     const SkewnessCell cell = curve.at(b, 0);
-    double skewness = cell.mean + cell.between * normal(random);
-    for (int i = 0; i < periods; ++i) skewness += cell.within * normal(random) / periods;
+    double skewness = cell.mean + cell.between * random.normal();
+    for (int i = 0; i < periods; ++i) skewness += cell.within * random.normal() / periods;
     const Estimate e = curve.invert(skewness, periods, 0);
     covered += e.lower <= b && (e.status == Status::ok ? b <= e.upper : !(b > e.upper));
   }
@@ -324,8 +322,7 @@ MonitoringCurve parse(const std::string& text) {
 }
 
 TEST(MonitoringCurve, FilesKeepEveryBit) {
-  std::mt19937_64 random(5);
-  std::uniform_real_distribution<double> uniform(0, 1);
+  Random random(5);
   MonitoringCurve curve = linear_curve(30);
   CurveConditions& c = curve.conditions;
   c.rig = "a \"quoted\" rig: # é [x]\n'second line' \\";
@@ -338,15 +335,15 @@ TEST(MonitoringCurve, FilesKeepEveryBit) {
   c.angular = true;
   c.output_locked = false;
   for (double* value : {&c.amplitude, &c.excitation_level, &c.frequency, &c.sampling_rate, &c.motor_travel})
-    *value = uniform(random);
-  c.apd = {77, -uniform(random), uniform(random)};
-  curve.noise_levels = {0, 1e-300, uniform(random) / 3, 1e9};
+    *value = random.uniform();
+  c.apd = {77, -random.uniform(), random.uniform()};
+  curve.noise_levels = {0, 1e-300, random.uniform() / 3, 1e9};
   c.noise = curve.noise_levels[2];
   for (CurvePoint& point : curve.points) {
-    point.monotonic = uniform(random) < 0.5;
+    point.monotonic = random.uniform() < 0.5;
     point.cells.clear();
     for (int k = 0; k < 4; ++k)
-      point.cells.push_back({uniform(random) - 0.5, uniform(random), uniform(random) * 1e-9});
+      point.cells.push_back({random.uniform() - 0.5, random.uniform(), random.uniform() * 1e-9});
   }
   const std::string text = curve.to_yaml();
   expect_same(curve, parse(text));

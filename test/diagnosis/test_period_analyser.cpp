@@ -3,10 +3,10 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/period_analyser.h"
 
 namespace backlash::diagnosis {
@@ -60,10 +60,9 @@ TEST(PeriodAnalyser, ClosesWithTheLastSampleOfAWindow) {
 
 TEST(PeriodAnalyser, JitterUnderAQuarterOfASampleChangesNothing) {
   for (const unsigned seed : {1u, 2u, 3u, 4u, 5u}) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> jitter(-0.24e-3, 0.24e-3);
+    Random random(seed);
     auto time = stamps(5000, 1e-3, 1.7e9);
-    for (double& t : time) t += jitter(random);
+    for (double& t : time) t += random.uniform(-0.24e-3, 0.24e-3);
     const auto windows = windows_of(time, 0.1);
     ASSERT_EQ(windows.size(), 50u);
     for (const PeriodResult& window : windows) {
@@ -187,11 +186,10 @@ TEST(PeriodAnalyser, ResetStartsOver) {
 
 TEST(PeriodAnalyser, AgreesWithASeparateDistributionOfEachWindow) {
   PeriodAnalyser analyser(0.05, kLayout);
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> uniform(-1.1, 1.1);
+  Random random(3);
   AmplitudeDistribution expected(kLayout);
   for (int i = 0; i < 500; ++i) {
-    const double value = uniform(random);
+    const double value = random.uniform(-1.1, 1.1);
     expected.add(value);
     const PeriodResult* window = analyser.add(2 + i * 1e-3, value);
     if (i % 50 != 49) continue;

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 
 namespace backlash::diagnosis {
@@ -48,8 +48,7 @@ struct Servo {
   }
   record::Record record(double rate = 1000) const {
     record::Record r;
-    std::mt19937 random(3);
-    std::normal_distribution<double> normal;
+    Random random(3);
     const auto rounded = [](double x, double step) { return step > 0 ? step * std::round(x / step) : x; };
     for (int i = 0; i < duration * rate; ++i) {
       const double t = i / rate, h = 1e-4;
@@ -58,7 +57,7 @@ struct Servo {
       r.time.push_back(t);
       r.column(record::Channel::motor_torque)
           .push_back(transmitted(t) + motor_inertia * acceleration + motor_coulomb * std::tanh(speed / 1e-3) +
-                     torque_noise * normal(random));
+                     torque_noise * random.normal());
       r.column(record::Channel::motor_position).push_back(rounded(motor(t), motor_step));
       r.column(record::Channel::load_position).push_back(offset + rounded(scale * load(t), load_step));
     }

@@ -3,10 +3,10 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/signal_checks.h"
 #include "support/waves.h"
 
@@ -81,9 +81,8 @@ TEST(DetectPeriod, VeryLongPeriods) {
 
 TEST(DetectPeriod, ExcitationThatBeginsLate) {
   Signal signal = sample(kWaves[1].second, 3000, 100, 0.01);
-  std::mt19937 random(6);
-  std::normal_distribution<double> normal;
-  for (int i = 0; i < 200000; ++i) signal.value[i] = 0.01 * normal(random);
+  Random random(6);
+  for (int i = 0; i < 200000; ++i) signal.value[i] = 0.01 * random.normal();
   EXPECT_NEAR(period_of(signal), 1, 1e-9);
 }
 
@@ -97,11 +96,10 @@ TEST(DetectPeriod, NothingWhereNothingRepeats) {
   EXPECT_TRUE(none({1, -1, 1, -1}));
   EXPECT_TRUE(none(std::vector<double>(1000, 0)));
   EXPECT_TRUE(none(std::vector<double>(1000, 0.1 + 0.2)));
-  std::mt19937 random(5);
-  std::normal_distribution<double> normal;
+  Random random(5);
   std::vector<double> white(3000), ring(3000), ramp(3000);
   for (int i = 0; i < 3000; ++i) {
-    white[i] = normal(random);
+    white[i] = random.normal();
     ring[i] = std::exp(-i / 300.0) * std::cos(2 * M_PI * i / 40.0);
     ramp[i] = i;
   }

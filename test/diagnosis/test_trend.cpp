@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/trend.h"
 
 namespace backlash::diagnosis {
@@ -91,11 +91,10 @@ TEST(Trend, WithoutGrowthALimitMayBeExceededAllTheSame) {
 
 TEST(Trend, TheOrderOfPointsAndValuesThatAreNoneDoNotMatter) {
   Points points = line(50, 1e-6);
-  std::mt19937_64 random(3);
-  std::normal_distribution<double> normal;
-  for (TrendPoint& p : points) p.value += 1e-6 * normal(random);
+  Random random(3);
+  for (TrendPoint& p : points) p.value += 1e-6 * random.normal();
   Points mixed = points;
-  std::shuffle(mixed.begin(), mixed.end(), random);
+  for (std::size_t i = mixed.size(); i > 1; --i) std::swap(mixed[i - 1], mixed[random.below(i)]);
   mixed.push_back({kStart, std::nan("")});
   mixed.push_back({HUGE_VAL, 1});
   const Trend a = find_trend(points, 2e-4, false), b = find_trend(mixed, 2e-4, false);
@@ -109,10 +108,9 @@ TEST(Trend, TiesOfTimesNarrowKendallsTest) {
   // nearer to the ends where the errors seem to have some.
   Points points;
   std::vector<double> slopes;
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> normal;
+  Random random(5);
   for (int i = 0; i < 10; ++i)
-    for (int k = 0; k < 2; ++k) points.push_back({kStart + kDay * i, normal(random)});
+    for (int k = 0; k < 2; ++k) points.push_back({kStart + kDay * i, random.normal()});
   for (const TrendPoint& a : points)
     for (const TrendPoint& b : points)
       if (a.time > b.time) slopes.push_back((a.value - b.value) / (a.time - b.time));
@@ -136,18 +134,16 @@ struct Histories {
   bool uneven = false;     // exponentially distributed distances of the points
   double growth = 0;       // standard deviations over the whole span
 
-  Points draw(std::mt19937_64& random) const {
-    std::normal_distribution<double> normal;
-    std::uniform_real_distribution<double> uniform;
+  Points draw(Random& random) const {
     Points all;
-    double time = kStart, slow = normal(random);
+    double time = kStart, slow = random.normal();
     for (int i = 0; i < points; ++i) {
-      const double distance = uneven ? -std::log(1 - uniform(random)) : 1;
+      const double distance = uneven ? -std::log(1 - random.uniform()) : 1;
       const double kept = memory > 0 ? std::pow(memory, distance) : 0;
       time += kDay * distance;
-      slow = kept * slow + std::sqrt(1 - kept * kept) * normal(random);
-      double error = std::sqrt(1 - independent) * slow + std::sqrt(independent) * normal(random);
-      if (uniform(random) < outliers) error += 20;
+      slow = kept * slow + std::sqrt(1 - kept * kept) * random.normal();
+      double error = std::sqrt(1 - independent) * slow + std::sqrt(independent) * random.normal();
+      if (random.uniform() < outliers) error += 20;
       all.push_back({time, rate() * (time - kStart) + error});
     }
     return all;
@@ -160,7 +156,7 @@ struct Rates {
 };
 
 Rates tried(const Histories& histories, int trials, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
+  Random random(seed);
   Rates rates;
   const double limit = 1.5 * histories.growth;
   int dated = 0;
@@ -201,7 +197,7 @@ TEST(Trend, IntervalsHoldForIndependentErrors) {
     EXPECT_GE(rates.coverage, 0.95 - scatter(0.95, kTrials)) << points;
     EXPECT_GE(rates.dates, 0.95 - scatter(0.95, kTrials)) << points;
   }
-  std::mt19937_64 random(13);
+  Random random(13);
   double width = 0;
   for (int trial = 0; trial < 50; ++trial) {
     const Trend t = find_trend(Histories{100}.draw(random), std::nullopt, false);
@@ -245,15 +241,14 @@ TEST(Trend, UpToAFifthOfThePointsMayBeWrong) {
 
 TEST(Trend, AMillionPointsTellTheSameAsFew) {
   // A point per minute for two years, half a micrometre of growth a month, errors of 5 um that a day forgets.
-  std::mt19937_64 random(41);
-  std::normal_distribution<double> normal;
+  Random random(41);
   const double rate = 6e-6 / kYear, kept = std::exp(-60 / kDay);
   Points all, some;
-  double slow = normal(random);
+  double slow = random.normal();
   for (int i = 0; i < 1'000'000; ++i) {
-    slow = kept * slow + std::sqrt(1 - kept * kept) * normal(random);
+    slow = kept * slow + std::sqrt(1 - kept * kept) * random.normal();
     const double time = kStart + 60.0 * i;
-    all.push_back({time, 1e-4 + rate * (time - kStart) + 3e-6 * slow + 4e-6 * normal(random)});
+    all.push_back({time, 1e-4 + rate * (time - kStart) + 3e-6 * slow + 4e-6 * random.normal()});
     if (i % 2500 == 0) some.push_back(all.back());  // few enough to be used one by one
   }
   const Trend many = find_trend(all, 150e-6, false), few = find_trend(some, 150e-6, false);

@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/verdict.h"
 
 namespace backlash::diagnosis {
@@ -85,14 +85,13 @@ TEST(Verdict, CombinesWhatAgreesSharpestFirst) {
 // Errors of two estimators with standard deviations 1 and 2 um, uncorrelated, and fully correlated: the worst
 // case.
 TEST(Verdict, TheIntervalHoldsItsPromiseForAnyCorrelation) {
-  std::mt19937_64 random(7);
-  std::normal_distribution<double> normal;
+  Random random(7);
   constexpr int kRuns = 20000;
   for (const double correlation : {0.0, 0.7, 1.0}) {
     int hits = 0, agreed = 0;
     double squares = 0;
     for (int i = 0; i < kRuns; ++i) {
-      const double common = normal(random), own = normal(random);
+      const double common = random.normal(), own = random.normal();
       const double a = 1e-6 * common;
       const double b = 2e-6 * (correlation * common + std::sqrt(1 - correlation * correlation) * own);
       const Verdict v = combined({ok("a", 5e-5 + a, 1.96e-6), ok("b", 5e-5 + b, 3.92e-6)});

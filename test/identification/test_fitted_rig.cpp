@@ -34,8 +34,8 @@ TEST(FittedRig, ValuesAreThoseFoundAndTheRestStays) {
   EXPECT_EQ(fitted.rig.link.inertia, 84);
   EXPECT_EQ(fitted.rig.link.coulomb_friction, 18);
   EXPECT_EQ(fitted.rig.link.viscous_damping, 7);
-  EXPECT_EQ(fitted.rig.mesh.contact_spec.values.at("stiffness"), 400e3);
-  EXPECT_EQ(fitted.rig.mesh.contact_spec.values.at("damping"), 560);
+  EXPECT_EQ(fitted.rig.mesh.contact_spec().values.at("stiffness"), 400e3);
+  EXPECT_EQ(fitted.rig.mesh.contact_spec().values.at("damping"), 560);
   EXPECT_EQ(fitted.rig.mesh.backlash, 6.3e-4);
   EXPECT_EQ(fitted.rig.mesh.start_in_gap, -0.25);
   EXPECT_NE(text.find("fitted +- 0.25"), std::string::npos);

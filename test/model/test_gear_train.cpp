@@ -3,10 +3,10 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "support/rigs.h"
 
@@ -55,13 +55,12 @@ TEST(GearTrain, FollowsTheEquationsOnBothFlanksAndInTheGap) {
   const Rig rig = full_rig();
   const GearTrain train(rig);
   ASSERT_EQ(train.dof(), 4);
-  std::mt19937_64 random(7);
-  std::uniform_real_distribution<double> angle(-0.01, 0.01), speed(-0.5, 0.5);
+  Random random(7);
   int forward = 0, reverse = 0, free = 0;
   for (int i = 0; i < 1000; ++i) {
     State s{};
-    for (int k = 0; k < 4; ++k) s[k] = angle(random), s[4 + k] = speed(random);
-    if (i % 3 == 0) s[2] = s[1] - angle(random) * 0.1;  // stay inside the gap of +-1.5e-3 rad
+    for (int k = 0; k < 4; ++k) s[k] = random.uniform(-0.01, 0.01), s[4 + k] = random.uniform(-0.5, 0.5);
+    if (i % 3 == 0) s[2] = s[1] - random.uniform(-1e-3, 1e-3);  // stay inside the gap of +-1.5e-3 rad
     const double x = s[1] - s[2];
     (x > 1.5e-3 ? forward : x < -1.5e-3 ? reverse : free)++;
     double rate[8], expected[4];
@@ -198,8 +197,7 @@ TEST(GearTrain, EnergyIsKineticPlusElastic) {
 
 // dE/dt = power of the motor - dampers - contact loss, for any motion: needs no integration.
 TEST(GearTrain, PowerBalanceHoldsInEveryConfiguration) {
-  std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> angle(-0.01, 0.01), speed(-0.5, 0.5);
+  Random random(11);
   for (int i = 0; i < 400; ++i) {
     Rig rig = full_rig();
     if (i & 1) rig.input_coupling = Coupling{};
@@ -212,7 +210,7 @@ TEST(GearTrain, PowerBalanceHoldsInEveryConfiguration) {
     const GearTrain train(rig);
     const int n = train.dof();
     State s{};
-    for (int k = 0; k < n; ++k) s[k] = angle(random), s[n + k] = speed(random);
+    for (int k = 0; k < n; ++k) s[k] = random.uniform(-0.01, 0.01), s[n + k] = random.uniform(-0.5, 0.5);
     double rate[8];
     train.derivative(0, s.data(), 0.02, rate);
     const auto energy_after = [&](double dt) {
@@ -372,8 +370,7 @@ TEST(GearTrain, RefusesMasslessPartsAndAMeshWithoutLaw) {
 // The same equations, with a layout that the compiler knows where the train is smooth and with one that it
 // does not elsewhere.
 TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
-  std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> angle(-0.01, 0.01), speed(-0.5, 0.5);
+  Random random(11);
   for (int layout = 0; layout < 8; ++layout) {
     Rig rig = test::sarkar_rig(20e-6);
     rig.reduction_ratio = 3;
@@ -390,7 +387,8 @@ TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
     ASSERT_FALSE(rubs.smooth());
     for (int i = 0; i < 100; ++i) {
       State s{};
-      for (int k = 0; k < smooth.dof(); ++k) s[k] = angle(random), s[smooth.dof() + k] = speed(random);
+      for (int k = 0; k < smooth.dof(); ++k)
+        s[k] = random.uniform(-0.01, 0.01), s[smooth.dof() + k] = random.uniform(-0.5, 0.5);
       rubs.begin_friction(0, s.data(), {0.03, 0.02});
       double without[8], with[8];
       smooth.derivative(0, s.data(), {0.03, 0.02}, without);

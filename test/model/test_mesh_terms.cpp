@@ -5,11 +5,11 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
@@ -145,10 +145,9 @@ TEST(MeshTerms, AMapGoesRoundTheTurn) {
 /// Found by search: less than whole turns from the first position by a rounding, where their quotient is
 /// whole.
 TEST(MeshTerms, AMapHasNoHoleAtItsFirstPosition) {
-  std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> start(-10, 10);
+  Random random(3);
   for (int i = 0; i < 2000; ++i) {
-    const double first = start(random);
+    const double first = random.uniform(-10, 10);
     char text[200];
     std::snprintf(text, sizeof text,
                   "id: backlash_map, positions: [%.17g, %.17g], backlash: [2e-3, 4e-3], centre: [0, 0]",

@@ -9,12 +9,12 @@
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/record/csv.h"
 
 #ifndef BACKLASH_DIAGNOSIS_SOURCE_DIR
@@ -233,15 +233,14 @@ TEST_F(CsvFileTest, MissingFilesAndFoldersAreMissingInput) {
 }
 
 Record noisy_record(std::size_t samples) {
-  std::mt19937_64 random(7);
-  std::normal_distribution<double> noise;
+  Random random(7);
   Record record;
   record.name = "noise";
   for (std::size_t i = 0; i < samples; ++i) {
     record.time.push_back(static_cast<double>(i) * 1e-4);
-    record.column(Channel::motor_torque).push_back(noise(random) * 1e-7);
-    record.column(Channel::sensor_torque).push_back(noise(random) * 1e12);
-    record.column(Channel::reference_position).push_back(std::round(noise(random)));
+    record.column(Channel::motor_torque).push_back(random.normal() * 1e-7);
+    record.column(Channel::sensor_torque).push_back(random.normal() * 1e12);
+    record.column(Channel::reference_position).push_back(std::round(random.normal()));
   }
   return record;
 }
@@ -324,18 +323,18 @@ TEST_F(CsvFileTest, PlacesThatCannotBeWrittenAreNamed) {
 
 // Whatever the bytes are: a record that fits together, or BadData that names the source.
 TEST(Csv, RandomTextsEndInARecordOrBadData) {
-  std::mt19937 random(20240502);
+  Random random(20240502);
   const std::string source = "time,motor_torque,load_position\n0,1,2\n0.1,1.5,-2e-3\n0.2,1,3\n0.3,+4,5\n";
   const std::string alphabet = "0123456789.,-+e\n\r\t; \"";
   int read = 0, refused = 0;
   for (int i = 0; i < 20000; ++i) {
     std::string text = source;
-    const std::size_t changes = 1 + random() % 3;
+    const std::size_t changes = 1 + random.below(3);
     for (std::size_t k = 0; k < changes; ++k) {
-      const std::size_t at = i % 4 == 0 ? random() % text.size() : 32 + random() % (text.size() - 32);
-      const char c =
-          random() % 8 == 0 ? static_cast<char>(random() % 256) : alphabet[random() % alphabet.size()];
-      if (random() % 3 == 0) {
+      const std::size_t at = i % 4 == 0 ? random.below(text.size()) : 32 + random.below(text.size() - 32);
+      const char c = random.below(8) == 0 ? static_cast<char>(random.below(256))
+                                          : alphabet[random.below(alphabet.size())];
+      if (random.below(3) == 0) {
         text.erase(at, 1);
       } else {
         text[at] = c;

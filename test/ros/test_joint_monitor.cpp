@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "backlash_diagnosis/ros/joint_monitor.h"
+#include "ros/monitor_support.h"
 #include "support/curve.h"
 #include "support/records.h"
 
@@ -18,20 +18,6 @@ namespace {
 
 using test::make_record;
 using test::values_at;
-
-/// Stamp of a time [s] of a record, to the nanosecond.
-ros::Time stamp_of(double time) {
-  return ros::Time(1'000'000'000, 0) + ros::Duration().fromNSec(std::lround(1e9 * time));
-}
-
-MonitorSettings monitor_settings(const std::string& joint) {
-  MonitorSettings settings;
-  settings.joint = joint;
-  settings.rig = rig_file::default_rig_file();
-  settings.curve = test::linear_curve();
-  settings.estimate_interval = 0;  // each period
-  return settings;
-}
 
 /// What a monitor tells, in the order in which it does.
 struct Heard {
@@ -51,14 +37,6 @@ struct Heard {
     return stamps.size();
   }
 };
-
-/// All samples of a record; how many of them completed a period.
-long feed(JointMonitor& monitor, const record::Record& record, std::size_t from = 0) {
-  long periods = 0;
-  for (std::size_t i = from; i < record.size(); ++i)
-    periods += monitor.take(stamp_of(record.time[i]), values_at(record, i), "", "joint_states").has_value();
-  return periods;
-}
 
 class JointMonitorTest : public testing::Test {
  protected:

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/blocks.h"

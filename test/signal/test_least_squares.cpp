@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 
 namespace backlash::signal {
@@ -17,12 +17,11 @@ struct Line {
 };
 
 Line line(int n, double noise, unsigned seed) {
-  std::mt19937_64 generator(seed);
-  std::normal_distribution<double> normal;
+  Random generator(seed);
   Line l{Eigen::MatrixXd(n, 2), Eigen::VectorXd(n)};
   for (int i = 0; i < n; ++i) {
     l.a.row(i) << 1, i;
-    l.b[i] = 2 - 3 * i + noise * normal(generator);
+    l.b[i] = 2 - 3 * i + noise * generator.normal();
   }
   return l;
 }
@@ -94,10 +93,9 @@ TEST(LeastSquares, BlockCovarianceKnowsThatNeighboursAgree) {
   double sum = 0, white = 0, blocks = 0;
   constexpr int kSeeds = 200, kRows = 2000, kStay = 20;
   for (int seed = 0; seed < kSeeds; ++seed) {
-    std::mt19937_64 generator(seed);
-    std::normal_distribution<double> normal;
+    Random generator(seed);
     Eigen::VectorXd y(kRows);
-    for (int i = 0; i < kRows; i += kStay) y.segment(i, kStay).setConstant(normal(generator));
+    for (int i = 0; i < kRows; i += kStay) y.segment(i, kStay).setConstant(generator.normal());
     const LeastSquaresFit fit =
         fit_nonlinear([&](const Eigen::VectorXd& p) { return Eigen::VectorXd(y.array() - p[0]); },
                       Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1));

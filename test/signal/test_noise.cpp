@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -65,13 +64,12 @@ TEST(EstimateNoise, MotionThatRepeatsPartOfTheTime) {
   // all is four fifths of the calm quarter. From period to period the estimate is too high by the root of the
   // 80 % (13.442) over the 20 % quantile (6.179) of chi-square with 10 degrees, within a period by that
   // of 8.558 over 3.070 (6 degrees).
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
+  Random random(3);
   std::vector<double> signal;
   double size = 0;
   for (int i = 0; i < 20000; ++i) {
-    if (i % 200 == 0) size = normal(random);
-    signal.push_back((i % 200 < 150 ? size * std::sin(2.1 * i) : 0) + 0.01 * normal(random));
+    if (i % 200 == 0) size = random.normal();
+    signal.push_back((i % 200 < 150 ? size * std::sin(2.1 * i) : 0) + 0.01 * random.normal());
   }
   const NoiseRange found = estimate_noise(signal, 200);
   EXPECT_NEAR(found.upper / 0.01, std::sqrt(13.442 / 6.179), 0.1);  // five errors, about 500 stretches
@@ -80,15 +78,14 @@ TEST(EstimateNoise, MotionThatRepeatsPartOfTheTime) {
 
 // Ringing that never repeats, everywhere: its differences are no white noise, and must not be taken for it.
 TEST(EstimateNoise, ChaoticRingingIsNoNoise) {
-  std::mt19937 random(4);
-  std::normal_distribution<double> normal;
+  Random random(4);
   for (const double cycle : {0.4, 1.3})  // rad per sample
     for (const double noise : {0.0, 0.01}) {
       std::vector<double> signal;
       double size = 0, phase = 0;
       for (int i = 0; i < 20000; ++i) {
-        if (i % 100 == 0) size = 1 + 0.3 * normal(random), phase = normal(random);
-        signal.push_back(size * std::sin(cycle * i + phase) + noise * normal(random));
+        if (i % 100 == 0) size = 1 + 0.3 * random.normal(), phase = random.normal();
+        signal.push_back(size * std::sin(cycle * i + phase) + noise * random.normal());
       }
       const NoiseRange found = estimate_noise(signal, 200);
       EXPECT_LT(found.upper, 0.03) << cycle << ' '
@@ -121,10 +118,9 @@ TEST(EstimateNoise, LeavesOutValuesThatAreNotFinite) {
 TEST(Noise, StandardErrorHoldsTheTruth) {
   int held = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
-    std::mt19937 random(seed);
-    std::normal_distribution<double> normal(0, 0.01);
+    Random random(seed);
     std::vector<double> signal;
-    for (int i = 0; i < 500; ++i) signal.push_back(std::sin(2 * M_PI * i / 100.0) + normal(random));
+    for (int i = 0; i < 500; ++i) signal.push_back(std::sin(2 * M_PI * i / 100.0) + 0.01 * random.normal());
     const NoiseRange range = with_standard_error(estimate_noise(signal, 100), signal.size());
     held += range.lower <= 0.01 && 0.01 <= range.upper;
   }

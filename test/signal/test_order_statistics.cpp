@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "backlash_diagnosis/signal/order_statistics.h"
 
@@ -32,6 +33,9 @@ TEST(OrderStatistics, RangesByHand) {
   EXPECT_NEAR(quantile_range(values, 0.01), 98, 1e-12);
   EXPECT_EQ(peak_to_peak(values), 100);
   EXPECT_EQ(peak_to_peak({}), 0);
+  const Extent whole = extent({3, -1, 7, 2}), part = extent({3, -1, 7, 2}, 2, 4);
+  EXPECT_EQ(std::tie(whole.low, whole.high), std::make_tuple(-1, 7));
+  EXPECT_EQ(std::tie(part.low, part.high), std::make_tuple(2, 7));
   EXPECT_EQ(smallest_step({1, 1, 1.5, 1.25, 4}), 0.25);
   EXPECT_EQ(smallest_step({2, 2}), 0);
   EXPECT_EQ(smallest_step({0, 1e-12, 2, 1}, 1e-9), 1);

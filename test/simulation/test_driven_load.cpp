@@ -163,7 +163,7 @@ TEST(DrivenLoad, WhatMovesNoLoadNeedsNoSimulation) {
   model::Rig motor = rig, load = rig;
   motor.motor.viscous_damping += 3;
   motor.terms.push_back(model::make_term("cogging", {{"amplitude", 5}, {"order", 40}, {"phase", 0}}));
-  motor.mesh.contact = model::make_contact_law(rig.mesh.contact_spec.law, rig.mesh.contact_spec.values);
+  motor.mesh.contact = model::make_contact_law(rig.mesh.contact_spec().law, rig.mesh.contact_spec().values);
   load.link.viscous_damping += 1;
   EXPECT_TRUE(moves_same_load(rig, motor));
   EXPECT_FALSE(moves_same_load(rig, load));

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <random>
 #include <string>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/diagnosis/coherence.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
@@ -54,20 +54,6 @@ diagnosis::MomentumTransferSettings momentum_settings() {
   return s;
 }
 
-/// Uniform and normal numbers that are the same on every platform.
-class Draw {
- public:
-  explicit Draw(std::uint64_t seed) : generator_(seed) {}
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53;
-  }
-  double normal() { return std::sqrt(-2 * std::log(uniform(1e-12, 1))) * std::cos(uniform(0, 2 * M_PI)); }
-  std::uint64_t seed() { return generator_() >> 20; }
-
- private:
-  std::mt19937_64 generator_;
-};
-
 struct Case {
   double backlash = 0;  // m
   record::Record record;
@@ -75,18 +61,18 @@ struct Case {
 
 /// The Sarkar rig with a random half gap, noise and seed; its stiffness differs from the declared one by the
 /// declared uncertainty (2 % at 95 %).
-Case random_case(Draw& draw, double largest_half_gap, double rate) {
+Case random_case(Random& random, double largest_half_gap, double rate) {
   rig_file::RigFile file = rig_file::default_rig_file();
   Case c;
-  c.backlash = file.rig.mesh.backlash = 2 * draw.uniform(0, largest_half_gap);
-  file.rig.input_coupling.stiffness *= 1 + 0.01 * draw.normal();
+  c.backlash = file.rig.mesh.backlash = 2 * random.uniform(0, largest_half_gap);
+  file.rig.input_coupling.stiffness *= 1 + 0.01 * random.normal();
   simulation::SensorsSettings& sensors = file.simulation.sensors;
   sensors.sampling_rate = rate;
-  sensors.seed = draw.seed();
-  sensors.of(record::Channel::motor_torque).noise = draw.uniform(0, 2e-3);
+  sensors.seed = random.bits();
+  sensors.of(record::Channel::motor_torque).noise = random.uniform(0, 2e-3);
   sensors.of(record::Channel::motor_position).resolution = 1e-6;
-  sensors.of(record::Channel::motor_velocity).noise = draw.uniform(0, 0.02);
-  c.record = simulation::simulate_record(file.rig, file.simulation, draw.uniform(0.5, 1.5));
+  sensors.of(record::Channel::motor_velocity).noise = random.uniform(0, 0.02);
+  c.record = simulation::simulate_record(file.rig, file.simulation, random.uniform(0.5, 1.5));
   return c;
 }
 
@@ -113,10 +99,10 @@ struct Score {
 constexpr int kCases = 60, kFewestRight = 52;
 
 TEST(RigEstimators, PositionDifferenceOfTheLockedRig) {
-  Draw draw(1);
+  Random random(1);
   Score score;
   for (int i = 0; i < kCases; ++i) {
-    const Case c = random_case(draw, 100e-6, i % 2 ? 1000 : 5000);
+    const Case c = random_case(random, 100e-6, i % 2 ? 1000 : 5000);
     score.add(diagnosis::estimate_position_difference(c.record, position_settings()), c.backlash);
   }
   EXPECT_GE(score.seen[diagnosis::Status::ok], 57);  // a gap of a few um may be below the range
@@ -128,10 +114,10 @@ TEST(RigEstimators, PositionDifferenceOfTheLockedRig) {
 }
 
 TEST(RigEstimators, MomentumTransferOfTheLockedRig) {
-  Draw draw(2);
+  Random random(2);
   Score by_speed, by_position;
   for (int i = 0; i < kCases; ++i) {
-    Case c = random_case(draw, 100e-6, i % 2 ? 5000 : 10000);
+    Case c = random_case(random, 100e-6, i % 2 ? 5000 : 10000);
     const bool tachometer = i % 4 < 2;
     c.record.column(tachometer ? record::Channel::motor_position : record::Channel::motor_velocity).clear();
     (tachometer ? by_speed : by_position)
@@ -150,8 +136,8 @@ TEST(RigEstimators, MomentumTransferOfTheLockedRig) {
 }
 
 TEST(RigEstimators, MomentumTransferNeedsToSeeTheImpacts) {
-  Draw draw(3);
-  const Case slow = random_case(draw, 100e-6, 1000);
+  Random random(3);
+  const Case slow = random_case(random, 100e-6, 1000);
   const diagnosis::Estimate e = diagnosis::estimate_momentum_transfer(slow.record, momentum_settings());
   EXPECT_EQ(e.status, diagnosis::Status::out_of_domain);
   EXPECT_NE(e.message.find("samples per cycle"), std::string::npos) << e.message;
@@ -201,23 +187,23 @@ diagnosis::PositionDifferenceSettings servo_settings() {
 }
 
 TEST(RigEstimators, PositionDifferenceOfAServoWithUnknownParameters) {
-  Draw draw(4);
+  Random random(4);
   int right = 0;
   constexpr int cases = 12;
   for (int i = 0; i < cases; ++i) {
-    model::Rig rig = servo_rig(460e3 * draw.uniform(0.7, 1.4));
-    rig.mesh.backlash = 5.4e-4 * draw.uniform(0.6, 1.4);
-    rig.motor.inertia *= draw.uniform(0.6, 1.4);
-    rig.link.inertia *= draw.uniform(0.6, 1.4);
+    model::Rig rig = servo_rig(460e3 * random.uniform(0.7, 1.4));
+    rig.mesh.backlash = 5.4e-4 * random.uniform(0.6, 1.4);
+    rig.motor.inertia *= random.uniform(0.6, 1.4);
+    rig.link.inertia *= random.uniform(0.6, 1.4);
     simulation::SimulationSettings run;
     run.excitation.type = "random";
-    run.excitation.amplitude = draw.uniform(150, 400);
+    run.excitation.amplitude = random.uniform(150, 400);
     run.excitation.start_frequency = 0.3;
-    run.excitation.end_frequency = draw.uniform(2, 6);
+    run.excitation.end_frequency = random.uniform(2, 6);
     run.excitation.line_count = 40;
-    run.excitation.seed = draw.seed();
-    run.sensors.seed = draw.seed();
-    run.sensors.of(record::Channel::motor_torque).noise = draw.uniform(1, 3);
+    run.excitation.seed = random.bits();
+    run.sensors.seed = random.bits();
+    run.sensors.of(record::Channel::motor_torque).noise = random.uniform(1, 3);
     run.sensors.of(record::Channel::motor_position).resolution = 8.7e-7;
     run.sensors.of(record::Channel::load_position).resolution = 7e-6;
     const diagnosis::Estimate e =

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::test {
@@ -22,11 +22,10 @@ struct RecordRecipe {
 inline record::Record make_record(const RecordRecipe& recipe) {
   record::Record record;
   record.name = "recipe";
-  std::mt19937 random(17);
-  std::normal_distribution<double> normal;
+  Random random(17);
   const auto count = static_cast<int>(std::lround(recipe.duration * recipe.rate));
   for (int i = 0; i < count; ++i) {
-    const double shift = std::clamp(recipe.jitter * normal(random), -0.45, 0.45);
+    const double shift = std::clamp(recipe.jitter * random.normal(), -0.45, 0.45);
     const double t = i / recipe.rate - recipe.idle;
     const double half = 2 * recipe.frequency * t + 1e-9;  // a switch at a sample acts from that sample on
     const double since = (half - std::floor(half)) / (2 * recipe.frequency);
@@ -36,7 +35,7 @@ inline record::Record make_record(const RecordRecipe& recipe) {
     record.column(record::Channel::motor_torque).push_back(recipe.amplitude * sign);
     record.column(record::Channel::motor_position).push_back(0.5 * recipe.travel * sign * (1 - 0.2 * ring));
     record.column(record::Channel::sensor_torque)
-        .push_back(recipe.amplitude * sign * (1 - 2 * ring) + recipe.noise * normal(random));
+        .push_back(recipe.amplitude * sign * (1 - 2 * ring) + recipe.noise * random.normal());
     record.column(record::Channel::load_position).push_back(0);
   }
   return record;

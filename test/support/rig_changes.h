@@ -30,10 +30,9 @@ inline std::vector<RigChange> rig_changes() {
       {"mesh.backlash", [](model::Rig& r) { r.mesh.backlash *= 1.1; }},
       {"mesh.base_radius", [](model::Rig& r) { r.mesh.base_radius = 1.3; }},
       {"mesh.start_in_gap", [](model::Rig& r) { r.mesh.start_in_gap += 0.5; }},
-      {"mesh.contact_spec", [](model::Rig& r) { r.mesh.contact_spec.values["stiffness"] *= 1.1; }},
       {"mesh.contact",
        [](model::Rig& r) {
-         model::ContactSpec softer = r.mesh.contact->made_of;
+         model::ContactSpec softer = r.mesh.contact_spec();
          softer.values["stiffness"] *= 0.9;
          r.mesh.contact = model::make_contact_law(softer.law, softer.values);
        }},

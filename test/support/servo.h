@@ -20,9 +20,7 @@ inline model::Rig other_servo() {
   rig.motor.inertia = 7.8;
   rig.link.inertia = 84;
   rig.mesh.backlash = 6.3e-4;
-  rig.mesh.contact_spec.values["stiffness"] = 400e3;
-  rig.mesh.contact_spec.values["damping"] = 560;
-  rig.mesh.contact = model::make_contact_law(rig.mesh.contact_spec.law, rig.mesh.contact_spec.values);
+  rig.mesh.contact = model::make_contact_law("linear", {{"stiffness", 400e3}, {"damping", 560}});
   rig.motor.coulomb_friction = 47;
   rig.motor.viscous_damping = 10;
   rig.link.coulomb_friction = 18;

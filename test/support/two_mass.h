@@ -7,8 +7,8 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <random>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::test {
@@ -74,8 +74,7 @@ struct TwoMassSensors {
 inline record::Record simulate(const TwoMass& machine, double duration, const TwoMassSensors& sensors = {},
                                double h = 1e-5) {
   record::Record record;
-  std::mt19937 random(sensors.seed);
-  std::normal_distribution<double> normal;
+  Random random(sensors.seed);
   const auto rounded = [](double value, double step) {
     return step > 0 ? step * std::round(value / step) : value;
   };
@@ -85,12 +84,12 @@ inline record::Record simulate(const TwoMass& machine, double duration, const Tw
   for (int i = 0; i < samples; ++i) {
     const double t = 1e-3 * i, torque = machine.motor_torque(t, s[2]);  // held over a sample
     record.time.push_back(t);
-    record.column(record::Channel::motor_torque).push_back(torque + sensors.torque_noise * normal(random));
+    record.column(record::Channel::motor_torque).push_back(torque + sensors.torque_noise * random.normal());
     record.column(record::Channel::motor_position)
         .push_back(rounded(sensors.motor_scale * s[0], sensors.motor_step));
     record.column(record::Channel::load_position).push_back(rounded(s[1], sensors.load_step));
-    record.column(record::Channel::motor_velocity).push_back(s[2] + sensors.speed_noise * normal(random));
-    record.column(record::Channel::load_velocity).push_back(s[3] + sensors.speed_noise * normal(random));
+    record.column(record::Channel::motor_velocity).push_back(s[2] + sensors.speed_noise * random.normal());
+    record.column(record::Channel::load_velocity).push_back(s[3] + sensors.speed_noise * random.normal());
     for (int k = 0; k < inner; ++k) machine.step(s, t + k * h, h, torque);
   }
   return record;

@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <random>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::test {
@@ -62,9 +62,8 @@ inline record::Record two_mass_record(const TwoMassMachine& m, const Torque& tor
 }
 
 inline void add_noise(std::vector<double>& values, double deviation, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, deviation);
-  for (double& v : values) v += normal(random);
+  Random random(seed);
+  for (double& v : values) v += deviation * random.normal();
 }
 
 /// The sensors of Table 3.1: speeds to 0.015 deg/s. Torque to 0.5 N m, seen from the load.

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <random>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "backlash_diagnosis/base/random.h"
 
 namespace backlash::test {
 
@@ -40,14 +41,13 @@ struct Signal {
 /// `noise`: standard deviation; `jitter`: of the stamps, in samples.
 inline Signal sample(const Wave& wave, double periods, double per_period, double noise = 0, double jitter = 0,
                      double start = 0) {
-  std::mt19937 random(7);
-  std::normal_distribution<double> normal;
+  Random random(7);
   Signal signal;
   const auto count = static_cast<int>(std::lround(periods * per_period));
   for (int i = 0; i < count; ++i) {
-    const double t = (i + std::max(-0.45, std::min(0.45, jitter * normal(random)))) / per_period;
+    const double t = (i + std::max(-0.45, std::min(0.45, jitter * random.normal()))) / per_period;
     signal.time.push_back(start + t);
-    signal.value.push_back(wave(t + 0.3 / per_period) + noise * normal(random));
+    signal.value.push_back(wave(t + 0.3 / per_period) + noise * random.normal());
   }
   return signal;
 }

@@ -217,9 +217,9 @@ def print_confusion(counts):
 
 def totals(results):
     """Figures of one half of the suite, and whether each goal is met."""
-    inside = [r for r in results if not r["outside"]]
-    empty = [r for r in inside if not r["true"]]
     outside = [r for r in results if r["outside"]]
+    empty = [r for r in results if not r["outside"] and not r["true"]]
+    inside = [r for r in results if not r["outside"] and r["true"]]
     right = sum(r["score"] in ("exact", "equivalent") for r in inside)
     figures = {"machines": len(results), "in_dictionary": len(inside),
                "exact": sum(r["score"] == "exact" for r in inside),

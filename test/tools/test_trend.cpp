@@ -2,9 +2,9 @@
 // The command backlash_trend: exit codes, JSON, limits of rigs and baselines, refusals.
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <regex>
 
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/history.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
@@ -29,14 +29,13 @@ class TrendCommand : public CommandTest {
 
   /// A point per day from 100 um on; scatter 0.5 um.
   void write_history(int days, double um_per_day, const std::string& name = "elbow.csv") const {
-    std::mt19937_64 random(1);
-    std::normal_distribution<double> normal;
+    Random random(1);
     diagnosis::History history({path(name)});
     for (int i = 0; i < days; ++i) {
       diagnosis::HistoryEntry e;
       e.time = kStart + kDay * i;
       e.grade = "good";
-      e.backlash = 1e-6 * (100 + um_per_day * i + 0.5 * normal(random));
+      e.backlash = 1e-6 * (100 + um_per_day * i + 0.5 * random.normal());
       e.lower = e.backlash - 1e-6;
       e.upper = e.backlash + 1e-6;
       e.backlash_angle = 50 * e.backlash;

@@ -26,6 +26,9 @@ class Random {
   /// In [0, 1).
   double uniform() { return boost::random::uniform_01<double>()(engine_); }
 
+  /// In [low, high).
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+
   /// Mean 0, standard deviation 1.
   double normal() { return boost::random::normal_distribution<double>()(engine_); }
 

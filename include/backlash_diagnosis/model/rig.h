@@ -47,12 +47,12 @@ struct Mesh {
   double base_radius = std::numeric_limits<double>::quiet_NaN();  // m, of the load gear; NaN: angular mesh
   double start_in_gap =
       0;  // -, where in the gap both positions are 0: +1 at the flank that drives forward, -1 at the other
-  ContactSpec contact_spec;  // what `contact` was made of, where a file said it
   std::shared_ptr<const ContactLaw> contact;
   std::shared_ptr<const StiffnessVariation> variation;  // null: the same stiffness in every position
 
   bool angular() const { return std::isnan(base_radius); }
   double lever() const { return angular() ? 1 : base_radius; }  // m (or 1): torque per contact force
+  const ContactSpec& contact_spec() const;  // what `contact` was made of; empty without one
 };
 
 /// A validated rig. Motor, input coupling and pinion are given as seen from the load side of the reduction

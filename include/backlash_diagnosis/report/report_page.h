@@ -24,6 +24,9 @@ struct Provenance {
 /// Sections on the rig, the files with their digests, versions and the command that repeats all.
 std::string provenance_sections(const Provenance& provenance);
 
+/// Section on the warnings, if only to say that there are none.
+std::string warnings_section(const std::vector<std::string>& warnings);
+
 /// The command for a shell: the folder it was given in, then its words, quoted where they need it.
 std::string shell_command(const std::vector<std::string>& words);
 

@@ -28,7 +28,7 @@ class JointDiagnostics {
   JointDiagnostics(const JointMonitor& monitor, const JointHistory* history, std::string topic,
                    const DiagnosticsSettings& settings);
 
-  void add_to(diagnostic_updater::Updater& updater);
+  void add_to(diagnostic_updater::DiagnosticTaskVector& tasks);
   void set(const DiagnosticsSettings& settings);
 
   /// Looks at the joint; true where a level differs from that at the last call: to be published at once.

@@ -2,6 +2,7 @@
 // Order statistics, one definition for the whole package. Values must not be NaN.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 namespace backlash::signal {
@@ -21,7 +22,18 @@ double median_magnitude(std::vector<double> values);
 /// [0, 0.5) on either side.
 double quantile_range(std::vector<double> values, double tail);
 
-/// Largest minus smallest value; 0 without values.
+/// Smallest and largest value; both 0 without values.
+struct Extent {
+  double low = 0, high = 0;
+  double size() const { return high - low; }
+};
+
+Extent extent(const std::vector<double>& values);
+
+/// Of the values from `begin` to before `end`.
+Extent extent(const std::vector<double>& values, std::size_t begin, std::size_t end);
+
+/// extent(values).size()
 double peak_to_peak(const std::vector<double>& values);
 
 /// Standard deviation of a normal distribution in units of its median absolute deviation.

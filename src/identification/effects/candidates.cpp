@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "orthogonal_part.h"
 
@@ -155,9 +156,9 @@ model::MotionRange motion_range(const std::vector<ServoData>& records) {
     std::vector<double> deflection(d.load.size());
     for (std::size_t k = 0; k < d.load.size(); ++k) deflection[k] = d.motor[k] - d.load[k];
     if (!deflection.empty()) range.deflection = std::max(range.deflection, deviation(deflection));
-    const auto [low, high] = std::minmax_element(d.motor.begin(), d.motor.end());
-    range.from = std::min(range.from, *low);
-    range.to = std::max(range.to, *high);
+    const auto [low, high] = signal::extent(d.motor);
+    range.from = std::min(range.from, low);
+    range.to = std::max(range.to, high);
     range.duration = std::max(range.duration, double(d.size()) * d.interval);
     range.interval = d.interval;
   }

@@ -6,7 +6,7 @@
 namespace backlash::identification {
 
 std::optional<model::Rig> with_hertzian_teeth(const model::Rig& rig, double torque) {
-  const model::ContactSpec& linear = rig.mesh.contact_spec;
+  const model::ContactSpec& linear = rig.mesh.contact_spec();
   if (rig.mesh.rigid || linear.law != "linear" || !(torque > 0)) return std::nullopt;
   const double stiffness = linear.values.at("stiffness"), damping = linear.values.at("damping");
   const double force = torque / rig.mesh.lever(), depth = force / stiffness;
@@ -15,7 +15,6 @@ std::optional<model::Rig> with_hertzian_teeth(const model::Rig& rig, double torq
   values["exponent"] = 1.5;
   values["alpha"] = damping / (1.5 * force);
   model::Rig other = rig;
-  other.mesh.contact_spec = {"hunt_crossley", values};
   other.mesh.contact = model::make_contact_law("hunt_crossley", values);
   return other;
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "steps.h"
 
@@ -20,9 +21,9 @@ bool can_be_fitted(const rig_file::RigParameter& p, const model::Rig& rig) {
 void start_in_travel(Machine& machine, const std::vector<ServoData>& data) {
   double& gap = machine.rig.mesh.backlash;
   for (std::size_t i = 0; i < data.size(); ++i) {
-    const auto [low, high] = std::minmax_element(data[i].motor.begin(), data[i].motor.end());
-    machine.calibrations[i].encoder_offset = -0.5 * (*low + *high);
-    gap = std::min(gap, 0.5 * (*high - *low) * machine.rig.mesh.lever());
+    const auto [low, high] = signal::extent(data[i].motor);
+    machine.calibrations[i].encoder_offset = -0.5 * (low + high);
+    gap = std::min(gap, 0.5 * (high - low) * machine.rig.mesh.lever());
   }
 }
 

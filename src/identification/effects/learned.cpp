@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "orthogonal_part.h"
 
@@ -33,13 +34,8 @@ std::vector<double> coordinate(const std::string& name, const RecordSet& records
 }
 
 /// Evenly spaced over what the records cover.
-std::vector<double> points_over(std::vector<double> values, double tail) {
-  const auto at = [&](double share) {
-    const auto place = values.begin() + long(share * double(values.size() - 1));
-    std::nth_element(values.begin(), place, values.end());
-    return *place;
-  };
-  const double low = at(tail), high = at(1 - tail);
+std::vector<double> points_over(const std::vector<double>& values, double tail) {
+  const double low = signal::quantile(values, tail), high = signal::quantile(values, 1 - tail);
   std::vector<double> points;
   if (!(high > low)) return points;
   for (int i = 0; i < kPoints; ++i) points.push_back(low + (high - low) * i / (kPoints - 1));

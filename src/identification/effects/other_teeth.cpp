@@ -23,9 +23,7 @@ Machine declared_with(const model::Rig& teeth, const Machine& declared) {
 
 /// The machine as it is fitted now, with other teeth.
 std::shared_ptr<const BandFit> with_teeth(BandFit fitted, const model::Mesh& teeth) {
-  model::Mesh& mesh = fitted.fit.machine.rig.mesh;
-  mesh.contact_spec = teeth.contact_spec;
-  mesh.contact = teeth.contact;
+  fitted.fit.machine.rig.mesh.contact = teeth.contact;
   return std::make_shared<const BandFit>(std::move(fitted));
 }
 

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash::identification {
 namespace {
@@ -53,12 +54,12 @@ Samples samples(const Machine& machine, const RecordSet& records, bool deflectio
 
 /// Share of the residual's square that the means over classes of the coordinate predict in folds left out.
 double followed(const Samples& s, const std::vector<double>& x) {
-  const auto [low, high] = std::minmax_element(x.begin(), x.end());
-  if (!(*high > *low)) return 0;
+  const auto [low, high] = signal::extent(x);
+  if (!(high > low)) return 0;
   std::vector<double> sum(kBins * kFolds, 0.0), count(kBins * kFolds, 0.0);
   std::vector<int> bin(x.size());
   for (std::size_t k = 0; k < x.size(); ++k) {
-    bin[k] = std::min(kBins - 1, int(kBins * (x[k] - *low) / (*high - *low)));
+    bin[k] = std::min(kBins - 1, int(kBins * (x[k] - low) / (high - low)));
     sum[bin[k] * kFolds + s.fold[k]] += s.residual[k];
     count[bin[k] * kFolds + s.fold[k]] += 1;
   }

@@ -39,8 +39,8 @@ std::string traced_rig_text(const rig_file::RigFile& declared, const Trace& trac
   std::map<std::string, std::string> units;
   for (const auto& [name, unit] : trace.units) units[name] = model::axis_unit(unit, declared.rig.linear);
   rig_file::RigDocument document(declared);
-  const model::ContactSpec& contact = trace.augmented.mesh.contact_spec;
-  if (!declared.rig.mesh.rigid && contact.law != declared.rig.mesh.contact_spec.law) {
+  const model::ContactSpec& contact = trace.augmented.mesh.contact_spec();
+  if (!declared.rig.mesh.rigid && contact.law != declared.rig.mesh.contact_spec().law) {
     document.set_contact_law(contact);
     units[rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).name] +=
         "^1.5";

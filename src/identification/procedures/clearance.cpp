@@ -104,9 +104,8 @@ FlankPassage passage_of(const Run& run, const Stretch& s, int push) {
           Eigen::Map<const Eigen::VectorXd>(run.fine.data() + s.begin, n), run.interval, push};
 }
 
-double travel_of(const Values& values, int begin, int end) {
-  const auto [low, high] = std::minmax_element(values.begin() + begin, values.begin() + end);
-  return *high - *low;
+signal::Extent extent_of(const Values& values, const Stretch& s) {
+  return signal::extent(values, static_cast<std::size_t>(s.begin), static_cast<std::size_t>(s.end));
 }
 
 /// One passage with the contact of all.
@@ -114,11 +113,11 @@ std::optional<GapPassage> measure(const Run& run, const Stretch& s, const FlankC
   GapPassage p;
   p.time.assign(run.time.begin() + s.begin, run.time.begin() + s.end);
   p.measured.assign(run.relative.begin() + s.begin, run.relative.begin() + s.end);
-  p.travel = travel_of(run.smooth, s.begin, s.end);
-  p.motor_travel = travel_of(run.motor, s.begin, s.end);
-  const auto [low, high] = std::minmax_element(run.smooth.begin() + s.begin, run.smooth.begin() + s.end);
+  const auto [low, high] = extent_of(run.smooth, s);
+  p.travel = high - low;
+  p.motor_travel = extent_of(run.motor, s).size();
   try {
-    const PassageFit fit = fit_flanks({passage_of(run, s, push)}, *low, *high, contact);
+    const PassageFit fit = fit_flanks({passage_of(run, s, push)}, low, high, contact);
     p.lower = fit.flanks.lower;
     p.upper = fit.flanks.lower + fit.flanks.gap;
     p.gap = fit.gap;
@@ -129,7 +128,7 @@ std::optional<GapPassage> measure(const Run& run, const Stretch& s, const FlankC
       const double v = (run.smooth[i] - run.smooth[i - 1]) / run.interval;
       if (std::fabs(v) > std::fabs(p.speed)) p.speed = v;
     }
-    const bool flies = *low<p.lower&& * high> p.upper;  // a flank that is not touched is a guess
+    const bool flies = low < p.lower && high > p.upper;  // a flank that is not touched is a guess
     return flies && p.deviation < kMisfit * p.travel ? std::optional(p) : std::nullopt;
   } catch (const CannotIdentify&) {
     return std::nullopt;
@@ -151,7 +150,7 @@ double held_frequency(const ClearanceSettings& s) {
 void require_brake(const Run& run, const std::vector<Stretch>& stretches, double most) {
   int moving = 0;
   for (const Stretch& s : stretches)
-    moving += travel_of(run.motor, s.begin, s.end) > most * travel_of(run.smooth, s.begin, s.end);
+    moving += extent_of(run.motor, s).size() > most * extent_of(run.smooth, s).size();
   if (2 * moving > int(stretches.size()))
     throw CannotIdentify(fmt::format(
         "the motor is not braked: in {} of {} passages it moves more than {:.4g} % of the load's travel",
@@ -169,9 +168,9 @@ PassageFit fit_all(const Run& run, const std::vector<Stretch>& stretches, double
   Values lows, highs;
   for (const Stretch& s : stretches) {
     passages.push_back(passage_of(run, s, push));
-    const auto [low, high] = std::minmax_element(run.smooth.begin() + s.begin, run.smooth.begin() + s.end);
-    lows.push_back(*low);
-    highs.push_back(*high);
+    const auto [low, high] = extent_of(run.smooth, s);
+    lows.push_back(low);
+    highs.push_back(high);
   }
   FlankContact known;
   known.stiffness = stiffness;
@@ -235,8 +234,7 @@ Clearance identify_clearance(const record::Record& record, const ClearanceSettin
   c.found = int(stretches.size());
   const auto unusable = [&](const Stretch& s) {
     return s.end - s.begin < kLeastSamples ||
-           travel_of(run.motor, s.begin, s.end) >
-               settings.most_motor_travel * travel_of(run.smooth, s.begin, s.end);
+           extent_of(run.motor, s).size() > settings.most_motor_travel * extent_of(run.smooth, s).size();
   };
   stretches.erase(std::remove_if(stretches.begin(), stretches.end(), unusable), stretches.end());
   std::vector<Passages> by_push;

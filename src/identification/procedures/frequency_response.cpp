@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/identification/procedures/stepped_sine.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
@@ -20,13 +21,14 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr double kSteppedShare = 0.9;   // choice: of the time in sine runs; less is no stepped sine
-constexpr double kHighest = 0.25;       // choice: of the sampling rate
 constexpr double kLongestSegment = 16;  // s, choice: if not asked for
 constexpr std::size_t kShortestSegment = 64, kFewestSegments = 8;
 constexpr std::size_t kFirstLine = 3;  // theory: below, what drifts leaks in
 constexpr double kExcited = 1e-5;      // choice: of the largest power of a line
 constexpr std::size_t kLeakReach = 8;  // theory: lines
-constexpr double kAlone = 1e-2;        // choice: of a line's power, three lines beside it: it stands alone
+constexpr std::size_t kLobe = 2;       // theory: lines, half the main lobe of a Hann window
+constexpr double kAlone = 1e-2;        // choice: of a line's power, just beyond its lobe: it stands alone
+constexpr Eigen::Index kFewestForInertia = 4;  // choice: points for a line of two parameters
 
 struct Signals {
   std::vector<double> torque, speed;
@@ -56,8 +58,7 @@ Signals collect(const record::Record& given, ResponseSide side) {
   const record::Channel source = s.from_position ? position : velocity;
   require_finite(s.torque, record::Channel::motor_torque);
   require_finite(record.column(source), source);
-  const auto [least, most] = std::minmax_element(s.torque.begin(), s.torque.end());
-  if (*least == *most) throw CannotIdentify("the torque does not vary");
+  if (signal::peak_to_peak(s.torque) == 0) throw CannotIdentify("the torque does not vary");
   s.speed = s.from_position ? signal::derivative(record.column(source), s.interval) : record.column(source);
   return s;
 }
@@ -84,7 +85,7 @@ double inertance(const Signals& s, const ResponseSettings& settings, const Frequ
   const auto& points = response.points;
   const std::size_t first = points.size() / 2;
   const auto rows = static_cast<Eigen::Index>(points.size() - first);
-  if (rows < 4) return 0;
+  if (rows < kFewestForInertia) return 0;
   Eigen::MatrixXd a(rows, 2);
   Eigen::VectorXd b(rows);
   for (Eigen::Index i = 0; i < rows; ++i) {
@@ -116,16 +117,16 @@ std::vector<ResponsePoint> stepped_points(const Signals& s, const SineRuns& sine
   return points;
 }
 
-/// Highest of its neighbours, with nearly nothing three lines away.
+/// Highest of its neighbours, with nearly nothing just beyond the lobe.
 bool alone(const std::vector<double>& power, std::size_t k) {
   return power[k] >= power[k - 1] && power[k] > power[k + 1] &&
-         std::max(power[k - 3], power[k + 3]) < kAlone * power[k];
+         std::max(power[k - kLobe - 1], power[k + kLobe + 1]) < kAlone * power[k];
 }
 
 /// Whether the line may be no more than what a Hann window leaks from a stronger one: d lines beside a sine
 /// 1 / (pi d (d^2 - 1)) of its amplitude at most; here twice that.
 bool leaked(const std::vector<double>& power, std::size_t k) {
-  for (std::size_t d = 2; d <= kLeakReach; ++d) {
+  for (std::size_t d = kLobe; d <= kLeakReach; ++d) {
     const double share = std::pow(2 / (M_PI * double(d) * double(d * d - 1)), 2);
     const double below = k >= d ? power[k - d] : 0, above = k + d < power.size() ? power[k + d] : 0;
     if (power[k] < share * std::max(below, above)) return true;
@@ -146,7 +147,8 @@ std::size_t segment_length(const Signals& s, double wanted) {
   if (wanted > 0) {
     segment = 2 * static_cast<std::size_t>(std::lround(0.5 * wanted / s.interval));
   } else {
-    while (2 * segment <= samples / 8 && 2.0 * double(segment) * s.interval <= kLongestSegment) segment *= 2;
+    while (2 * segment <= samples / kFewestSegments && 2.0 * double(segment) * s.interval <= kLongestSegment)
+      segment *= 2;
   }
   if (segment < kShortestSegment || 2 * samples / segment < kFewestSegments + 1)
     throw CannotIdentify(std::to_string(samples) + " samples do not hold " + std::to_string(kFewestSegments) +
@@ -170,15 +172,15 @@ FrequencyResponse broadband(const Signals& s, const ResponseSettings& settings) 
   const bool both_signs = reverses(s.speed);
   FrequencyResponse response;
   std::size_t single = 0;  // line of the last sine that stands alone
-  for (std::size_t k = kFirstLine; k + 3 < power.size(); ++k) {
+  for (std::size_t k = kFirstLine; k + kLobe + 1 < power.size(); ++k) {
     if (!(power[k] > kExcited * largest) || !(spectra.yy[k] > 0) || leaked(power, k)) continue;
-    if (single > 0 && k <= single + 2) continue;
+    if (single > 0 && k <= single + kLobe) continue;
     double line = double(k);
     if (alone(power, k)) {
       line = interpolated(power, k);
       single = k;
-      while (!response.points.empty() &&
-             response.points.back().frequency * double(segment) * s.interval >= double(k) - 2.5)
+      while (!response.points.empty() && response.points.back().frequency * double(segment) * s.interval >=
+                                             double(k) - double(kLobe) - 0.5)
         response.points.pop_back();
     }
     ResponsePoint point;
@@ -221,7 +223,7 @@ FrequencyResponse estimate_response(const record::Record& record, const Response
   double best = 0;
   for (const ResponsePoint& point : response.points) best = std::max(best, point.coherence);
   const auto bad = [&](const ResponsePoint& p) {
-    return !(p.coherence >= settings.least_coherence) || p.frequency * s.interval > kHighest ||
+    return !(p.coherence >= settings.least_coherence) || p.frequency * s.interval > kHighestFrequency ||
            !std::isfinite(p.standard_error);
   };
   auto& points = response.points;

@@ -42,9 +42,9 @@ bool gap_varies(const model::Rig& rig) {
 }
 
 GapMap with_wind_up(GapMap map, const model::Rig& rig) {
-  if (!rig.mesh.contact_spec.values.has("stiffness"))
-    throw InvalidParameter("contact.law", rig.mesh.contact_spec.law, "has no stiffness to be wound up");
-  const double lever = rig.mesh.lever(), k = rig.mesh.contact_spec.values.at("stiffness") * lever * lever;
+  if (!rig.mesh.contact_spec().values.has("stiffness"))
+    throw InvalidParameter("contact.law", rig.mesh.contact_spec().law, "has no stiffness to be wound up");
+  const double lever = rig.mesh.lever(), k = rig.mesh.contact_spec().values.at("stiffness") * lever * lever;
   const model::Body& load = rig.link;
   const double forward = load.coulomb_friction + load.coulomb_asymmetry +
                          (load.viscous_damping + load.viscous_asymmetry) * std::fabs(map.forward_speed);

@@ -10,8 +10,17 @@
 namespace backlash::identification {
 namespace {
 
-constexpr int kLinear = 4;            // c0, c1, p, q
-constexpr double kMostDamping = 0.9;  // theory: damping ratio; above, nothing rings
+constexpr int kLinear = 4;                  // c0, c1, p, q
+constexpr int kNonlinear = 2;               // a, wd
+constexpr double kMostDamping = 0.9;        // theory: damping ratio; above, nothing rings
+constexpr std::size_t kFewestSamples = 10;  // choice: four more than unknowns
+constexpr double kFarthest = 2;             // choice: of w0 found over expected, either way
+constexpr double kGridFrom = 0.6, kGridTo = 1.7, kGridStep = 1.12;     // choice: of the expected w0
+constexpr double kGridDamping[] = {0.02, 0.06, 0.12, 0.2, 0.35, 0.6};  // choice: damping ratios
+constexpr double kTypical = 0.1;         // choice: of the expected w0, the size of a step of the fit
+constexpr double kAboveNoise = 3;        // choice: deviations of the residuals that an extreme stands out by
+constexpr double kPeakReach = 0.25;      // choice: of half a period, on either side of an extreme
+constexpr std::size_t kFewestPeaks = 3;  // theory: a line of two parameters, and one to spare
 
 /// The damped sine as a problem in (rate, frequency) alone.
 class DampedSine {
@@ -45,8 +54,8 @@ class DampedSine {
 Eigen::Vector2d start_of(const DampedSine& sine, double expected) {
   Eigen::Vector2d best;
   double least = std::numeric_limits<double>::infinity();
-  for (double w = 0.6 * expected; w < 1.7 * expected; w *= 1.12)
-    for (const double z : {0.02, 0.06, 0.12, 0.2, 0.35, 0.6}) {
+  for (double w = kGridFrom * expected; w < kGridTo * expected; w *= kGridStep)
+    for (const double z : kGridDamping) {
       const Eigen::Vector2d p(z * w, w * std::sqrt(1 - z * z));
       const double sum = sine.residuals(p).squaredNorm();
       if (sum < least) {
@@ -69,23 +78,26 @@ void polar(Ringing& r, const Eigen::Matrix2d& covariance) {
 }  // namespace
 
 Ringing fit_ringing(const std::vector<double>& time, const std::vector<double>& values, double expected) {
-  if (time.size() < 10) throw CannotIdentify("ringing of fewer than 10 samples");
+  if (time.size() < kFewestSamples)
+    throw CannotIdentify("ringing of fewer than " + std::to_string(kFewestSamples) + " samples");
   const DampedSine sine(time, values);
   const signal::LeastSquaresFit fit =
       signal::fit_nonlinear([&](const Eigen::VectorXd& p) { return sine.residuals(p); },
-                            start_of(sine, expected), Eigen::Vector2d::Constant(0.1 * expected));
+                            start_of(sine, expected), Eigen::Vector2d::Constant(kTypical * expected));
   Ringing r;
   r.time = time;
   r.measured = values;
   // The linear coefficients cost degrees of freedom as well.
-  const double rows = double(time.size()), more = std::sqrt((rows - 2) / (rows - 2 - kLinear));
+  const double rows = double(time.size()),
+               more = std::sqrt((rows - kNonlinear) / (rows - kNonlinear - kLinear));
   const Eigen::Matrix2d covariance = fit.covariance * (more * more);
   r.deviation = fit.deviation * more;
   r.rate = {fit.values[0], std::sqrt(covariance(0, 0))};
   r.frequency = {std::fabs(fit.values[1]), std::sqrt(covariance(1, 1))};
   polar(r, covariance);
   const double w0 = r.natural_frequency.value;
-  if (!(r.rate.value > 0 && r.damping_ratio.value < kMostDamping && w0 > 0.5 * expected && w0 < 2 * expected))
+  if (!(r.rate.value > 0 && r.damping_ratio.value < kMostDamping && w0 > expected / kFarthest &&
+        w0 < kFarthest * expected))
     throw CannotIdentify("no decaying ringing near " + std::to_string(expected / (2 * M_PI)) + " Hz");
   const Eigen::VectorXd c = sine.coefficients(fit.values);
   r.fitted.resize(time.size());
@@ -105,9 +117,9 @@ void measure_peaks(Ringing& r) {
   for (int i = 0; i < n; ++i) y[i] = r.measured[i] - r.level - r.slope * (r.time[i] - r.time[0]);
   const double interval = (r.time.back() - r.time.front()) / (n - 1);
   const double half_period = M_PI / r.frequency.value / interval;  // samples
-  const int reach = std::max(1, static_cast<int>(half_period / 4));
+  const int reach = std::max(1, static_cast<int>(kPeakReach * half_period));
   for (int i = reach; i + reach < n; ++i) {
-    bool extreme = std::fabs(y[i]) > 3 * r.deviation;
+    bool extreme = std::fabs(y[i]) > kAboveNoise * r.deviation;
     for (int k = i - reach; k <= i + reach && extreme; ++k)
       extreme = y[k] * y[i] > 0 && std::fabs(y[k]) <= std::fabs(y[i]);
     if (!extreme) continue;
@@ -125,7 +137,7 @@ void measure_peaks(Ringing& r) {
     r.peak_time.push_back(r.time[i] + at * interval);
     r.peak.push_back(c[0] + at * c[1] / 2);
   }
-  if (r.peak.size() < 3) return;
+  if (r.peak.size() < kFewestPeaks) return;
   Eigen::MatrixXd a(r.peak.size(), 2);
   Eigen::VectorXd logarithm(r.peak.size());
   for (std::size_t i = 0; i < r.peak.size(); ++i) {

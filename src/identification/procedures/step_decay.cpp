@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "procedures.h"
 
 namespace backlash::identification {
@@ -20,10 +21,9 @@ double relative(const signal::Measured& m) {
 /// Torque that jumps by half of its range several times.
 bool is_square(const record::Record& record) {
   const std::vector<double>& torque = record.column(record::Channel::motor_torque);
-  const auto [low, high] = std::minmax_element(torque.begin(), torque.end());
+  const double half = 0.5 * signal::peak_to_peak(torque);
   int jumps = 0;
-  for (std::size_t k = 1; k < torque.size(); ++k)
-    jumps += std::fabs(torque[k] - torque[k - 1]) > 0.5 * (*high - *low);
+  for (std::size_t k = 1; k < torque.size(); ++k) jumps += std::fabs(torque[k] - torque[k - 1]) > half;
   return jumps >= 3;
 }
 

@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "procedures.h"
 
 namespace backlash::identification {
@@ -33,9 +34,8 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
   for (const CaseRecord& r : c.records) {
     if (!r.drive() || !r.has_load) continue;
     const auto& q = r.record.column(record::Channel::load_position);
-    const auto [low, high] = std::minmax_element(q.begin(), q.end());
     const double travel = q.back() - q.front();
-    if (std::fabs(travel) < 0.95 * (*high - *low)) continue;
+    if (std::fabs(travel) < 0.95 * signal::peak_to_peak(q)) continue;
     runs.push_back({&r, travel / (r.record.time.back() - r.record.time.front())});
   }
   std::string reasons;

@@ -15,8 +15,11 @@ namespace {
 
 constexpr std::size_t kFewestCycles = 4, kMostCycles = 200;
 constexpr std::size_t kFewestForNoise = 64;  // theory: samples that tell the noise
-constexpr double kBetween =
-    2.5;  // cycles between two runs that count as inside: the step from one to the other
+constexpr double kBetween = 2.5;             // choice: cycles between two runs that count as inside
+constexpr double kMostMoved = 0.25;      // choice: cycles that a refined passage may lie from the rough one
+constexpr double kTail = 0.01;           // choice: share of the samples beyond the range on either side
+constexpr std::size_t kSettling = 5;     // choice: one of so many cycles is left out at the begin
+constexpr std::size_t kSpareTheEnd = 8;  // choice: cycles, from which on the last one is left out too
 constexpr double kLeastUneven = 1e-3, kMostUneven = 0.02;  // choice: cycles
 constexpr double kJitter = 5;                              // choice: deviations of a passage
 constexpr std::size_t kJitterReach = 10;  // choice: passages on either side that tell the deviation
@@ -25,7 +28,8 @@ constexpr double kNoSine = 0.1;           // choice: of the torque's power
 constexpr double kTurn = 0.1;             // choice: of the torque's range; a smaller turn is noise
 constexpr double kNoiseTurn = 8;          // choice: standard deviations; the same for known noise
 constexpr double kMostTurn = 0.5;         // choice: of the range, lest the sine itself be noise
-constexpr double kFewestSamples = 8;      // theory: a cycle or a group of them is fitted with, three unknowns
+constexpr std::size_t kFewestSamples =
+    8;  // theory: a cycle or a group of them is fitted with, three unknowns
 
 /// A rising passage of the mean between a minimum and the next maximum.
 struct Passage {
@@ -59,7 +63,7 @@ void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
     }
     const Eigen::Vector3d fit = signal::solve_symmetric(normal, right);
     const double early = std::atan2(fit[1], fit[2]) / (2 * M_PI);
-    const bool found = std::isfinite(early) && std::fabs(early) < 0.25;
+    const bool found = std::isfinite(early) && std::fabs(early) < kMostMoved;
     refined.push_back(found ? Passage{rough - early * period, fit[0], std::hypot(fit[1], fit[2])}
                             : passages[i]);
   }
@@ -68,8 +72,8 @@ void refine(const std::vector<double>& u, std::vector<Passage>& passages) {
 
 std::vector<Passage> find_passages(const std::vector<double>& u) {
   std::vector<Passage> passages;
-  if (u.size() < 8) return passages;
-  const double reach = signal::quantile_range(u, 0.01);
+  if (u.size() < kFewestSamples) return passages;
+  const double reach = signal::quantile_range(u, kTail);
   const double noise = u.size() < kFewestForNoise ? 0 : signal::white_noise(u);
   const double turn = std::clamp(kNoiseTurn * noise, kTurn * reach, kMostTurn * reach);
   if (!(turn > 0)) return passages;
@@ -156,7 +160,7 @@ std::complex<double> amplitude(const Eigen::Vector2d& cosine_and_sine) {
 double cycle_scatter(const std::vector<double>& u, const std::vector<double>& y, const SineRun& run,
                      const LineFit& whole) {
   const double f = run.frequency(), middle = 0.5 * (run.begin + run.end), half = 0.5 * (run.end - run.begin);
-  const auto group = static_cast<std::size_t>(std::max(1.0, std::ceil(kFewestSamples * f)));
+  const auto group = static_cast<std::size_t>(std::max(1.0, std::ceil(double(kFewestSamples) * f)));
   const std::size_t groups = run.cycles / group;
   std::vector<std::complex<double>> found;
   std::complex<double> mean = 0;
@@ -199,7 +203,8 @@ SineRuns find_sine_runs(const std::vector<double>& torque) {
     }
     first = last;
     const LineFit fit = fit_line(torque, torque, run);
-    if (run.frequency() > 0.25 || fit.left_power[0] > kNoSine * (fit.left_power[0] + fit.line_power[0]))
+    if (run.frequency() > kHighestFrequency ||
+        fit.left_power[0] > kNoSine * (fit.left_power[0] + fit.line_power[0]))
       continue;
     inside += run.end - run.begin;
     if (!found.runs.empty() && run.begin - found.runs.back().end <= kBetween / run.frequency())
@@ -213,7 +218,8 @@ SineRuns find_sine_runs(const std::vector<double>& torque) {
 ResponsePoint sine_response(const std::vector<double>& torque, const std::vector<double>& speed,
                             const SineRun& run) {
   const double period = 1 / run.frequency();
-  const std::size_t leading = std::max<std::size_t>(1, (run.cycles + 4) / 5), trailing = run.cycles >= 8;
+  const std::size_t leading = std::max<std::size_t>(1, (run.cycles + kSettling - 1) / kSettling),
+                    trailing = run.cycles >= kSpareTheEnd;
   const SineRun used{run.begin + double(leading) * period, run.end - double(trailing) * period,
                      run.cycles - leading - trailing};
   const LineFit fit = fit_line(torque, speed, used);

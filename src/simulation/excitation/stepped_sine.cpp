@@ -10,7 +10,8 @@
 namespace backlash::simulation {
 namespace {
 
-constexpr double kMostSteps = 100'000;
+constexpr int kMostSteps = 100'000, kMostCycles = 1'000'000;  // choice: against slips of the pen
+constexpr double kRounding = 1e-6;  // choice: of a step; decimal fractions are not exact
 
 class SteppedSine : public Excitation {
  public:
@@ -48,12 +49,13 @@ std::unique_ptr<Excitation> stepped_sine_excitation(double amplitude, double sta
   require("start_frequency", start, Range::positive());
   require("end_frequency", end, Range::positive());
   require("step_frequency", step, Range::positive());
-  require("cycles", cycles, Range::between(1, 1e6));
+  require("cycles", cycles, Range::between(1, kMostCycles));
   require("bias", bias, Range::any());
   if (end < start) throw InvalidParameter("excitation.end_frequency", end, "must be >= start_frequency");
-  const double steps = std::floor((end - start) / step + 1e-6);  // decimal fractions are not exact
+  const double steps = std::floor((end - start) / step + kRounding);
   if (steps >= kMostSteps)
-    throw InvalidParameter("excitation.step_frequency", step, "gives more than 1e5 frequencies");
+    throw InvalidParameter("excitation.step_frequency", step,
+                           "gives more than " + std::to_string(kMostSteps) + " frequencies");
   std::vector<double> frequencies;
   for (int k = 0; k <= steps; ++k) frequencies.push_back(start + k * step);
   return std::make_unique<SteppedSine>(amplitude, std::move(frequencies), cycles, bias);

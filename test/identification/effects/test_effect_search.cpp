@@ -96,8 +96,8 @@ TEST(EffectSearch, PreslidingIsTheShapeOfFrictionOrAnEffect) {
 /// Hertzian teeth, about as stiff as those of other_servo() under 300 N m.
 model::Rig hertzian_servo() {
   model::Rig machine = test::other_servo();
-  machine.mesh.contact_spec = {"hunt_crossley", {{"stiffness", 1.5e7}, {"exponent", 1.5}, {"alpha", 1.0}}};
-  machine.mesh.contact = model::make_contact_law("hunt_crossley", machine.mesh.contact_spec.values);
+  machine.mesh.contact =
+      model::make_contact_law("hunt_crossley", {{"stiffness", 1.5e7}, {"exponent", 1.5}, {"alpha", 1.0}});
   return machine;
 }
 
@@ -108,13 +108,13 @@ TEST(EffectSearch, TeethOfAnotherShapeAreNoEffect) {
   const Trace trace = traced(records_of(machine));
   EXPECT_EQ(found(trace), std::set<std::string>{"gravity"});
   ASSERT_EQ(trace.notes.size(), 1u);
-  EXPECT_EQ(trace.augmented.mesh.contact_spec.law, "hunt_crossley");
+  EXPECT_EQ(trace.augmented.mesh.contact_spec().law, "hunt_crossley");
   EXPECT_NEAR(trace.parameters.at("mesh_stiffness").value, 1.5e7, 0.01e7);
   EXPECT_NEAR(trace.parameters.at("mesh_alpha").value, 1, 0.05);
   expect_at_floor(trace);
   // Before: as declared, with linear teeth.
   EXPECT_GT(trace.channels.at("deflection").before, 10 * trace.channels.at("deflection").after);
-  EXPECT_EQ(trace.base.mesh.contact_spec.law, "linear");
+  EXPECT_EQ(trace.base.mesh.contact_spec().law, "linear");
 }
 
 TEST(EffectSearch, TwoEffectsAtOnce) {

@@ -126,15 +126,15 @@ TEST(TracedRig, OfOneInertiaAndOfALockedLink) {
 TEST(TracedRig, OtherTeethReplaceTheDeclaredLaw) {
   const rig_file::RigFile declared = rig_file::rig_file_from_text(config("two_inertia_servo"), "rig.yaml");
   Trace trace = found(declared.rig, kServo, {gravity()});
-  trace.augmented.mesh.contact_spec = {"hunt_crossley",
-                                       {{"stiffness", 2.1e7}, {"exponent", 1.5}, {"alpha", 0.8}}};
+  trace.augmented.mesh.contact =
+      model::make_contact_law("hunt_crossley", {{"stiffness", 2.1e7}, {"exponent", 1.5}, {"alpha", 0.8}});
   trace.parameters.erase("mesh_damping");
   trace.parameters["mesh_stiffness"] = {2.1e7, 1e5};
   trace.parameters["mesh_alpha"] = {0.8, 0.01};
   trace.units["mesh_alpha"] = "s/rad";
   const rig_file::RigFile file = rig_file::rig_file_from_text(traced_rig_text(declared, trace), "rig.yaml");
-  EXPECT_EQ(file.rig.mesh.contact_spec.law, "hunt_crossley");
-  EXPECT_EQ(file.rig.mesh.contact_spec.values, trace.augmented.mesh.contact_spec.values);
+  EXPECT_EQ(file.rig.mesh.contact_spec().law, "hunt_crossley");
+  EXPECT_EQ(file.rig.mesh.contact_spec().values, trace.augmented.mesh.contact_spec().values);
   EXPECT_EQ(file.text.find("damping: 483"), std::string::npos) << file.text;
   EXPECT_NE(file.text.find("# N m/rad^1.5, fitted +- 1e+05"), std::string::npos) << file.text;
   EXPECT_NE(file.text.find("# s/rad, fitted +- 0.01"), std::string::npos) << file.text;

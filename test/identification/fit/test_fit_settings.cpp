@@ -26,8 +26,8 @@ TEST(MeshResonance, IsThatOfTwoInertiasAndASpring) {
 // F = K d^1.5: dF/dd = 1.5 K^(2/3) F^(1/3), so eight times the torque is sqrt(2) times the frequency.
 TEST(MeshResonance, OfHertzianTeethRisesWithTheTorque) {
   model::Rig rig = test::servo_file().rig;
-  rig.mesh.contact_spec = {"hunt_crossley", {{"stiffness", 1.5e7}, {"exponent", 1.5}, {"alpha", 0.0}}};
-  rig.mesh.contact = model::make_contact_law("hunt_crossley", rig.mesh.contact_spec.values);
+  rig.mesh.contact =
+      model::make_contact_law("hunt_crossley", {{"stiffness", 1.5e7}, {"exponent", 1.5}, {"alpha", 0.0}});
   const double stiffness = 1.5 * std::pow(1.5e7, 2.0 / 3) * std::cbrt(100.0);
   EXPECT_NEAR(mesh_resonance(rig, 100), std::sqrt(stiffness * (1 / 6.3 + 1 / 108.0)) / (2 * M_PI), 0.1);
   EXPECT_NEAR(mesh_resonance(rig, 800) / mesh_resonance(rig, 100), std::sqrt(2.0), 1e-3);

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/procedures/decay.h"
 #include "support/two_mass.h"
 
@@ -36,8 +36,7 @@ DecaySettings settings_of(const TwoMass& machine) {
 /// Ringing as a formula after every torque step, motor and load turning one way: z, w0 as given.
 record::Record closed_form(double z, double w0, double noise, unsigned seed, int steps = 9) {
   record::Record r;
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
+  Random random(seed);
   const double wd = w0 * std::sqrt(1 - z * z);
   for (int i = 0; i < (steps + 1) * 500; ++i) {
     const double t = 1e-3 * i, since = std::fmod(t, 0.5), sign = std::fmod(t, 1.0) < 0.5 ? 1 : -1;
@@ -45,7 +44,7 @@ record::Record closed_form(double z, double w0, double noise, unsigned seed, int
         0.01 + 0.02 * since + sign * 0.1 * std::exp(-z * w0 * since) * std::sin(wd * since + 0.3);
     r.time.push_back(t);
     r.column(record::Channel::motor_torque).push_back(150 * sign);
-    r.column(record::Channel::motor_velocity).push_back(1 + 0.8 * y + noise * normal(random));
+    r.column(record::Channel::motor_velocity).push_back(1 + 0.8 * y + noise * random.normal());
     r.column(record::Channel::load_velocity).push_back(1 - 0.2 * y);
   }
   return r;

@@ -102,14 +102,17 @@ TEST(SteppedSineResponse, OfTheSweepOfTheThesis) {
 
 TEST(SteppedSineResponse, StandardErrorsHoldTheNoise) {
   // Torque noise of 0.5 N m moves the passages too, which is part of the error.
-  for (unsigned seed = 1; seed <= 3; ++seed) {
+  double square = 0;
+  constexpr unsigned kSeeds = 3;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     const FrequencyResponse response = estimate_response(test::with_noise(sweep(), seed));
     ASSERT_GT(response.points.size(), 380u);
-    // Seven cycles give the error to 1/sqrt(12), so the square of the pull is on average 12/10; 400 points
-    // of that: 5 %. Three of these, and a few runs over a step.
-    EXPECT_NEAR(pull(response, 0.5, 100), std::sqrt(1.2), 0.25) << seed;
+    square += std::pow(pull(response, 0.5, 100), 2) / kSeeds;
     EXPECT_LT(worst(response, 20, 60), 0.02) << seed;
   }
+  // Seven cycles give the error to 1/sqrt(12), so the square of the pull is on average 12/10; 1200 points of
+  // that: 3 %. The few runs over a step are far off and add most of the tolerance.
+  EXPECT_NEAR(std::sqrt(square), std::sqrt(1.2), 0.25);
 }
 
 TEST(SteppedSineResponse, ReversalIsMarkedAndABiasAvoidsIt) {

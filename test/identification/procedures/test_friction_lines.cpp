@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/procedures/friction_lines.h"
 
 namespace backlash::identification {
@@ -81,13 +81,12 @@ TEST(FrictionLine, TheTwoFastestReverseRunsContradictEachOther) {
 }
 
 TEST(FrictionLine, AStraightLineRarelyWarns) {
-  std::mt19937 random(4);
-  std::normal_distribution<double> normal;
+  Random random(4);
   int warned = 0;
   for (int trial = 0; trial < 1000; ++trial) {
     std::vector<ConstantSpeedRun> rows;
     for (const double w : {0.17, 0.35, 0.52, 0.7, 0.87, 1.4, 1.57})
-      rows.push_back(row(w, 79 + 18 * w + 0.01 * normal(random), 0.01));
+      rows.push_back(row(w, 79 + 18 * w + 0.01 * random.normal(), 0.01));
     warned += !fit_friction_line(rows, Direction::positive).warnings.empty();
   }
   // Three tests at 1 % (quadratic, root, rows): 30 at most where they were independent, and three deviations.
@@ -128,13 +127,12 @@ TEST(FrictionLine, StatedErrorsOfTheRowsAreWeights) {
 }
 
 TEST(FrictionLine, StandardErrorsAreHonestForRowsThatScatterMoreThanTheySay) {
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal;
+  Random random(3);
   double sum = 0, squares = 0, stated = 0;
   constexpr int kTrials = 1000;
   for (int trial = 0; trial < kTrials; ++trial) {
     std::vector<ConstantSpeedRun> rows;
-    for (int i = 1; i <= 10; ++i) rows.push_back(row(0.15 * i, 79 + 18 * 0.15 * i + normal(random), 0.1));
+    for (int i = 1; i <= 10; ++i) rows.push_back(row(0.15 * i, 79 + 18 * 0.15 * i + random.normal(), 0.1));
     const FrictionLine line = fit_friction_line(rows, Direction::positive);
     sum += line.viscous.value;
     squares += std::pow(line.viscous.value - 18, 2);
@@ -161,8 +159,7 @@ struct Drive {
 
 // Constant speeds of 5 s each, ramps of 0.5 s between them, 500 Hz.
 record::Record staircase(const std::vector<double>& speeds, unsigned seed, const Drive& drive = {}) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
+  Random random(seed);
   record::Record record;
   record.name = "staircase";
   constexpr double kRate = 500, kStay = 5, kRamp = 0.5;
@@ -172,7 +169,7 @@ record::Record staircase(const std::vector<double>& speeds, unsigned seed, const
     for (int i = 0; i < int((kStay + kRamp) * kRate); ++i) {
       const double t = record.time.size() / kRate, u = std::min(1.0, i / (kRamp * kRate));
       const double w = before + u * (target - before), a = u < 1 ? (target - before) / kRamp : 0;
-      coloured = keep * coloured + std::sqrt(1 - keep * keep) * drive.noise * normal(random);
+      coloured = keep * coloured + std::sqrt(1 - keep * keep) * drive.noise * random.normal();
       record.time.push_back(t);
       record.column(record::Channel::motor_velocity).push_back(w + 2e-3 * std::sin(2 * M_PI * 7.3 * t));
       const double sign = (w > 0) - (w < 0);

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/procedures/gap_map.h"
 #include "support/two_mass.h"
 
@@ -31,8 +31,7 @@ struct Recipe {
 /// A run as a formula, with the sensors of the thesis; speed < 0: reverse, from the far end.
 record::Record run(const Recipe& r, double speed) {
   record::Record record;
-  std::mt19937 random(r.seed + (speed > 0 ? 0 : 1000));
-  std::normal_distribution<double> normal;
+  Random random(r.seed + (speed > 0 ? 0 : 1000));
   const double sign = speed > 0 ? 1 : -1;
   const int samples = int(r.turns * kTurn / std::fabs(speed) * 1000);
   for (int i = 0; i < samples; ++i) {
@@ -41,7 +40,7 @@ record::Record run(const Recipe& r, double speed) {
     const double motor = r.scale * (q + Recipe::centre(q) + sign * (r.at(q) / 2 + r.wind_up) + 0.01);
     record.time.push_back(1e-3 * i);
     record.column(record::Channel::motor_position)
-        .push_back(kMotorStep * std::round((motor + r.noise * normal(random)) / kMotorStep));
+        .push_back(kMotorStep * std::round((motor + r.noise * random.normal()) / kMotorStep));
     record.column(record::Channel::load_position).push_back(kLoadStep * std::round(q / kLoadStep));
   }
   return record;

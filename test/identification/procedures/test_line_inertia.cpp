@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/procedures/line_inertia.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 
@@ -99,8 +99,7 @@ struct SineRecipe {
 };
 
 record::Record sine_run(const SineRecipe& run, unsigned seed = 1) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
+  Random random(seed);
   record::Record record;
   record.name = "sine";
   const double w = 2 * M_PI * run.frequency, keep = std::exp(-0.001 / 0.02);
@@ -111,7 +110,7 @@ record::Record sine_run(const SineRecipe& run, unsigned seed = 1) {
   for (int i = 0; i < int(1000 * run.duration); ++i) {
     const double t = 1e-3 * i, before = t + run.delay;  // the torque that acts at t is stamped t - delay
     const double a = run.acceleration + w * run.amplitude * std::cos(w * before), v = speed(before);
-    coloured = keep * coloured + std::sqrt(1 - keep * keep) * run.noise * normal(random);
+    coloured = keep * coloured + std::sqrt(1 - keep * keep) * run.noise * random.normal();
     record.time.push_back(t);
     record.column(record::Channel::motor_torque)
         .push_back(run.inertia * a + run.viscous * v + run.coulomb * ((v > 0) - (v < 0)) + coloured);

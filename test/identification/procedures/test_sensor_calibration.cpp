@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/procedures/sensor_calibration.h"
 
 namespace backlash::identification {
@@ -25,9 +25,8 @@ double quantised(double x, double step) {
 }
 
 /// One way for 10 s from `start` with 1 s of ramp at both ends, `rate` Hz; ends where it returns.
-void run_one_way(record::Record& record, const SensorRig& rig, double speed, std::mt19937& random,
+void run_one_way(record::Record& record, const SensorRig& rig, double speed, Random& random,
                  double& position) {
-  std::normal_distribution<double> normal;
   constexpr double kInterval = 2e-3;
   const double t0 = record.time.empty() ? 0 : record.time.back() + kInterval;
   const double sign = speed > 0 ? 1 : -1;
@@ -41,14 +40,14 @@ void run_one_way(record::Record& record, const SensorRig& rig, double speed, std
     record.column(record::Channel::motor_position).push_back(quantised(position, 8.7e-7));
     record.column(record::Channel::load_position)
         .push_back(quantised(rig.scale * position + rig.offset - behind + twist, 7e-6));
-    record.column(record::Channel::motor_velocity).push_back(w + rig.noise * normal(random));
+    record.column(record::Channel::motor_velocity).push_back(w + rig.noise * random.normal());
     record.column(record::Channel::load_velocity)
-        .push_back(rig.speed_scale * w + rig.speed_offset + rig.noise * normal(random));
+        .push_back(rig.speed_scale * w + rig.speed_offset + rig.noise * random.normal());
   }
 }
 
 record::Record runs(const SensorRig& rig, const std::vector<double>& speeds, unsigned seed = 1) {
-  std::mt19937 random(seed);
+  Random random(seed);
   record::Record record;
   record.name = "runs";
   double position = 0.1 * seed;
@@ -70,7 +69,7 @@ TEST(PositionCalibration, BothDirectionsGiveScaleOffsetAndPlay) {
 
 TEST(PositionCalibration, RunsMayBeRecordsOfTheirOwn) {
   const SensorRig rig;
-  std::mt19937 random(1);
+  Random random(1);
   double position = 0;
   record::Record forward, back;
   run_one_way(forward, rig, 0.3, random, position);
@@ -96,11 +95,10 @@ TEST(PositionCalibration, StandardErrorsAreHonestForErrorsOfTheSensors) {
     SensorRig rig;
     rig.torque_ripple = 0;
     record::Record record = runs(rig, {0.3, -0.3}, seed);
-    std::mt19937 random(1000 + seed);
-    std::normal_distribution<double> normal;
+    Random random(1000 + seed);
     double coloured = 0;  // 20 ms memory: shorter than the parts that are left out
     for (double& x : record.column(record::Channel::load_position))
-      x += coloured = 0.9 * coloured + 1e-4 * normal(random);
+      x += coloured = 0.9 * coloured + 1e-4 * random.normal();
     const PositionCalibration c = calibrate_position({record});
     squares += std::pow(c.scale.value - rig.scale, 2);
     stated += std::pow(c.scale.standard_error, 2);

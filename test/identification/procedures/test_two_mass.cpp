@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
 #include "backlash_diagnosis/simulation/simulation.h"
 #include "support/two_mass_record.h"
@@ -112,10 +112,9 @@ TEST(TwoMass, SplitPropagatesErrors) {
   for (const KnownInertia known :
        {KnownInertia::total_inertia, KnownInertia::motor_inertia, KnownInertia::both_inertias}) {
     const StiffnessSplit stated = split_stiffness(known, measured, total, motor);
-    std::mt19937_64 random(4);
-    std::normal_distribution<double> normal;
+    Random random(4);
     const auto draw = [&](const signal::Measured& m) {
-      return sure(m.value + m.standard_error * normal(random));
+      return sure(m.value + m.standard_error * random.normal());
     };
     constexpr int kDraws = 4000;
     double square[3]{};
@@ -181,10 +180,9 @@ TEST(Resonances, StandardErrorsHoldTheNoise) {
   double sum[2]{}, squares[2]{}, stated[2]{};
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
     FrequencyResponse noisy = clean;
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal(0, kNoise);
+    Random random(seed);
     for (ResponsePoint& p : noisy.points)
-      p.response *= std::complex<double>(1 + normal(random), normal(random));
+      p.response *= std::complex<double>{1 + kNoise * random.normal(), kNoise * random.normal()};
     const Resonances found = find_resonances(noisy);
     const signal::Measured both[] = {found.resonance, found.anti_resonance};
     for (int k = 0; k < 2; ++k) {
@@ -279,10 +277,9 @@ TEST(TwoMassFit, StandardErrorsHoldTheNoise) {
   double sum[kValues]{}, squares[kValues]{}, stated[kValues]{};
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
     FrequencyResponse noisy = clean;
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal(0, kNoise);
+    Random random(seed);
     for (ResponsePoint& p : noisy.points)
-      p.response *= std::complex<double>(1 + normal(random), normal(random));
+      p.response *= std::complex<double>{1 + kNoise * random.normal(), kNoise * random.normal()};
     const TwoMassFit fit = fit_two_mass(noisy);
     const signal::Measured all[] = {fit.motor_inertia, fit.load_inertia, fit.stiffness, fit.damping,
                                     fit.viscous};
