@@ -51,6 +51,8 @@ report::Json step_json(const identification::FoundEffect& e, const identificatio
     json["parameters"][p.name] = with_unit(p.measured, model::axis_unit(p.unit, trace.augmented.linear));
   json["test_error_before"] = report::json_number(e.test_error_before);
   json["test_error_after"] = report::json_number(e.test_error_after);
+  json["test_gain"] = {{"value", report::json_number(e.test_gain.value)},
+                       {"interval", report::json_interval(e.test_gain.lower, e.test_gain.upper)}};
   const identification::Evidence& v = e.evidence;
   json["evidence"] = {{"gain", report::json_number(v.gain)},
                       {"gain_held_out", report::json_number(v.gain_held_out)},

@@ -21,6 +21,11 @@ std::string listed(const std::vector<std::string>& parts) {
   return text;
 }
 
+bool all_fall(const identification::Trace& trace) {
+  return std::all_of(trace.channels.begin(), trace.channels.end(),
+                     [](const auto& c) { return c.second.after < c.second.before; });
+}
+
 std::string effect_text(const identification::FoundEffect& e, bool linear) {
   std::string text = "  " + e.id;
   for (const auto& [name, word] : e.words) text += " (" + name + ": " + word + ")";
@@ -32,7 +37,9 @@ std::string effect_text(const identification::FoundEffect& e, bool linear) {
   const identification::Evidence& v = e.evidence;
   text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
           percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
-          " of " + std::to_string(v.blocks) + " better), " + percent(v.gain_forward) + " on the last part\n";
+          " of " + std::to_string(v.blocks) + " better), " + percent(v.gain_forward) +
+          " on the last part;\n    on the unseen record smaller by " + percent(e.test_gain.value) +
+          " (95 %: " + percent(e.test_gain.lower) + " to " + percent(e.test_gain.upper) + ")\n";
   if (!e.nearest.empty()) text += "    nearest named effects: " + joined(e.nearest) + "\n";
   if (!e.equivalent_to.empty()) text += "    would explain the same: " + joined(e.equivalent_to) + "\n";
   return text;
@@ -89,7 +96,8 @@ std::string verdict_sentence(const identification::Trace& trace) {
   std::string text;
   if (!effects.empty())
     text = "The declared model lacks " + listed(effects) + ". With " + (effects.size() == 1 ? "it" : "them") +
-           " the error on the test record falls: " + listed(errors) + ".";
+           " the error on the test record " + (all_fall(trace) ? "falls: " : "changes: ") + listed(errors) +
+           ".";
   if (trace.verdict == identification::TraceVerdict::nothing_missing)
     text = "Nothing is missing: the declared model, fitted, has these errors on the test record: " +
            listed(errors) + ".";

@@ -402,5 +402,36 @@ TEST(GearTrain, DryFrictionAddsItselfAndChangesNothingElse) {
   }
 }
 
+// One inertia whose friction follows what its load takes, T = J a + A sin(q + p), solved by hand for either
+// sign: J a = tau - c w - F - mu |T| - A sin(q + p), so T (1 + mu sign T) = tau - c w - F.
+TEST(GearTrain, FrictionOfOneInertiaFollowsWhatItsLoadTakes) {
+  constexpr double kInertia = 0.4, kViscous = 0.9, kCoulomb = 0.8, kCoefficient = 0.2, kGravity = 3;
+  Rig rig;
+  rig.mesh.rigid = true;
+  rig.motor = {kInertia, kViscous};
+  rig.motor.coulomb_friction = kCoulomb;
+  ParameterValues values = {{"coefficient", kCoefficient}};
+  values.set_choice("body", "motor");
+  rig.terms = {make_term("load_dependent_friction", values),
+               make_term("gravity", {{"amplitude", kGravity}, {"phase", 0.1}})};
+  for (const double torque : {4.0, 1.5, 0.2, -3.0}) {
+    GearTrain train(rig);
+    double state[GearTrain::kMaxStates] = {0.7, 1.2}, rate[GearTrain::kMaxStates];
+    train.begin_friction(0, state, torque);
+    train.derivative(0, state, torque, rate);
+    const double sliding = torque - kViscous * state[1] - kCoulomb;
+    const double through = sliding / (1 + kCoefficient * (sliding > 0 ? 1 : -1));
+    EXPECT_NEAR(rate[1], (through - kGravity * std::sin(state[0] + 0.1)) / kInertia, 1e-10) << torque;
+  }
+  // At rest it holds against gravity up to F + mu A sin(q + p).
+  const double gravity = kGravity * std::sin(0.2 + 0.1), most = kCoulomb + kCoefficient * gravity;
+  for (const double share : {0.999, 1.001}) {
+    GearTrain train(rig);
+    double state[GearTrain::kMaxStates] = {0.2, 0};
+    train.begin_friction(0, state, gravity + share * most);
+    EXPECT_EQ(train.any_stuck(), share < 1);
+  }
+}
+
 }  // namespace
 }  // namespace backlash::model

@@ -54,7 +54,8 @@ Records records_of(const model::Rig& rig, const std::vector<record::Record>& tra
 }
 
 /// Parameters of the machine without and with effects, and the steps.
-void describe_machine(const SearchResult& result, const std::vector<ServoPrediction>& on_test, Trace& trace) {
+void describe_machine(const SearchResult& result, const std::vector<ServoPrediction>& on_test,
+                      const BeliefSettings& belief, Trace& trace) {
   const Hypothesis& found = result.found;
   trace.base = result.declared.base->fit.machine.rig;
   trace.augmented = found.fitted->fit.machine.rig;
@@ -65,7 +66,7 @@ void describe_machine(const SearchResult& result, const std::vector<ServoPredict
   for (const std::string& name : found.held) trace.parameters[name] = {0, 0};
   for (const Hypothesis* h : {&result.declared, &found})
     for (const FitParameter& p : h->base->start.parameters) trace.units[p.name] = p.unit;
-  trace.steps = found_effects(found, values.effects, on_test);
+  trace.steps = found_effects(found, values.effects, on_test, belief);
   trace.rejected = rejected_effects(found);
 }
 
@@ -95,12 +96,12 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   const Records records = records_of(raw, train, test);
   SearchSettings settings(asked);
   settings.fit = with_bands(settings.fit, declared, records.train);
-  const SearchResult result = search_effects(declared, records.train, settings, progress);
+  const SearchResult result = search_effects(declared, records.train, records.test, settings, progress);
   const Hypothesis& found = result.found;
   Trace trace;
   trace.cutoff = settings.fit.cutoff;
   const std::vector<ServoPrediction> on_test = predicted_by_all(found, records.test, settings.fit);
-  describe_machine(result, on_test, trace);
+  describe_machine(result, on_test, settings.belief, trace);
   describe_errors(result, on_test, records, settings.fit, trace);
   if (found.other_teeth)
     trace.notes.push_back(
@@ -114,7 +115,6 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   else if (trace.unexplained)
     trace.verdict = TraceVerdict::unexplained;
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
-  for (std::string& warning : harm_warnings(trace.steps)) trace.warnings.push_back(std::move(warning));
   return trace;
 }
 

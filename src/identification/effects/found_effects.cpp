@@ -7,11 +7,10 @@
 #include <cmath>
 
 #include "learned.h"
+#include "unseen_gain.h"
 
 namespace backlash::identification {
 namespace {
-
-constexpr double kWorse = 1.05;  // choice: times the error on the test record: an effect that does harm
 
 /// Of a learned map: where its coordinate reaches and how large it gets.
 void describe_map(const model::Term& term, std::vector<signal::Measured>& fitted, FoundEffect& effect) {
@@ -69,6 +68,14 @@ std::vector<std::string> ids_of(const Effect& effect) {
 
 }  // namespace
 
+std::size_t fitted_count(const model::TermType& type, const ParameterValues& values) {
+  if (type.map) return values.list(type.map->values).size();
+  const model::TermSearch& search = *type.search;
+  std::size_t count = search.phase.empty() ? 1 : 2;
+  for (const model::TermShape& shape : search.shapes) count += shape.refined;
+  return count;
+}
+
 FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
   MachineFit fit = fitted.fit;
   judge_errors(fit, fitted.start, fitted.records);
@@ -85,7 +92,8 @@ FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
 }
 
 std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::Measured> fitted,
-                                       const std::vector<ServoPrediction>& on_test) {
+                                       const std::vector<ServoPrediction>& on_test,
+                                       const BeliefSettings& settings) {
   std::vector<FoundEffect> all;
   const auto error = [](const ServoPrediction& p, const std::string& channel) {
     return channel == "torque" ? p.torque_error.error : p.deflection_error.error;
@@ -106,6 +114,8 @@ std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::
       step = all.insert(all.end(), e);
     }
     step->test_error_after = error(on_test[i + 1], step->channel);
+    step->test_gain = test_gain(left(on_test[i], accepted.gain.deflection, settings),
+                                left(on_test[i + 1], accepted.gain.deflection, settings), settings);
     for (std::size_t t = 0; t < accepted.candidate.terms.size(); ++t, ++place) {
       step->terms.push_back(place);
       const std::size_t number = step->terms.size();
@@ -114,16 +124,6 @@ std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::
     }
   }
   return all;
-}
-
-std::vector<std::string> harm_warnings(const std::vector<FoundEffect>& steps) {
-  std::vector<std::string> warnings;
-  for (const FoundEffect& e : steps)
-    if (e.test_error_after > kWorse * e.test_error_before)
-      warnings.push_back(
-          fmt::format("{} makes the test record worse ({} {:.3g} -> {:.3g} %): not to be believed", e.id,
-                      e.channel, 100 * e.test_error_before, 100 * e.test_error_after));
-  return warnings;
 }
 
 }  // namespace backlash::identification

@@ -17,15 +17,16 @@ struct FittedValues {
   std::map<std::string, signal::Measured> machine;
   std::vector<signal::Measured> effects;
 };
+/// How many values of a term are fitted, the strength first.
+std::size_t fitted_count(const model::TermType& type, const ParameterValues& values);
+
 /// `declared`: how many of the first parameters are the machine's.
 FittedValues fitted_values(const BandFit& fitted, std::size_t declared);
 
 /// One step per effect; a second term of the same kind belongs to the step of the first. `on_test`: as
 /// predicted_by_all() gives it.
 std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::Measured> fitted,
-                                       const std::vector<ServoPrediction>& on_test);
-
-/// Effects are chosen by the training records alone; the test record only judges them.
-std::vector<std::string> harm_warnings(const std::vector<FoundEffect>& steps);
+                                       const std::vector<ServoPrediction>& on_test,
+                                       const BeliefSettings& settings);
 
 }  // namespace backlash::identification

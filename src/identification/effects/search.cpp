@@ -47,7 +47,8 @@ class SearchProgress {
 }  // namespace
 
 SearchResult search_effects(const model::Rig& declared, const std::vector<ServoData>& data,
-                            const SearchSettings& settings, const Progress& progress) {
+                            const ServoData& unseen, const SearchSettings& settings,
+                            const Progress& progress) {
   SearchProgress told(settings, progress);
   const Interruption interruption([&] { return told.goes_on(); });  // fits of minutes end when asked to
   const SearchContext context{data, motion_range(data), settings,
@@ -60,6 +61,7 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
   h = try_equivalents(h, context);
   h = add_learned(h, context);
   h = drop_stand_ins(h, context);
+  h = believe(h, unseen, context);
   result.found = hold_friction(h, context);
   return result;
 }

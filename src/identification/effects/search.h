@@ -13,10 +13,11 @@ struct SearchResult {
   Hypothesis found;
 };
 
-/// The same for the same records and settings. `settings.fit` has its bands. `data` must outlive the result.
-/// Throws CannotIdentify, Cancelled.
+/// Searched in `data`, believed where `unseen` bears it out. The same for the same records and settings.
+/// `settings.fit` has its bands. `data` must outlive the result. Throws CannotIdentify, Cancelled.
 SearchResult search_effects(const model::Rig& declared, const std::vector<ServoData>& data,
-                            const SearchSettings& settings, const Progress& progress);
+                            const ServoData& unseen, const SearchSettings& settings,
+                            const Progress& progress);
 
 /// What the terms of this id change of the signal, of the channel where that is more.
 double share_of_signal(const Hypothesis& h, const std::string& id);

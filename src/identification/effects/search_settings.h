@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "backlash_diagnosis/identification/fit/fit_settings.h"
@@ -67,6 +68,19 @@ struct MapSettings {
          roughest = 1e-4;  // choice: of the mean squared sensitivity, weights of curvature that are tried
 };
 
+/// What the unseen record must bear out.
+struct BeliefSettings {
+  int blocks = 20;          // choice: of the record, drawn with replacement: several reversals each
+  int draws = 400;          // choice (time)
+  std::uint64_t seed = 1;   // choice
+  double risk = 0.05;       // choice: beyond both ends of an interval
+  double least_part = 0.1;  // choice: of what lies above the noise, that an effect must explain
+  double below_noise =
+      0.64;             // theory: of the noise's square, its deviation known to a fifth: nothing leaves less
+  double worse = 0.05;  // choice: of the other channel's error
+  double least_z = 4;   // choice: of a strength, standard errors
+};
+
 struct SearchSettings {
   explicit SearchSettings(const TraceSettings& trace = {}) : asked(trace) {
     fit.cutoff = trace.cutoff;
@@ -87,6 +101,7 @@ struct SearchSettings {
   AcceptanceSettings acceptance;
   RevisionSettings revision;
   MapSettings maps;
+  BeliefSettings belief;
   double shape_of_friction = 0.01;  // choice: of the signal: less is how friction begins, not an effect
   double unexplained = 2;           // choice: times the floor, beyond which something is left
 };

@@ -46,6 +46,10 @@ Hypothesis add_learned(const Hypothesis& h, const SearchContext& context);
 /// No effects where they leave more than they explain: they may be stand-ins for what has no name.
 Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 
+/// Without the effects that the unseen record does not bear out, or whose strength does not stand out of its
+/// error.
+Hypothesis believe(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);
+
 /// Friction of the machine that comes out below 0 held at 0, one parameter after the other. Throws
 /// CannotIdentify where the machine cannot be fitted with that.
 Hypothesis hold_friction(const Hypothesis& h, const SearchContext& context);

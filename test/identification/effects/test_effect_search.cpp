@@ -141,6 +141,28 @@ TEST(EffectSearch, TwoEffectsAtOnce) {
     EXPECT_LT(i.after, 0.15) << i.channel << " " << i.input << " before " << i.before;
 }
 
+// A bump in the way of the motor, which no harmonic is: 60 N m over 0.05 rad.
+TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
+  model::Rig machine = test::other_servo();
+  ParameterValues bump;
+  bump.set_choice("acts_on", "motor");
+  bump.set_choice("coordinate", "motor_position");
+  std::vector<double> points, values;
+  for (int i = -20; i <= 20; ++i) {
+    points.push_back(0.05 * i);
+    values.push_back(60 * std::exp(-std::pow((points.back() - 0.1) / 0.15, 2)));
+  }
+  bump.set_list("points", points);
+  bump.set_list("values", values);
+  machine.terms.push_back(model::make_term("learned_map", bump));
+  const Trace trace = traced(records_of(machine, 10));
+  ASSERT_EQ(found(trace), std::set<std::string>{"learned_map"});
+  EXPECT_EQ(trace.steps[0].words.at("coordinate"), "motor_position");
+  EXPECT_EQ(trace.steps[0].words.at("acts_on"), "motor");
+  const TraceChannel& torque = trace.channels.at("torque");
+  EXPECT_LT(torque.after, 0.3 * torque.before);  // as asked for
+}
+
 /// A drive that gives less than it is asked for: of a recorded torque u the machine feels T0 tanh(u / T0).
 record::Record with_saturation(record::Record record, double limit) {
   for (double& torque : record.column(record::Channel::motor_torque))
@@ -148,8 +170,8 @@ record::Record with_saturation(record::Record record, double limit) {
   return record;
 }
 
-TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
-  // Long enough that the torque of the motor and that through the teeth, which is its larger part, differ.
+// Only the torque itself would explain it.
+TEST(EffectSearch, NeverExplainsTheTorqueByItself) {
   Records r = records_of(test::other_servo(), 10);
   double largest = 0;
   for (const record::Record* record : {&r.train, &r.test})
@@ -158,11 +180,10 @@ TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
   r.train = with_saturation(r.train, 1.15 * largest);
   r.test = with_saturation(r.test, 1.15 * largest);
   const Trace trace = traced(r);
-  ASSERT_EQ(found(trace), std::set<std::string>{"learned_map"});
-  EXPECT_EQ(trace.steps[0].words.at("coordinate"), "motor_torque");
-  EXPECT_EQ(trace.steps[0].words.at("acts_on"), "motor");
+  EXPECT_TRUE(trace.unexplained);
   const TraceChannel& torque = trace.channels.at("torque");
-  EXPECT_LT(torque.after, 0.3 * torque.before);  // as asked for
+  EXPECT_GT(torque.after, 0.3 * torque.before);
+  for (const FoundEffect& e : trace.steps) EXPECT_GT(e.test_gain.lower, 0) << e.id;
 }
 
 TEST(EffectSearch, SaysWhenItCannotNameWhatIsMissing) {

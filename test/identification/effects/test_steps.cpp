@@ -274,12 +274,14 @@ TEST(ShareOfSignal, OfASineIsItsPartOfTheTorque) {
 TEST(SearchEffects, CanBeStoppedAndIsTheSameEveryTime) {
   const SearchBench bench{with_cogging()};
   const auto found = [&] {
-    return search_effects(test::one_inertia_rig(), bench.data, bench.context.settings, nullptr).found;
+    return search_effects(test::one_inertia_rig(), bench.data, bench.data.front(), bench.context.settings,
+                          nullptr)
+        .found;
   };
   const Hypothesis a = found(), b = found();
   ASSERT_EQ(ids(a), std::vector<std::string>{"cogging"});
   EXPECT_EQ(a.effects[0].candidate.terms, b.effects[0].candidate.terms);
-  EXPECT_THROW(search_effects(test::one_inertia_rig(), bench.data, bench.context.settings,
+  EXPECT_THROW(search_effects(test::one_inertia_rig(), bench.data, bench.data.front(), bench.context.settings,
                               [](double, const std::string&) { return false; }),
                Cancelled);
 }

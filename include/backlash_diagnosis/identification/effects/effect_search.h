@@ -49,6 +49,12 @@ struct Evidence {
   int blocks_better = 0, blocks = 0;
 };
 
+/// Relative decrease of the error of the channel on the unseen record, with its 95 % interval (blocks drawn with
+/// replacement).
+struct TestGain {
+  double value = 0, lower = 0, upper = 0;
+};
+
 /// One step: an effect that was added.
 struct FoundEffect {
   std::string id;
@@ -61,6 +67,7 @@ struct FoundEffect {
   std::vector<std::string> nearest;  // of a learned map: ids that explain part of the same
   Evidence evidence;
   double test_error_before = 0, test_error_after = 0;  // of the channel
+  TestGain test_gain;                                  // of the same
   std::vector<std::string> equivalent_to;              // ids that reach most of the gain
 };
 

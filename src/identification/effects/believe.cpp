@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The unseen record decides what is believed: each effect, with those before it, must lower the error there,
+// and its strength must stand out of its own error.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "found_effects.h"
+#include "steps.h"
+#include "unseen_gain.h"
+#include "unseen_record.h"
+
+namespace backlash::identification {
+namespace {
+
+std::string interval(const TestGain& g) {
+  return fmt::format("{:.2g} % (95 %: {:.2g} to {:.2g} %)", 100 * g.value, 100 * g.lower, 100 * g.upper);
+}
+
+/// Why the record does not bear out the effect that makes the difference of both; empty: it does.
+std::string contradicted(const ServoPrediction& before, const ServoPrediction& after, bool deflection,
+                         const BeliefSettings& settings) {
+  const char* const names[] = {"torque", "deflection"};
+  const Left was = left(before, deflection, settings), is = left(after, deflection, settings);
+  const TestGain gain = test_gain(was, is, settings);
+  const char* const name = names[deflection];
+  if (!(gain.lower > 0))
+    return fmt::format("on the unseen record it lessens the error of {} by {}: not told from nothing", name,
+                       interval(gain));
+  const double above = was.total() - was.noise, decrease = was.total() - is.total();
+  if (decrease < settings.least_part * above)
+    return fmt::format("on the unseen record it explains {:.2g} % of what {} has above the noise: too little",
+                       100 * decrease / above, name);
+  if (is.total() < settings.below_noise * is.noise)
+    return fmt::format("on the unseen record it leaves less of {} than noise does: it explains the noise",
+                       name);
+  if (before.deflection.empty()) return "";
+  const TestGain other =
+      test_gain(left(before, !deflection, settings), left(after, !deflection, settings), settings);
+  if (other.upper < 0 && other.value < -settings.worse)
+    return fmt::format("on the unseen record it makes the error of {} worse, by {}", names[!deflection],
+                       interval({-other.value, -other.upper, -other.lower}));
+  return "";
+}
+
+/// The first effect whose strength does not stand out of its error; an effect of several terms needs one that
+/// does.
+std::optional<std::size_t> vague(const Hypothesis& h, double least) {
+  const std::vector<signal::Measured> all = fitted_values(*h.fitted, h.declared->parameters.size()).effects;
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < h.effects.size(); ++i) {
+    const Candidate& candidate = h.effects[i].candidate;
+    const model::TermType& type = model::term_type(candidate.id);
+    double clearest = 0;
+    for (const ParameterValues& term : candidate.terms) {
+      const std::size_t count = fitted_count(type, term);
+      if (type.map)
+        clearest = INFINITY;
+      else
+        clearest = std::max(clearest, std::fabs(all.at(at).value) / all.at(at).standard_error);
+      at += count;
+    }
+    if (clearest < least) return i;
+  }
+  return std::nullopt;
+}
+
+/// The first effect that is not to be believed, and why.
+std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
+                                                                const SearchContext& context) {
+  const BeliefSettings& settings = context.settings.belief;
+  if (const auto at = vague(h, settings.least_z))
+    return std::pair{*at, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
+  const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
+  for (std::size_t i = 0; i < h.effects.size(); ++i) {
+    std::string why = contradicted(on_unseen[i], on_unseen[i + 1], h.effects[i].gain.deflection, settings);
+    if (!why.empty()) return std::pair{i, std::move(why)};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Hypothesis believe(const Hypothesis& before, const ServoData& unseen, const SearchContext& context) {
+  Hypothesis h = before;
+  while (!h.effects.empty()) {
+    context.tell("asking the unseen record");
+    const auto wrong = unbelievable(h, unseen, context);
+    if (!wrong) break;
+    const std::string id = h.effects[wrong->first].candidate.id;
+    h = with_rejected(without_effect(h, wrong->first, context), id, wrong->second);
+  }
+  return h;
+}
+
+}  // namespace backlash::identification
