@@ -6,12 +6,18 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
 namespace backlash::identification {
+namespace {
+
+constexpr double kUsualSkew = 1e-3;  // s, choice: scale of the skew of two encoders
+
+}  // namespace
 
 FitParameter machine_parameter(const std::string& name, const model::Rig& rig) {
   const rig_file::RigParameter& p = rig_file::servo_parameter(name);
   if (const double value = p.get(rig); p.positive() && !(value > 0))
     throw InvalidParameter(name, value, "must be > 0");
-  return {p.name, p.unit, p.positive(), 1, p.get, p.set};
+  const double scale = p.kind == rig_file::ParameterKind::encoder_skew ? kUsualSkew : 1;
+  return {p.name, p.unit, p.positive(), scale, p.get, p.set};
 }
 
 FitParameter term_parameter(std::size_t term, const std::string& name, const model::Rig& rig, double scale) {
