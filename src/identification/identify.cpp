@@ -60,10 +60,18 @@ std::vector<std::string> parameter_names(const model::Rig& rig) {
   std::vector<std::string> names;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     if (p.kind == rig_file::ParameterKind::start_in_gap) continue;
+    if (rig.coupled && !rig_file::told_by_deflection(p)) continue;
     const bool skew = p.kind == rig_file::ParameterKind::encoder_skew && p.known_to(rig);
     if (p.get(rig) != 0 || skew) names.push_back(p.name);
   }
   return names;
+}
+
+/// All but the first and the last take the torque for this joint's alone.
+std::vector<Procedure> procedures_for(const model::Rig& rig) {
+  if (rig.mesh.rigid) return {{"one_inertia", run_one_inertia}};
+  if (rig.coupled) return {servo_procedures().front(), servo_procedures().back()};
+  return servo_procedures();
 }
 
 /// The skew of the encoders that was taken out of the records is part of what was found.
@@ -138,8 +146,7 @@ IdentificationCase identification_case(const model::Rig& declared,
 Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
                         const Progress& progress) {
   IdentificationCase c = identification_case(declared, records);
-  std::vector<Procedure> procedures = {{"one_inertia", run_one_inertia}};
-  if (!declared.mesh.rigid) procedures = servo_procedures();
+  const std::vector<Procedure> procedures = procedures_for(declared);
   double done = 0;
   for (const Procedure& procedure : procedures) {
     if (progress && !progress(done++ / double(procedures.size()), procedure.name)) throw Cancelled();

@@ -80,6 +80,7 @@ Mesh read_mesh(const YamlReader& yaml) {
 void read_gear_train(const YamlReader& yaml, Rig& rig) {
   rig.reduction_ratio = yaml.number("reduction_ratio", Range::positive());
   rig.motor_side = yaml.boolean_or("motor_side", false);
+  rig.coupled = yaml.boolean_or("coupled", false);
   rig.linear = yaml.has("axis") && yaml.choice("axis", {"rotary", "linear"}) == "linear";
   const YamlReader motor = yaml.map("motor");
   rig.motor = read_end(motor);

@@ -25,6 +25,7 @@ constexpr double kSmallest = 0.01;      // choice: of the mean deviation: what i
 constexpr std::size_t kBlocks = 12;     // choice
 constexpr double kLeftWrong = 5e-5;     // s, simulation: what the model leaves wrong on servos with play
 constexpr double kClear = 4;            // choice: standard errors
+constexpr std::size_t kFewest = 64;     // samples, choice
 constexpr Eigen::Index kSkew = 2;       // its column
 constexpr Eigen::Index kColumns = 7;
 
@@ -87,6 +88,9 @@ signal::Measured skew_in_band(const DrivenPositions& p, double cutoff) {
 }  // namespace
 
 signal::Measured encoder_skew(const DrivenPositions& positions) {
+  const std::size_t n = positions.motor.size();
+  if (n < kFewest || positions.torque.size() != n || positions.load.size() != n)
+    throw CannotIdentify("too short, or without a column, to tell the skew of the encoders");
   const double cutoff = std::min(kBand, kWidestBand / positions.interval);
   signal::Measured skew = skew_in_band(positions, cutoff);
   const double slow = skew_in_band(positions, 0.5 * cutoff).value;

@@ -106,6 +106,11 @@ const RigParameter& servo_parameter(RigPart part, ParameterKind kind) {
   throw InvalidParameter("parameter", "of this part and kind", "is not one of a servo with two inertias");
 }
 
+bool told_by_deflection(const RigParameter& p) {
+  const bool motor_friction = p.part == RigPart::motor && p.is_friction() && !p.is_asymmetry();
+  return p.kind == Kind::encoder_skew || p.kind == Kind::stiffness || motor_friction;
+}
+
 const RigParameter* asymmetry_of(const RigParameter& mean) {
   for (const RigParameter& parameter : servo_parameters())
     if (parameter.mean == mean.name) return &parameter;

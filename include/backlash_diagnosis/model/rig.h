@@ -76,6 +76,9 @@ struct Rig {
   /// s, by which load_position and load_velocity of a record are later than motor_position: > 0, and the load
   /// encoder shows q_L(t - skew). `sensors: encoder_skew` of the rig file.
   double encoder_skew = 0;
+  /// Other axes move as well and are not in the record: motor_torque holds their coupling, and no model of
+  /// this axis predicts it. `gear_train: coupled` of the rig file.
+  bool coupled = false;
 
   /// Load-side angle (or torque, divided) to the axis of motor_position: reduction ratio or 1.
   double motor_axis_ratio() const { return motor_side ? reduction_ratio : 1; }

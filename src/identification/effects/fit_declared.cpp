@@ -14,6 +14,7 @@ namespace {
 /// All that the rig declares, of the bodies and the mesh that it has.
 bool can_be_fitted(const rig_file::RigParameter& p, const model::Rig& rig) {
   if (p.kind == rig_file::ParameterKind::start_in_gap || !p.known_to(rig)) return false;
+  if (rig.coupled && !rig_file::told_by_deflection(p)) return false;
   if (p.part == rig_file::RigPart::link && !simulation::load_moves_freely(rig)) return false;
   return p.get(rig) != 0 || p.kind == rig_file::ParameterKind::encoder_skew;
 }
@@ -56,7 +57,7 @@ std::vector<FitParameter> declared_parameters(const model::Rig& rig) {
     FitParameter p = machine_parameter(declared.name, rig);
     // Without an effect that it lacks a machine may want friction below 0; a logarithm would not come back.
     // With a locked link damping is hardly told and stays where it is.
-    if (p.positive && declared.is_friction() && !rig.link_locked) {
+    if (p.positive && declared.is_friction() && !rig.link_locked && !rig.coupled) {
       p.positive = false;
       p.scale = p.get(rig);
     }
@@ -72,6 +73,7 @@ Hypothesis fit_declared(const model::Rig& declared, const SearchContext& context
   if (declared.link_locked) start_in_travel(machine, context.data);
   start_with_skew(machine, context.data);
   machine.parameters = declared_parameters(machine.rig);
+  if (declared.coupled) machine.priors = rows_as_declared(declared);
   Hypothesis h;
   h.base = std::make_shared<const BandFit>(fit_to_records(
       context.data, machine, context.settings.fit, [&] { context.tell("fit of the declared machine"); }));

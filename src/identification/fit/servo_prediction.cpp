@@ -185,7 +185,38 @@ std::vector<double> PreparedServo::acting_torque(const model::Rig& rig,
   return signal::delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
 }
 
+/// Of a machine whose torque holds the coupling of other axes. That torque, less what the motor takes, goes
+/// through the teeth all the same:
+///   q_L = q_M - e(tau - J_M a_M - friction)
+/// so that the load's position follows, and the torque itself cannot be told.
+ServoResiduals PreparedServo::coupled_residuals(const model::Rig& rig, const Calibration& calibration) const {
+  const ServoData& d = data();
+  const model::GearTrain train(rig);
+  const double inertia = train.motor_inertia(), slowest = kSureSpeed * d.rate_noise;
+  simulation::DrivenLoad load;
+  load.load = d.motor;
+  load.load_rate = d.load_rate;
+  load.mesh_torque = signal::low_pass(torque_of_moment_, d.interval, cutoff);
+  const std::vector<double> acceleration = signal::low_pass(d.motor_acceleration, d.interval, cutoff);
+  for (std::size_t k = 0; k < d.size(); ++k) {
+    const double rate = d.motor_rate[k], sign = std::fabs(rate) > slowest ? (rate > 0 ? 1 : -1) : 0;
+    load.mesh_torque[k] -=
+        inertia * acceleration[k] + rig.motor.viscous_damping * rate + rig.motor.coulomb_friction * sign;
+    load.load[k] -= train.elastic_deflection(load.mesh_torque[k]);
+  }
+  load.mesh_on_motor = load.mesh_torque;
+  ServoResiduals r;
+  r.deflection = signal::delayed(load.load, rig.encoder_skew / d.interval);
+  for (std::size_t k = 0; k < d.size(); ++k) r.deflection[k] -= d.load[k];
+  r.deflection = signal::low_pass(r.deflection, d.interval, cutoff);
+  for (double& value : r.deflection) value += calibration.encoder_offset;
+  r.torque.assign(d.size(), 0.0);
+  r.load = std::make_shared<const simulation::DrivenLoad>(std::move(load));
+  return r;
+}
+
 ServoResiduals PreparedServo::residuals(const model::Rig& rig, const Calibration& calibration) const {
+  if (rig.coupled) return coupled_residuals(rig, calibration);
   const Drive drive(data(), rig, calibration);
   const auto load = loads_->get(*this, drive, rig, calibration);
   const simulation::MotorTorques motor = simulation::motor_torques(rig, drive.motion, load->motion);
