@@ -69,6 +69,20 @@ void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
   covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
 }
 
+/// What is left beyond noise may follow what a value changes, wholly where the machine is not to be modelled:
+/// it must not be told better than |left| / |change per unit|, or than it is known beside the records.
+void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double in_floors) {
+  const double left =
+      fit.residuals.head(rows).norm() * std::sqrt(std::max(0.0, 1 - 1 / (in_floors * in_floors)));
+  Eigen::VectorXd growth = Eigen::VectorXd::Ones(fit.values.size());
+  for (Eigen::Index i = 0; i < growth.size(); ++i) {
+    const double change = fit.jacobian.col(i).head(rows).norm(), error = std::sqrt(fit.covariance(i, i));
+    const double known = fit.jacobian.col(i).tail(fit.jacobian.rows() - rows).norm();  // beside the records
+    if (left > 0 && error > 0) growth[i] = std::max(1.0, 1 / std::hypot(change / left, known) / error);
+  }
+  fit.covariance = growth.asDiagonal() * fit.covariance * growth.asDiagonal();
+}
+
 }  // namespace
 
 double size(const Misfit& misfit) {
@@ -253,6 +267,7 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
+  if (start.rig.coupled) allow_for_left(fit.fit, rows, records.misfit(fit.machine).deflection);
 }
 
 }  // namespace backlash::identification
