@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::identification {
@@ -19,7 +20,8 @@ constexpr double kVague = 30;  // choice: times the scale: standard deviation of
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
-constexpr long kFewestBlocks = 4;  // choice: per unknown, for a covariance from blocks
+constexpr double kSkewOfSample = 1e-3;  // simulation: samples, that interpolation leaves wrong of a skew
+constexpr long kFewestBlocks = 4;       // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));
@@ -266,7 +268,13 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);
+  const rig_file::RigParameter& skew =
+      rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
+  for (std::size_t i = 0; i < start.parameters.size(); ++i)
+    if (start.parameters[i].name == skew.name)
+      fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) +=
+          std::pow(kSkewOfSample * records.records().front().data().interval, 2);
   if (start.rig.coupled) allow_for_left(fit.fit, rows, records.misfit(fit.machine).deflection);
 }
 
