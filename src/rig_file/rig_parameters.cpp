@@ -107,8 +107,8 @@ const RigParameter& servo_parameter(RigPart part, ParameterKind kind) {
 }
 
 bool told_by_deflection(const RigParameter& p) {
-  const bool motor_friction = p.part == RigPart::motor && p.is_friction() && !p.is_asymmetry();
-  return p.kind == Kind::encoder_skew || p.kind == Kind::stiffness || motor_friction;
+  const bool dry = p.part == RigPart::motor && p.kind == Kind::coulomb_friction && !p.is_asymmetry();
+  return p.kind == Kind::encoder_skew || p.kind == Kind::stiffness || dry;
 }
 
 const RigParameter* asymmetry_of(const RigParameter& mean) {

@@ -64,7 +64,7 @@ const RigParameter& servo_parameter(const std::string& name);
 const RigParameter& servo_parameter(RigPart part, ParameterKind kind);
 
 /// Whether the deflection of a machine tells it whose torque holds the coupling of other axes (Rig::coupled):
-/// skew, stiffness, and friction of the motor beside what is declared of it.
+/// skew, stiffness, and dry friction of the motor. Viscous friction acts like a skew.
 bool told_by_deflection(const RigParameter& parameter);
 
 /// The parameter that says how far the directions of this one differ; null: it has none.

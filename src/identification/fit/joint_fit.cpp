@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
@@ -69,6 +70,13 @@ void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
   const Eigen::VectorXd growth =
       (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
   covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
+}
+
+/// s: of a coupled machine the deflection under viscous friction, which is declared, looks like a skew.
+double skew_of_friction(const model::Rig& rig) {
+  const double stiffness =
+      rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).get(rig);
+  return rig.coupled ? kDeclaredUncertainty * rig.motor.viscous_damping / stiffness : 0;
 }
 
 /// What is left beyond noise may follow what a value changes, wholly where the machine is not to be modelled:
@@ -274,7 +282,8 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   for (std::size_t i = 0; i < start.parameters.size(); ++i)
     if (start.parameters[i].name == skew.name)
       fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) +=
-          std::pow(kSkewOfSample * records.records().front().data().interval, 2);
+          std::pow(kSkewOfSample * records.records().front().data().interval, 2) +
+          std::pow(skew_of_friction(fit.machine.rig), 2);
   if (start.rig.coupled) allow_for_left(fit.fit, rows, records.misfit(fit.machine).deflection);
 }
 

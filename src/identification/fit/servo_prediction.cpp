@@ -196,7 +196,7 @@ ServoResiduals PreparedServo::coupled_residuals(const model::Rig& rig, const Cal
   simulation::DrivenLoad load;
   load.load = d.motor;
   load.load_rate = d.load_rate;
-  load.mesh_torque = signal::low_pass(torque_of_moment_, d.interval, cutoff);
+  load.mesh_torque = signal::low_pass(acting_torque(rig, calibration), d.interval, cutoff);
   const std::vector<double> acceleration = signal::low_pass(d.motor_acceleration, d.interval, cutoff);
   for (std::size_t k = 0; k < d.size(); ++k) {
     const double rate = d.motor_rate[k], sign = std::fabs(rate) > slowest ? (rate > 0 ? 1 : -1) : 0;

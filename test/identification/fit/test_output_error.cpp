@@ -62,6 +62,30 @@ TEST(OutputError, FindsALoadEncoderThatIsLate) {
   }
 }
 
+// The machine is the simulator's; torque of another axis, 600 N m in the rhythm of its own, is added to the
+// channel and, over the stiffness, to the deflection. Two standard errors.
+TEST(OutputError, ACoupledMachineTellsItsSkew) {
+  rig_file::RigFile file = rig_file::load_rig_file(test::package_file("config/kr300.yaml"));
+  for (const double skew : {0.0, 3e-3}) {
+    file.rig.encoder_skew = skew;
+    record::Record record = simulation::simulate_record(file.rig, file.simulation, 10);
+    for (std::size_t k = 0; k < record.size(); ++k) {
+      const double other = 600 * std::sin(2 * record.time[k]);
+      record.column(record::Channel::motor_torque)[k] += other;
+      record.column(record::Channel::load_position)[k] -= other / 1e7;
+    }
+    model::Rig declared = file.rig;
+    declared.encoder_skew = 0;
+    OutputErrorSettings settings;
+    settings.parameters = {"mesh_stiffness", "motor_coulomb", "encoder_skew"};
+    const OutputError fit = fit_output_error(declared, {servo_data(record, declared)}, settings);
+    const signal::Measured found = fit.parameters.at("encoder_skew");
+    EXPECT_NEAR(found.value, skew, 2 * found.standard_error);
+    EXPECT_LT(found.standard_error, 2e-4);
+    EXPECT_NEAR(fit.parameters.at("mesh_stiffness").value / 1e7, 1, 0.1);
+  }
+}
+
 TEST(OutputError, StandardErrorsCoverTheScatter) {
   const model::Rig truth = other_servo();
   OutputErrorSettings settings = all_parameters();
