@@ -10,9 +10,11 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/flank_fit.h"
+#include "backlash_diagnosis/record/encoder_skew.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
 #include "refusal.h"
 
 namespace backlash::diagnosis {
@@ -32,6 +34,7 @@ constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
 // wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
 constexpr double kLargestFactor = 2;
+constexpr double kSkewErrors = 2;        // theory: standard errors to either side, 95 %
 constexpr std::size_t kFewestStays = 6;  // on a flank
 constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
 
@@ -47,6 +50,7 @@ void check(const PositionDifferenceSettings& s) {
   require(s.motor_inertia >= 0 && std::isfinite(s.motor_inertia), "motor_inertia", s.motor_inertia,
           "must be >= 0");
   require(s.load_ratio > 0 && std::isfinite(s.load_ratio), "load_ratio", s.load_ratio, "must be > 0");
+  require(std::isfinite(s.encoder_skew), "encoder_skew", s.encoder_skew, "must be finite");
   require(!(s.base_radius <= 0), "base_radius", s.base_radius, "must be > 0");
 }
 
@@ -80,6 +84,33 @@ TwoEncoders collect(const record::Record& record, const PositionDifferenceSettin
 
 double travel(const std::vector<double>& values) {
   return signal::quantile_range(values, 0.01);
+}
+
+/// The load's position `skew` [s] earlier. Near breaks and ends, where it is not known, windows are broken.
+TwoEncoders without_skew(TwoEncoders motion, double skew) {
+  if (skew == 0) return motion;
+  const double samples = skew / motion.interval;
+  motion.load = signal::delayed(motion.load, -samples);
+  const long reach = std::lround(std::ceil(std::abs(samples))) + 2, n = long(motion.motor.size());
+  std::vector<char> unbroken = motion.unbroken;
+  for (long i = 0; i < n; ++i) {
+    if (motion.unbroken[i] && i >= reach && i < n - reach) continue;
+    for (long k = std::max(0L, i - reach); k <= std::min(n - 1, i + reach); ++k) unbroken[k] = false;
+  }
+  motion.unbroken = std::move(unbroken);
+  return motion;
+}
+
+/// Skew of the encoders beside the declared one, where the record tells it apart from zero; else 0 with an
+/// unknown error. The flanks hold a small one like a friction of the motor.
+signal::Measured clear_skew(const TwoEncoders& motion, double inertia) {
+  try {
+    const signal::Measured skew =
+        record::encoder_skew({motion.interval, motion.torque, motion.motor, motion.load, inertia});
+    if (record::is_clear(skew)) return skew;
+  } catch (const CannotIdentify&) {  // too short, or too little moves
+  }
+  return {0, 0};
 }
 
 /// A load that travels farther than the deflection varies shows friction with both signs of its speed.
@@ -133,6 +164,23 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
   }
 }
 
+/// By how much the play changes at either end of the interval of the skew that was taken out.
+double gap_change(const TwoEncoders& motion, const FlankModel& model, const signal::Measured& skew,
+                  double gap) {
+  if (skew.standard_error == 0) return 0;
+  double largest = 0;
+  for (const double side : {-kSkewErrors, kSkewErrors}) {
+    const FlankFit fit = fit_record(without_skew(motion, skew.value + side * skew.standard_error), model).fit;
+    if (!fit.found)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("the load encoder is {:.3g} +- {:.2g} ms late, and within that error the "
+                                "flanks are lost",
+                                1e3 * skew.value, 1e3 * skew.standard_error)};
+    largest = std::max(largest, std::abs(fit.gap - gap));
+  }
+  return largest;
+}
+
 void require_sound(const FlankFit& fit) {
   if (!fit.found)
     throw Refusal{Status::out_of_domain,
@@ -171,7 +219,7 @@ std::string describe(const FlankFit& fit, bool moves) {
 }
 
 void fill(const record::Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
-  const TwoEncoders motion = collect(record, settings);
+  const TwoEncoders motion = without_skew(collect(record, settings), settings.encoder_skew);
   if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
     throw Refusal{Status::out_of_domain,
                   fmt::format("the output moves by {:.4g} rad although the rig says that it is locked",
@@ -182,8 +230,11 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   model.inertia = settings.motor_inertia;
   model.elastic_deviation = settings.elastic_uncertainty / 1.96;
   model.moving = load_moves(motion);
-  const auto [fit, longer] = fit_record(motion, model);
+  const signal::Measured skew =
+      model.moving ? clear_skew(motion, settings.motor_inertia) : signal::Measured{0, 0};
+  const auto [fit, longer] = fit_record(without_skew(motion, skew.value), model);
   require_sound(fit);
+  const double skewed = gap_change(motion, model, skew, fit.gap);
 
   const double scatter =
       signal::student_t_quantile(0.975, std::max(1.0, std::floor(0.5 * static_cast<double>(fit.stays)) - 1)) *
@@ -191,7 +242,8 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
   const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
   const double bounce = model.moving ? 0 : kBounce * fit.gap;
-  const double half = std::hypot(std::hypot(scatter, windows), std::hypot(unexplained, bounce));
+  const double half =
+      std::hypot(std::hypot(scatter, windows), std::hypot(unexplained, std::hypot(bounce, skewed)));
   double lower = fit.gap - half, upper = fit.gap + half;
   if (fit.varies) {
     lower = std::min(lower, fit.least_gap - half);
@@ -209,6 +261,9 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   estimate.lower = settings.base_radius * estimate.angle_lower;
   estimate.upper = settings.base_radius * estimate.angle_upper;
   estimate.message = describe(fit, model.moving);
+  if (skew.value != 0)
+    estimate.message += fmt::format("; the load encoder is {:.3g} +- {:.2g} ms later than the rig file says",
+                                    1e3 * skew.value, 1e3 * skew.standard_error);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/findings/trace_report.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "report/json.h"
 #include "trace_contributions.h"
 
@@ -29,6 +30,14 @@ report::Json machine_json(const std::map<std::string, signal::Measured>& paramet
   for (const auto& [name, m] : parameters)
     json[name] = with_unit(m, model::axis_unit(trace.units.at(name), trace.augmented.linear));
   return json;
+}
+
+/// What belongs to the sensors and not to the machine.
+std::map<std::string, signal::Measured> calibrations(const identification::Trace& trace) {
+  std::map<std::string, signal::Measured> of_sensors;
+  for (const auto& [name, m] : trace.parameters)
+    if (rig_file::servo_parameter(name).part == rig_file::RigPart::sensors) of_sensors[name] = m;
+  return of_sensors;
 }
 
 /// All values of a term, as the rig file has them.
@@ -130,6 +139,7 @@ std::string trace_report_json(const identification::Trace& trace, const TraceInp
                                     {"input", i.input},
                                     {"before", report::json_number(i.before)},
                                     {"after", report::json_number(i.after)}});
+  json["calibrations"] = machine_json(calibrations(trace), trace);
   json["base_parameters"] = machine_json(trace.base_parameters, trace);
   json["parameters"] = machine_json(trace.parameters, trace);
   json["notes"] = trace.notes;

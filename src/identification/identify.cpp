@@ -60,9 +60,31 @@ std::vector<std::string> parameter_names(const model::Rig& rig) {
   std::vector<std::string> names;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
     if (p.kind == rig_file::ParameterKind::start_in_gap) continue;
-    if (p.get(rig) != 0) names.push_back(p.name);
+    if (rig.coupled && !rig_file::told_by_deflection(p)) continue;
+    const bool skew = p.kind == rig_file::ParameterKind::encoder_skew && p.known_to(rig);
+    if (p.get(rig) != 0 || skew) names.push_back(p.name);
   }
   return names;
+}
+
+/// All but the first and the last take the torque for this joint's alone.
+std::vector<Procedure> procedures_for(const model::Rig& rig) {
+  if (rig.mesh.rigid) return {{"one_inertia", run_one_inertia}};
+  if (rig.coupled) return {servo_procedures().front(), servo_procedures().back()};
+  return servo_procedures();
+}
+
+/// The skew of the encoders that was taken out of the records is part of what was found.
+void put_skew_back(IdentificationCase& c) {
+  const std::string& name =
+      rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew).name;
+  if (c.skew.standard_error == 0) return;  // no record tells it
+  c.result.rig.encoder_skew += c.skew.value;
+  const auto fitted = c.result.parameters.find(name);
+  if (fitted == c.result.parameters.end())
+    c.result.parameters[name] = c.skew;
+  else
+    fitted->second.value += c.skew.value;
 }
 
 /// The map with the wind-up of the machine as fitted, and the rig with its variation where it declares one.
@@ -124,8 +146,7 @@ IdentificationCase identification_case(const model::Rig& declared,
 Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
                         const Progress& progress) {
   IdentificationCase c = identification_case(declared, records);
-  std::vector<Procedure> procedures = {{"one_inertia", run_one_inertia}};
-  if (!declared.mesh.rigid) procedures = servo_procedures();
+  const std::vector<Procedure> procedures = procedures_for(declared);
   double done = 0;
   for (const Procedure& procedure : procedures) {
     if (progress && !progress(done++ / double(procedures.size()), procedure.name)) throw Cancelled();
@@ -147,6 +168,7 @@ Identification identify(const model::Rig& declared, const std::vector<record::Re
     throw CannotIdentify("the records allow no procedure: " + joined(reasons));
   }
   if (c.result.gap_map && !declared.mesh.rigid) refine_gap_map(c);
+  if (!declared.mesh.rigid) put_skew_back(c);
   warn_of_asymmetry(c);
   warn_of_misfit(c.result);
   return c.result;

@@ -4,6 +4,8 @@
 namespace backlash::model {
 namespace {
 
+constexpr double kLongestSkew = 0.1;  // s, choice: what is later is no delay of an encoder
+
 /// A number for both directions, or a map of `forward` and `backward`; as mean and half difference.
 void read_directional(const YamlReader& parent, const std::string& key, double& mean, double& asymmetry) {
   if (!parent.has(key)) return;
@@ -78,6 +80,7 @@ Mesh read_mesh(const YamlReader& yaml) {
 void read_gear_train(const YamlReader& yaml, Rig& rig) {
   rig.reduction_ratio = yaml.number("reduction_ratio", Range::positive());
   rig.motor_side = yaml.boolean_or("motor_side", false);
+  rig.coupled = yaml.boolean_or("coupled", false);
   rig.linear = yaml.has("axis") && yaml.choice("axis", {"rotary", "linear"}) == "linear";
   const YamlReader motor = yaml.map("motor");
   rig.motor = read_end(motor);
@@ -133,6 +136,8 @@ Rig read_rig(const YamlReader& yaml) {
   read_gear_train(yaml.map("gear_train"), rig);
   if (yaml.has("terms"))
     for (const YamlReader& term : yaml.maps("terms")) rig.terms.push_back(read_term(term));
+  if (const auto sensors = yaml.optional_map("sensors"))
+    rig.encoder_skew = sensors->number_or("encoder_skew", 0, Range::between(-kLongestSkew, kLongestSkew));
   return rig;
 }
 

@@ -10,11 +10,21 @@
 namespace backlash::rig_file {
 namespace {
 
+constexpr double kClear = 4;  // choice: standard errors, from which a value is told apart from zero
+
 /// "kg m^2, fitted +- 0.02", of a value that the file has divided by `divisor`.
 std::string fitted_comment(const FittedValues& found, const std::string& name, double divisor) {
   const double error = found.parameters.at(name).standard_error;
   if (!std::isfinite(error)) return found.units.at(name) + ", fitted";
   return fmt::format("{}, fitted +- {:.2g}", found.units.at(name), error / divisor);
+}
+
+/// A skew that is not told apart from zero makes no new line in a file.
+bool is_worth_writing(const FittedValues& found, const YamlTree& tree) {
+  const RigParameter& skew = servo_parameter(RigPart::sensors, ParameterKind::encoder_skew);
+  const signal::Measured& m = found.parameters.at(skew.name);
+  return tree.root->entries.at("sensors").value->entries.count(skew.name) > 0 ||
+         std::fabs(m.value) > kClear * m.standard_error;
 }
 
 /// The map under "gear_train.PART".
@@ -28,6 +38,7 @@ void RigDocument::set_fitted(const FittedValues& found) {
   const model::Rig& rig = found.rig;
   for (const RigParameter& p : servo_parameters()) {
     if (found.parameters.count(p.name) == 0 || p.key.empty()) continue;
+    if (p.kind == ParameterKind::encoder_skew && !is_worth_writing(found, tree())) continue;
     const double divisor = std::pow(found.motor_axis_ratio, p.ratio_power);
     const std::string comment = fitted_comment(found, p.name, divisor);
     if (p.kind == ParameterKind::backlash)

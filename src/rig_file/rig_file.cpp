@@ -43,6 +43,7 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
     };
   }
   difference.load_ratio = momentum.load_ratio = rig.motor_axis_ratio();
+  difference.encoder_skew = rig.encoder_skew;
   difference.base_radius = momentum.base_radius = base_radius;
 }
 

@@ -73,6 +73,8 @@ std::vector<RigParameter> make_parameters() {
   for (RigParameter& p : friction()) all.push_back(std::move(p));
   all.push_back({"start_in_gap", RigPart::mesh, Kind::start_in_gap, "-", "gear_train.mesh.start_in_gap",
                  Range::any(), 0, "", "", "", BACKLASH_FIELD(mesh.start_in_gap)});
+  all.push_back({"encoder_skew", RigPart::sensors, Kind::encoder_skew, "s", "sensors.encoder_skew",
+                 Range::any(), 0, "", "", "", BACKLASH_FIELD(encoder_skew)});
   return all;
 }
 
@@ -82,6 +84,7 @@ std::vector<RigParameter> make_parameters() {
 }  // namespace
 
 bool RigParameter::known_to(const model::Rig& rig) const {
+  if (part == RigPart::sensors) return !rig.mesh.rigid && !rig.link_locked;
   if (part != RigPart::mesh) return true;
   return !rig.mesh.rigid && (contact.empty() || rig.mesh.contact_spec().values.has(contact));
 }
@@ -101,6 +104,11 @@ const RigParameter& servo_parameter(RigPart part, ParameterKind kind) {
   for (const RigParameter& parameter : servo_parameters())
     if (parameter.part == part && parameter.kind == kind && !parameter.is_asymmetry()) return parameter;
   throw InvalidParameter("parameter", "of this part and kind", "is not one of a servo with two inertias");
+}
+
+bool told_by_deflection(const RigParameter& p) {
+  const bool dry = p.part == RigPart::motor && p.kind == Kind::coulomb_friction && !p.is_asymmetry();
+  return p.kind == Kind::encoder_skew || p.kind == Kind::stiffness || dry;
 }
 
 const RigParameter* asymmetry_of(const RigParameter& mean) {

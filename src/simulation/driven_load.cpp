@@ -307,6 +307,8 @@ model::Rig acting_on_load(model::Rig rig) {
   rig.pinion = none.pinion;
   rig.torque_constant = none.torque_constant;
   rig.sensor_with_damper = none.sensor_with_damper;
+  rig.encoder_skew = none.encoder_skew;
+  rig.coupled = none.coupled;
   if (rig.input_coupling.rigid) rig.input_coupling = none.input_coupling;
   const auto idle = [](const std::shared_ptr<const model::Term>& term) { return !term->moves_load(); };
   rig.terms.erase(std::remove_if(rig.terms.begin(), rig.terms.end(), idle), rig.terms.end());

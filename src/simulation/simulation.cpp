@@ -2,6 +2,7 @@
 #include "backlash_diagnosis/simulation/simulation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
@@ -9,10 +10,13 @@
 namespace backlash::simulation {
 namespace {
 
-/// `machine` as it would be seen beside the torque of `drive`.
-model::Observation driven(model::Observation machine, const model::Observation& drive) {
-  machine.motor_torque = drive.motor_torque;
-  machine.motor_current = drive.motor_current;
+/// One sample of what was seen of torque, load and all else at moments of their own.
+model::Observation together(const model::Observation& torque, model::Observation machine,
+                            const model::Observation& load) {
+  machine.motor_torque = torque.motor_torque;
+  machine.motor_current = torque.motor_current;
+  machine.load_position = load.load_position;
+  machine.load_velocity = load.load_velocity;
   return machine;
 }
 
@@ -26,32 +30,50 @@ SimulationSettings read_simulation_settings(const YamlReader& yaml) {
   return settings;
 }
 
+Simulation::Late Simulation::late(double delay, double rate) {
+  // Rounding must not make one more sample of a delay of whole ones.
+  constexpr double kRounding = 1e-9;  // samples
+  const long samples = static_cast<long>(std::ceil(delay * rate - kRounding));
+  return {delay, samples, std::max(0.0, double(samples) / rate - delay)};
+}
+
 Simulation::Simulation(const model::Rig& rig, const SimulationSettings& settings)
     : plant_(rig, settings.excitation, settings.solver),
       sensors_(settings.sensors),
-      rate_(settings.sensors.sampling_rate),
-      delay_(model::sensing(rig.terms).torque_delay),
-      late_samples_(static_cast<long>(std::ceil(std::fabs(delay_) * rate_))),
-      after_sample_(std::max(0.0, double(late_samples_) / rate_ - std::fabs(delay_))) {
+      rate_(settings.sensors.sampling_rate) {
+  const double delay = model::sensing(rig.terms).torque_delay, skew = rig.encoder_skew;
+  const double latest = std::min({0.0, delay, delay + skew});  // the torque is 0
+  torque_ = late(-latest, rate_);
+  motor_ = late(delay - latest, rate_);
+  load_ = late(delay + skew - latest, rate_);
   forget();
 }
 
 void Simulation::forget() {
-  past_.assign(late_samples_, plant_.gear_train().observe(plant_.state().data(), model::AppliedTorque()));
+  const model::Observation rest = plant_.gear_train().observe(plant_.state().data(), model::AppliedTorque());
+  for (Late* l : {&torque_, &motor_, &load_}) l->past.assign(l->samples, rest);
 }
 
-/// Moves on to the next sample, by way of the moment that a later one shows.
+/// Moves on to the next sample, by way of the moments that later ones show.
 model::Observation Simulation::observe() {
-  if (late_samples_ > 0 && index_ > 0) {
-    plant_.advance_to(double(index_ - 1) / rate_ + after_sample_);
-    past_.push_back(plant_.observe());
+  std::array<Late*, 3> in_turn{&torque_, &motor_, &load_};
+  std::sort(in_turn.begin(), in_turn.end(),
+            [](const Late* a, const Late* b) { return a->after_sample < b->after_sample; });
+  for (Late* l : in_turn) {
+    if (l->samples == 0 || index_ == 0) continue;
+    plant_.advance_to(double(index_ - 1) / rate_ + l->after_sample);
+    l->past.push_back(plant_.observe());
   }
   plant_.advance_to(double(index_) / rate_);
   const model::Observation now = plant_.observe();
-  if (late_samples_ == 0) return now;
-  const model::Observation before = past_.front();
-  past_.pop_front();
-  return delay_ > 0 ? driven(before, now) : driven(now, before);
+  const auto shown = [&](Late& l) {
+    if (l.samples == 0) return now;
+    const model::Observation before = l.past.front();
+    l.past.pop_front();
+    return before;
+  };
+  const model::Observation torque = shown(torque_), motor = shown(motor_);
+  return together(torque, motor, shown(load_));
 }
 
 model::Observation Simulation::step() {

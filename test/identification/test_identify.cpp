@@ -32,7 +32,7 @@ TEST(Identify, SquareWaveAllowsDecayAndOutputError) {
     EXPECT_TRUE(report(found, name).records.empty()) << name;
     EXPECT_FALSE(report(found, name).message.empty()) << name;
   }
-  EXPECT_EQ(found.parameters.size(), 9u);
+  EXPECT_EQ(found.parameters.size(), 10u);
   EXPECT_EQ(found.units.at("mesh_stiffness"), "N m/rad");
 }
 

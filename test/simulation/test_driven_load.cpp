@@ -220,6 +220,8 @@ TEST(DrivenLoad, AnyChangeOfTheRigThatMovesTheLoadIsSeen) {
   }
   // These are worth a simulation less.
   const std::set<std::string> expected = {"name",
+                                          "coupled",
+                                          "encoder_skew",
                                           "joint",
                                           "reduction_ratio",
                                           "motor_side",

@@ -94,6 +94,26 @@ TEST(Sensing, ThePhaseMovesByTheAngleOfTheDelay) {
         << d;  // tolerance of the motion
 }
 
+// The oracle is the closed form at the moments that motor and load show.
+TEST(Sensing, ALoadEncoderMayBeLateOrEarlyBesideADelayOfTheTorque) {
+  const FreeBody body;
+  for (const double skew : {2e-3, 0.7e-3, -1.6e-3})
+    for (const double d : {0.0, 1.2e-3, -0.5e-3}) {
+      model::Rig rig = free_body({});
+      if (d != 0) rig.terms = {delay(d)};
+      rig.encoder_skew = skew;
+      const record::Record record = simulate_record(rig, run_settings(), 0.2);
+      const double latest = std::min({0.0, d, d + skew});
+      for (int k = 0; k < 200; ++k) {
+        const double t = 1e-3 * k + latest;
+        ASSERT_NEAR(record.column(record::Channel::motor_torque)[k], body.torque(t), 1e-9) << k;
+        ASSERT_NEAR(record.column(record::Channel::motor_position)[k], body.position(t - d), 1e-9) << k;
+        ASSERT_NEAR(record.column(record::Channel::load_position)[k], body.position(t - d - skew), 1e-9) << k;
+        ASSERT_NEAR(record.column(record::Channel::load_velocity)[k], body.velocity(t - d - skew), 1e-9) << k;
+      }
+    }
+}
+
 TEST(Sensing, ATorqueThatJumpsShowsItsJumpLate) {
   SimulationSettings settings = run_settings();
   settings.excitation = test::square(2, 5);

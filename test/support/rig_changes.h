@@ -25,6 +25,8 @@ inline std::vector<RigChange> rig_changes() {
       {"linear", [](model::Rig& r) { r.linear = !r.linear; }},
       {"torque_constant", [](model::Rig& r) { r.torque_constant = 0.7; }},
       {"sensor_with_damper", [](model::Rig& r) { r.sensor_with_damper = !r.sensor_with_damper; }},
+      {"coupled", [](model::Rig& r) { r.coupled = !r.coupled; }},
+      {"encoder_skew", [](model::Rig& r) { r.encoder_skew += 1e-3; }},
       {"link_locked", [](model::Rig& r) { r.link_locked = !r.link_locked; }},
       {"mesh.rigid", [](model::Rig& r) { r.mesh.rigid = !r.mesh.rigid; }},
       {"mesh.backlash", [](model::Rig& r) { r.mesh.backlash *= 1.1; }},

@@ -6,6 +6,10 @@
 // to 1 %, eccentricity, transmission error, gravity, cogging; where the load moves each may follow its
 // position.
 //
+// Skew: a load encoder that is d [s] late adds d w_L to the difference. Where the load moves, the record
+// tells d (record/encoder_skew.h); four standard errors away from the declared one it is taken out. A smaller
+// one acts like a friction of the motor, which the fit holds.
+//
 // Elastic deflection: where the load moves, the record itself tells how deflection follows torque; where it
 // is locked, or the record does not hold it to 10 %, the declared function counts.
 //
@@ -16,6 +20,7 @@
 // - what the model does not hold: twice the rms residual with a locked output, where all windows lie at
 //   nearly one torque and a pinion that keeps bouncing shifts all of them alike; 0.15 times it where the load
 //   moves,
+// - the skew of the encoders, where it was taken out: the change of the play over its interval,
 // - with a locked output 3 % of the play, for the bouncing that the residual does not show.
 // The shares are set by simulation, see test_rig_estimators.cpp.
 //
@@ -47,6 +52,9 @@ struct PositionDifferenceSettings {
 
   /// The rig says so; then a load_position that moves by more than 5 % of motor_position is refused.
   bool output_locked = false;
+
+  /// s, by which load_position is later than motor_position, as declared: taken out first.
+  double encoder_skew = 0;
 
   /// m, > 0; NaN where the rig gives none, then Estimate::backlash is NaN.
   double base_radius = kNaN;

@@ -73,6 +73,12 @@ struct Rig {
   bool link_locked = false;
   Mesh mesh;
   std::vector<std::shared_ptr<const Term>> terms;
+  /// s, by which load_position and load_velocity of a record are later than motor_position: > 0, and the load
+  /// encoder shows q_L(t - skew). `sensors: encoder_skew` of the rig file.
+  double encoder_skew = 0;
+  /// Other axes move as well and are not in the record: motor_torque holds their coupling, and no model of
+  /// this axis predicts it. `gear_train: coupled` of the rig file.
+  bool coupled = false;
 
   /// Load-side angle (or torque, divided) to the axis of motor_position: reduction ratio or 1.
   double motor_axis_ratio() const { return motor_side ? reduction_ratio : 1; }
@@ -92,7 +98,8 @@ bool operator==(const Rig& a, const Rig& b);
 /// The same machine with all values at the load side of the reduction.
 Rig load_side(const Rig& rig);
 
-/// Reads the machine's part of a rig file (`name`, `joint`, `gear_train`, `terms`). Throws BadData naming
+/// Reads the machine's part of a rig file (`name`, `joint`, `gear_train`, `terms`, `sensors: encoder_skew`).
+/// Throws BadData naming
 /// file, line, key, value and limit.
 Rig read_rig(const YamlReader& yaml);
 

@@ -13,7 +13,7 @@
 namespace backlash::rig_file {
 
 /// What a parameter belongs to.
-enum class RigPart { motor, link, mesh };
+enum class RigPart { motor, link, mesh, sensors };
 
 enum class ParameterKind {
   inertia,
@@ -24,6 +24,7 @@ enum class ParameterKind {
   start_in_gap,  // where in the gap both positions are 0
   coulomb_friction,
   viscous_friction,
+  encoder_skew,  // by how much load_position is later than motor_position
 };
 
 struct RigParameter {
@@ -46,20 +47,25 @@ struct RigParameter {
   }
   /// Half of forward minus backward.
   bool is_asymmetry() const { return !mean.empty(); }
-  /// Whether a machine like this rig has such a parameter: a rigid mesh has none, a contact law only its own.
+  /// Whether a machine like this rig has such a parameter: a rigid mesh has none, a contact law only its own;
+  /// encoders are compared where the load moves freely behind the mesh.
   bool known_to(const model::Rig& rig) const;
 };
 
 /// Of two inertias with a mesh between them: motor_inertia load_inertia mesh_stiffness mesh_damping
 /// mesh_alpha backlash_angle motor_coulomb motor_viscous load_coulomb load_viscous, then where directions
 /// differ motor_coulomb_asymmetry, motor_viscous_asymmetry, load_coulomb_asymmetry, load_viscous_asymmetry,
-/// and start_in_gap. Setting may make a rig that GearTrain refuses.
+/// start_in_gap, and encoder_skew. Setting may make a rig that GearTrain refuses.
 const std::vector<RigParameter>& servo_parameters();
 
 /// By name, or by what it is (of both directions: the mean). Throw InvalidParameter for one that is not in
 /// the table.
 const RigParameter& servo_parameter(const std::string& name);
 const RigParameter& servo_parameter(RigPart part, ParameterKind kind);
+
+/// Whether the deflection of a machine tells it whose torque holds the coupling of other axes (Rig::coupled):
+/// skew, stiffness, and dry friction of the motor. Viscous friction acts like a skew.
+bool told_by_deflection(const RigParameter& parameter);
 
 /// The parameter that says how far the directions of this one differ; null: it has none.
 const RigParameter* asymmetry_of(const RigParameter& mean);

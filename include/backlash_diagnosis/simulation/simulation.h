@@ -4,7 +4,8 @@
 //
 // Where the torque acts later than its stamp says (Sensing::torque_delay d > 0), a sample of time t holds the
 // torque of t and all else as it was at t - d; where it acts earlier, the torque of t - |d| and all else of
-// t. Both moments are simulated, not interpolated. Before time 0 the rig was at rest without torque.
+// t. The load's position and speed are later by Rig::encoder_skew than the motor's, or earlier where that is
+// < 0. All moments are simulated, not interpolated. Before time 0 the rig was at rest without torque.
 #pragma once
 
 #include <deque>
@@ -44,16 +45,21 @@ class Simulation {
   void reset();
 
  private:
+  /// Samples that are some time older than their stamps.
+  struct Late {
+    double delay;                              // s, >= 0
+    long samples;                              // the delay is so many samples
+    double after_sample;                       // s, less this
+    std::deque<model::Observation> past = {};  // the next `samples` of them
+  };
+  static Late late(double delay, double rate);
   model::Observation observe();
   void forget();
 
   Plant plant_;
   SensorModel sensors_;
   double rate_;
-  double delay_;                         // s, Sensing::torque_delay
-  long late_samples_;                    // |delay| is so many samples
-  double after_sample_;                  // s, less this
-  std::deque<model::Observation> past_;  // the next late_samples_ as they were |delay| before their stamps
+  Late torque_, motor_, load_;  // what a sample shows of the torque, of the load and of all else
   long index_ = 0;
 };
 

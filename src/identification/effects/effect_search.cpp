@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/mesh_resonance.h"
@@ -70,6 +71,22 @@ void describe_machine(const SearchResult& result, const std::vector<ServoPredict
   trace.rejected = rejected_effects(found);
 }
 
+/// The torque of a machine that is coupled to other axes cannot be told.
+void forget_torque(Trace& trace) {
+  const double unknown = std::nan("");
+  trace.channels.at("torque") = {unknown, unknown, unknown, unknown, unknown};
+  auto& all = trace.independence;
+  all.erase(
+      std::remove_if(all.begin(), all.end(), [](const Independence& i) { return i.channel == "torque"; }),
+      all.end());
+  trace.notes.push_back(
+      "other axes move (gear_train.coupled): cannot tell anything of the torque, which holds their coupling, "
+      "and no "
+      "effect is sought. The deflection is predicted from the torque that goes through the teeth, and tells "
+      "the "
+      "skew of the encoders");
+}
+
 /// Errors of both channels before and after, and the test record as both models have it.
 void describe_errors(const SearchResult& result, const std::vector<ServoPrediction>& on_test,
                      const Records& records, const FitSettings& fit, Trace& trace) {
@@ -86,6 +103,7 @@ void describe_errors(const SearchResult& result, const std::vector<ServoPredicti
   if (!after.deflection.empty()) channel("deflection", &ServoPrediction::deflection_error);
   trace.series = trace_series(records.test, before, after);
   trace.independence = independence(trace.series, records.test, trace.cutoff);
+  if (last.rig.coupled) forget_torque(trace);
 }
 
 }  // namespace

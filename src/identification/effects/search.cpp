@@ -55,6 +55,10 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
                               [&](const std::string& p) { told.phase(p); },
                               [&](const Hypothesis& h) { told.hypothesis(h); }};
   SearchResult result{fit_declared(declared, context), {}};
+  if (declared.coupled) {
+    result.found = result.declared;
+    return result;
+  }
   Hypothesis h = add_effects_or_teeth(result.declared, context);
   h = drop_superfluous(h, context);
   h = reconsider(h, context);

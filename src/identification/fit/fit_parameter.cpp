@@ -1,17 +1,45 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fit_parameter.h"
 
+#include <cmath>
+
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/model/term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
 namespace backlash::identification {
+namespace {
+
+constexpr double kDeclaredStiffness = 3;  // choice: factor, one standard deviation of a declared stiffness
+constexpr double kUsualSkew = 1e-3;       // s, choice: scale of the skew of two encoders
+
+}  // namespace
 
 FitParameter machine_parameter(const std::string& name, const model::Rig& rig) {
   const rig_file::RigParameter& p = rig_file::servo_parameter(name);
   if (const double value = p.get(rig); p.positive() && !(value > 0))
     throw InvalidParameter(name, value, "must be > 0");
-  return {p.name, p.unit, p.positive(), 1, p.get, p.set};
+  const double scale = p.kind == rig_file::ParameterKind::encoder_skew ? kUsualSkew : 1;
+  return {p.name, p.unit, p.positive(), scale, p.get, p.set};
+}
+
+std::vector<std::function<double(const model::Rig&)>> rows_as_declared(const model::Rig& declared) {
+  std::vector<std::function<double(const model::Rig&)>> rows;
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters()) {
+    const double value = p.get(declared);
+    if (!rig_file::told_by_deflection(p) || !p.positive() || !(value > 0)) continue;
+    if (p.kind == rig_file::ParameterKind::stiffness) {
+      rows.push_back([get = p.get, value](const model::Rig& rig) {
+        return std::log(get(rig) / value) / std::log(kDeclaredStiffness);
+      });
+      continue;
+    }
+    rows.push_back([get = p.get, value](const model::Rig& rig) {
+      return (get(rig) / value - 1) / kDeclaredUncertainty;
+    });
+  }
+  return rows;
 }
 
 FitParameter term_parameter(std::size_t term, const std::string& name, const model::Rig& rig, double scale) {

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::identification {
@@ -19,7 +21,8 @@ constexpr double kVague = 30;  // choice: times the scale: standard deviation of
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
-constexpr long kFewestBlocks = 4;  // choice: per unknown, for a covariance from blocks
+constexpr double kSkewOfSample = 1e-3;  // simulation: samples, that interpolation leaves wrong of a skew
+constexpr long kFewestBlocks = 4;       // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));
@@ -67,6 +70,27 @@ void take_larger(Eigen::MatrixXd& covariance, const Eigen::MatrixXd& other) {
   const Eigen::VectorXd growth =
       (other.diagonal().cwiseQuotient(covariance.diagonal())).cwiseMax(1).cwiseSqrt();
   covariance = growth.asDiagonal() * covariance * growth.asDiagonal();
+}
+
+/// s: of a coupled machine the deflection under viscous friction, which is declared, looks like a skew.
+double skew_of_friction(const model::Rig& rig) {
+  const double stiffness =
+      rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).get(rig);
+  return rig.coupled ? kDeclaredUncertainty * rig.motor.viscous_damping / stiffness : 0;
+}
+
+/// What is left beyond noise may follow what a value changes, wholly where the machine is not to be modelled:
+/// it must not be told better than |left| / |change per unit|, or than it is known beside the records.
+void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double in_floors) {
+  const double left =
+      fit.residuals.head(rows).norm() * std::sqrt(std::max(0.0, 1 - 1 / (in_floors * in_floors)));
+  Eigen::VectorXd growth = Eigen::VectorXd::Ones(fit.values.size());
+  for (Eigen::Index i = 0; i < growth.size(); ++i) {
+    const double change = fit.jacobian.col(i).head(rows).norm(), error = std::sqrt(fit.covariance(i, i));
+    const double known = fit.jacobian.col(i).tail(fit.jacobian.rows() - rows).norm();  // beside the records
+    if (left > 0 && error > 0) growth[i] = std::max(1.0, 1 / std::hypot(change / left, known) / error);
+  }
+  fit.covariance = growth.asDiagonal() * fit.covariance * growth.asDiagonal();
 }
 
 }  // namespace
@@ -252,7 +276,15 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);
+  const rig_file::RigParameter& skew =
+      rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
+  for (std::size_t i = 0; i < start.parameters.size(); ++i)
+    if (start.parameters[i].name == skew.name)
+      fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) +=
+          std::pow(kSkewOfSample * records.records().front().data().interval, 2) +
+          std::pow(skew_of_friction(fit.machine.rig), 2);
+  if (start.rig.coupled) allow_for_left(fit.fit, rows, records.misfit(fit.machine).deflection);
 }
 
 }  // namespace backlash::identification

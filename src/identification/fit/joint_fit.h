@@ -107,7 +107,7 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records,
 
 /// Covariance of the fitted values from wide steps and from blocks of the records as long as the time between
 /// two reversals of the motor, the larger: until the next reversal what friction and play leave keeps its
-/// sign.
+/// sign. Of a machine that is coupled to other axes also what is left counts as if it followed each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
 }  // namespace backlash::identification

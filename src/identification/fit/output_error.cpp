@@ -23,6 +23,7 @@ Machine start_machine(const model::Rig& rig, std::size_t records, const OutputEr
   machine.calibrations.resize(records);
   for (const std::string& name : settings.parameters)
     machine.parameters.push_back(machine_parameter(name, rig));
+  if (rig.coupled) machine.priors = rows_as_declared(rig);
   for (const Finding& finding : settings.findings) machine.priors.push_back(prior_row(finding));
   return machine;
 }

@@ -79,6 +79,7 @@ ChannelError relative(const std::vector<double>& measured, const std::vector<dou
 struct Drive {
   simulation::RecordedMotion motion;
   double gain = 1;              // of the load encoder
+  double skew = 0;              // samples, by which it is late
   std::vector<double> changed;  // column that is not as recorded
 
   Drive(const ServoData& data, const model::Rig& rig, const Calibration& calibration) {
@@ -88,11 +89,13 @@ struct Drive {
     if (!data.smooth_acceleration.empty()) motion.acceleration = &data.smooth_acceleration;
     if (simulation::load_moves_freely(rig)) {
       gain = model::sensing(rig.terms).load_position_gain;
+      skew = rig.encoder_skew / data.interval;
       motion.load_rate = &data.load_rate;
-      motion.first_load = (data.first_load - calibration.encoder_offset) / gain;
+      motion.first_load =
+          (data.first_load + rig.encoder_skew * data.first_load_rate - calibration.encoder_offset) / gain;
       motion.first_load_rate = data.first_load_rate / gain;
-      if (gain == 1) return;
-      changed = data.load_rate;
+      if (gain == 1 && skew == 0) return;
+      changed = signal::delayed(data.load_rate, -skew);
       for (double& rate : changed) rate /= gain;
       motion.load_rate = &changed;
     } else if (calibration.encoder_offset != 0) {
@@ -106,9 +109,9 @@ struct Drive {
 
 struct SimulatedLoad {
   model::Rig rig;
-  double gain, offset;
+  double gain, skew, offset;
   simulation::DrivenLoad motion;
-  std::vector<double> deflection;  // simulated load minus recorded, without offset, low-passed; see Drive
+  std::vector<double> deflection;  // simulated load as shown minus recorded, without offset, low-passed
 };
 
 }  // namespace
@@ -118,17 +121,17 @@ class SimulatedLoads {
  public:
   std::shared_ptr<const SimulatedLoad> get(const PreparedServo& record, const Drive& drive,
                                            const model::Rig& rig, const Calibration& calibration) {
-    if (auto known = find(rig, drive.gain, calibration.encoder_offset)) return known;
+    if (auto known = find(rig, drive, calibration.encoder_offset)) return known;
     auto made = std::make_shared<SimulatedLoad>();
     made->rig = rig;
     made->gain = drive.gain;
+    made->skew = drive.skew;
     made->offset = calibration.encoder_offset;
     made->motion = simulation::simulate_driven_load(rig, drive.motion, record.feedback);
     if (simulation::load_moves_freely(rig)) {
       const ServoData& data = record.data();
-      std::vector<double> difference(data.size());
-      for (std::size_t k = 0; k < data.size(); ++k)
-        difference[k] = drive.gain * made->motion.load[k] - data.load[k];
+      std::vector<double> difference = signal::delayed(made->motion.load, drive.skew);
+      for (std::size_t k = 0; k < data.size(); ++k) difference[k] = drive.gain * difference[k] - data.load[k];
       made->deflection = signal::low_pass(difference, data.interval, record.cutoff);
     }
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -140,10 +143,12 @@ class SimulatedLoads {
  private:
   static constexpr std::size_t kKept = 8;  // that a Jacobian's columns come upon the load of its centre again
 
-  std::shared_ptr<const SimulatedLoad> find(const model::Rig& rig, double gain, double offset) {
+  std::shared_ptr<const SimulatedLoad> find(const model::Rig& rig, const Drive& drive, double offset) {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (auto at = kept_.begin(); at != kept_.end(); ++at) {
-      if ((*at)->gain != gain || (*at)->offset != offset || !simulation::moves_same_load((*at)->rig, rig))
+      const SimulatedLoad& known = **at;
+      if (known.gain != drive.gain || known.skew != drive.skew || known.offset != offset ||
+          !simulation::moves_same_load(known.rig, rig))
         continue;
       kept_.splice(kept_.begin(), kept_, at);
       return kept_.front();
@@ -180,7 +185,38 @@ std::vector<double> PreparedServo::acting_torque(const model::Rig& rig,
   return signal::delayed(calibration.held ? torque_held_ : torque_of_moment_, delay);
 }
 
+/// Of a machine whose torque holds the coupling of other axes. That torque, less what the motor takes, goes
+/// through the teeth all the same:
+///   q_L = q_M - e(tau - J_M a_M - friction)
+/// so that the load's position follows, and the torque itself cannot be told.
+ServoResiduals PreparedServo::coupled_residuals(const model::Rig& rig, const Calibration& calibration) const {
+  const ServoData& d = data();
+  const model::GearTrain train(rig);
+  const double inertia = train.motor_inertia(), slowest = kSureSpeed * d.rate_noise;
+  simulation::DrivenLoad load;
+  load.load = d.motor;
+  load.load_rate = d.load_rate;
+  load.mesh_torque = signal::low_pass(acting_torque(rig, calibration), d.interval, cutoff);
+  const std::vector<double> acceleration = signal::low_pass(d.motor_acceleration, d.interval, cutoff);
+  for (std::size_t k = 0; k < d.size(); ++k) {
+    const double rate = d.motor_rate[k], sign = std::fabs(rate) > slowest ? (rate > 0 ? 1 : -1) : 0;
+    load.mesh_torque[k] -=
+        inertia * acceleration[k] + rig.motor.viscous_damping * rate + rig.motor.coulomb_friction * sign;
+    load.load[k] -= train.elastic_deflection(load.mesh_torque[k]);
+  }
+  load.mesh_on_motor = load.mesh_torque;
+  ServoResiduals r;
+  r.deflection = signal::delayed(load.load, rig.encoder_skew / d.interval);
+  for (std::size_t k = 0; k < d.size(); ++k) r.deflection[k] -= d.load[k];
+  r.deflection = signal::low_pass(r.deflection, d.interval, cutoff);
+  for (double& value : r.deflection) value += calibration.encoder_offset;
+  r.torque.assign(d.size(), 0.0);
+  r.load = std::make_shared<const simulation::DrivenLoad>(std::move(load));
+  return r;
+}
+
 ServoResiduals PreparedServo::residuals(const model::Rig& rig, const Calibration& calibration) const {
+  if (rig.coupled) return coupled_residuals(rig, calibration);
   const Drive drive(data(), rig, calibration);
   const auto load = loads_->get(*this, drive, rig, calibration);
   simulation::MotorTorques motor = simulation::motor_torques(rig, drive.motion, load->motion);

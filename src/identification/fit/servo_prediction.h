@@ -38,6 +38,8 @@ struct PreparedServo {
   std::vector<char> counts;    // settled, and the motor slides
 
  private:
+  ServoResiduals coupled_residuals(const model::Rig& rig, const Calibration& calibration) const;
+
   const ServoData* data_;  // of the caller
   std::vector<double> torque_of_moment_, torque_held_;
   std::shared_ptr<SimulatedLoads> loads_;

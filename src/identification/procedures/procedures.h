@@ -25,6 +25,7 @@ struct CaseRecord {
 struct IdentificationCase {
   std::vector<CaseRecord> records;
   std::vector<std::string> names;  // of the parameters to be found
+  signal::Measured skew{0, 0};     // s, of the load encoder, that has been taken out of the records
   model::Rig declared;
   Identification result;  // result.rig: what is known by now
 };
@@ -45,6 +46,7 @@ const std::vector<Procedure>& servo_procedures();
 void update_from_findings(IdentificationCase& c);
 
 /// The steps, one file each in this folder.
+ProcedureReport run_encoder_skew(IdentificationCase& c);
 ProcedureReport run_sensor_calibration(IdentificationCase& c);
 ProcedureReport run_friction_lines(IdentificationCase& c);
 ProcedureReport run_line_inertia(IdentificationCase& c);

@@ -125,7 +125,17 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   }
   c.result.channels["torque"] = total(fit.torque, torque);
   c.result.channels["deflection"] = total(fit.deflection, deflection);
-  const ChannelError &t = c.result.channels["torque"], &d = c.result.channels["deflection"];
+  if (fit.rig.coupled) {
+    c.result.channels.erase("torque");
+    c.result.torque.clear();
+    c.result.warnings.push_back(
+        "other axes move (gear_train.coupled): the torque cannot be told, nor what it tells");
+  }
+  const ChannelError d = c.result.channels["deflection"];
+  report.message =
+      fmt::format("deflection error {:.2g} % (noise alone {:.2g} %)", 100 * d.error, 100 * d.floor);
+  if (fit.rig.coupled) return report;
+  const ChannelError t = c.result.channels["torque"];
   report.message = fmt::format("torque error {:.2g} % (noise alone {:.2g} %), deflection {:.2g} % ({:.2g} %)",
                                100 * t.error, 100 * t.floor, 100 * d.error, 100 * d.floor);
   return report;
