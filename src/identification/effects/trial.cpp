@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "../fit/calibration.h"
@@ -13,40 +14,20 @@
 namespace backlash::identification {
 namespace {
 
-/// What the terms of a candidate have from their grids, in rising order.
-std::vector<std::vector<double>> places(const Candidate& candidate) {
-  std::vector<std::vector<double>> all;
-  for (const ParameterValues& term : candidate.terms) {
-    all.emplace_back();
-    for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
-      if (!shape.refined) all.back().push_back(term.at(shape.name));
+/// The same with the orders that were free before at the nearest whole numbers; nothing where those are 0 or
+/// two terms become one.
+std::optional<Candidate> at_whole_orders(Candidate candidate, const std::vector<char>& holds) {
+  std::set<double> different;
+  for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes) {
+    if (!shape.wave) continue;
+    for (std::size_t i = 0; i < candidate.terms.size(); ++i) {
+      double& order = candidate.terms[i][shape.name];
+      if (holds[i]) order = std::round(order);
+      if (!(order > 0) || !different.insert(order).second) return std::nullopt;
+    }
   }
-  std::sort(all.begin(), all.end());
-  return all;
-}
-
-/// The same with its t-th term's shape some places farther in the grid; nothing where that ends or where two
-/// terms become one.
-std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, const model::TermShape& shape,
-                                   long step, const model::MotionRange& range) {
-  const std::vector<double> grid = shape.values(range);
-  const long at =
-      std::find(grid.begin(), grid.end(), candidate.terms[t].at(shape.name)) - grid.begin() + step;
-  if (at < 0 || at >= long(grid.size())) return std::nullopt;
-  for (const ParameterValues& term : candidate.terms)
-    if (term.at(shape.name) == grid[std::size_t(at)]) return std::nullopt;
-  Candidate other = candidate;
-  other.terms[t][shape.name] = grid[std::size_t(at)];
-  return other;
-}
-
-std::vector<Candidate> neighbours(const Candidate& candidate, const model::TermShape& shape,
-                                  const model::MotionRange& range) {
-  std::vector<Candidate> all;
-  for (std::size_t t = 0; t < candidate.terms.size(); ++t)
-    for (const long step : {-2L, -1L, 1L, 2L})
-      if (const auto other = neighbour(candidate, t, shape, step, range)) all.push_back(*other);
-  return all;
+  candidate.holds_order = holds;
+  return candidate;
 }
 
 std::size_t shape_count(const Trial& trial) {
@@ -112,26 +93,22 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
   return all;
 }
 
-Trial best_neighbour(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
-  if (clearly_right(h.fitted->records.misfit(trial.fit.machine), context)) return trial;
-  const double less = 1 - context.settings.trials.better_neighbour;
-  Trial best = trial;
-  std::set<std::vector<std::vector<double>>> known;
-  for (bool better = true; better;) {
-    better = false;
-    for (const model::TermShape& shape : model::term_type(best.candidate.id).search->shapes) {
-      if (shape.refined || shape.values(context.range).size() < 2) continue;
-      for (const Candidate& other : neighbours(best.candidate, shape, context.range)) {
-        if (!known.insert(places(other)).second) continue;
-        context.tell("trying " + best.candidate.id);
-        auto fitted = tried(h, other, context, best.residual);
-        if (!fitted || fitted->residual >= less * best.residual) continue;
-        best = std::move(*fitted);
-        better = true;
-      }
-    }
+Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
+  const std::vector<char>& holds = trial.candidate.holds_order;
+  if (std::find(holds.begin(), holds.end(), char(true)) == holds.end() ||
+      clearly_right(h.fitted->records.misfit(trial.fit.machine), context))
+    return trial;
+  const double less = context.settings.revision.clearly_less;
+  Candidate free = trial.candidate;
+  free.holds_order.clear();
+  context.tell("fitting the order of " + free.id);
+  auto fitted = tried(h, free, context, trial.residual);
+  if (!fitted || fitted->residual >= less * trial.residual) return trial;
+  if (const auto whole = at_whole_orders(fitted->candidate, holds)) {
+    auto rounded = tried(h, *whole, context, fitted->residual / less);
+    if (rounded && less * rounded->residual <= fitted->residual) return *rounded;
   }
-  return best;
+  return *fitted;
 }
 
 }  // namespace backlash::identification
