@@ -23,8 +23,12 @@ double deviation(const std::vector<double>& x) {
 
 constexpr double kResolved = 2;  // choice: periods in the travel: fewer, and whole orders are tried first
 
-bool is_resolved(double order, const model::MotionRange& range) {
-  return order >= kResolved * model::order_resolution(range);
+constexpr double kOrderError = 0.25;  // choice: of the resolution: whole orders that are nearer look alike
+
+/// 1/rad, of an order that is one of those tried; 0 of one that the travel resolves.
+double held_order(double order, const model::MotionRange& range) {
+  const double resolution = model::order_resolution(range);
+  return order < kResolved * resolution ? kOrderError * resolution : 0;
 }
 
 /// Orders are those that the travel does not resolve, and the strongest of the spectrum beyond them.
@@ -143,11 +147,11 @@ Candidate pair(const Probed& a, const Probed& b, const Eigen::VectorXd& left) {
   return c;
 }
 
-/// With whether the order of each of its terms is held.
+/// With the orders that are not fitted.
 Candidate holding(Candidate c, const model::MotionRange& range) {
   for (const model::TermShape& shape : model::term_type(c.id).search->shapes)
     for (const ParameterValues& term : c.terms)
-      if (shape.wave) c.holds_order.push_back(!is_resolved(term.at(shape.name), range));
+      if (shape.wave) c.held_orders.push_back(held_order(term.at(shape.name), range));
   return c;
 }
 
@@ -229,9 +233,9 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
 
 std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, std::size_t term) {
   std::vector<const model::TermShape*> all;
-  const bool holds = term < candidate.holds_order.size() && candidate.holds_order[term];
+  const bool held = term < candidate.held_orders.size() && candidate.held_orders[term] > 0;
   for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
-    if (shape.refined && !(shape.wave && holds)) all.push_back(&shape);
+    if (shape.refined && !(shape.wave && held)) all.push_back(&shape);
   return all;
 }
 

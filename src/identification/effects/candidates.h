@@ -17,9 +17,9 @@ struct Candidate {
   std::vector<ParameterValues> terms;
   double gain = 0;        // predicted: relative decrease of the norm of all residuals
   double smoothness = 0;  // of a learned map, see learned.h
-  // Per term: its order is one that was tried and is not fitted, as the travel hardly resolves it. Empty:
-  // none.
-  std::vector<char> holds_order = {};
+  // 1/rad, per term: standard error of an order that is not fitted but one of those that were tried, as the
+  // travel hardly resolves it; 0: fitted. Empty: all are.
+  std::vector<double> held_orders = {};
 };
 
 /// The shapes of the i-th term of a candidate that are fitted, in the order of their parameters in a fit.

@@ -13,8 +13,6 @@ namespace {
 
 constexpr double kWorse = 1.05;  // choice: times the error on the test record: an effect that does harm
 
-const double kHeldOrder = std::sqrt(1.0 / 12);  // theory: of any number that is nearest to that whole one
-
 /// Of a learned map: where its coordinate reaches and how large it gets.
 void describe_map(const model::Term& term, std::vector<signal::Measured>& fitted, FoundEffect& effect) {
   const model::TermMap& map = *model::term_type(term.id).map;
@@ -34,7 +32,7 @@ void describe_map(const model::Term& term, std::vector<signal::Measured>& fitted
 }
 
 /// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0, an
-/// order that the travel does not resolve that of a whole number.
+/// order that the travel does not resolve a part of the resolution.
 void describe(const model::Term& term, const Candidate& candidate, std::size_t t, const std::string& suffix,
               std::vector<signal::Measured>& fitted, FoundEffect& effect) {
   const model::TermType& type = model::term_type(term.id);
@@ -48,7 +46,8 @@ void describe(const model::Term& term, const Candidate& candidate, std::size_t t
   take(search.strength);
   if (!search.phase.empty()) take(search.phase);
   for (const model::TermShape& shape : search.shapes)
-    if (shape.wave) found[shape.name] = {term.values.at(shape.name), kHeldOrder};
+    if (shape.wave && t < candidate.held_orders.size())
+      found[shape.name] = {term.values.at(shape.name), candidate.held_orders[t]};
   for (const model::TermShape* shape : fitted_shapes(candidate, t)) take(shape->name);
   for (const ParameterSpec& spec : type.parameters) {
     if (!spec.choices.empty()) {

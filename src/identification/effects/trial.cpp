@@ -14,20 +14,24 @@
 namespace backlash::identification {
 namespace {
 
-/// The same with the orders that were free before at the nearest whole numbers; nothing where those are 0 or
-/// two terms become one.
-std::optional<Candidate> at_whole_orders(Candidate candidate, const std::vector<char>& holds) {
-  std::set<double> different;
-  for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes) {
-    if (!shape.wave) continue;
-    for (std::size_t i = 0; i < candidate.terms.size(); ++i) {
-      double& order = candidate.terms[i][shape.name];
-      if (holds[i]) order = std::round(order);
-      if (!(order > 0) || !different.insert(order).second) return std::nullopt;
+/// The same at the whole numbers on either side of its orders, where `held` has an error for them: all
+/// combinations but those where two terms become one.
+std::vector<Candidate> at_whole_orders(const Candidate& candidate, const std::vector<double>& held) {
+  std::vector<Candidate> all = {candidate};
+  for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
+    for (std::size_t i = 0; shape.wave && i < held.size(); ++i) {
+      if (held[i] == 0) continue;
+      std::vector<Candidate> more;
+      for (const Candidate& c : all) {
+        const double order = c.terms[i].at(shape.name);
+        for (const double whole : std::set<double>{std::floor(order), std::ceil(order)})
+          if (whole > 0 && (i == 0 || whole != c.terms[0].at(shape.name)))
+            more.emplace_back(c).terms[i][shape.name] = whole;
+      }
+      all = std::move(more);
     }
-  }
-  candidate.holds_order = holds;
-  return candidate;
+  for (Candidate& c : all) c.held_orders = held;
+  return all;
 }
 
 std::size_t shape_count(const Trial& trial) {
@@ -94,21 +98,22 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
 }
 
 Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
-  const std::vector<char>& holds = trial.candidate.holds_order;
-  if (std::find(holds.begin(), holds.end(), char(true)) == holds.end() ||
+  const std::vector<double>& held = trial.candidate.held_orders;
+  if (std::all_of(held.begin(), held.end(), [](double error) { return error == 0; }) ||
       clearly_right(h.fitted->records.misfit(trial.fit.machine), context))
     return trial;
   const double less = context.settings.revision.clearly_less;
   Candidate free = trial.candidate;
-  free.holds_order.clear();
+  free.held_orders.clear();
   context.tell("fitting the order of " + free.id);
-  auto fitted = tried(h, free, context, trial.residual);
-  if (!fitted || fitted->residual >= less * trial.residual) return trial;
-  if (const auto whole = at_whole_orders(fitted->candidate, holds)) {
-    auto rounded = tried(h, *whole, context, fitted->residual / less);
-    if (rounded && less * rounded->residual <= fitted->residual) return *rounded;
+  const auto fitted = tried(h, free, context, trial.residual);
+  if (!fitted) return trial;
+  Trial best = trial;
+  for (const Candidate& whole : at_whole_orders(fitted->candidate, held)) {
+    auto rounded = tried(h, whole, context, best.residual);
+    if (rounded && rounded->residual < best.residual) best = std::move(*rounded);
   }
-  return *fitted;
+  return fitted->residual < less * best.residual ? *fitted : best;
 }
 
 }  // namespace backlash::identification

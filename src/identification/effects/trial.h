@@ -30,8 +30,8 @@ struct Trials {
 Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
                   const SearchContext& context);
 
-/// Orders that the travel does not resolve are whole numbers, unless any number leaves clearly less; then
-/// the whole numbers near it if they leave as little, or those numbers.
+/// Orders that the travel does not resolve stay whole numbers, the best of those near to what a fit says,
+/// unless any number leaves clearly less.
 Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context);
 
 }  // namespace backlash::identification

@@ -75,7 +75,7 @@ TEST(Screen, FindsAnOrderThatIsNoWholeNumberInTheSpectrum) {
       screen(h.fitted->fit, h.fitted->records, bench.context.range, bench.context.settings.screen);
   ASSERT_FALSE(all.empty());
   EXPECT_EQ(all[0].id, "cogging");
-  EXPECT_NEAR(all[0].terms[0].at("order"), 18.667, 0.3);
+  EXPECT_NEAR(all[0].terms[0].at("order"), 18.667, 0.56);  // a quarter of the resolution, where a fit arrives
   const auto trial = tried(h, all[0], bench.context);
   ASSERT_TRUE(trial);
   EXPECT_NEAR(trial->candidate.terms[0].at("order"), 18.667, 0.012);
@@ -89,7 +89,7 @@ TEST(Trial, OfALowOrderIsFreeOnlyWhereThatIsClearlyBetter) {
     const SearchBench bench{machine};
     const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
     Candidate whole = test::cogging_effect(0.5, 3, 0.3).candidate;
-    whole.holds_order = {true};
+    whole.held_orders = {0.5};
     const auto held = tried(h, whole, bench.context);
     ASSERT_TRUE(held);
     EXPECT_EQ(held->candidate.terms[0].at("order"), 3);
@@ -98,7 +98,7 @@ TEST(Trial, OfALowOrderIsFreeOnlyWhereThatIsClearlyBetter) {
       EXPECT_EQ(free.candidate.terms[0].at("order"), 3);
     else
       EXPECT_NEAR(free.candidate.terms[0].at("order"), 3.45, 0.05);
-    EXPECT_EQ(free.candidate.holds_order.empty(), order != 3);
+    EXPECT_EQ(free.candidate.held_orders.empty(), order != 3);
   }
 }
 
@@ -109,12 +109,12 @@ TEST(Trial, AWrongWholeOrderBecomesTheRightOne) {
   const SearchBench bench{machine};
   const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
   Candidate whole = test::cogging_effect(0.5, 4, 0.3).candidate;
-  whole.holds_order = {true};
+  whole.held_orders = {0.5};
   const auto wrong = tried(h, whole, bench.context);
   ASSERT_TRUE(wrong);
   const Trial right = with_free_orders(h, *wrong, bench.context);
   EXPECT_EQ(right.candidate.terms[0].at("order"), 3);
-  EXPECT_TRUE(right.candidate.holds_order.at(0));
+  EXPECT_EQ(right.candidate.held_orders.at(0), 0.5);
 }
 
 TEST(Trial, WhatIsPredictedToGainLittleIsNotFitted) {
