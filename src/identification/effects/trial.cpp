@@ -34,8 +34,9 @@ std::vector<Candidate> at_whole_orders(const Candidate& candidate, const std::ve
   return all;
 }
 
+/// Of all its terms.
 std::size_t shape_count(const Trial& trial) {
-  return model::term_type(trial.candidate.id).search->shapes.size();
+  return trial.candidate.terms.size() * model::term_type(trial.candidate.id).search->shapes.size();
 }
 
 }  // namespace
@@ -82,7 +83,7 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
     }
     context.tell(fmt::format("trying {} (predicted gain {:.3g})", c.id, c.gain));
     if (auto trial = tried(h, c, context))
-      all.fitted.push_back(std::move(*trial));
+      all.fitted.push_back(with_free_orders(h, *trial, context));
     else
       all.rejected.push_back({c.id, "the machine cannot be fitted with it"});
   }
@@ -97,12 +98,13 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
   return all;
 }
 
+// In times the noise floor: rows are weighed by what the machine left without the effect.
 Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
   const std::vector<double>& held = trial.candidate.held_orders;
+  const auto left = [&](const Trial& t) { return size(h.fitted->records.misfit(t.fit.machine)); };
   if (std::all_of(held.begin(), held.end(), [](double error) { return error == 0; }) ||
       clearly_right(h.fitted->records.misfit(trial.fit.machine), context))
     return trial;
-  const double less = context.settings.revision.clearly_less;
   Candidate free = trial.candidate;
   free.held_orders.clear();
   context.tell("fitting the order of " + free.id);
@@ -111,9 +113,9 @@ Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchCont
   Trial best = trial;
   for (const Candidate& whole : at_whole_orders(fitted->candidate, held)) {
     auto rounded = tried(h, whole, context, best.residual);
-    if (rounded && rounded->residual < best.residual) best = std::move(*rounded);
+    if (rounded && left(*rounded) < left(best)) best = std::move(*rounded);
   }
-  return fitted->residual < less * best.residual ? *fitted : best;
+  return left(*fitted) < context.settings.revision.clearly_less * left(best) ? *fitted : best;
 }
 
 }  // namespace backlash::identification
