@@ -2,6 +2,7 @@
 #include "backlash_diagnosis/model/term.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -33,6 +34,11 @@ const std::vector<TermType>& term_types() {
                                               varying_backlash_term(),
                                               varying_reduction_ratio_term()};
   return types;
+}
+
+double order_resolution(const MotionRange& range) {
+  const double travel = range.to - range.from;
+  return travel > 0 ? 2 * M_PI / travel : std::numeric_limits<double>::infinity();
 }
 
 const TermType& term_type(const std::string& id) {

@@ -61,6 +61,8 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   check_excitation(yaml.map("excitation"), file.simulation.excitation, file.rig);
   file.test_runs = read_test_runs(yaml, file.rig);
   file.diagnosis = diagnosis::read_diagnosis_settings(yaml.map("diagnosis"));
+  if (const auto drive = yaml.optional_map("drive"))
+    file.drive = read_drive(*drive, file.rig.reduction_ratio);
   yaml.finish();
   if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())
     yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");

@@ -104,6 +104,8 @@ identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
   identification::Trace trace =
       identification::trace_residual(job.rig.rig, train, test, job.settings, progress);
   trace.warnings.insert(trace.warnings.begin(), warnings.begin(), warnings.end());
+  if (job.rig.drive)
+    for (const std::string& note : findings::drive_notes(trace, *job.rig.drive)) trace.notes.push_back(note);
   if (progress && !progress(1, "writing the report")) throw Cancelled();
   folder.write(trace, job.rig, {job.rig.source, job.train, job.test});
   return trace;

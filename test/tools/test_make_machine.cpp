@@ -242,6 +242,15 @@ TEST_F(MakeMachine, CoggingIsAsTheTruthSays) {
   });
 }
 
+TEST_F(MakeMachine, OrdersMayBeAskedFor) {
+  make("--seed 5 --effects cogging,transmission_error,varying_backlash --order 18.667 --duration 1");
+  EXPECT_EQ(of("cogging", "n"), 18.667);
+  EXPECT_EQ(of("transmission_error", "n"), 18.667);
+  EXPECT_EQ(of("varying_backlash", "n1"), 18.667);
+  make("--seed 4 --duration 30 --effects cogging --order 18.667");
+  expect_balance([this](double q) { return of("cogging", "A") * std::sin(18.667 * q + of("cogging", "p")); });
+}
+
 TEST_F(MakeMachine, TeethAreAsTheTruthSays) {
   make("--seed 9 --duration 30 --effects transmission_error");
   const double a = of("transmission_error", "A"), n = of("transmission_error", "n");
@@ -279,6 +288,7 @@ TEST_F(MakeMachine, TeethAreAsTheTruthSays) {
 TEST_F(MakeMachine, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(run("make_machine --seed 1 --out x --effects rust").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --friction oil").code, 64);
+  EXPECT_EQ(run("make_machine --seed 1 --out x --order -3").code, 64);
   EXPECT_EQ(run("make_machine --out x").code, 64);
   EXPECT_FALSE(exists("x"));
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/identification/effects/effect_search.h"
+#include "backlash_diagnosis/rig_file/drive.h"
 
 namespace backlash::findings {
 
@@ -34,6 +35,10 @@ std::string trace_report_json(const identification::Trace& trace, const TraceInp
 /// For plots: the test record as both models have it and what each step adds to it. As many samples as
 /// signals of this bandwidth need.
 std::string trace_series_json(const identification::Trace& trace);
+
+/// A sentence for each order that was found: which part of the drive turns that often, and which does not.
+/// None for a linear axis.
+std::vector<std::string> drive_notes(const identification::Trace& trace, const rig_file::Drive& drive);
 
 /// The id, or of a learned map what it is a function of.
 std::string effect_name(const identification::FoundEffect& effect);

@@ -127,12 +127,30 @@ struct MotionRange {
   double interval = 0;      // s, between samples
 };
 
+/// One moment of a motion, for an effect carrier * sin(order * position + ...).
+struct WaveMoment {
+  double position;  // rad, whose turns the order counts
+  double speed;     // rad/s, of that position
+  double carrier;   // +1 or -1; 0 where the effect does not show
+};
+
+/// Where a residual shows an effect with an order: as a wave over a position.
+struct WaveOver {
+  bool deflection;  // in the residual of the deflection, else of the torque
+  WaveMoment (*at)(const Motion&, const ParameterValues& choices);
+};
+
 /// A parameter of a term that gives the effect its shape, and the values that are tried.
 struct TermShape {
   std::string name;
   std::vector<double> (*values)(const MotionRange&);
-  bool refined;  // the best is then fitted with all others; else (an order) it is one of the values
+  bool refined;  // the best is then fitted with all others; else it is one of the values
+  // An order, which any number > 0 may be: those that a spectrum of the residual shows are tried as well.
+  std::optional<WaveOver> wave = std::nullopt;
 };
+
+/// 1/rad: orders that differ by less are hard to tell apart over the travel; infinite where nothing moves.
+double order_resolution(const MotionRange&);
 
 /// How the search for what a model lacks tries a term: for each combination of its choices and shapes, with a
 /// strength to be fitted.

@@ -2,10 +2,12 @@
 // A whole rig file: the machine, its test run and its diagnosis. The one loader for it.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/rig_file/drive.h"
 #include "backlash_diagnosis/rig_file/test_runs.h"
 #include "backlash_diagnosis/simulation/simulation.h"
 
@@ -16,6 +18,7 @@ struct RigFile {
   simulation::SimulationSettings simulation;
   diagnosis::DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
   std::vector<TestRun> test_runs;
+  std::optional<Drive> drive;
   std::string source;  // path, or "built-in sarkar_1997"
   std::string text;    // as read
   std::string digest;  // 64-bit FNV-1a of the text, hexadecimal

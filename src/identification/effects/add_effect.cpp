@@ -46,8 +46,7 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
   for (const RejectedEffect& r : trials.rejected) h = with_rejected(std::move(h), r.id, r.reason);
   const HeldOut now =
       held_out(before.fitted->fit, before.fitted->start, records, context.settings.acceptance);
-  for (const Trial& trial : trials.fitted) {
-    const Trial best = best_neighbour(before, trial, context);
+  for (const Trial& best : trials.fitted) {
     const Gain gain = compare(now, held_out_of(best, before, context));
     const std::string reason = objection(gain, best.fit.machine, records, context.settings);
     if (!reason.empty()) {

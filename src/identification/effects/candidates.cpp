@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "orthogonal_part.h"
+#include "residual_orders.h"
 
 namespace backlash::identification {
 namespace {
@@ -21,24 +22,49 @@ double deviation(const std::vector<double>& x) {
   return std::sqrt(std::max(0.0, square / n - mean * mean));
 }
 
+constexpr double kResolved = 2;  // choice: periods in the travel: fewer, and whole orders are tried first
+
+constexpr double kOrderError = 0.25;  // choice: of the resolution: whole orders that are nearer look alike
+
+/// 1/rad, of an order that is one of those tried; 0 of one that the travel resolves.
+double held_order(double order, const model::MotionRange& range) {
+  const double resolution = model::order_resolution(range);
+  return order < kResolved * resolution ? kOrderError * resolution : 0;
+}
+
+/// Orders are those that the travel does not resolve, and the strongest of the spectrum beyond them.
+std::vector<double> values_of(const model::TermShape& shape, const ParameterValues& choices,
+                              const model::MotionRange& range, const ResidualOrders& orders,
+                              std::size_t peaks) {
+  std::vector<double> all = shape.values(range);
+  if (!shape.wave) return all;
+  const double lowest = kResolved * model::order_resolution(range);
+  for (const signal::OrderPeak& peak :
+       signal::strongest_orders(orders.spectrum(*shape.wave, choices), peaks, lowest))
+    all.push_back(peak.order);
+  return all;
+}
+
 /// All values that one term is tried with, without strength and phase.
 std::vector<ParameterValues> combinations(const model::TermType& type, const model::MotionRange& range,
-                                          bool load_moves) {
+                                          bool load_moves, const ResidualOrders& orders, std::size_t peaks) {
   std::vector<ParameterValues> all(1);
-  const auto extend = [&](const auto& options, const auto& set) {
+  const auto extend = [&](const auto& options_of, const auto& set) {
     std::vector<ParameterValues> longer;
     for (const ParameterValues& values : all)
-      for (const auto& option : options) set(longer.emplace_back(values), option);
+      for (const auto& option : options_of(values)) set(longer.emplace_back(values), option);
     all = std::move(longer);
   };
   for (const ParameterSpec& spec : type.parameters) {
     if (spec.choices.empty()) continue;
     std::vector<std::string> words = spec.choices;
     if (!load_moves && spec.name == "body") words = {"motor"};
-    extend(words, [&](ParameterValues& v, const std::string& word) { v.set_choice(spec.name, word); });
+    extend([&](const ParameterValues&) { return words; },
+           [&](ParameterValues& v, const std::string& word) { v.set_choice(spec.name, word); });
   }
   for (const model::TermShape& shape : type.search->shapes)
-    extend(shape.values(range), [&](ParameterValues& v, double value) { v[shape.name] = value; });
+    extend([&](const ParameterValues& v) { return values_of(shape, v, range, orders, peaks); },
+           [&](ParameterValues& v, double value) { v[shape.name] = value; });
   return all;
 }
 
@@ -105,14 +131,14 @@ bool set_strength(const Probed& p, const double* factors, ParameterValues& value
 }
 
 Candidate single(const Probed& p, const Eigen::VectorXd& left) {
-  Candidate c{p.type->id, {{}}, 0, 0};
+  Candidate c{p.type->id, {{}}};
   const Explained e = explain(p.columns, left);
   if (set_strength(p, e.factors.data(), c.terms[0])) c.gain = e.gain;
   return c;
 }
 
 Candidate pair(const Probed& a, const Probed& b, const Eigen::VectorXd& left) {
-  Candidate c{a.type->id, {{}, {}}, 0, 0};
+  Candidate c{a.type->id, {{}, {}}};
   Eigen::MatrixXd both(a.columns.rows(), a.columns.cols() + b.columns.cols());
   both << a.columns, b.columns;
   const Explained e = explain(both, left);
@@ -122,20 +148,29 @@ Candidate pair(const Probed& a, const Probed& b, const Eigen::VectorXd& left) {
   return c;
 }
 
+/// With the orders that are not fitted.
+Candidate holding(Candidate c, const model::MotionRange& range) {
+  for (const model::TermShape& shape : model::term_type(c.id).search->shapes)
+    for (const ParameterValues& term : c.terms)
+      if (shape.wave) c.held_orders.push_back(held_order(term.at(shape.name), range));
+  return c;
+}
+
 void keep_better(std::map<std::string, Candidate>& best, const std::string& group,
                  const Candidate& candidate) {
   const auto [at, first] = best.try_emplace(group, candidate);
   if (!first && candidate.gain > at->second.gain) at->second = candidate;
 }
 
-std::vector<Probed> all_probes(const model::Rig& rig, const model::MotionRange& range, double share) {
+std::vector<Probed> all_probes(const model::Rig& rig, const model::MotionRange& range,
+                               const ResidualOrders& orders, const ScreenSettings& settings) {
   std::vector<Probed> all;
   const bool load = simulation::load_moves_freely(rig);
   for (const model::TermType& type : model::term_types()) {
     if (!type.search) continue;
     if (rig.link_locked && type.search->needs_turning_link) continue;
-    const double strength = share * type.search->typical(range);
-    for (const ParameterValues& shape : combinations(type, range, load)) {
+    const double strength = settings.probe * type.search->typical(range);
+    for (const ParameterValues& shape : combinations(type, range, load, orders, settings.peaks)) {
       std::string group = type.id;
       for (const ParameterSpec& spec : type.parameters)
         if (!spec.choices.empty()) group += " " + shape.choice(spec.name);
@@ -171,7 +206,8 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
   const Eigen::VectorXd now = records.rows(fit.machine.rig, fit.machine.calibrations);
   const OrthogonalPart orthogonal(fit, now.size());
   const Eigen::VectorXd& left = orthogonal.residuals();
-  std::vector<Probed> all = all_probes(fit.machine.rig, range, settings.probe);
+  std::vector<Probed> all =
+      all_probes(fit.machine.rig, range, ResidualOrders(fit, records, orthogonal), settings);
   for_each_in_parallel(int(all.size()), [&](int i) {
     try {
       probe(all[i], fit, records, orthogonal, now, settings.telling);
@@ -190,26 +226,37 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
   }
   std::vector<Candidate> sorted;
   for (const auto& [group, candidate] : best)
-    if (candidate.gain > 0) sorted.push_back(candidate);
+    if (candidate.gain > 0) sorted.push_back(holding(candidate, range));
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   return sorted;
 }
 
+std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, std::size_t term) {
+  std::vector<const model::TermShape*> all;
+  const bool held = term < candidate.held_orders.size() && candidate.held_orders[term] > 0;
+  for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
+    if (shape.refined && !(shape.wave && held)) all.push_back(&shape);
+  return all;
+}
+
 Machine with_candidate(Machine machine, const Candidate& candidate, const model::MotionRange& range) {
   const model::TermSearch& search = *model::term_type(candidate.id).search;
-  for (const ParameterValues& values : candidate.terms) {
+  for (std::size_t i = 0; i < candidate.terms.size(); ++i) {
     const std::size_t place = machine.rig.terms.size();
-    machine.rig.terms.push_back(model::make_term(candidate.id, values));
-    const auto fit = [&](const std::string& name, double scale) {
-      machine.parameters.push_back(term_parameter(place, name, machine.rig, scale));
+    machine.rig.terms.push_back(model::make_term(candidate.id, candidate.terms[i]));
+    const auto fit = [&](const std::string& name, double scale) -> FitParameter& {
+      return machine.parameters.emplace_back(term_parameter(place, name, machine.rig, scale));
     };
     fit(search.strength, search.typical(range));
     if (!search.phase.empty()) fit(search.phase, 1);
-    for (const model::TermShape& shape : search.shapes) {
-      if (!shape.refined) continue;
-      const std::vector<double> grid = shape.values(range);
-      fit(shape.name, grid.size() > 1 ? std::fabs(grid[1] - grid[0]) : 1);
+    for (const model::TermShape* shape : fitted_shapes(candidate, i)) {
+      if (shape->wave) {  // a part of it counts, as of a phase, and not a share
+        fit(shape->name, model::order_resolution(range)).positive = false;
+        continue;
+      }
+      const std::vector<double> grid = shape->values(range);
+      fit(shape->name, grid.size() > 1 ? std::fabs(grid[1] - grid[0]) : 1);
     }
   }
   return machine;

@@ -17,7 +17,13 @@ struct Candidate {
   std::vector<ParameterValues> terms;
   double gain = 0;        // predicted: relative decrease of the norm of all residuals
   double smoothness = 0;  // of a learned map, see learned.h
+  // 1/rad, per term: standard error of an order that is not fitted but one of those that were tried, as the
+  // travel hardly resolves it; 0: fitted. Empty: all are.
+  std::vector<double> held_orders = {};
 };
+
+/// The shapes of the i-th term of a candidate that are fitted, in the order of their parameters in a fit.
+std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, std::size_t term);
 
 /// The best candidate of each kind and choice, best first. `fit` is the present fit with its sensitivities.
 /// What a change of the fitted parameters explains is not counted as a gain of a candidate.

@@ -30,9 +30,10 @@ void describe_map(const model::Term& term, std::vector<signal::Measured>& fitted
   fitted.erase(fitted.begin(), fitted.begin() + long(effect.curve_y.size()));
 }
 
-/// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0.
-void describe(const model::Term& term, const std::string& suffix, std::vector<signal::Measured>& fitted,
-              FoundEffect& effect) {
+/// Parameters and words of an effect's term; what was not fitted but chosen among values has the error 0, an
+/// order that the travel does not resolve a part of the resolution.
+void describe(const model::Term& term, const Candidate& candidate, std::size_t t, const std::string& suffix,
+              std::vector<signal::Measured>& fitted, FoundEffect& effect) {
   const model::TermType& type = model::term_type(term.id);
   if (type.map) return describe_map(term, fitted, effect);
   const model::TermSearch& search = *type.search;
@@ -44,7 +45,9 @@ void describe(const model::Term& term, const std::string& suffix, std::vector<si
   take(search.strength);
   if (!search.phase.empty()) take(search.phase);
   for (const model::TermShape& shape : search.shapes)
-    if (shape.refined) take(shape.name);
+    if (shape.wave && t < candidate.held_orders.size())
+      found[shape.name] = {term.values.at(shape.name), candidate.held_orders[t]};
+  for (const model::TermShape* shape : fitted_shapes(candidate, t)) take(shape->name);
   for (const ParameterSpec& spec : type.parameters) {
     if (!spec.choices.empty()) {
       effect.words[spec.name + suffix] = term.values.choice(spec.name);
@@ -119,8 +122,8 @@ std::vector<FoundEffect> found_effects(const Hypothesis& h, std::vector<signal::
     for (std::size_t t = 0; t < accepted.candidate.terms.size(); ++t, ++place) {
       step->terms.push_back(place);
       const std::size_t number = step->terms.size();
-      describe(*h.fitted->fit.machine.rig.terms[place], number > 1 ? "_" + std::to_string(number) : "",
-               fitted, *step);
+      describe(*h.fitted->fit.machine.rig.terms[place], accepted.candidate, t,
+               number > 1 ? "_" + std::to_string(number) : "", fitted, *step);
     }
   }
   return all;

@@ -17,9 +17,11 @@ class OrthogonalPart {
   Eigen::VectorXd of(const Eigen::VectorXd& column) const;
   /// That of the residuals of the fit.
   const Eigen::VectorXd& residuals() const { return residuals_; }
+  /// Orthonormal columns that span the sensitivities.
+  const Eigen::MatrixXd& basis() const { return basis_; }
 
  private:
-  Eigen::MatrixXd basis_;  // orthonormal, of the sensitivities
+  Eigen::MatrixXd basis_;
   Eigen::VectorXd residuals_;
 };
 

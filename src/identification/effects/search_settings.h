@@ -18,6 +18,7 @@ struct ScreenSettings {
       0.02;  // theory: of a strength that shows clearly, for differences above the noise of the simulation
   double telling =
       1e-3;  // theory: of a sensitivity, to be left after what the machine's own parameters explain
+  std::size_t peaks = 4;  // choice (time): of the spectrum of the residual, orders that are tried
 };
 
 /// Which candidates are fitted with the machine, and how.
@@ -29,7 +30,6 @@ struct TrialSettings {
   double far_off = 1.2;  // simulation: times the wanted residuals, after the rough half of a fit
   double tie =
       0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
-  double better_neighbour = 1e-3;  // choice: of the residuals, for the next order in the grid to replace this
 };
 
 /// When an effect is believed (least gains: TraceSettings).

@@ -9,14 +9,15 @@
 
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
+#include "residual_orders.h"
 
 namespace backlash::identification {
 namespace {
 
 constexpr int kBins = 24,
               kFolds = 12;  // choice: classes of a coordinate; parts of each record, for cross-validation
-constexpr int kLargestOrder = 80;      // choice: of the motor position, load side
-constexpr double kWorthNaming = 0.05;  // choice: of the variance
+constexpr double kLargestOrder = 4000;  // choice (time): of the motor position, load side
+constexpr double kWorthNaming = 0.05;   // choice: of the variance
 constexpr double kWorthSaying =
     0.01;  // choice: of the signal: what is smaller lies within what any model neglects
 constexpr std::size_t kMostNames = 3;  // choice
@@ -77,22 +78,13 @@ double followed(const Samples& s, const std::vector<double>& x) {
   return total > 0 ? std::max(0.0, 1 - left / total) : 0;
 }
 
-/// The order of the position that holds most of the residual's square, and its share.
-std::pair<int, double> strongest_order(const Samples& s, const std::vector<double>& position) {
-  std::pair<int, double> best{0, 0};
-  const double total = std::inner_product(s.residual.begin(), s.residual.end(), s.residual.begin(), 0.0);
-  for (int n = 1; n <= kLargestOrder; ++n) {
-    double ss = 0, cc = 0, sc = 0, rs = 0, rc = 0;
-    for (std::size_t k = 0; k < position.size(); ++k) {
-      const double a = std::sin(n * position[k]), b = std::cos(n * position[k]);
-      ss += a * a, cc += b * b, sc += a * b, rs += a * s.residual[k], rc += b * s.residual[k];
-    }
-    const double determinant = ss * cc - sc * sc;
-    if (!(determinant > 0) || !(total > 0)) continue;
-    const double share = (cc * rs * rs - 2 * sc * rs * rc + ss * rc * rc) / determinant / total;
-    if (share > best.second) best = {n, share};
-  }
-  return best;
+/// The order of the motor position that holds most of the residual's square; nothing where no order is seen.
+std::optional<signal::OrderPeak> strongest_order(const Samples& s, double cutoff) {
+  const std::vector<double>&position = s.coordinates[0].second, &speed = s.coordinates[1].second;
+  signal::OrderSamples samples{s.residual, position, std::vector<double>(position.size(), 1.0), {}};
+  for (const double v : speed) samples.highest.push_back(highest_order(v, cutoff));
+  const auto peaks = signal::strongest_orders(signal::order_spectrum(samples, kLargestOrder), 1);
+  return peaks.empty() ? std::nullopt : std::make_optional(peaks.front());
 }
 
 }  // namespace
@@ -106,8 +98,8 @@ std::optional<Unexplained> signature(const Machine& machine, const RecordSet& re
   const Samples s = samples(machine, records, deflection);
   std::vector<std::pair<double, std::string>> shares;
   for (const auto& [name, values] : s.coordinates) shares.emplace_back(followed(s, values), name);
-  const auto [order, share] = strongest_order(s, s.coordinates.front().second);
-  shares.emplace_back(share, "order " + std::to_string(order) + " of the motor position");
+  if (const auto peak = strongest_order(s, records.records().front().cutoff))
+    shares.emplace_back(peak->share, fmt::format("order {:.4g} of the motor position", peak->order));
   std::stable_sort(shares.begin(), shares.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   Unexplained u{deflection ? "deflection" : "torque",

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "../fit/calibration.h"
@@ -13,44 +14,29 @@
 namespace backlash::identification {
 namespace {
 
-/// What the terms of a candidate have from their grids, in rising order.
-std::vector<std::vector<double>> places(const Candidate& candidate) {
-  std::vector<std::vector<double>> all;
-  for (const ParameterValues& term : candidate.terms) {
-    all.emplace_back();
-    for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
-      if (!shape.refined) all.back().push_back(term.at(shape.name));
-  }
-  std::sort(all.begin(), all.end());
+/// The same at the whole numbers on either side of its orders, where `held` has an error for them: all
+/// combinations but those where two terms become one.
+std::vector<Candidate> at_whole_orders(const Candidate& candidate, const std::vector<double>& held) {
+  std::vector<Candidate> all = {candidate};
+  for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
+    for (std::size_t i = 0; shape.wave && i < held.size(); ++i) {
+      if (held[i] == 0) continue;
+      std::vector<Candidate> more;
+      for (const Candidate& c : all) {
+        const double order = c.terms[i].at(shape.name);
+        for (const double whole : std::set<double>{std::floor(order), std::ceil(order)})
+          if (whole > 0 && (i == 0 || whole != c.terms[0].at(shape.name)))
+            more.emplace_back(c).terms[i][shape.name] = whole;
+      }
+      all = std::move(more);
+    }
+  for (Candidate& c : all) c.held_orders = held;
   return all;
 }
 
-/// The same with its t-th term's shape some places farther in the grid; nothing where that ends or where two
-/// terms become one.
-std::optional<Candidate> neighbour(const Candidate& candidate, std::size_t t, const model::TermShape& shape,
-                                   long step, const model::MotionRange& range) {
-  const std::vector<double> grid = shape.values(range);
-  const long at =
-      std::find(grid.begin(), grid.end(), candidate.terms[t].at(shape.name)) - grid.begin() + step;
-  if (at < 0 || at >= long(grid.size())) return std::nullopt;
-  for (const ParameterValues& term : candidate.terms)
-    if (term.at(shape.name) == grid[std::size_t(at)]) return std::nullopt;
-  Candidate other = candidate;
-  other.terms[t][shape.name] = grid[std::size_t(at)];
-  return other;
-}
-
-std::vector<Candidate> neighbours(const Candidate& candidate, const model::TermShape& shape,
-                                  const model::MotionRange& range) {
-  std::vector<Candidate> all;
-  for (std::size_t t = 0; t < candidate.terms.size(); ++t)
-    for (const long step : {-2L, -1L, 1L, 2L})
-      if (const auto other = neighbour(candidate, t, shape, step, range)) all.push_back(*other);
-  return all;
-}
-
+/// Of all its terms.
 std::size_t shape_count(const Trial& trial) {
-  return model::term_type(trial.candidate.id).search->shapes.size();
+  return trial.candidate.terms.size() * model::term_type(trial.candidate.id).search->shapes.size();
 }
 
 }  // namespace
@@ -97,7 +83,7 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
     }
     context.tell(fmt::format("trying {} (predicted gain {:.3g})", c.id, c.gain));
     if (auto trial = tried(h, c, context))
-      all.fitted.push_back(std::move(*trial));
+      all.fitted.push_back(with_free_orders(h, *trial, context));
     else
       all.rejected.push_back({c.id, "the machine cannot be fitted with it"});
   }
@@ -112,26 +98,24 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
   return all;
 }
 
-Trial best_neighbour(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
-  if (clearly_right(h.fitted->records.misfit(trial.fit.machine), context)) return trial;
-  const double less = 1 - context.settings.trials.better_neighbour;
+// In times the noise floor: rows are weighed by what the machine left without the effect.
+Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
+  const std::vector<double>& held = trial.candidate.held_orders;
+  const auto left = [&](const Trial& t) { return size(h.fitted->records.misfit(t.fit.machine)); };
+  if (std::all_of(held.begin(), held.end(), [](double error) { return error == 0; }) ||
+      clearly_right(h.fitted->records.misfit(trial.fit.machine), context))
+    return trial;
+  Candidate free = trial.candidate;
+  free.held_orders.clear();
+  context.tell("fitting the order of " + free.id);
+  const auto fitted = tried(h, free, context, trial.residual);
+  if (!fitted) return trial;
   Trial best = trial;
-  std::set<std::vector<std::vector<double>>> known;
-  for (bool better = true; better;) {
-    better = false;
-    for (const model::TermShape& shape : model::term_type(best.candidate.id).search->shapes) {
-      if (shape.refined || shape.values(context.range).size() < 2) continue;
-      for (const Candidate& other : neighbours(best.candidate, shape, context.range)) {
-        if (!known.insert(places(other)).second) continue;
-        context.tell("trying " + best.candidate.id);
-        auto fitted = tried(h, other, context, best.residual);
-        if (!fitted || fitted->residual >= less * best.residual) continue;
-        best = std::move(*fitted);
-        better = true;
-      }
-    }
+  for (const Candidate& whole : at_whole_orders(fitted->candidate, held)) {
+    auto rounded = tried(h, whole, context, best.residual);
+    if (rounded && left(*rounded) < left(best)) best = std::move(*rounded);
   }
-  return best;
+  return left(*fitted) < context.settings.revision.clearly_less * left(best) ? *fitted : best;
 }
 
 }  // namespace backlash::identification

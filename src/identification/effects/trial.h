@@ -30,8 +30,8 @@ struct Trials {
 Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
                   const SearchContext& context);
 
-/// Sensitivities of a model that lacks an effect may mislead about orders: those beside the trial's in the
-/// grid of its shapes are fitted too, unless what it leaves is noise.
-Trial best_neighbour(const Hypothesis& h, const Trial& trial, const SearchContext& context);
+/// Orders that the travel does not resolve stay whole numbers, the best of those near to what a fit says,
+/// unless any number leaves clearly less.
+Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context);
 
 }  // namespace backlash::identification

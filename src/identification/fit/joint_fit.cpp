@@ -112,8 +112,8 @@ RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double f
   weights_.resize(data.size());
   for (std::size_t r = 0; r < records_.size(); ++r) {
     for (std::size_t k = 0; k < data[r].size(); k += stride(records_[r])) {
-      layout_.push_back({r, false, double(k) * data[r].interval});
-      layout_.push_back({r, true, double(k) * data[r].interval});
+      layout_.push_back({r, false, k, double(k) * data[r].interval});
+      layout_.push_back({r, true, k, double(k) * data[r].interval});
     }
   }
 }

@@ -57,6 +57,7 @@ class RecordSet {
   struct Row {
     std::size_t record;
     bool deflection;
+    std::size_t sample;
     double time;  // s from the start of the record
   };
   const std::vector<Row>& layout() const { return layout_; }

@@ -24,6 +24,10 @@ class Cogging : public Term {
   double amplitude_, order_, phase_;
 };
 
+WaveMoment over_motor_position(const Motion& m, const ParameterValues&) {
+  return {m.motor_position, m.motor_velocity, 1};
+}
+
 }  // namespace
 
 TermType cogging_term() {
@@ -34,7 +38,7 @@ TermType cogging_term() {
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<Cogging>(p.at("amplitude"), p.at("order"), p.at("phase"));
           },
-          TermSearch{"amplitude", "phase", clear_torque, {orders<80>()}}};
+          TermSearch{"amplitude", "phase", clear_torque, {order_shape({false, over_motor_position})}}};
 }
 
 }  // namespace backlash::model

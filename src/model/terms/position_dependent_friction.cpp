@@ -24,6 +24,12 @@ class PositionDependentFriction : public EndFrictionTerm {
   double amplitude_, order_, phase_;
 };
 
+WaveMoment with_direction(const Motion& m, const ParameterValues& choices) {
+  const EndOfTrain end(choices);
+  const double speed = end.velocity(m);
+  return {end.position(m), speed, speed == 0 ? 0 : std::copysign(1.0, speed)};
+}
+
 }  // namespace
 
 TermType position_dependent_friction_term() {
@@ -35,7 +41,7 @@ TermType position_dependent_friction_term() {
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<PositionDependentFriction>(p);
           },
-          TermSearch{"amplitude", "phase", clear_torque, {orders<80>()}}};
+          TermSearch{"amplitude", "phase", clear_torque, {order_shape({false, with_direction})}}};
 }
 
 }  // namespace backlash::model

@@ -2,6 +2,8 @@
 // Values of strengths and shapes that the search for missing effects tries, of several terms.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "backlash_diagnosis/model/term.h"
@@ -17,16 +19,18 @@ inline double clear_angle(const MotionRange& range) {
   return 0.1 * range.deflection;
 }
 
-/// The orders 1 to LAST of an effect that is periodic in a position.
-template <int LAST>
-TermShape orders() {
-  return {"order",
-          [](const MotionRange&) {
-            std::vector<double> all;
-            for (int n = 1; n <= LAST; ++n) all.push_back(n);
-            return all;
-          },
-          false};
+/// Orders that the travel does not resolve, where a spectrum says little: whole numbers up to three periods
+/// in the travel, or as many steps of a quarter of a period.
+inline std::vector<double> low_orders(const MotionRange& range) {
+  const double resolution = order_resolution(range), step = std::max(1.0, std::floor(0.25 * resolution));
+  std::vector<double> all = {step};
+  while (std::isfinite(resolution) && all.back() + step <= 3 * resolution) all.push_back(all.back() + step);
+  return all;
+}
+
+/// The order of an effect that is periodic in a position.
+inline TermShape order_shape(const WaveOver& wave) {
+  return {"order", low_orders, true, wave};
 }
 
 }  // namespace backlash::model

@@ -26,6 +26,10 @@ class TransmissionError : public Term {
   double amplitude_, order_, phase_;
 };
 
+WaveMoment over_load_position(const Motion& m, const ParameterValues&) {
+  return {m.load_position, m.load_velocity, 1};
+}
+
 }  // namespace
 
 TermType transmission_error_term() {
@@ -36,7 +40,7 @@ TermType transmission_error_term() {
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<TransmissionError>(p.at("amplitude"), p.at("order"), p.at("phase"));
           },
-          TermSearch{"amplitude", "phase", clear_angle, {orders<80>()}}};
+          TermSearch{"amplitude", "phase", clear_angle, {order_shape({true, over_load_position})}}};
 }
 
 }  // namespace backlash::model

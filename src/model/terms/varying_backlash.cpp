@@ -26,18 +26,25 @@ class VaryingBacklash : public Term {
   double amplitude_, order_, phase_;
 };
 
+WaveMoment with_side(const Motion& m, const ParameterValues&) {
+  return {m.load_position, m.load_velocity, m.mesh_torque == 0 ? 0 : std::copysign(1.0, m.mesh_torque)};
+}
+
 }  // namespace
 
 TermType varying_backlash_term() {
-  TermType type{
-      "varying_backlash",
-      {{"amplitude", "-", Range::any(), "a, relative to the backlash"},
-       {"order", "1/rad", Range::positive(), "n, periods per load turn"},
-       {"phase", "rad", Range::any(), "p"}},
-      [](const ParameterValues& p) -> std::unique_ptr<Term> {
-        return std::make_unique<VaryingBacklash>(p.at("amplitude"), p.at("order"), p.at("phase"));
-      },
-      TermSearch{"amplitude", "phase", [](const MotionRange&) { return 0.1; }, {orders<12>()}, true}};
+  TermType type{"varying_backlash",
+                {{"amplitude", "-", Range::any(), "a, relative to the backlash"},
+                 {"order", "1/rad", Range::positive(), "n, periods per load turn"},
+                 {"phase", "rad", Range::any(), "p"}},
+                [](const ParameterValues& p) -> std::unique_ptr<Term> {
+                  return std::make_unique<VaryingBacklash>(p.at("amplitude"), p.at("order"), p.at("phase"));
+                },
+                TermSearch{"amplitude",
+                           "phase",
+                           [](const MotionRange&) { return 0.1; },
+                           {order_shape({true, with_side})},
+                           true}};
   type.gap_variation = GapVariation::harmonic;
   return type;
 }

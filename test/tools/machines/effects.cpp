@@ -8,10 +8,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Wave draw_wave(Random& random, double smallest, double largest, int first_order, int last_order) {
+Wave draw_wave(Random& random, const Circumstances& circumstances, double smallest, double largest,
+               int first_order, int last_order) {
   const double amplitude = random.uniform(smallest, largest);
   const int order = random.whole(first_order, last_order);
-  return {amplitude, static_cast<double>(order), random.phase()};
+  return {amplitude, circumstances.order > 0 ? circumstances.order : order, random.phase()};
 }
 
 Json describe(const std::string& where, const std::string& equation, const Wave& wave) {
@@ -54,9 +55,9 @@ Json load_dependent_friction(Random& random, const Circumstances&, Machine& mach
   return {{"motor friction", "+ A*abs(T)*sign(w), T = torque through the mesh"}, {"A", share}};
 }
 
-Json position_dependent_friction(Random& random, const Circumstances&, Machine& machine) {
+Json position_dependent_friction(Random& random, const Circumstances& circumstances, Machine& machine) {
   Wave& wave = machine.motor.friction.position;
-  wave = draw_wave(random, 0.2, 0.45, 2, 40);
+  wave = draw_wave(random, circumstances, 0.2, 0.45, 2, 40);
   return describe("motor friction", "Coulomb*(1 + A*sin(n*q+p)), q = motor position", wave);
 }
 
@@ -73,26 +74,26 @@ Json gravity(Random& random, const Circumstances&, Machine& machine) {
           {"p", machine.gravity.phase}};
 }
 
-Json cogging(Random& random, const Circumstances&, Machine& machine) {
-  machine.drive.cogging = draw_wave(random, 9, 25, 12, 72);
+Json cogging(Random& random, const Circumstances& circumstances, Machine& machine) {
+  machine.drive.cogging = draw_wave(random, circumstances, 9, 25, 12, 72);
   return describe("motor torque", "A*sin(n*q+p), q = motor position, opposing", machine.drive.cogging);
 }
 
-Json transmission_error(Random& random, const Circumstances&, Machine& machine) {
-  machine.mesh.transmission_error = draw_wave(random, 4e-5, 8e-5, 6, 60);
+Json transmission_error(Random& random, const Circumstances& circumstances, Machine& machine) {
+  machine.mesh.transmission_error = draw_wave(random, circumstances, 4e-5, 8e-5, 6, 60);
   return describe("mesh displacement", "+ A*sin(n*q+p), q = load position [rad]",
                   machine.mesh.transmission_error);
 }
 
-Json varying_backlash(Random& random, const Circumstances&, Machine& machine) {
-  const Wave first = draw_wave(random, 0.15, 0.4, 1, 12);
+Json varying_backlash(Random& random, const Circumstances& circumstances, Machine& machine) {
+  const Wave first = draw_wave(random, circumstances, 0.15, 0.4, 1, 12);
   machine.mesh.gap = {first};
   Json drawn{{"backlash_angle(q)", "b*(1 + a1*sin(n1*q+p1)), q = load position"},
              {"a1", first.amplitude},
              {"n1", first.order},
              {"p1", first.phase}};
-  if (random.chance(0.5)) return drawn;
-  Wave second = draw_wave(random, 0.08, 0.2, 1, 11);
+  if (random.chance(0.5) || circumstances.order > 0) return drawn;
+  Wave second = draw_wave(random, circumstances, 0.08, 0.2, 1, 11);
   if (second.order >= first.order) ++second.order;
   machine.mesh.gap.push_back(second);
   drawn["backlash_angle(q)"] = "b*(1 + a1*sin(n1*q+p1) + a2*sin(n2*q+p2)), q = load position";
@@ -179,8 +180,8 @@ Json thermal_growth(Random& random, const Circumstances& circumstances, Machine&
           {"s", machine.mesh.thermal_time}};
 }
 
-Json speed_ripple(Random& random, const Circumstances&, Machine& machine) {
-  machine.drive.speed_ripple = draw_wave(random, 80, 200, 8, 40);
+Json speed_ripple(Random& random, const Circumstances& circumstances, Machine& machine) {
+  machine.drive.speed_ripple = draw_wave(random, circumstances, 80, 200, 8, 40);
   return describe("motor torque", "A*w*abs(w)*sin(n*q+p), q = motor position, opposing",
                   machine.drive.speed_ripple);
 }

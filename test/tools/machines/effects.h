@@ -16,6 +16,7 @@ namespace machines {
 struct Circumstances {
   double duration = 30;  // s, of a record
   Travel travel;         // rad, that both records share
+  double order = 0;      // 1/rad, of every wave over a position; 0: drawn
 };
 
 struct Effect {

@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
   std::uint64_t seed = 0;
   std::string effects, friction, contact, out;
-  double noise = 1, noise_share = 0, duration = 30;
+  double noise = 1, noise_share = 0, duration = 30, order = 0;
   int encoder_bits = 0;
   bool dither = true;
 };
@@ -72,7 +72,7 @@ Motions draw_motions(const Options& options) {
     const Travel a = travel_of(motions.train, options.duration),
                  b = travel_of(motions.test, options.duration);
     const Travel common{std::max(a.from, b.from), std::min(a.to, b.to)};
-    motions.circumstances = {options.duration, common};
+    motions.circumstances = {options.duration, common, options.order};
     if (common.to - common.from >= 0.5 * std::min(a.to - a.from, b.to - b.from)) return motions;
   }
 }
@@ -185,6 +185,8 @@ bool read_options(int argc, char** argv, Options& options) {
   add("noise-share", po::value(&options.noise_share)->default_value(0),
       "torque noise as a share of the torque's standard deviation instead");
   add("duration", po::value(&options.duration)->default_value(30), "of a record [s]");
+  add("order", po::value(&options.order)->default_value(0),
+      "of every effect that is a wave over a position, per turn of the load, any number; 0: drawn");
   add("encoder-bits", po::value(&options.encoder_bits)->default_value(0),
       "per turn of the load encoder, motor 3 more; 0: as declared");
   add("no-dither", "slow motions only");
@@ -206,6 +208,7 @@ bool read_options(int argc, char** argv, Options& options) {
   one_of("contact", options.contact, {"linear", "hertz"});
   if (!(options.duration >= 1 && options.duration <= 600)) throw po::error("--duration: 1 to 600 s");
   if (!(options.noise >= 0 && options.noise_share >= 0)) throw po::error("noise is not negative");
+  if (!(options.order >= 0)) throw po::error("--order is not negative");
   options.dither = given.count("no-dither") == 0;
   return true;
 }
