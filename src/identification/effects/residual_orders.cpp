@@ -32,7 +32,7 @@ ResidualOrders::ResidualOrders(const MachineFit& fit, const RecordSet& records, 
                      row.deflection ? !r.deflection.empty() && record.settled[k] : bool(record.counts[k]),
                      record.cutoff,
                      {row.time, d.motor[k], d.motor_rate[k], r.load->load[k], r.load->load_rate[k],
-                      r.load->mesh_torque[k], d.torque[k]}});
+                      r.mesh_torque[k]}});
   }
 }
 

@@ -211,6 +211,8 @@ ServoResiduals PreparedServo::coupled_residuals(const model::Rig& rig, const Cal
   r.deflection = signal::low_pass(r.deflection, d.interval, cutoff);
   for (double& value : r.deflection) value += calibration.encoder_offset;
   r.torque.assign(d.size(), 0.0);
+  r.predicted_torque = r.torque;
+  r.mesh_torque = load.mesh_torque;
   r.load = std::make_shared<const simulation::DrivenLoad>(std::move(load));
   return r;
 }
