@@ -78,8 +78,8 @@ TEST(LearnedMap, IsLinearInItsValues) {
 TEST(LearnedMap, FollowsEachCoordinateAndActsOnEitherEnd) {
   const Motion motion{1, 2, 3, 4, 5, 6};
   const std::vector<std::pair<const char*, double>> coordinates = {
-      {"time", 1},          {"motor_position", 2}, {"motor_velocity", 3}, {"load_position", 4},
-      {"load_velocity", 5}, {"mesh_torque", 6}};
+      {"time", 1},          {"motor_position", 2}, {"motor_velocity", 3},
+      {"load_position", 4}, {"load_velocity", 5},  {"mesh_torque", 6}};
   for (const auto& [name, value] : coordinates)
     for (const char* end : {"motor", "load"}) {
       const auto map = learned(end, name, {0, 1, 2, 3, 4, 5, 6, 7, 8}, {0, 1, 4, 9, 16, 25, 36, 49, 64});

@@ -28,11 +28,11 @@ ResidualOrders::ResidualOrders(const MachineFit& fit, const RecordSet& records, 
     const ServoData& d = record.data();
     const ServoResiduals& r = of[row.record];
     const std::size_t k = row.sample;
-    rows_.push_back({row.deflection,
-                     row.deflection ? !r.deflection.empty() && record.settled[k] : bool(record.counts[k]),
-                     record.cutoff,
-                     {row.time, d.motor[k], d.motor_rate[k], r.load->load[k], r.load->load_rate[k],
-                      r.mesh_torque[k]}});
+    rows_.push_back(
+        {row.deflection,
+         row.deflection ? !r.deflection.empty() && record.settled[k] : bool(record.counts[k]),
+         record.cutoff,
+         {row.time, d.motor[k], d.motor_rate[k], r.load->load[k], r.load->load_rate[k], r.mesh_torque[k]}});
   }
 }
 

@@ -48,19 +48,11 @@ class Curve {
   std::vector<double> x_, y_, slope_;
 };
 
-enum class Coordinate {
-  motor_position,
-  load_position,
-  motor_velocity,
-  load_velocity,
-  mesh_torque,
-  time
-};
+enum class Coordinate { motor_position, load_position, motor_velocity, load_velocity, mesh_torque, time };
 
 /// In the order of Coordinate.
 std::vector<std::string> coordinates() {
-  return {"motor_position", "load_position", "motor_velocity", "load_velocity", "mesh_torque",
-          "time"};
+  return {"motor_position", "load_position", "motor_velocity", "load_velocity", "mesh_torque", "time"};
 }
 
 Coordinate coordinate_of(const ParameterValues& p) {

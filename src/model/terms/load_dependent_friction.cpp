@@ -33,7 +33,8 @@ double clear_coefficient(const MotionRange&) {
 
 TermType load_dependent_friction_term() {
   return {"load_dependent_friction",
-          {body_parameter(), {"coefficient", "-", Range::between(0, 0.95), "mu, friction per torque through the mesh"}},
+          {body_parameter(),
+           {"coefficient", "-", Range::between(0, 0.95), "mu, friction per torque through the mesh"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> {
             return std::make_unique<LoadDependentFriction>(p);
           },

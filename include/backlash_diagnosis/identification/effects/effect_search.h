@@ -49,8 +49,8 @@ struct Evidence {
   int blocks_better = 0, blocks = 0;
 };
 
-/// Relative decrease of the error of the channel on the unseen record, with its 95 % interval (blocks drawn with
-/// replacement).
+/// Relative decrease of the error of the channel on the unseen record, with its 95 % interval (blocks drawn
+/// with replacement).
 struct TestGain {
   double value = 0, lower = 0, upper = 0;
 };
