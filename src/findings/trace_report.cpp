@@ -21,9 +21,12 @@ std::string listed(const std::vector<std::string>& parts) {
   return text;
 }
 
-bool all_fall(const identification::Trace& trace) {
-  return std::all_of(trace.channels.begin(), trace.channels.end(),
-                     [](const auto& c) { return c.second.after < c.second.before; });
+constexpr double kSame = 0.01;  // choice: of an error: a smaller change is none
+
+/// "falls from 3 % to 1 %"
+std::string change_text(const identification::TraceChannel& c) {
+  if (std::fabs(c.after - c.before) <= kSame * c.before) return "stays at " + percent(c.after);
+  return (c.after < c.before ? "falls from " : "rises from ") + percent(c.before) + " to " + percent(c.after);
 }
 
 std::string effect_text(const identification::FoundEffect& e, bool linear) {
@@ -89,15 +92,13 @@ std::string verdict_sentence(const identification::Trace& trace) {
   std::vector<std::string> effects, errors;
   for (const identification::FoundEffect& e : trace.steps) effects.push_back(effect_name(e));
   for (const auto& [name, c] : trace.channels)
-    errors.push_back(name +
-                     (effects.empty() ? " " + percent(c.after)
-                                      : " from " + percent(c.before) + " to " + percent(c.after)) +
-                     " (noise alone: " + percent(c.floor) + ")");
+    errors.push_back(
+        (effects.empty() ? name + " " + percent(c.after) : "that of " + name + " " + change_text(c)) +
+        " (noise alone: " + percent(c.floor) + ")");
   std::string text;
   if (!effects.empty())
     text = "The declared model lacks " + listed(effects) + ". With " + (effects.size() == 1 ? "it" : "them") +
-           " the error on the test record " + (all_fall(trace) ? "falls: " : "changes: ") + listed(errors) +
-           ".";
+           " the error on the test record changes: " + listed(errors) + ".";
   if (trace.verdict == identification::TraceVerdict::nothing_missing)
     text = "Nothing is missing: the declared model, fitted, has these errors on the test record: " +
            listed(errors) + ".";

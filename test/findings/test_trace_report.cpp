@@ -113,6 +113,17 @@ TEST(TraceReport, JsonIsTheContract) {
   EXPECT_EQ(json["warnings"], Json{"b.csv: 3 gaps"});
 }
 
+TEST(TraceReport, SaysWhetherAnErrorFallsStaysOrRises) {
+  identification::Trace t = trace();
+  const std::pair<double, const char*> cases[] = {{0.01, "torque falls from 3 % to 1 %"},
+                                                  {0.0301, "torque stays at 3.01 %"},
+                                                  {0.04, "torque rises from 3 % to 4 %"}};
+  for (const auto& [after, text] : cases) {
+    t.channels["torque"] = {0.03, after, 0.01, 0.03, 0.01};
+    EXPECT_NE(verdict_sentence(t).find(text), std::string::npos) << verdict_sentence(t);
+  }
+}
+
 TEST(TraceReport, UnexplainedIsSaidWithItsSignature) {
   identification::Trace t = trace();
   t.verdict = identification::TraceVerdict::unexplained;
