@@ -54,13 +54,12 @@ std::optional<std::size_t> vague(const Hypothesis& h, double least) {
     const Candidate& candidate = h.effects[i].candidate;
     const model::TermType& type = model::term_type(candidate.id);
     double clearest = 0;
-    for (const ParameterValues& term : candidate.terms) {
-      const std::size_t count = fitted_count(type, term);
+    for (std::size_t t = 0; t < candidate.terms.size(); ++t) {
       if (type.map)
         clearest = INFINITY;
       else
         clearest = std::max(clearest, std::fabs(all.at(at).value) / all.at(at).standard_error);
-      at += count;
+      at += fitted_count(candidate, t);
     }
     if (clearest < least) return i;
   }

@@ -71,12 +71,10 @@ std::vector<std::string> ids_of(const Effect& effect) {
 
 }  // namespace
 
-std::size_t fitted_count(const model::TermType& type, const ParameterValues& values) {
-  if (type.map) return values.list(type.map->values).size();
-  const model::TermSearch& search = *type.search;
-  std::size_t count = search.phase.empty() ? 1 : 2;
-  for (const model::TermShape& shape : search.shapes) count += shape.refined;
-  return count;
+std::size_t fitted_count(const Candidate& candidate, std::size_t t) {
+  const model::TermType& type = model::term_type(candidate.id);
+  if (type.map) return candidate.terms[t].list(type.map->values).size();
+  return (type.search->phase.empty() ? 1 : 2) + fitted_shapes(candidate, t).size();
 }
 
 FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {

@@ -17,8 +17,8 @@ struct FittedValues {
   std::map<std::string, signal::Measured> machine;
   std::vector<signal::Measured> effects;
 };
-/// How many values of a term are fitted, the strength first.
-std::size_t fitted_count(const model::TermType& type, const ParameterValues& values);
+/// How many values of the t-th term are fitted, the strength first.
+std::size_t fitted_count(const Candidate& candidate, std::size_t t);
 
 /// `declared`: how many of the first parameters are the machine's.
 FittedValues fitted_values(const BandFit& fitted, std::size_t declared);

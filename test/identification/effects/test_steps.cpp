@@ -271,6 +271,30 @@ TEST(ShareOfSignal, OfASineIsItsPartOfTheTorque) {
   EXPECT_EQ(share_of_signal(*with, "gravity"), 0);
 }
 
+// The unseen record is of the machine itself, or of one that lacks the effect.
+TEST(Believe, KeepsWhatTheUnseenRecordBearsOut) {
+  const SearchBench bench{with_cogging()};
+  Effect cogging = cogging_effect(0.8, 7, 0.6);
+  cogging.candidate.held_orders = {0.5};  // the order is not fitted: the next value is another term's
+  const Hypothesis h = *refitted(fit_declared(test::one_inertia_rig(), bench.context),
+                                 {cogging, cogging_effect(0.1, 3, 0.2)}, bench.context);
+  const model::Rig rig = test::one_inertia_rig();
+  const Hypothesis believed = believe(h, servo_data(record_of(with_cogging(), 5), rig), bench.context);
+  ASSERT_EQ(ids(believed), std::vector<std::string>{"cogging"});
+  EXPECT_EQ(believed.effects[0].candidate.terms[0].at("order"), 7);
+  EXPECT_NE(believed.rejected.back().reason.find("less than 4 standard errors"), std::string::npos);
+}
+
+TEST(Believe, DropsWhatTheUnseenRecordContradicts) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis h = *refitted(fit_declared(test::one_inertia_rig(), bench.context),
+                                 {cogging_effect(0.8, 7, 0.6)}, bench.context);
+  const ServoData unseen = servo_data(record_of(OneInertiaMachine(), 5), test::one_inertia_rig());
+  const Hypothesis believed = believe(h, unseen, bench.context);
+  EXPECT_TRUE(believed.effects.empty());
+  EXPECT_NE(reason(believed, "cogging").find("on the unseen record"), std::string::npos);
+}
+
 TEST(SearchEffects, CanBeStoppedAndIsTheSameEveryTime) {
   const SearchBench bench{with_cogging()};
   const auto found = [&] {
