@@ -50,7 +50,7 @@ Command command() {
       "--cutoff 40"};
   c.exit_codes =
       "  0   done: nothing is missing, or the effects that are were found and added\n"
-      "  3   something is missing that no effect explains\n";
+      "  3   something is missing that no effect explains, be it beside effects that were found\n";
   return c;
 }
 
@@ -131,7 +131,8 @@ int trace(const Arguments& arguments) {
   if (!arguments.has("feedback"))
     std::cout << findings::trace_summary(done) << "\nreport: " << files.page << ", " << files.report
               << "\nrig with what was found: " << files.rig << '\n';
-  return done.verdict == identification::TraceVerdict::unexplained ? kInconclusive : kHealthy;
+  return done.verdict == identification::TraceVerdict::unexplained || done.unexplained ? kInconclusive
+                                                                                       : kHealthy;
 }
 
 }  // namespace
