@@ -136,9 +136,13 @@ class TraceResidualTest(unittest.TestCase):
                 self.assertTrue(client.wait_for_server(rospy.Duration(TIMEOUT)))
                 estimates.wait_for_count(1)
                 before = len(estimates.messages)
-                client.send_goal(self.goal(rig=self.rig, out=self.path("beside")))
-                self.assertTrue(result_of(client).success)
-                stamps = [nanoseconds(m) for m in estimates.messages[before:] if m.method == "lost_motion"]
+                stamps = []
+                for _ in range(10):  # jobs one after the other, as one may take no longer than three estimates
+                    client.send_goal(self.goal(rig=self.rig, out=self.path("beside")))
+                    self.assertTrue(result_of(client).success)
+                    stamps = [nanoseconds(m) for m in estimates.messages[before:] if m.method == "lost_motion"]
+                    if len(stamps) > 3:
+                        break
         self.assertGreater(len(stamps), 3)
         self.assertEqual({b - a for a, b in zip(stamps, stamps[1:])}, {300_000_000})  # three periods, none left out
 
