@@ -122,17 +122,21 @@ std::string trace_report_json(const identification::Trace& trace, const TraceInp
                        {"rejected", report::Json::array()},
                        {"unexplained", nullptr}};
   for (const auto& [name, c] : trace.channels)
-    json["channels"][name] = {{"before", report::json_number(c.before)},
-                              {"after", report::json_number(c.after)},
-                              {"floor", report::json_number(c.floor)},
-                              {"train_before", report::json_number(c.train_before)},
-                              {"train_after", report::json_number(c.train_after)}};
+    json["channels"][name] = {
+        {"before", report::json_number(c.before)},
+        {"after", report::json_number(c.after)},
+        {"floor", report::json_number(c.floor)},
+        {"train_before", report::json_number(c.train_before)},
+        {"train_after", report::json_number(c.train_after)},
+        {"explainable", report::json_number(c.explainable.value)},
+        {"explainable_interval", report::json_interval(c.explainable.lower, c.explainable.upper)}};
   for (const identification::FoundEffect& e : trace.steps) json["steps"].push_back(step_json(e, trace));
   for (const identification::RejectedEffect& r : trace.rejected)
     json["rejected"].push_back({{"effect", r.id}, {"reason", r.reason}});
   if (trace.unexplained)
     json["unexplained"] = {{"channel", trace.unexplained->channel},
-                           {"signature", trace.unexplained->signature}};
+                           {"signature", trace.unexplained->signature},
+                           {"explainable", report::json_number(trace.unexplained->explainable.value)}};
   json["independence"] = report::Json::array();
   for (const identification::Independence& i : trace.independence)
     json["independence"].push_back({{"channel", i.channel},

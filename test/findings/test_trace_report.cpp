@@ -127,11 +127,12 @@ TEST(TraceReport, SaysWhetherAnErrorFallsStaysOrRises) {
 TEST(TraceReport, UnexplainedIsSaidWithItsSignature) {
   identification::Trace t = trace();
   t.verdict = identification::TraceVerdict::unexplained;
-  t.unexplained = identification::Unexplained{"deflection", "follows load position, order 7.3"};
+  t.unexplained = identification::Unexplained{"deflection", "follows load position, order 7.3", {0.5, 0.4, 0.6}};
   const Json json = Json::parse(trace_report_json(t, kInputs));
   EXPECT_EQ(json["verdict"], "unexplained");
   EXPECT_EQ(json["unexplained"]["channel"], "deflection");
   EXPECT_EQ(json["unexplained"]["signature"], "follows load position, order 7.3");
+  EXPECT_EQ(json["unexplained"]["explainable"], 0.5);
   EXPECT_NE(verdict_sentence(t).find("lacks quadratic_drag"), std::string::npos);
   EXPECT_NE(verdict_sentence(t).find("order 7.3"), std::string::npos);
   t.steps.clear();

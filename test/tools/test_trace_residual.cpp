@@ -68,6 +68,9 @@ void expect_contract(const Json& report) {
     EXPECT_GT(step.at("evidence").at("gain_held_out").get<double>(), 0);
     EXPECT_TRUE(step.at("equivalent_to").is_array());
   }
+  for (const Json& channel : report.at("channels")) EXPECT_LE(channel.at("explainable").get<double>(), 1);
+  if (!report.at("unexplained").is_null())
+    EXPECT_TRUE(report.at("unexplained").at("explainable").is_number());
   EXPECT_TRUE(report.contains("unexplained"));
 }
 

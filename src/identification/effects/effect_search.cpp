@@ -106,6 +106,47 @@ void describe_errors(const SearchResult& result, const std::vector<ServoPredicti
   if (last.rig.coupled) forget_torque(trace);
 }
 
+/// What is left of each channel, of the training records and of the unseen one.
+std::vector<ChannelRemainder> remainders(const SearchResult& result, const ServoPrediction& on_test,
+                                         const Records& records, const SearchSettings& settings) {
+  const Machine& last = result.found.fitted->fit.machine;
+  std::vector<Predicted> train;
+  for (std::size_t i = 0; i < records.train.size(); ++i)
+    train.push_back(
+        {&records.train[i], predict_servo(last.rig, records.train[i], settings.fit, last.calibrations[i])});
+  const std::vector<Predicted> test = {{&records.test, on_test}};
+  std::vector<ChannelRemainder> all;
+  for (const bool deflection : {false, true}) {
+    if (deflection ? on_test.deflection.empty() : last.rig.coupled) continue;
+    const std::string channel = deflection ? "deflection" : "torque";
+    all.push_back({channel, "", remainder(train, deflection, settings.fit.cutoff, settings.explainable)});
+    all.push_back({channel, " on the unseen record",
+                   remainder(test, deflection, settings.fit.cutoff, settings.explainable)});
+  }
+  return all;
+}
+
+/// Whether what is left is noise.
+void judge_remainder(const std::vector<ChannelRemainder>& all, const ExplainableSettings& settings,
+                     Trace& trace) {
+  std::map<std::string, double> most;
+  for (const ChannelRemainder& c : all) {
+    const auto [at, first] = most.emplace(c.channel, 0.0);
+    const double part = explainable_part(c.left);
+    if (!first && part <= at->second) continue;
+    at->second = part;
+    trace.channels.at(c.channel).explainable = {c.left.explainable.value, c.left.explainable.lower,
+                                                c.left.explainable.upper};
+  }
+  trace.unexplained = signature(all, trace.augmented.linear, settings);
+  if (!trace.unexplained)
+    for (std::string& note : noise_notes(all, settings)) trace.notes.push_back(std::move(note));
+  if (!trace.steps.empty())
+    trace.verdict = TraceVerdict::effect_found;
+  else if (trace.unexplained)
+    trace.verdict = TraceVerdict::unexplained;
+}
+
 }  // namespace
 
 Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& train,
@@ -127,11 +168,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
         "they are in "
         "the model, but nothing is called missing for it");
   note_shape_of_friction(found, settings.shape_of_friction, trace);
-  trace.unexplained = signature(found.fitted->fit.machine, found.fitted->records, settings.unexplained);
-  if (!trace.steps.empty())
-    trace.verdict = TraceVerdict::effect_found;
-  else if (trace.unexplained)
-    trace.verdict = TraceVerdict::unexplained;
+  judge_remainder(remainders(result, on_test.back(), records, settings), settings.explainable, trace);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
 }

@@ -81,6 +81,21 @@ struct BeliefSettings {
   double least_z = 4;   // choice: of a strength, standard errors
 };
 
+/// What a residual may still follow (explainable.h).
+struct ExplainableSettings {
+  int blocks = 12;  // choice: of each record, each predicted from the others
+  int knots = 24, knots_of_pair = 7,
+      knots_of_time = 6;            // choice: of a function of one state, of two, of time
+  std::size_t orders = 4;           // choice: waves over the position
+  std::size_t most_samples = 6000;  // choice (time)
+  std::size_t least_samples = 200;  // choice: fewer tell nothing
+  double near_zero = 0.1;           // choice: share of a residual: less is nothing that matters
+  double worth_saying = 0.01;  // choice: of the signal: what is smaller lies within what any model neglects
+  double worth_naming = 0.05;  // choice: share of a residual, of a single state
+  double clear = 2;            // choice: times the floor of the sensors, beyond which noise needs a word
+  double uneven = 4;           // theory: coloured noise with ten values in a part stays below
+};
+
 struct SearchSettings {
   explicit SearchSettings(const TraceSettings& trace = {}) : asked(trace) {
     fit.cutoff = trace.cutoff;
@@ -103,7 +118,7 @@ struct SearchSettings {
   MapSettings maps;
   BeliefSettings belief;
   double shape_of_friction = 0.01;  // choice: of the signal: less is how friction begins, not an effect
-  double unexplained = 2;           // choice: times the floor, beyond which something is left
+  ExplainableSettings explainable;
 };
 
 }  // namespace backlash::identification

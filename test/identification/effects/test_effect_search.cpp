@@ -9,6 +9,7 @@
 #include <set>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/identification/effects/effect_search.h"
 #include "backlash_diagnosis/model/term.h"
 #include "support/servo.h"
@@ -188,6 +189,33 @@ TEST(EffectSearch, NeverExplainsTheTorqueByItself) {
   for (const FoundEffect& e : trace.steps) EXPECT_GT(e.test_gain.lower, 0) << e.id;
 }
 
+/// Noise of first order beneath 3 Hz, a twentieth of the usual torque.
+record::Record with_coloured_noise(record::Record record, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<double>& torque = record.column(record::Channel::motor_torque);
+  double square = 0, noise = 0;
+  for (const double value : torque) square += value * value / double(torque.size());
+  const double memory = std::exp(-2 * M_PI * 3 * (record.time[1] - record.time[0]));
+  for (double& value : torque) {
+    noise = memory * noise + std::sqrt(1 - memory * memory) * random.normal();
+    value += 0.05 * std::sqrt(square) * noise;
+  }
+  return record;
+}
+
+// The floor of the sensors' noise is white; what is left here is far above it, and nothing is missing.
+TEST(EffectSearch, NoiseOfAnotherColourIsNoEffect) {
+  Records r = records_of(test::other_servo());
+  r.train = with_coloured_noise(r.train, 1);
+  r.test = with_coloured_noise(r.test, 2);
+  const Trace trace = traced(r);
+  EXPECT_TRUE(trace.steps.empty());
+  EXPECT_GT(trace.channels.at("torque").after, 2 * trace.channels.at("torque").floor);
+  EXPECT_FALSE(trace.unexplained);
+  EXPECT_EQ(trace.verdict, TraceVerdict::nothing_missing);
+  EXPECT_FALSE(trace.notes.empty());
+}
+
 TEST(EffectSearch, SaysWhenItCannotNameWhatIsMissing) {
   // A coupling that slips now and then: the load encoder is ahead by more and more.
   Records r = records_of(test::other_servo());
@@ -204,6 +232,7 @@ TEST(EffectSearch, SaysWhenItCannotNameWhatIsMissing) {
   EXPECT_EQ(trace.verdict, TraceVerdict::unexplained);
   ASSERT_TRUE(trace.unexplained);
   EXPECT_EQ(trace.unexplained->channel, "deflection");
+  EXPECT_GT(trace.unexplained->explainable.value, 0.1);
   for (const auto& [name, channel] : trace.channels) EXPECT_LE(channel.after, 1.005 * channel.before) << name;
 }
 

@@ -71,9 +71,17 @@ struct FoundEffect {
   std::vector<std::string> equivalent_to;              // ids that reach most of the gain
 };
 
+/// Of the square of what is left: how much a flexible regression over the state of the machine, that has not
+/// seen the block it predicts, can still say. Its interval from blocks drawn with replacement.
+struct Explainable {
+  double value = 0, lower = 0, upper = 0;
+};
+
 struct TraceChannel {
-  double before = 0, after = 0, floor = 0;  // relative, on the test record
+  double before = 0, after = 0;
+  double floor = 0;  // what the noise of the sensors alone leaves; all three relative, on the test record
   double train_before = 0, train_after = 0;
+  Explainable explainable;  // of the records where it is more: training or test
 };
 
 /// An effect that was tried and is not in the model, and why.
@@ -91,6 +99,7 @@ struct Independence {
 /// What no effect explains.
 struct Unexplained {
   std::string channel, signature;
+  Explainable explainable;
 };
 
 /// The test record as both models have it, for plots. Signals of channels are low-passed.

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// When what is left is called noise, and when something is missing: of remainders whose nature is given.
+#include <gtest/gtest.h>
+
+#include "identification/effects/signature.h"
+
+namespace backlash::identification {
+namespace {
+
+/// Ten times the noise of the sensors, a tenth of the signal.
+ChannelRemainder left_of_torque(double explainable, double lower, double unevenness) {
+  ChannelRemainder c{"torque", "", {}};
+  c.left.rms = 10;
+  c.left.floor = 1;
+  c.left.signal = 100;
+  c.left.explainable = {explainable, lower, explainable + 0.1};
+  c.left.follows = {{"motor position", {explainable, lower, explainable}}};
+  c.left.unevenness = unevenness;
+  return c;
+}
+
+TEST(Signature, NamesWhatTheRemainderFollows) {
+  const auto u = signature({left_of_torque(0.5, 0.4, 1.2)}, false, {});
+  ASSERT_TRUE(u);
+  EXPECT_EQ(u->channel, "torque");
+  EXPECT_EQ(u->explainable.value, 0.5);
+  EXPECT_NE(u->signature.find("motor position (50 % of its variance)"), std::string::npos) << u->signature;
+}
+
+TEST(Signature, NoiseOfAnotherColourIsNotMissing) {
+  const std::vector<ChannelRemainder> all = {left_of_torque(0.02, -0.01, 1.5)};
+  EXPECT_FALSE(signature(all, false, {}));
+  EXPECT_EQ(noise_notes(all, {}).size(), 1u);  // but is told
+}
+
+TEST(Signature, WhatIsNotToldFromNothingIsNotMissing) {
+  EXPECT_FALSE(signature({left_of_torque(0.2, -0.05, 1.5)}, false, {}));
+}
+
+TEST(Signature, WhatComesAndGoesIsNoNoise) {
+  const auto u = signature({left_of_torque(0.02, -0.01, 9)}, false, {});
+  ASSERT_TRUE(u);
+  EXPECT_NE(u->signature.find("comes and goes"), std::string::npos);
+}
+
+TEST(Signature, AHundredthOfTheSignalIsWithinWhatAnyModelNeglects) {
+  ChannelRemainder c = left_of_torque(0.9, 0.8, 9);
+  c.left.signal = 2000;
+  EXPECT_FALSE(signature({c}, false, {}));
+}
+
+TEST(Signature, TakesTheChannelOfWhichMostIsExplainable) {
+  ChannelRemainder deflection = left_of_torque(0.3, 0.2, 1);
+  deflection.channel = "deflection";
+  const auto u = signature({left_of_torque(0.2, 0.1, 1), deflection}, false, {});
+  ASSERT_TRUE(u);
+  EXPECT_EQ(u->channel, "deflection");
+}
+
+}  // namespace
+}  // namespace backlash::identification
