@@ -28,6 +28,7 @@ const std::vector<TermType>& term_types() {
                                               position_dependent_friction_term(),
                                               presliding_term(),
                                               quadratic_drag_term(),
+                                              square_root_friction_term(),
                                               radial_compliance_term(),
                                               stribeck_term(),
                                               transmission_error_term(),

@@ -55,6 +55,8 @@ TEST(EndTerms, FrictionByHand) {
   expect_ends(added_friction(stribeck + "1, body: motor"), 8 * std::exp(-3.0), 0);
   expect_ends(added_friction(stribeck + "2, body: motor"), 8 * std::exp(-9.0), 0);
   expect_ends(added_friction(stribeck + "2, body: load"), 0, 8 * std::exp(-1.0));
+  expect_ends(added_friction("id: square_root_friction, friction: 2, body: motor"), 2 * std::sqrt(1.5), 0);
+  expect_ends(added_friction("id: square_root_friction, friction: 2, body: load"), 0, 2 * std::sqrt(0.5));
   const std::string loaded = "id: load_dependent_friction, coefficient: 0.1, body: ";
   expect_ends(added_friction(loaded + "motor"), 2, 0);
   expect_ends(added_friction(loaded + "load"), 0, 2);
@@ -145,6 +147,13 @@ TEST(EndTermsInMotion, CoastingByQuadraticDrag) {
                   w / (1 + 1.2 * 2 * 3 / 3), kClose);
 }
 
+TEST(EndTermsInMotion, CoastingByFrictionThatBends) {
+  for (const char* body : {"motor", "load"})
+    for (const double s : {1.0, -1.0})  // J w' = -A sqrt(w), so sqrt(w) falls by A t / (2 J)
+      EXPECT_NEAR(moved(one_body("id: square_root_friction, friction: 0.6", body), 2 * s, 3).first,
+                  s * std::pow(std::sqrt(2.0) - 0.6 * 3 / (2 * 3), 2), kClose);
+}
+
 TEST(EndTermsInMotion, CoastingWithAsymmetry) {
   for (const char* body : {"motor", "load"})
     for (const double s : {1.0, -1.0}) {
@@ -172,8 +181,10 @@ TEST(EndTermsInMotion, OneBodySticksByTheFrictionOfBothEnds) {
   EXPECT_NEAR(moved(rig, 0, 3, -1.4).first, -0.2, kClose);
   EXPECT_NEAR(moved(rig, 1, 1).first, 1 - 1.8 / 3, kClose);
   EXPECT_EQ(moved(rig, 1, 2).first, 0);
-  rig.terms = {term("id: stribeck, torque: -0.8, speed: 1e6, exponent: 1, body: load")};  // takes of both
-  EXPECT_NEAR(moved(rig, 1, 1).first, 1 - 0.7 / 3, 1e-6);                                 // speed / 1e6
+  rig.terms = {term(  // takes of both
+      "id: position_dependent_friction, amplitude: 0.8, order: 1e-6, phase: -1.5707963267948966, body: "
+      "load")};
+  EXPECT_NEAR(moved(rig, 1, 1).first, 1 - 0.7 / 3, 1e-6);  // travel * order
 }
 
 TEST(EndTermsInMotion, CoastingByStribeckFriction) {

@@ -32,10 +32,10 @@ REDUCTION_GOAL = 0.3
 SAME_ERROR = 1.005
 AT_FLOOR = 1.1
 
-NAMED = ["asymmetric_coulomb", "asymmetric_viscous", "stribeck", "quadratic_drag", "load_dependent_friction",
-         "position_dependent_friction", "friction_drift", "gravity", "cogging", "transmission_error",
-         "varying_backlash", "mesh_hardening", "varying_reduction_ratio", "encoder_scale", "delay", "presliding",
-         "local_fault"]
+NAMED = ["asymmetric_coulomb", "asymmetric_viscous", "stribeck", "quadratic_drag", "square_root_friction",
+         "load_dependent_friction", "position_dependent_friction", "friction_drift", "gravity", "cogging",
+         "transmission_error", "varying_backlash", "mesh_hardening", "varying_reduction_ratio", "encoder_scale",
+         "delay", "presliding", "local_fault"]
 OUTSIDE = ["torque_saturation", "slipping_coupling", "damaged_tooth", "thermal_growth", "speed_ripple", "creep"]
 PAIRS = ["gravity,cogging", "varying_backlash,stribeck", "transmission_error,load_dependent_friction",
          "friction_drift,varying_backlash", "delay,gravity", "quadratic_drag,encoder_scale",

@@ -2,7 +2,8 @@
 // Stribeck effect: dry friction is larger at low speed,
 //   added friction = A exp(-|w / ws|^e)        A [N m], ws [rad/s] > 0, w speed of the body, at rest A
 // e = 2 (Gaussian) or e = 1 (Tustin); Armstrong-Helouvry, Dupont and Canudas de Wit (1994, Automatica
-// 30:1083) compare the forms. A < 0: less friction at low speed; the sum of all friction is never below 0.
+// 30:1083) compare the forms. A >= 0: friction that grows from low speeds on is another effect
+// (square_root_friction).
 #include <cmath>
 
 #include "end_of_train.h"
@@ -41,7 +42,7 @@ std::vector<double> exponents(const MotionRange&) {
 TermType stribeck_term() {
   return {"stribeck",
           {body_parameter(),
-           {"torque", "N m", Range::any(), "A, added at rest"},
+           {"torque", "N m", Range::not_negative(), "A, added at rest"},
            {"speed", "rad/s", Range::positive(), "ws, of the decay"},
            {"exponent", "-", Range::between(0.1, 10), "e"}},
           [](const ParameterValues& p) -> std::unique_ptr<Term> { return std::make_unique<Stribeck>(p); },

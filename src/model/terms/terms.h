@@ -22,6 +22,7 @@ TermType local_fault_term();
 TermType mesh_hardening_term();
 TermType position_dependent_friction_term();
 TermType quadratic_drag_term();
+TermType square_root_friction_term();
 TermType presliding_term();
 TermType radial_compliance_term();
 TermType stribeck_term();

@@ -49,6 +49,13 @@ Json quadratic_drag(Random& random, const Circumstances&, Machine& machine) {
   return {{at_motor ? "motor friction" : "load friction", "+ A*w*abs(w)"}, {"A", drag}};
 }
 
+Json square_root_friction(Random& random, const Circumstances&, Machine& machine) {
+  const bool at_motor = random.chance(0.5);
+  double& friction = (at_motor ? machine.motor : machine.load).friction.square_root;
+  friction = random.uniform(25, 60);
+  return {{at_motor ? "motor friction" : "load friction", "+ A*sqrt(abs(w))*sign(w)"}, {"A", friction}};
+}
+
 Json load_dependent_friction(Random& random, const Circumstances&, Machine& machine) {
   double& share = machine.motor.friction.load_dependent;
   share = random.uniform(0.05, 0.15);
@@ -200,6 +207,7 @@ const std::vector<Effect>& all_effects() {
       {"asymmetric_viscous", true, {}, asymmetric_viscous},
       {"stribeck", true, {}, stribeck},
       {"quadratic_drag", true, {}, quadratic_drag},
+      {"square_root_friction", true, {}, square_root_friction},
       {"load_dependent_friction", true, {}, load_dependent_friction},
       {"position_dependent_friction", true, {}, position_dependent_friction},
       {"friction_drift", true, {}, friction_drift},

@@ -36,6 +36,7 @@ struct Friction {
   double stribeck = 0;            // N m, more at low speed
   double stribeck_speed = 1;      // rad/s
   double quadratic = 0;           // N m s^2/rad^2
+  double square_root = 0;         // N m s^0.5/rad^0.5
   double load_dependent = 0;      // -, times the torque through the mesh
   Wave position;                  // relative to coulomb
   double drift = 0;               // 1/s, relative to coulomb

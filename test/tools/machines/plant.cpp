@@ -92,6 +92,7 @@ double Plant::friction_limit(const Friction& f, const State& state, int directio
   const double speed = state.speed;
   double limit = f.coulomb * (1 + f.position.value(state.position) + f.drift * time_) +
                  direction * f.asymmetric_coulomb + f.load_dependent * std::abs(mesh_torque_);
+  if (f.square_root != 0) limit += f.square_root * std::sqrt(std::abs(speed));
   if (f.stribeck != 0) limit += f.stribeck * std::exp(-std::pow(speed / f.stribeck_speed, 2));
   return std::max(0.0, limit);
 }
