@@ -160,7 +160,7 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
     const bool noisy = longer.found && (!fit.found || fit.residual > kNoiseFalls * longer.residual);
     if (!noisy && (fit.found || half >= kLongestWindow)) return {fit, longer};
     if (2 * half > kLongestWindow) return {noisy ? longer : fit, longer};
-    fit = std::move(longer);
+    fit = longer;
   }
 }
 

@@ -94,13 +94,13 @@ void find_faults(GearGeometry& g) {
     g.faults.push_back(
         fmt::format("contact ratio {:.4g} is below 1: contact is interrupted", g.contact_ratio));
   if (g.approach > g.pinion.base_radius * tangent)
-    g.faults.push_back("interference: the tips of the gear reach below the base circle of the pinion");
+    g.faults.emplace_back("interference: the tips of the gear reach below the base circle of the pinion");
   if (g.recess > g.gear.base_radius * tangent)
-    g.faults.push_back("interference: the tips of the pinion reach below the base circle of the gear");
+    g.faults.emplace_back("interference: the tips of the pinion reach below the base circle of the gear");
   if (!(g.pinion.tip_thickness > 0))
-    g.faults.push_back("the teeth of the pinion are pointed below their tip circle");
+    g.faults.emplace_back("the teeth of the pinion are pointed below their tip circle");
   if (!(g.gear.tip_thickness > 0))
-    g.faults.push_back("the teeth of the gear are pointed below their tip circle");
+    g.faults.emplace_back("the teeth of the gear are pointed below their tip circle");
 }
 
 void remark_undercut(const GearPair& pair, const std::string& name, const SpurGear& gear,

@@ -60,7 +60,7 @@ Mesh read_mesh(const YamlReader& yaml) {
   if (yaml.has("base_radius")) mesh.base_radius = yaml.number("base_radius", Range::positive());
   std::vector<std::string> given;
   for (const char* key : {"backlash", "half_gap", "backlash_angle"})
-    if (yaml.has(key)) given.push_back(key);
+    if (yaml.has(key)) given.emplace_back(key);
   if (given.size() != 1)
     yaml.fail(given.empty() ? "backlash" : given.back(),
               "exactly one of backlash, half_gap, backlash_angle must be given");

@@ -36,7 +36,7 @@ bool ask(const std::string& method, const std::vector<std::string>& values, XmlR
 /// Of a list of [name, [nodes]], the names with this node.
 std::vector<std::string> names_of_this_node(XmlRpcValue& list) {
   std::vector<std::string> names;
-  for (int i = 0; i < list.size(); ++i)
+  for (int i = 0; i < list.size(); ++i)  // NOLINT(modernize-loop-convert): begin() is of a struct
     for (int node = 0; node < list[i][1].size(); ++node)
       if (static_cast<std::string>(list[i][1][node]) == ros::this_node::getName())
         names.push_back(list[i][0]);

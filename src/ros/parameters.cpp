@@ -94,7 +94,7 @@ std::vector<std::string> Parameters::texts(const std::string& name, const std::v
   if (found.getType() != XmlRpc::XmlRpcValue::TypeArray || found.size() == 0)
     throw InvalidParameter("~" + name, shown(found), "must be a list of names");
   std::vector<std::string> texts;
-  for (int i = 0; i < found.size(); ++i) {
+  for (int i = 0; i < found.size(); ++i) {  // NOLINT(modernize-loop-convert): begin() is of a struct
     if (found[i].getType() != XmlRpc::XmlRpcValue::TypeString)
       throw InvalidParameter("~" + name, shown(found[i]), "must be text");
     texts.push_back(static_cast<std::string>(found[i]));

@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "excitation/limits.h"
+#include "excitation/checks.h"
 
 namespace backlash::simulation {
 namespace {

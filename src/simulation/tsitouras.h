@@ -5,8 +5,7 @@
 // weight in the error.
 #pragma once
 
-namespace backlash::simulation {
-namespace tsitouras {
+namespace backlash::simulation::tsitouras {
 
 constexpr int kStages = 7;
 
@@ -41,5 +40,4 @@ inline void interpolant(double u, double* weights) {
   weights[6] = 2.5 * (u - 1) * (u - 0.6) * uu;
 }
 
-}  // namespace tsitouras
-}  // namespace backlash::simulation
+}  // namespace backlash::simulation::tsitouras

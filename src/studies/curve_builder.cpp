@@ -132,7 +132,7 @@ std::vector<model::Rig> machines_of(const CurvePlan& plan) {
   for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
   for (int i = 0; i + 1 < count; ++i)
     machines.push_back(
-        with_backlash(draw_machine(plan.file, static_cast<std::uint64_t>(2 * i + 1)), (i + 0.5) * step));
+        with_backlash(draw_machine(plan.file, 2 * static_cast<std::uint64_t>(i) + 1), (i + 0.5) * step));
   for (int i = 0; i < count_beyond(plan); ++i)
     machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
   return machines;

@@ -209,7 +209,7 @@ std::vector<StudyTrial> run_variants(const rig_file::RigFile& rig_file,
   Ticker ticker(progress, count, "records under other conditions");
   for_each_in_parallel(count, ticker, [&](int i) {
     const Variant& variant = variants[i / records];
-    Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records + i));
+    Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records) + i);
     d.backlash += variant.shortest * request.max_backlash;
     const record::Record record = simulate_variant(file, variant, d, apd.settling_periods);
     trials[2 * i] = {variant.name, d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};

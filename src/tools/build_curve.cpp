@@ -80,7 +80,8 @@ void tell(const diagnosis::MonitoringCurve& curve, const std::string& out) {
 }
 
 int build(const Arguments& arguments) {
-  const std::string rig = arguments.positional(0), out = arguments.text("out"), plot = arguments.text("plot");
+  const std::string& rig = arguments.positional(0);
+  const std::string out = arguments.text("out"), plot = arguments.text("plot");
   studies::CurveRequest request = read_request(arguments);
   const rig_file::RigFile file = rig_file::load_rig_file(rig);
   check_output(out, {rig});

@@ -157,7 +157,8 @@ std::string joined_sources(const std::vector<rig_file::RigFile>& files) {
 }
 
 int compare(const Arguments& arguments) {
-  const std::string path = arguments.positional(0), out = arguments.text("json");
+  const std::string& path = arguments.positional(0);
+  const std::string out = arguments.text("json");
   identification::ComparisonSettings settings;
   settings.cutoff = arguments.number("cutoff", settings.cutoff, Range::positive());
   settings.after = arguments.number("after", settings.after, Range::positive());

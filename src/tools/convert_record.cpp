@@ -35,7 +35,7 @@ Command command() {
 }
 
 int convert(const Arguments& arguments) {
-  const std::string in = arguments.positional(0), out = arguments.positional(1);
+  const std::string &in = arguments.positional(0), &out = arguments.positional(1);
   check_record_path(in);
   check_record_path(out);
   BagPlace place;

@@ -165,8 +165,9 @@ void tell_cost(const studies::WorkPrecision& work) {
 }
 
 int run_study(const Arguments& arguments) {
-  const std::string rig = arguments.positional(0), loop = arguments.text("loop"),
-                    out = arguments.text("json"), plot = arguments.text("plot");
+  const std::string& rig = arguments.positional(0);
+  const std::string loop = arguments.text("loop"), out = arguments.text("json"),
+                    plot = arguments.text("plot");
   const rig_file::RigFile file = rig_file::load_rig_file(rig);
   const studies::IntegratorStudySettings settings = studies::load_integrator_study(loop);
   check_output(out, {rig, loop});

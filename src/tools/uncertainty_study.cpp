@@ -155,8 +155,8 @@ diagnosis::MonitoringCurve curve_for(const Arguments& arguments, const rig_file:
 }
 
 int study(const Arguments& arguments) {
-  const std::string rig = arguments.positional(0), out = arguments.text("json"),
-                    plot = arguments.text("plot");
+  const std::string& rig = arguments.positional(0);
+  const std::string out = arguments.text("json"), plot = arguments.text("plot");
   studies::StudyRequest request;
   request.records = static_cast<int>(arguments.integer("records", request.records, 1, 1'000'000));
   request.seed = arguments.integer("seed", request.seed, 0, std::uint64_t{1} << 53);

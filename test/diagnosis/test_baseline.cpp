@@ -73,7 +73,7 @@ TEST(Baseline, WhatIsNoBaselineIsRefusedWithItsKey) {
       {"schema_version: 1", "schema_version: 2", "schema_version"},
       {"schema_version: 1\n", "", "schema_version"},
       {"rig_digest: \"0123456789abcdef\"\n", "", "rig_digest"},
-      {"[\"lost_motion\", \"apd_skewness\"]", "[]", "methods"},
+      {R"(["lost_motion", "apd_skewness"])", "[]", "methods"},
       {"backlash: 8e-05", "backlash: much", "backlash"},
       {"backlash: 8e-05", "backlash: 9e-05", "interval"},
       {"backlash: 8e-05\n", "", "backlash"},

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Histories: what was written once is there, whatever happens to the writer, the disk or the file.
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <stdlib.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -12,6 +10,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -390,7 +390,7 @@ TEST_F(HistoryTest, AFileThatWasMovedAwayIsBegunAnew) {
 
 TEST_F(HistoryTest, BehindALinkTheFileItselfIsRotated) {
   fs::create_directory(folder_ / "real");
-  std::ofstream(path("real/elbow.csv"));
+  std::ofstream(path("real/elbow.csv")).close();
   fs::create_symlink("real/elbow.csv", path());
   {
     History history(this->history(400));

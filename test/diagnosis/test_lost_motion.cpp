@@ -174,7 +174,8 @@ TEST(LostMotionRamp, IntervalContainsTheTruthAsOftenAsItSays) {
     experiment.rate = 100;
     experiment.seed = static_cast<unsigned>(k);
     Random generator(1000 + experiment.seed);
-    for (int half = 0; half < 10; ++half) experiment.slips.push_back({2.0 * half, 1e-3 * generator.normal()});
+    for (int half = 0; half < 10; ++half)
+      experiment.slips.emplace_back(2.0 * half, 1e-3 * generator.normal());
     const Estimate estimate = estimate_lost_motion(run(machine, experiment), at(3.4));
     const double truth = machine.play(3.4, 4);
     inside += estimate.angle_lower <= truth && truth <= estimate.angle_upper;

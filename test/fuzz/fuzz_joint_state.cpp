@@ -46,13 +46,13 @@ sensor_msgs::JointState message_from(FuzzedDataProvider& in, ros::Time& stamp) {
   return m;
 }
 
-void check_stream(const SampleStream& stream, long offered) {
-  const StreamCounters& c = stream.counters();
+void check_stream(const diagnosis::SampleStream& stream, long offered) {
+  const diagnosis::StreamCounters& c = stream.counters();
   fuzz::require(c.accepted + c.not_a_number + c.repeated == offered, "samples that no counter knows");
-  const Record& kept = stream.kept();
+  const record::Record& kept = stream.kept();
   for (std::size_t i = 0; i < kept.size(); ++i)
     fuzz::require(i == 0 || kept.time[i] > kept.time[i - 1], "times that do not increase");
-  for (const Channel channel : kChannels)
+  for (const record::Channel channel : record::kChannels)
     for (const double value : kept.column(channel))
       fuzz::require(std::isfinite(value), "a value that is not finite");
 }
@@ -61,16 +61,16 @@ void check_stream(const SampleStream& stream, long offered) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   FuzzedDataProvider in(data, size);
-  JointStateReader reader({"joint", "elbow"});
-  StreamSettings settings;
+  ros_bridge::JointStateReader reader({"joint", "elbow"});
+  diagnosis::StreamSettings settings;
   settings.keep = 0.5;
-  ApdSettings apd;
-  apd.signal = Channel::sensor_torque;
+  diagnosis::ApdSettings apd;
+  apd.signal = record::Channel::sensor_torque;
   apd.period = 0.01;
   apd.layout = {20, -1.0, 1.0};
   if (in.ConsumeBool()) settings.apd = apd;
-  SampleStream streams[] = {SampleStream(settings), SampleStream(settings)};
-  StampClock clock;
+  diagnosis::SampleStream streams[] = {diagnosis::SampleStream(settings), diagnosis::SampleStream(settings)};
+  ros_bridge::StampClock clock;
   ros::Time stamp(1'000'000'000, 0);
   long offered[2] = {0, 0};
   while (in.remaining_bytes() > 0) {

@@ -42,12 +42,13 @@ TEST(Identify, ARecordOfTheMotorSideAloneTellsItsFriction) {
   record::Record record;
   record.name = "speeds.csv";
   for (int k = 0; k < 40000; ++k) {
-    const double t = k * 1e-3, speed = std::vector<double>{0.2, 0.8, -0.3, -1.0}[k / 10000];
+    const int run = k / 10000;
+    const double t = k * 1e-3, speed = std::vector<double>{0.2, 0.8, -0.3, -1.0}[run];
     record.time.push_back(t);
     record.column(record::Channel::motor_velocity).push_back(speed + 1e-4 * std::sin(17.3 * k));
     record.column(record::Channel::motor_torque)
         .push_back((speed > 0 ? 78 : -78) + 22 * speed + std::sin(31.7 * k));
-    record.column(record::Channel::motor_position).push_back(speed * (t - 10 * (k / 10000)));
+    record.column(record::Channel::motor_position).push_back(speed * (t - 10 * run));
   }
   const Identification found = identify(test::servo_file().rig, {record});
   EXPECT_EQ(report(found, "friction_lines").records.size(), 1u);

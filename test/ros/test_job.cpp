@@ -70,7 +70,7 @@ TEST(Job, FailuresAreToldInItsLastWords) {
 // 2 GB where 0.5 are allowed: the job fails, nobody else.
 TEST(Job, MemoryIsBounded) {
   Job job;
-  job.words = {"/usr/bin/python3", "-c", "x = bytearray(2 * 10**9)"};
+  job.words = {"/usr/bin/python3", "-c", "x = bytes(2 * 10**9)"};
   job.memory = 0.5;
   EXPECT_EQ(failure(job), "MemoryError");
   job.memory = 3;

@@ -43,9 +43,10 @@ TEST(Plant, EveryHalfPeriodHasTheSameNumberOfSamples) {
       Plant plant(heavy, test::square(1e-9, frequency), test::solver(1e-3));
       const double rate = 2 * frequency * half;
       for (long k = 0; k < 20000; ++k) {
+        const long switches = k / half;
         plant.advance_to(k / rate);
-        if (k % half == 0 && k / rate != (k / half) / (2 * frequency)) ++apart;
-        ASSERT_EQ(plant.motor_torque() > 0, k / half % 2 == 0) << "sample " << k << " at " << rate << " Hz";
+        if (k % half == 0 && k / rate != switches / (2 * frequency)) ++apart;
+        ASSERT_EQ(plant.motor_torque() > 0, switches % 2 == 0) << "sample " << k << " at " << rate << " Hz";
         ASSERT_NEAR(plant.time(), k / rate, 1e-15 * plant.time());
       }
     }

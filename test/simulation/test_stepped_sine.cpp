@@ -15,7 +15,8 @@ TEST(SteppedSine, EveryFrequencyHasItsWholeCyclesAndThenItStartsAgain) {
   const std::vector<double> ends = {6, 9, 11, 12.5};  // 3 / 0.5, + 3 / 1, + 3 / 1.5, + 3 / 2
   EXPECT_DOUBLE_EQ(sine->period(), 12.5);
   for (long k = 0; k < 12; ++k) {
-    const double turn = 12.5 * static_cast<double>(k / 4);
+    const long turns = k / 4;
+    const double turn = 12.5 * static_cast<double>(turns);
     EXPECT_NEAR(sine->segment_end(k), turn + ends[k % 4], 1e-13) << k;
     const double start = turn + (k % 4 == 0 ? 0 : ends[k % 4 - 1]), frequency = 0.5 * (k % 4 + 1);
     for (double cycles = 0; cycles <= 3; cycles += 0.1)  // the argument has an error of some 1e-13

@@ -79,7 +79,7 @@ void forget_torque(Trace& trace) {
   all.erase(
       std::remove_if(all.begin(), all.end(), [](const Independence& i) { return i.channel == "torque"; }),
       all.end());
-  trace.notes.push_back(
+  trace.notes.emplace_back(
       "other axes move (gear_train.coupled): cannot tell anything of the torque, which holds their coupling, "
       "and no "
       "effect is sought. The deflection is predicted from the torque that goes through the teeth, and tells "
@@ -163,7 +163,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   describe_machine(result, on_test, settings.belief, trace);
   describe_errors(result, on_test, records, settings.fit, trace);
   if (found.other_teeth)
-    trace.notes.push_back(
+    trace.notes.emplace_back(
         "the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; so "
         "they are in "
         "the model, but nothing is called missing for it");

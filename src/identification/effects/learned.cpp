@@ -193,10 +193,10 @@ Machine with_map(Machine machine, const LearnedCandidate& candidate, const model
   const double root = std::sqrt(candidate.smoothness),
                ridge = std::sqrt(settings.ridge * candidate.smoothness);
   for (std::size_t i = 0; i < kPoints; ++i) {
-    machine.priors.push_back(
+    machine.priors.emplace_back(
         [=, &map](const model::Rig& rig) { return ridge * rig.terms[place]->values.list(map.values)[i]; });
     if (i + 2 < kPoints)
-      machine.priors.push_back([=, &map](const model::Rig& rig) {
+      machine.priors.emplace_back([=, &map](const model::Rig& rig) {
         const std::vector<double>& v = rig.terms[place]->values.list(map.values);
         return root * (v[i] - 2 * v[i + 1] + v[i + 2]);
       });

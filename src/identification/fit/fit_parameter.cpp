@@ -30,12 +30,12 @@ std::vector<std::function<double(const model::Rig&)>> rows_as_declared(const mod
     const double value = p.get(declared);
     if (!rig_file::told_by_deflection(p) || !p.positive() || !(value > 0)) continue;
     if (p.kind == rig_file::ParameterKind::stiffness) {
-      rows.push_back([get = p.get, value](const model::Rig& rig) {
+      rows.emplace_back([get = p.get, value](const model::Rig& rig) {
         return std::log(get(rig) / value) / std::log(kDeclaredStiffness);
       });
       continue;
     }
-    rows.push_back([get = p.get, value](const model::Rig& rig) {
+    rows.emplace_back([get = p.get, value](const model::Rig& rig) {
       return (get(rig) / value - 1) / kDeclaredUncertainty;
     });
   }

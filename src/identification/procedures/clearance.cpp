@@ -266,7 +266,7 @@ Clearance identify_clearance(const record::Record& record, const ClearanceSettin
   if (2 * c.passages.size() < std::size_t(c.found))
     c.warnings.push_back(fmt::format("only {} of {} passages fit", c.passages.size(), c.found));
   if (p.fit.contact.damping == 0)
-    c.warnings.push_back(
+    c.warnings.emplace_back(
         "the load seems to meet no damping on the flanks: they are touched too softly, distrust the gap");
   if (difference > kSensitive * c.gap.value)
     c.warnings.push_back(fmt::format(

@@ -213,7 +213,7 @@ double relative(const signal::Measured& m) {
 void correct_wind_up(GapMap& map, const GapMapSettings& s) {
   const signal::Measured &f = s.friction_forward, &r = s.friction_reverse, &k = s.stiffness;
   if (!std::isfinite(k.value) || !std::isfinite(f.value) || !std::isfinite(r.value)) {
-    map.warnings.push_back("without stiffness and load friction the wind-up of the mesh stays in the gap");
+    map.warnings.emplace_back("without stiffness and load friction the wind-up of the mesh stays in the gap");
     return;
   }
   const auto error = [](const signal::Measured& m) {

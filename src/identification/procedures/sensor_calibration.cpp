@@ -157,7 +157,7 @@ PositionCalibration calibrate_position(const std::vector<record::Record>& record
     out.play_and_wind_up = combination(fit, Eigen::Vector3d(0, -1, 1));
   } else {
     out.offset = combination(fit, Eigen::Vector2d(-e.centre, 1));
-    out.warnings.push_back("one direction only: the offset holds half of play and wind-up");
+    out.warnings.emplace_back("one direction only: the offset holds half of play and wind-up");
   }
   return out;
 }

@@ -36,7 +36,7 @@ ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
 ProcedureReport run_one_inertia(IdentificationCase& c) {
   ProcedureReport report{"one_inertia", {}, ""};
   if (c.records.size() != 1)
-    c.result.warnings.push_back("a machine of one inertia is fitted to the first record that allows it");
+    c.result.warnings.emplace_back("a machine of one inertia is fitted to the first record that allows it");
   std::string reasons;
   for (const CaseRecord& r : c.records) {
     try {

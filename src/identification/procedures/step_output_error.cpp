@@ -128,7 +128,7 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   if (fit.rig.coupled) {
     c.result.channels.erase("torque");
     c.result.torque.clear();
-    c.result.warnings.push_back(
+    c.result.warnings.emplace_back(
         "other axes move (gear_train.coupled): the torque cannot be told, nor what it tells");
   }
   const ChannelError d = c.result.channels["deflection"];

@@ -78,7 +78,7 @@ ProcedureReport run_frequency_response(IdentificationCase& c) {
     add_finding(c, report.name, {{"mesh_damping", 1}}, with_model_error(fit.damping, 5 * kResponseModel));
   } else {
     report.message += "; the speed reverses, so play and Coulomb friction are in it: not used further";
-    c.result.warnings.push_back(
+    c.result.warnings.emplace_back(
         "frequency_response: the speed reverses in the record; a bias torque would keep the "
         "teeth in contact");
   }

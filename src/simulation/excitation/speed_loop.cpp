@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "backlash_diagnosis/simulation/excitation.h"
-#include "limits.h"
+#include "checks.h"
 
 namespace backlash::simulation {
 namespace {

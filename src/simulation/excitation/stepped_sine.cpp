@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/simulation/excitation.h"
-#include "limits.h"
+#include "checks.h"
 
 namespace backlash::simulation {
 namespace {

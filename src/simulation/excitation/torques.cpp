@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/simulation/excitation.h"
-#include "limits.h"
+#include "checks.h"
 
 namespace backlash::simulation {
 namespace {

@@ -60,7 +60,7 @@ TEST(MultiStart, TriesOtherStartsWhereMoreThanNoiseIsLeft) {
 TEST(MultiStart, MoreIsKnownOfAMachineBesideTheRecords) {
   const test::SearchBench bench{test::OneInertiaMachine()};
   Machine machine = declared_machine();
-  machine.priors.push_back([](const model::Rig& rig) { return (rig.motor.inertia - 2.1) / 1e-6; });
+  machine.priors.emplace_back([](const model::Rig& rig) { return (rig.motor.inertia - 2.1) / 1e-6; });
   const BandFit fit = fit_to_records(bench.data, machine, bench.context.settings.fit);
   EXPECT_NEAR(fit.fit.machine.rig.motor.inertia, 2.1, 1e-5);
 }

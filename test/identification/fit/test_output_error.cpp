@@ -51,7 +51,7 @@ TEST(OutputError, FindsALoadEncoderThatIsLate) {
     const model::Rig declared = servo_file().rig;
     const record::Record record = simulation::simulate_record(truth, test::servo_run(2), 10);
     OutputErrorSettings settings = all_parameters();
-    settings.parameters.push_back("encoder_skew");
+    settings.parameters.emplace_back("encoder_skew");
     const OutputError fit = fit_output_error(declared, {servo_data(record, declared)}, settings);
     const signal::Measured found = fit.parameters.at("encoder_skew");
     EXPECT_NEAR(found.value, skew, 3 * found.standard_error) << skew;
