@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "sampling.h"
 
 namespace backlash::identification {
 namespace {
@@ -21,8 +22,9 @@ constexpr double kVague = 30;  // choice: times the scale: standard deviation of
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
-constexpr double kSkewOfSample = 1e-3;  // simulation: samples, that interpolation leaves wrong of a skew
-constexpr long kFewestBlocks = 4;       // choice: per unknown, for a covariance from blocks
+constexpr double kSkewOfSample = 1e-3;     // simulation: samples, that interpolation leaves wrong of a skew
+constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
+constexpr long kFewestBlocks = 4;          // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));
@@ -116,6 +118,12 @@ RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double f
       layout_.push_back({r, true, k, double(k) * data[r].interval});
     }
   }
+}
+
+RecordSet RecordSet::of_others(const std::vector<ServoData>& data) const {
+  RecordSet others(data, records_.front().cutoff, records_.front().feedback);
+  others.weights_ = weights_;
+  return others;
 }
 
 double RecordSet::row_interval() const {
@@ -284,6 +292,10 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
       fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) +=
           std::pow(kSkewOfSample * records.records().front().data().interval, 2) +
           std::pow(skew_of_friction(fit.machine.rig), 2);
+  const Eigen::VectorXd bias = sampling_bias(fit, records);
+  fit.fit.values -= bias;
+  fit.machine = unknowns.machine(fit.fit.values);
+  fit.fit.covariance += std::pow(kUnsureOfSampling, 2) * bias * bias.transpose();
   if (start.rig.coupled) allow_for_left(fit.fit, rows, records.misfit(fit.machine).deflection);
 }
 
