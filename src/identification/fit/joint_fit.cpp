@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
+#include "backlash_diagnosis/model/term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "sampling.h"
@@ -22,7 +23,9 @@ constexpr double kVague = 30;  // choice: times the scale: standard deviation of
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
-constexpr double kSkewOfSample = 1e-3;     // simulation: samples, that interpolation leaves wrong of a skew
+constexpr double kSkewOfSample = 1e-3;  // simulation: samples, that interpolation leaves wrong of a skew
+constexpr double kUnsureOfHold = 0.3;  // samples, theory: 95 % reach from a torque that is held to one of the
+                                       // moment, half a sample earlier, which a record of a later one hides
 constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
 constexpr long kFewestBlocks = 4;          // choice: per unknown, for a covariance from blocks
 
@@ -79,6 +82,21 @@ double skew_of_friction(const model::Rig& rig) {
   const double stiffness =
       rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::stiffness).get(rig);
   return rig.coupled ? kDeclaredUncertainty * rig.motor.viscous_damping / stiffness : 0;
+}
+
+/// What samples cannot tell of a delay, `interval` [s] apart.
+void add_timing(MachineFit& fit, const Machine& start, double interval) {
+  const std::string& skew =
+      rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew).name;
+  const std::string& delay = model::term_type_that([](const model::TermType& type) {
+                               return type.calibrates == model::Calibrates::torque_delay;
+                             }).search->strength;
+  for (std::size_t i = 0; i < start.parameters.size(); ++i) {
+    double& variance = fit.fit.covariance(Eigen::Index(i), Eigen::Index(i));
+    if (start.parameters[i].name == skew)
+      variance += std::pow(kSkewOfSample * interval, 2) + std::pow(skew_of_friction(fit.machine.rig), 2);
+    if (start.parameters[i].name == delay) variance += std::pow(kUnsureOfHold * interval, 2);
+  }
 }
 
 /// What is left beyond noise may follow what a value changes, wholly where the machine is not to be modelled:
@@ -284,14 +302,8 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);
-  const rig_file::RigParameter& skew =
-      rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
-  for (std::size_t i = 0; i < start.parameters.size(); ++i)
-    if (start.parameters[i].name == skew.name)
-      fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) +=
-          std::pow(kSkewOfSample * records.records().front().data().interval, 2) +
-          std::pow(skew_of_friction(fit.machine.rig), 2);
+  add_timing(fit, start, records.records().front().data().interval);
   const Eigen::VectorXd bias = sampling_bias(fit, records);
   fit.fit.values -= bias;
   fit.machine = unknowns.machine(fit.fit.values);
