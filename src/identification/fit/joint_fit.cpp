@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "sampling.h"
 
@@ -303,6 +304,9 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
+  const double free = double(rows) / double(block) - double(unknowns.size());  // degrees of freedom
+  fit.fit.covariance *=
+      std::pow(signal::student_t_quantile(0.975, std::max(1.0, free)) / signal::kNormalQuantile975, 2);
   add_timing(fit, start, records.records().front().data().interval);
   const Eigen::VectorXd bias = sampling_bias(fit, records);
   fit.fit.values -= bias;
