@@ -87,10 +87,17 @@ void put_skew_back(IdentificationCase& c) {
     fitted->second.value += c.skew.value;
 }
 
-/// The map with the wind-up of the machine as fitted, and the rig with its variation where it declares one.
-void refine_gap_map(IdentificationCase& c) {
-  *c.result.gap_map = with_wind_up(*c.result.gap_map, c.result.rig);
-  if (gap_varies(c.declared)) c.result.rig = with_gap_map(c.result.rig, *c.result.gap_map, GapUse::variation);
+/// One mean gap: that of the fit, which the rig file gets. A rig that declares no variation keeps none.
+void agree_on_gap(const model::Rig& declared, Identification& result) {
+  const auto gap = result.parameters.find(
+      rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::backlash).name);
+  if (gap == result.parameters.end()) return;
+  *result.gap_map = with_mean_gap(*result.gap_map, gap->second);
+  gap->second = result.gap_map->mean_gap;
+  if (gap_varies(declared))
+    result.rig = with_gap_map(result.rig, *result.gap_map, GapUse::variation);
+  else
+    result.rig.terms = model::load_side(declared).terms;
 }
 
 /// The rig declares equal friction in both directions, and the friction lines contradict it.
@@ -157,7 +164,8 @@ Identification identify(const model::Rig& declared, const std::vector<record::Re
       continue;
     }
     if (declared.mesh.rigid || procedure.run == run_output_error) continue;
-    if (c.result.gap_map && gap_varies(c.declared)) c.declared = with_gap_map(c.declared, *c.result.gap_map);
+    if (c.result.gap_map && (c.result.gap_map->varies || gap_varies(declared)))
+      c.declared = with_gap_map(c.declared, *c.result.gap_map);
     update_from_findings(c);
   }
   if (progress) progress(1, "done");
@@ -167,7 +175,7 @@ Identification identify(const model::Rig& declared, const std::vector<record::Re
       reasons.push_back(report.name + ": " + report.message);
     throw CannotIdentify("the records allow no procedure: " + joined(reasons));
   }
-  if (c.result.gap_map && !declared.mesh.rigid) refine_gap_map(c);
+  if (c.result.gap_map && !declared.mesh.rigid) agree_on_gap(declared, c.result);
   if (!declared.mesh.rigid) put_skew_back(c);
   warn_of_asymmetry(c);
   warn_of_misfit(c.result);

@@ -25,6 +25,11 @@ struct Cubic {
     const double s = 1 - u;
     return s * s * ((1 + 2 * u) * y0 + u * d0) + u * u * ((3 - 2 * u) * y1 - s * d1);
   }
+  /// Per sample.
+  double slope(double u) const {
+    const double s = 1 - u;
+    return 6 * u * s * (y1 - y0) + s * (1 - 3 * u) * d0 - u * (2 - 3 * u) * d1;
+  }
 };
 
 /// After sample k, with slopes from the samples beside it (Catmull and Rom): a straight line would lose 0.03
@@ -43,16 +48,18 @@ struct Moment {
   double motor, motor_rate, load_rate;
 };
 
-/// Motion within one sample.
+/// Motion within one sample. The motor's speed is the derivative of its position, so that a damper between
+/// the teeth takes the energy that belongs to their motion: another line through the same speeds makes the
+/// motor's inertia 0.15 % and the damping 0.1 % too small.
 struct Segment {
-  Cubic motor, motor_rate, load_rate;
+  Cubic motor, load_rate;
   double start, interval;
 
   Moment at(double u) const {
     const double t = start + u * interval;
-    if (u == 0) return {t, motor.y0, motor_rate.y0, load_rate.y0};
-    if (u == 1) return {t, motor.y1, motor_rate.y1, load_rate.y1};
-    return {t, motor(u), motor_rate(u), load_rate(u)};
+    if (u == 0) return {t, motor.y0, motor.d0 / interval, load_rate.y0};
+    if (u == 1) return {t, motor.y1, motor.d1 / interval, load_rate.y1};
+    return {t, motor(u), motor.slope(u) / interval, load_rate(u)};
   }
 };
 
@@ -275,7 +282,6 @@ DrivenLoad follow(Body& load, const RecordedMotion& motion) {
   for (std::size_t k = 0; k < n; ++k) {
     const std::size_t j = std::min(k + 1, n - 1);
     const Segment segment{{q[k], q[j], motion.interval * w[k], motion.interval * w[j]},
-                          between(w, k),
                           motion.load_rate ? between(*motion.load_rate, k) : Cubic{0, 0, 0, 0},
                           double(k) * motion.interval,
                           motion.interval};

@@ -109,9 +109,12 @@ TEST(ModelComparison, LadderOfTheThesis) {
 TEST(ModelComparison, MapUsedDirectlyIsTooLargeByTheWindUp) {
   const rig_file::RigFile varying = rig_file("yumrukcal_2013_varying");
   const model::Rig constant = rig_file("yumrukcal_2013").rig;
-  const GapMap runs = identify_gap_map(run(varying, "constant_speed_forward", 40).slice(3, 40),
-                                       run(varying, "constant_speed_backward", 40).slice(3, 40));
-  const GapMap map = with_wind_up(runs, constant);
+  GapMapSettings load;
+  load.stiffness = {460e3, 0};
+  load.friction_forward = {16.8 + 7.6 * 0.1745, 0};  // N m, at 10 deg/s [5.2]
+  load.friction_reverse = {13.3 + 11.5 * 0.1745, 0};
+  const GapMap map = identify_gap_map(run(varying, "constant_speed_forward", 40).slice(3, 40),
+                                      run(varying, "constant_speed_backward", 40).slice(3, 40), load);
   const record::Record record = run(varying, "square_wave_backward", 20);
   const auto models =
       compare_models({with_gap_map(constant, map), with_gap_map(constant, map, GapUse::directly)},

@@ -11,8 +11,9 @@
 // Where the link is locked or the mesh rigid the load has no motion of its own: it stands, or moves with the
 // motor, and only the torque on the motor is computed.
 //
-// Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples. A step is divided
-// where the load comes to rest, turns round or breaks away and where teeth touch or part.
+// Fixed steps of one sample, classical Runge-Kutta, motor position cubic between samples, its speed the
+// derivative of that. A step is divided where the load comes to rest, turns round or breaks away and where
+// teeth touch or part.
 #pragma once
 
 #include <vector>

@@ -7,8 +7,11 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/finding.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
+#include "backlash_diagnosis/model/term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "sampling.h"
 
 namespace backlash::identification {
 namespace {
@@ -22,7 +25,10 @@ constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
 constexpr double kSkewOfSample = 1e-3;  // simulation: samples, that interpolation leaves wrong of a skew
-constexpr long kFewestBlocks = 4;       // choice: per unknown, for a covariance from blocks
+constexpr double kUnsureOfHold = 0.3;  // samples, theory: 95 % reach from a torque that is held to one of the
+                                       // moment, half a sample earlier, which a record of a later one hides
+constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
+constexpr long kFewestBlocks = 4;          // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));
@@ -79,6 +85,21 @@ double skew_of_friction(const model::Rig& rig) {
   return rig.coupled ? kDeclaredUncertainty * rig.motor.viscous_damping / stiffness : 0;
 }
 
+/// What samples cannot tell of a delay, `interval` [s] apart.
+void add_timing(MachineFit& fit, const Machine& start, double interval) {
+  const std::string& skew =
+      rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew).name;
+  const std::string& delay = model::term_type_that([](const model::TermType& type) {
+                               return type.calibrates == model::Calibrates::torque_delay;
+                             }).search->strength;
+  for (std::size_t i = 0; i < start.parameters.size(); ++i) {
+    double& variance = fit.fit.covariance(Eigen::Index(i), Eigen::Index(i));
+    if (start.parameters[i].name == skew)
+      variance += std::pow(kSkewOfSample * interval, 2) + std::pow(skew_of_friction(fit.machine.rig), 2);
+    if (start.parameters[i].name == delay) variance += std::pow(kUnsureOfHold * interval, 2);
+  }
+}
+
 /// What is left beyond noise may follow what a value changes, wholly where the machine is not to be modelled:
 /// it must not be told better than |left| / |change per unit|, or than it is known beside the records.
 void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double in_floors) {
@@ -116,6 +137,12 @@ RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double f
       layout_.push_back({r, true, k, double(k) * data[r].interval});
     }
   }
+}
+
+RecordSet RecordSet::of_others(const std::vector<ServoData>& data) const {
+  RecordSet others(data, records_.front().cutoff, records_.front().feedback);
+  others.weights_ = weights_;
+  return others;
 }
 
 double RecordSet::row_interval() const {
@@ -276,14 +303,15 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
       kWideStep * unknowns.scale(), true);
-  const rig_file::RigParameter& skew =
-      rig_file::servo_parameter(rig_file::RigPart::sensors, rig_file::ParameterKind::encoder_skew);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
-  for (std::size_t i = 0; i < start.parameters.size(); ++i)
-    if (start.parameters[i].name == skew.name)
-      fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) +=
-          std::pow(kSkewOfSample * records.records().front().data().interval, 2) +
-          std::pow(skew_of_friction(fit.machine.rig), 2);
+  const double free = double(rows) / double(block) - double(unknowns.size());  // degrees of freedom
+  fit.fit.covariance *=
+      std::pow(signal::student_t_quantile(0.975, std::max(1.0, free)) / signal::kNormalQuantile975, 2);
+  add_timing(fit, start, records.records().front().data().interval);
+  const Eigen::VectorXd bias = sampling_bias(fit, records);
+  fit.fit.values -= bias;
+  fit.machine = unknowns.machine(fit.fit.values);
+  fit.fit.covariance += std::pow(kUnsureOfSampling, 2) * bias * bias.transpose();
   if (start.rig.coupled) allow_for_left(fit.fit, rows, records.misfit(fit.machine).deflection);
 }
 

@@ -51,6 +51,8 @@ class RecordSet {
   /// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
   void weigh(const Machine& machine);
   Misfit misfit(const Machine& machine) const;
+  /// Other records of the same lengths with the weights of these. `data` must outlive it.
+  RecordSet of_others(const std::vector<ServoData>& data) const;
 
   Eigen::VectorXd rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const;
 
@@ -106,9 +108,10 @@ class Unknowns {
 MachineFit fit_machine(const Machine& start, const RecordSet& records,
                        const signal::NonlinearOptions& options);
 
-/// Covariance of the fitted values from wide steps and from blocks of the records as long as the time between
-/// two reversals of the motor, the larger: until the next reversal what friction and play leave keeps its
-/// sign. Of a machine that is coupled to other axes also what is left counts as if it followed each value.
+/// Takes off what sampling makes of the values (sampling.h), and gives their covariance from wide steps and
+/// from blocks of the records as long as the time between two reversals of the motor, the larger: until the
+/// next reversal what friction and play leave keeps its sign. A part of what was taken off counts as an
+/// error. Of a machine that is coupled to other axes also what is left counts as if it followed each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
 }  // namespace backlash::identification

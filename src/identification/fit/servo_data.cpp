@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/mesh_resonance.h"
@@ -68,6 +69,13 @@ std::pair<double, double> start_of(const std::vector<double>& x) {
     square += (double(k) - middle) * (double(k) - middle);
   }
   return {mean - middle * moment / square, moment / square};
+}
+
+void take_rates_of_load(ServoData& data) {
+  data.load_rate =
+      signal::low_pass(fast_derivative(data.load, data.interval), data.interval, data.load_rate_cutoff);
+  std::tie(data.first_load, data.first_load_rate) = start_of(data.load);
+  data.first_load_rate /= data.interval;
 }
 
 double root_mean_square(const std::vector<double>& x) {
@@ -169,10 +177,19 @@ ServoData servo_data(const record::Record& raw, const model::Rig& rig, double to
           ? mesh_resonance(model::load_side(rig), torque > 0 ? torque : usual_torque(data.torque))
           : 0;
   data.load_rate_cutoff = resonance > 0 ? std::min(kLoadRateBand * resonance, highest) : highest;
-  data.load_rate =
-      signal::low_pass(fast_derivative(data.load, data.interval), data.interval, data.load_rate_cutoff);
-  std::tie(data.first_load, data.first_load_rate) = start_of(data.load);
-  data.first_load_rate /= data.interval;
+  take_rates_of_load(data);
+  return data;
+}
+
+ServoData with_columns(const ServoData& pattern, std::vector<double> torque, std::vector<double> motor,
+                       std::vector<double> load) {
+  ServoData data = pattern;
+  data.torque = std::move(torque);
+  data.motor = std::move(motor);
+  data.load = std::move(load);
+  data.motor_rate = fast_derivative(data.motor, data.interval);
+  data.motor_acceleration = second_difference(data.motor, data.interval);
+  take_rates_of_load(data);
   return data;
 }
 

@@ -41,17 +41,12 @@ bool gap_varies(const model::Rig& rig) {
                      [](const auto& term) { return varies_gap(term->id); });
 }
 
-GapMap with_wind_up(GapMap map, const model::Rig& rig) {
-  if (!rig.mesh.contact_spec().values.has("stiffness"))
-    throw InvalidParameter("contact.law", rig.mesh.contact_spec().law, "has no stiffness to be wound up");
-  const double lever = rig.mesh.lever(), k = rig.mesh.contact_spec().values.at("stiffness") * lever * lever;
-  const model::Body& load = rig.link;
-  const double forward = load.coulomb_friction + load.coulomb_asymmetry +
-                         (load.viscous_damping + load.viscous_asymmetry) * std::fabs(map.forward_speed);
-  const double backward = load.coulomb_friction - load.coulomb_asymmetry +
-                          (load.viscous_damping - load.viscous_asymmetry) * std::fabs(map.reverse_speed);
-  map.wind_up = {(forward + backward) / k, 0};
-  map.mean_gap = {map.mean_separation.value - map.wind_up.value, map.mean_separation.standard_error};
+GapMap with_mean_gap(GapMap map, const signal::Measured& fitted) {
+  map.mean_gap = fitted;
+  for (const Harmonic& h : map.harmonics)
+    map.mean_gap.standard_error = std::hypot(map.mean_gap.standard_error, h.amplitude.standard_error);
+  map.wind_up = {map.mean_separation.value - map.mean_gap.value,
+                 std::hypot(map.mean_separation.standard_error, map.mean_gap.standard_error)};
   return map;
 }
 

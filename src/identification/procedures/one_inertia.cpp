@@ -13,6 +13,7 @@
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/blocks.h"
+#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
@@ -20,18 +21,19 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kLargestDelay = 2;   // choice: sampling intervals
-constexpr int kDelayBits = 12;        // choice: the search ends within 0.001 of an interval
-constexpr double kVagueDelay = 1;     // choice: sampling intervals of standard error
-constexpr double kLeastPeriods = 40;  // choice: of the cutoff
-constexpr double kPeriods = 100;      // choice: where the cutoff is chosen
-constexpr double kLeastShare = 0.05;  // choice: of the samples in each direction
-constexpr double kStanding = 4;       // choice: standard deviations of the speed's noise
-constexpr double kSignNoise = 1e-3;   // choice: of the speed: how sharply its sign is taken
-constexpr double kSignBandwidth = 4;  // choice: but not below four times the cutoff
-constexpr double kShortest = 0.25;    // choice: of the memory: a standstill that matters
-constexpr std::size_t kBlocks = 30;   // choice: left out one at a time, for the errors
-constexpr double kMuchLeft = 0.1;     // choice: relative error that is worth a warning
+constexpr double kLargestDelay = 2;     // choice: sampling intervals
+constexpr int kDelayBits = 12;          // choice: the search ends within 0.001 of an interval
+constexpr double kVagueDelay = 1;       // choice: sampling intervals of standard error
+constexpr double kLeastPeriods = 40;    // choice: of the cutoff
+constexpr double kPeriods = 100;        // choice: where the cutoff is chosen
+constexpr double kLeastShare = 0.05;    // choice: of the samples in each direction
+constexpr double kStanding = 4;         // choice: standard deviations of the speed's noise
+constexpr double kSignNoise = 1e-3;     // choice: of the speed: how sharply its sign is taken
+constexpr double kSignBandwidth = 4;    // choice: but not below four times the cutoff
+constexpr double kShortest = 0.25;      // choice: of the memory: a standstill that matters
+constexpr std::size_t kBlocks = 30;     // choice: left out one at a time, for the errors
+constexpr double kUnsureOfNoise = 0.3;  // choice: of what noise of the acceleration makes of the inertia
+constexpr double kMuchLeft = 0.1;       // choice: relative error that is worth a warning
 
 /// What the equations need of a record.
 struct Signals {
@@ -170,12 +172,38 @@ struct Solution {
   Eigen::VectorXd error;
 };
 
+/// White noise of the position, differentiated twice up to the cutoff: the square of the gain (2 pi f)^2
+/// integrated.
+double acceleration_noise(const Signals& s) {
+  return s.position_noise * std::pow(2 * M_PI * s.cutoff, 2) * std::sqrt(2 * s.cutoff * s.interval / 5);
+}
+
+/// Fitted minus true values that the noise of the acceleration makes, which is known and not correlated with
+/// the torque: (A'A - rows noise^2 e e')^-1 A'b are the true ones (Fuller 1987, Measurement Error Models,
+/// Section 2.2).
+Eigen::VectorXd noise_bias(const Signals& s, const Eigen::MatrixXd& a, const signal::LeastSquaresFit& fit) {
+  const Eigen::VectorXd unit = a.colwise().norm().cwiseInverse();
+  Eigen::MatrixXd normal = signal::gram(Eigen::MatrixXd(a * unit.asDiagonal()));
+  const double noise = double(a.rows()) * std::pow(acceleration_noise(s) * unit[0], 2);
+  normal(0, 0) -= noise;
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(a.cols());
+  gradient[0] = -noise * fit.values[0] / unit[0];
+  return unit.cwiseProduct(signal::solve_symmetric(normal, gradient));
+}
+
 Solution solve(const Signals& s, const Eigen::MatrixXd& a, double delay, bool estimated) {
   Solution out;
   out.delay = delay;
   out.fit = signal::fit_linear(a, picked(signal::delayed(s.torque, delay), s.used));
   const Eigen::MatrixXd all = estimated ? with_delay_column(s, a, delay) : a;
   out.error = signal::jackknife_covariance(all, out.fit.residuals, block_of_rows(s)).diagonal().cwiseSqrt();
+  out.error *=
+      signal::student_t_quantile(0.975, double(kBlocks) - double(all.cols())) / signal::kNormalQuantile975;
+  const Eigen::VectorXd bias = noise_bias(s, a, out.fit);
+  out.fit.values -= bias;
+  out.fit.residuals += a * bias;
+  for (Eigen::Index i = 0; i < bias.size(); ++i)
+    out.error[i] = std::hypot(out.error[i], kUnsureOfNoise * bias[i]);
   return out;
 }
 
@@ -183,9 +211,7 @@ Solution solve(const Signals& s, const Eigen::MatrixXd& a, double delay, bool es
 double floor_of(const record::Record& record, const Signals& s, double inertia, double torque_size) {
   const double left = signal::noise_after_low_pass(s.interval, s.cutoff);
   const double torque = signal::white_noise(record.column(record::Channel::motor_torque)) * left;
-  const double acceleration = s.position_noise * std::pow(2 * M_PI * s.cutoff, 2) *
-                              std::sqrt(2 * s.cutoff * s.interval / 5);  // noise with f^2 up to the cutoff
-  return std::hypot(torque, inertia * acceleration) / torque_size;
+  return std::hypot(torque, inertia * acceleration_noise(s)) / torque_size;
 }
 
 double spread(const Eigen::VectorXd& values) {

@@ -5,6 +5,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/identification/procedures/gap_terms.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "procedures.h"
@@ -66,7 +67,9 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
     all.erase(
         std::remove_if(all.begin(), all.end(), [](const Finding& f) { return f.procedure == "clearance"; }),
         all.end());
-    c.result.warnings.push_back("backlash depends on the position of the load: " + map.statement);
+    c.result.warnings.push_back(
+        "backlash depends on the position of the load: " + map.statement +
+        (gap_varies(c.declared) ? "" : "; the machine is fitted with it, the rig file keeps a constant gap"));
   }
   return report;
 }

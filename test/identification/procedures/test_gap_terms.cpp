@@ -62,11 +62,12 @@ TEST(GapTerms, AMapThatDoesNotVaryGivesAConstantGap) {
   EXPECT_NEAR(gap_in_train(rig, 1), 5.5e-4, 1e-12);
 }
 
-TEST(GapTerms, WindUpFromTheRigByHand) {
-  const GapMap map = with_wind_up(hand_made_map(), rig_file::load_rig_file(kVarying).rig);
-  const double torque = 16.8 + 7.6 * 0.2 + 13.3 + 11.5 * 0.1;  // N m, load's friction both ways [5.2]
-  EXPECT_NEAR(map.wind_up.value, torque / kStiffness, 1e-12);
-  EXPECT_NEAR(map.mean_gap.value, 6e-4 - torque / kStiffness, 1e-12);
+TEST(GapTerms, MeanOfAFitCountsTheErrorsOfTheOrders) {
+  const GapMap map = with_mean_gap(hand_made_map(), {5.4e-4, 3e-7});
+  EXPECT_EQ(map.mean_gap.value, 5.4e-4);
+  EXPECT_NEAR(map.mean_gap.standard_error, std::sqrt(9e-14 + 2 * 1e-14), 1e-12);  // both amplitudes +- 1e-7
+  EXPECT_NEAR(map.wind_up.value, 0.6e-4, 1e-12);
+  EXPECT_NEAR(map.wind_up.standard_error, std::sqrt(1e-12 + 11e-14), 1e-12);
 }
 
 TEST(GapTerms, RigFileGetsTheEntriesAndKeepsTheRest) {

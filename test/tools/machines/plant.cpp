@@ -67,7 +67,7 @@ double Plant::flank(int side, double displacement, double rate, double* gap_slop
 }
 
 // Every flank acts on both bodies by virtual work: penetration = side * displacement - half gap.
-Plant::MeshTorques Plant::mesh(double length) {
+Plant::MeshTorques Plant::mesh() const {
   const Mesh& mesh = machine_.mesh;
   const double ratio = 1 + mesh.ratio_per_torque * mesh_torque_;
   const double error_slope = mesh.transmission_error.slope(load_.position);
@@ -77,14 +77,18 @@ Plant::MeshTorques Plant::mesh(double length) {
   double forward_slope, backward_slope;
   const double forward = flank(1, displacement, rate, &forward_slope);
   const double backward = flank(-1, displacement, rate, &backward_slope);
-  mesh_torque_ = forward - backward;
+  const double torque = forward - backward;
+  return {torque, -torque * ratio,
+          torque * (1 - error_slope) + forward * forward_slope + backward * backward_slope};
+}
+
+void Plant::slip(double length) {
+  const Mesh& mesh = machine_.mesh;
   if (mesh.slip_torque != 0) {
     const double excess = std::max(0.0, std::abs(mesh_torque_) - mesh.slip_torque);
     slip_ += std::copysign(excess / mesh.slip_damping, mesh_torque_) * length;
   }
   slip_ += mesh.creep_per_torque * mesh_torque_ * std::abs(motor_.speed) * length;
-  return {-mesh_torque_ * ratio,
-          mesh_torque_ * (1 - error_slope) + forward * forward_slope + backward * backward_slope};
 }
 
 /// The torque that friction without bristles has in this direction of motion.
@@ -119,11 +123,8 @@ void Plant::accelerate(const Body& body, double torque, double length, State* st
   state->speed = direction * std::max(0.0, std::abs(free) - stop);
 }
 
-void Plant::step(double torque, double length) {
-  motor_.position += length / 2 * motor_.speed;
-  load_.position += length / 2 * load_.speed;
-  time_ += length / 2;
-  const MeshTorques teeth = mesh(length);
+/// Speeds after `length` under the teeth as they are.
+void Plant::push(double torque, const MeshTorques& teeth, double length) {
   const Drive& drive = machine_.drive;
   const double speed = motor_.speed;
   const double ripple = drive.cogging.value(motor_.position) +
@@ -133,6 +134,22 @@ void Plant::step(double torque, double length) {
                             ? 0
                             : machine_.gravity.amplitude * std::sin(load_.position + machine_.gravity.phase);
   accelerate(machine_.load, teeth.load - weight, length, &load_);
+}
+
+void Plant::step(double torque, double length) {
+  motor_.position += length / 2 * motor_.speed;
+  load_.position += length / 2 * load_.speed;
+  time_ += length / 2;
+  // The teeth act with the speeds of the middle of the step: with those of its start their damping b would
+  // take b length / 2 from the inertia of the motor.
+  const State motor = motor_, load = load_;
+  push(torque, mesh(), length / 2);
+  const MeshTorques teeth = mesh();
+  motor_ = motor;
+  load_ = load;
+  mesh_torque_ = teeth.through;
+  slip(length);
+  push(torque, teeth, length);
   motor_.position += length / 2 * motor_.speed;
   load_.position += length / 2 * load_.speed;
   time_ += length / 2;

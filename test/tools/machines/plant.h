@@ -26,13 +26,15 @@ class Plant {
     double position = 0, speed = 0, bristle = 0;
   };
   struct MeshTorques {
-    double motor = 0, load = 0;
+    double through = 0, motor = 0, load = 0;  // N m
   };
 
   double half_gap(int side, double* slope) const;
   double flank(int side, double displacement, double rate, double* gap_slope) const;
   double law(double penetration, double rate, double softening) const;
-  MeshTorques mesh(double length);
+  MeshTorques mesh() const;
+  void slip(double length);
+  void push(double torque, const MeshTorques& teeth, double length);
   void accelerate(const Body& body, double torque, double length, State* state) const;
   double friction_limit(const Friction& friction, const State& state, int direction) const;
 

@@ -48,4 +48,8 @@ double time_between_reversals(const ServoData& data);
 /// without them, BadData for gaps or values that are not finite (naming channel and time).
 ServoData servo_data(const record::Record& record, const model::Rig& rig, double usual_torque = 0);
 
+/// Other columns of a machine whose load moves freely, with bands and noise as in `pattern`.
+ServoData with_columns(const ServoData& pattern, std::vector<double> torque, std::vector<double> motor,
+                       std::vector<double> load);
+
 }  // namespace backlash::identification

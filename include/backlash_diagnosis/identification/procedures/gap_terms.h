@@ -21,10 +21,10 @@ enum class GapUse {
   variation,  // the rig's own: A_n are the map's, b is not
 };
 
-/// The map with the wind-up that the friction of the rig's load and its contact stiffness make at the speeds
-/// of the runs: for a rig that was fitted after the map was made. Errors of the rig are not known here and
-/// not included. Throws InvalidParameter for a contact law without stiffness.
-GapMap with_wind_up(GapMap map, const model::Rig& rig);
+/// The map with another mean gap, as a fit of the whole machine tells it; the wind-up is the rest of the
+/// separation. Where the machine was fitted with the orders of the map held, their errors are part of the
+/// mean's: the fit takes it from the places that its records visit.
+GapMap with_mean_gap(GapMap map, const signal::Measured& fitted);
 
 /// Whether a term says how the backlash depends on the position of the load: varying_backlash, backlash_map.
 bool gap_varies(const model::Rig& rig);

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sampling.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+#include "backlash_diagnosis/simulation/plant.h"
+
+namespace backlash::identification {
+namespace {
+
+constexpr double kControl = 0.25;    // choice: of the feedback: slow next to the mesh, fast next to a drift
+constexpr int kPieces = 4;           // choice: per sample, of a torque that is not held
+constexpr double kTolerance = 1e-9;  // simulation: 1e-6 makes the damping of the teeth 0.07 % too large
+
+/// The torque of each sample: as recorded and what keeps the machine on its way, decided when it first acts.
+class Command {
+ public:
+  Command(const ServoData& data, double delay, bool held) : torque(data.torque), delay_(delay), held_(held) {}
+
+  /// N m, `at` [samples] in the middle of a piece.
+  double acting(double at, double correction) {
+    const double stamp = at - delay_, before = std::floor(stamp);
+    const double first = of(long(before), correction);
+    return held_ ? first : first + (stamp - before) * (of(long(before) + 1, correction) - first);
+  }
+  /// Ends of the pieces of a sample, 0 to 1, in which the torque is taken for constant.
+  std::vector<double> pieces() const {
+    std::vector<double> ends;
+    if (held_) {
+      ends = {delay_ - std::floor(delay_), 1};
+      if (ends.front() == 0) ends.erase(ends.begin());
+    } else {
+      for (int i = 1; i <= kPieces; ++i) ends.push_back(double(i) / kPieces);
+    }
+    return ends;
+  }
+
+  std::vector<double> torque;
+
+ private:
+  double of(long sample, double correction) {
+    const long at = std::clamp(sample, 0L, long(torque.size()) - 1);
+    for (; decided_ <= at; ++decided_) torque[decided_] += correction;
+    return torque[at];
+  }
+
+  double delay_;
+  bool held_;
+  long decided_ = 0;
+};
+
+simulation::SolverSettings solver(const model::Rig& rig, const ServoData& data) {
+  double largest = 0;
+  for (std::size_t k = 0; k < data.size(); ++k)
+    largest = std::max(largest, std::fabs(data.motor[k] - data.load[k] - data.motor[0] + data.load[0]));
+  simulation::SolverSettings settings;
+  settings.relative_tolerance = kTolerance;
+  settings.position_tolerance = kTolerance * largest;
+  settings.velocity_tolerance =
+      settings.position_tolerance * 2 * M_PI * mesh_resonance(rig, usual_torque(data.torque));
+  return settings;
+}
+
+}  // namespace
+
+ServoData sampled_machine(const model::Rig& fitted, const ServoData& data, const Calibration& calibration,
+                          double feedback) {
+  const model::Rig rig = model::load_side(fitted);
+  const model::Sensing sensing = model::sensing(rig.terms);
+  simulation::ExcitationSettings by_command;
+  by_command.type = "topic";
+  simulation::Plant plant(rig, by_command, solver(rig, data));
+  const double h = data.interval, skew = rig.encoder_skew / h;
+  plant.set_state({data.motor[0],
+                   (data.first_load + rig.encoder_skew * data.first_load_rate - calibration.encoder_offset) /
+                       sensing.load_position_gain,
+                   data.motor_rate[0], data.first_load_rate / sensing.load_position_gain});
+  Command command(data, calibration.torque_delay + sensing.torque_delay / h, calibration.held);
+  const double inertia = plant.gear_train().motor_inertia() + plant.gear_train().load_inertia(),
+               frequency = kControl * feedback;  // rad/s
+  std::vector<double> motor, load;
+  for (std::size_t k = 0; k < data.size(); ++k) {
+    const simulation::Plant::State& now = plant.state();
+    motor.push_back(now[0]);
+    load.push_back(now[1]);
+    const double correction =
+        inertia * frequency * (frequency * (data.motor[k] - now[0]) + 2 * (data.motor_rate[k] - now[2]));
+    double start = 0;
+    for (const double end : command.pieces()) {
+      plant.set_torque(command.acting(double(k) + 0.5 * (start + end), correction));
+      plant.advance_to((double(k) + end) * h);
+      start = end;
+    }
+  }
+  load = signal::delayed(load, skew);
+  for (double& q : load) q = sensing.load_position_gain * q + calibration.encoder_offset;
+  return with_columns(data, std::move(command.torque), std::move(motor), std::move(load));
+}
+
+Eigen::VectorXd sampling_bias(const MachineFit& fit, const RecordSet& records) {
+  const Machine& machine = fit.machine;
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(fit.fit.values.size());
+  if (!simulation::load_moves_freely(machine.rig) || machine.rig.coupled || machine.deflection_only)
+    return none;
+  std::vector<ServoData> sampled;
+  try {
+    for (std::size_t i = 0; i < records.records().size(); ++i) {
+      const PreparedServo& record = records.records()[i];
+      sampled.push_back(
+          sampled_machine(machine.rig, record.data(), machine.calibrations[i], record.feedback));
+    }
+  } catch (const IntegrationError&) {
+    return none;
+  }
+  const Eigen::VectorXd rows = records.of_others(sampled).rows(machine.rig, machine.calibrations);
+  const Eigen::MatrixXd& jacobian = fit.fit.jacobian;
+  const Eigen::VectorXd unit = jacobian.colwise().norm().cwiseInverse();
+  const Eigen::MatrixXd scaled = jacobian * unit.asDiagonal();
+  return -unit.cwiseProduct(
+      signal::solve_symmetric(signal::gram(scaled), scaled.topRows(rows.size()).transpose() * rows));
+}
+
+}  // namespace backlash::identification
