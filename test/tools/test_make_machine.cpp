@@ -208,6 +208,29 @@ TEST_F(MakeMachine, EncodersHaveTheirResolution) {
   }
 }
 
+TEST_F(MakeMachine, TheLoadEncoderIsLateByTheSkew) {
+  make("--seed 9 --duration 2");
+  const Values motor = train_.motor, load = train_.load;
+  make("--seed 9 --duration 2 --skew 0.005");
+  EXPECT_EQ(train_.motor, motor);
+  for (std::size_t k = 5; k < load.size(); ++k) ASSERT_EQ(train_.load[k], load[k - 5]) << k;  // at 1 kHz
+}
+
+// The same machine with other noise: what differs is the noise of both.
+TEST_F(MakeMachine, TheNoiseHasTheAskedForColour) {
+  make("--seed 10 --duration 20 --noise 0");
+  const Values without = train_.torque;
+  make("--seed 10 --duration 20 --noise-corner 8");
+  Values noise;
+  double product = 0, square = 0;
+  for (std::size_t k = 0; k < without.size(); ++k) noise.push_back(train_.torque[k] - without[k]);
+  for (std::size_t k = 1; k < noise.size(); ++k)
+    product += noise[k] * noise[k - 1], square += noise[k] * noise[k];
+  // Of 20 s with a memory of 20 ms: about 500 independent values, so 3 % each way; twice that here.
+  EXPECT_NEAR(rms(noise) / rig("torque_noise_sd"), 1, 0.1);
+  EXPECT_NEAR(product / square, std::exp(-2 * M_PI * 8e-3), 0.01);
+}
+
 TEST_F(MakeMachine, ParametersAreNearTheDeclared) {
   for (int seed = 0; seed < 10; ++seed) {
     make("--duration 1 --seed " + std::to_string(seed));
@@ -289,6 +312,8 @@ TEST_F(MakeMachine, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(run("make_machine --seed 1 --out x --effects rust").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --friction oil").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --order -3").code, 64);
+  EXPECT_EQ(run("make_machine --seed 1 --out x --skew -0.001").code, 64);
+  EXPECT_EQ(run("make_machine --seed 1 --out x --noise-corner -1").code, 64);
   EXPECT_EQ(run("make_machine --out x").code, 64);
   EXPECT_FALSE(exists("x"));
 }

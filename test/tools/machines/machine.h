@@ -83,6 +83,8 @@ struct Sensors {
   double torque_noise = 2;                                   // N m, standard deviation
   double load_gain = 1;                                      // shown over true
   double latency = 0;                                        // s, angles are older than their stamp
+  double load_skew = 0;     // s >= 0, so much older still is that of the load
+  double noise_corner = 0;  // Hz, above which the noise of the torque falls; 0: white
 };
 
 struct Machine {

@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
   std::uint64_t seed = 0;
   std::string effects, friction, contact, out;
-  double noise = 1, noise_share = 0, duration = 30, order = 0;
+  double noise = 1, noise_share = 0, noise_corner = 0, skew = 0, duration = 30, order = 0;
   int encoder_bits = 0;
   bool dither = true;
 };
@@ -48,6 +48,8 @@ Machine draw_machine(const Options& options) {
           std::sqrt(body->inertia * body->friction.coulomb / body->friction.bristle_length);
     }
   }
+  machine.sensors.load_skew = options.skew;
+  machine.sensors.noise_corner = options.noise_corner;
   if (options.encoder_bits > 0) {  // as far apart as the declared ones
     machine.sensors.load_resolution = 2 * Random::kPi / std::ldexp(1, options.encoder_bits);
     machine.sensors.motor_resolution = machine.sensors.load_resolution / 8;
@@ -157,6 +159,8 @@ void make(const Options& options) {
                      {"contact", options.contact},
                      {"dither", options.dither},
                      {"duration", options.duration},
+                     {"noise_corner", options.noise_corner},
+                     {"encoder_skew", options.skew},
                      {"test_motion", motions.test_kind},
                      {"motor_resolution", machine.sensors.motor_resolution},
                      {"load_resolution", machine.sensors.load_resolution}}}};
@@ -184,6 +188,9 @@ bool read_options(int argc, char** argv, Options& options) {
   add("noise", po::value(&options.noise)->default_value(1), "times the torque noise of 1 to 3 N m");
   add("noise-share", po::value(&options.noise_share)->default_value(0),
       "torque noise as a share of the torque's standard deviation instead");
+  add("noise-corner", po::value(&options.noise_corner)->default_value(0),
+      "Hz, above which the torque noise falls (first order, of the same size); 0: white");
+  add("skew", po::value(&options.skew)->default_value(0), "s, by which the load encoder is late");
   add("duration", po::value(&options.duration)->default_value(30), "of a record [s]");
   add("order", po::value(&options.order)->default_value(0),
       "of every effect that is a wave over a position, per turn of the load, any number; 0: drawn");
@@ -208,6 +215,8 @@ bool read_options(int argc, char** argv, Options& options) {
   one_of("contact", options.contact, {"linear", "hertz"});
   if (!(options.duration >= 1 && options.duration <= 600)) throw po::error("--duration: 1 to 600 s");
   if (!(options.noise >= 0 && options.noise_share >= 0)) throw po::error("noise is not negative");
+  if (!(options.noise_corner >= 0)) throw po::error("--noise-corner is not negative");
+  if (!(options.skew >= 0 && options.skew < 0.1)) throw po::error("--skew: 0 to 0.1 s");
   if (!(options.order >= 0)) throw po::error("--order is not negative");
   options.dither = given.count("no-dither") == 0;
   return true;

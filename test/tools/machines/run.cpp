@@ -80,9 +80,22 @@ Travel travel_of(const Reference& reference, double duration) {
   return travel;
 }
 
+namespace {
+
+/// The row that shows what was at this step; none between two samples.
+Row* shown(std::vector<Row>& rows, std::size_t step) {
+  return step % kSteps == 0 && step / kSteps < rows.size() ? &rows[step / kSteps] : nullptr;
+}
+
+}  // namespace
+
 std::vector<Row> run(const Machine& machine, const Reference& reference, double duration) {
   const auto samples = static_cast<std::size_t>(std::lround(duration / kInterval));
-  const auto late = static_cast<std::size_t>(std::lround(machine.sensors.latency / kInterval * kSteps));
+  const auto steps = [](double time) {
+    return static_cast<std::size_t>(std::lround(time / kInterval * kSteps));
+  };
+  const std::size_t late = steps(machine.sensors.latency),
+                    load_late = late + steps(machine.sensors.load_skew);
   std::vector<Row> rows(samples);
   Plant plant(machine);
   SpeedControl control;
@@ -92,11 +105,10 @@ std::vector<Row> run(const Machine& machine, const Reference& reference, double 
         control.torque(sum(reference.speed, time), plant.motor_speed(), sum(reference.torque, time));
     rows[k].torque = torque;
     for (std::size_t i = 0; i < kSteps; ++i) {
-      const std::size_t shown = k * kSteps + i + late;  // the step at which these angles are written down
-      if (shown % kSteps == 0 && shown / kSteps < samples) {
-        rows[shown / kSteps].motor_position = plant.motor_position();
-        rows[shown / kSteps].load_position = plant.load_position() * machine.sensors.load_gain;
-      }
+      const std::size_t step = k * kSteps + i;
+      if (Row* row = shown(rows, step + late)) row->motor_position = plant.motor_position();
+      if (Row* row = shown(rows, step + load_late))
+        row->load_position = plant.load_position() * machine.sensors.load_gain;
       plant.step(torque, kInterval / kSteps);
     }
   }
@@ -104,8 +116,12 @@ std::vector<Row> run(const Machine& machine, const Reference& reference, double 
 }
 
 void measure(const Sensors& sensors, Random& random, std::vector<Row>& rows) {
+  const double memory =
+      sensors.noise_corner > 0 ? std::exp(-2 * Random::kPi * sensors.noise_corner * kInterval) : 0;
+  double noise = random.normal();
   for (Row& row : rows) {
-    row.torque += sensors.torque_noise * random.normal();
+    row.torque += sensors.torque_noise * noise;
+    noise = memory * noise + std::sqrt(1 - memory * memory) * random.normal();
     row.motor_position = std::round(row.motor_position / sensors.motor_resolution) * sensors.motor_resolution;
     row.load_position = std::round(row.load_position / sensors.load_resolution) * sensors.load_resolution;
   }
