@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "../fit/calibration.h"
+#include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "effect_roles.h"
 #include "learned.h"
 
@@ -73,6 +74,18 @@ Machine extended(Machine machine, const Candidate& candidate, const SearchContex
                   context.settings.maps);
 }
 
+Machine with_friction_again(Machine machine, const Machine& declared) {
+  for (const FitParameter& p : machine.parameters) {
+    const bool known = std::any_of(declared.parameters.begin(), declared.parameters.end(),
+                                   [&](const FitParameter& d) { return d.name == p.name; });
+    if (!known) continue;
+    const rig_file::RigParameter& friction = rig_file::servo_parameter(p.name);
+    if (friction.is_friction() && !friction.is_asymmetry() && p.get(machine.rig) <= 0)
+      p.set(machine.rig, p.get(declared.rig));
+  }
+  return machine;
+}
+
 Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, const SearchContext& context) {
   Machine machine = h.fitted->fit.machine;
   machine.rig.terms = h.declared->rig.terms;
@@ -80,6 +93,7 @@ Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, cons
   machine.priors = h.declared->priors;
   machine.has_map = false;
   machine.largest_delay = h.base->fit.machine.largest_delay;
+  if (!effects.empty()) machine = with_friction_again(std::move(machine), *h.declared);
   for (const Effect& effect : effects) machine = extended(std::move(machine), effect.candidate, context);
   return machine;
 }

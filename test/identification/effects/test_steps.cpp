@@ -53,6 +53,24 @@ TEST(Hypothesis, KeepsTheLatestReasonOfWhatIsNotInIt) {
   EXPECT_EQ(rejected_effects(before).size(), 2u);  // a value: what was made of it changes nothing
 }
 
+// So much drag that a straight line wants a dry friction far below 0, where the model no longer feels it.
+TEST(AddEffect, FrictionComesBackWithTheEffectThatHidIt) {
+  OneInertiaMachine machine;
+  machine.coulomb = 0.5;
+  machine.viscous = 0.4;
+  machine.extra = [](double, double w) { return 3 * w * std::fabs(w); };
+  const SearchBench bench{machine};
+  const Hypothesis declared = fit_declared(test::one_inertia_rig(), bench.context);
+  ASSERT_LE(declared.fitted->fit.machine.rig.motor.coulomb_friction, 0);
+  const Hypothesis h = add_effect(declared, bench.context);
+  ASSERT_EQ(ids(h), std::vector<std::string>{"quadratic_drag"});
+  const model::Rig& rig = h.fitted->fit.machine.rig;
+  // Noise of 0.05 N m in some 1000 independent samples: a few thousandths; ten times that.
+  EXPECT_NEAR(rig.motor.coulomb_friction, 0.5, 0.03);
+  EXPECT_NEAR(rig.motor.viscous_damping, 0.4, 0.05);
+  EXPECT_NEAR(rig.terms[0]->values.at("drag"), 3, 0.03);
+}
+
 TEST(Hypothesis, RefittedHasTheEffectsAsFitted) {
   const SearchBench bench{with_cogging()};
   const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
