@@ -30,17 +30,19 @@ constexpr double kLeastShare = 0.05;    // choice: of the samples in each direct
 constexpr double kStanding = 4;         // choice: standard deviations of the speed's noise
 constexpr double kSignNoise = 1e-3;     // choice: of the speed: how sharply its sign is taken
 constexpr double kSignBandwidth = 4;    // choice: but not below four times the cutoff
-constexpr double kShortest = 0.25;      // choice: of the memory: a standstill that matters
+constexpr double kReach = 0.3;          // theory: periods of its cutoff that the speed is sharp to
 constexpr std::size_t kBlocks = 30;     // choice: left out one at a time, for the errors
 constexpr double kUnsureOfNoise = 0.3;  // choice: of what noise of the acceleration makes of the inertia
 constexpr double kMuchLeft = 0.1;       // choice: relative error that is worth a warning
 
 /// What the equations need of a record.
 struct Signals {
-  double interval = 0, cutoff = 0, position_noise = 0;
-  std::vector<double> time, torque;  // torque filtered, delayed by nothing
-  Eigen::MatrixXd columns;           // a, v, sign(v), 1, filtered; all samples
-  std::vector<Eigen::Index> used;    // samples
+  double interval = 0, cutoff = 0;                // s, Hz
+  double position_noise = 0, position_error = 0;  // rad, white alone and with the rounding
+  std::vector<double> time, torque,
+      slides;  // torque as a second difference sees it; 1 where the motor slides for sure, else 0
+  Eigen::MatrixXd columns;         // a, v, sign(v), 1 where it slides, filtered; all samples
+  std::vector<Eigen::Index> used;  // samples
 };
 
 std::vector<double> second_derivative(const std::vector<double>& x, double interval) {
@@ -52,17 +54,32 @@ std::vector<double> second_derivative(const std::vector<double>& x, double inter
   return a;
 }
 
-/// Samples in standstill, widened by the memory of the filter.
-std::vector<bool> standing(const std::vector<double>& speed, double threshold, double memory) {
-  const std::size_t n = speed.size(), widen = static_cast<std::size_t>(std::ceil(memory));
-  std::vector<bool> out(n, false);
-  for (std::size_t k = 0, end; k < n; k = end) {
-    for (end = k; end < n && std::fabs(speed[end]) <= threshold;) ++end;
-    if (double(end - k) > std::max(1.0, kShortest * memory))
-      std::fill(out.begin() + (k > widen ? k - widen : 0), out.begin() + std::min(n, end + widen), true);
-    if (end == k) ++end;
-  }
-  return out;
+/// A second difference is the mean of the acceleration over two intervals with triangular weights. This is
+/// that mean of what is smooth, by Simpson's rule.
+std::vector<double> over_second_difference(const std::vector<double>& x) {
+  std::vector<double> mean = x;
+  for (std::size_t k = 1; k + 1 < x.size(); ++k) mean[k] = (x[k - 1] + 10 * x[k] + x[k + 1]) / 12;
+  return mean;
+}
+
+/// 1 where the motor moves one way over all that a sample's equation sees, `reach` samples to either side; 0
+/// where it may stand or turn, and friction take any value.
+std::vector<double> sliding(const std::vector<double>& speed, double threshold, long reach) {
+  const long n = long(speed.size());
+  std::vector<int> direction(n);
+  for (long k = 0; k < n; ++k) direction[k] = (speed[k] > threshold) - (speed[k] < -threshold);
+  std::vector<double> slides(n, 1.0);
+  for (long k = 0; k < n; ++k)
+    for (long j = std::max(0L, k - reach); j <= std::min(n - 1, k + reach); ++j)
+      if (direction[j] == 0 || direction[j] != direction[k]) slides[k] = 0;
+  return slides;
+}
+
+/// Low-passed of what shows where the motor slides: the equation is linear, so that what is left out at one
+/// moment does not reach another.
+std::vector<double> low_pass_sliding(const Signals& s, std::vector<double> x) {
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] *= s.slides[k];
+  return signal::low_pass(x, s.interval, s.cutoff);
 }
 
 void require_channels(const record::Record& record) {
@@ -97,26 +114,27 @@ Signals prepare(const record::Record& record, double cutoff) {
     throw CannotIdentify(fmt::format("{}: {:.3g} s are too short for a motion of {:.3g} Hz", record.name,
                                      double(n) * t, s.cutoff));
   s.position_noise = signal::position_noise(position);
+  // The rounding of a slow motion is no white noise, and more than what looks like it.
+  s.position_error = std::max(s.position_noise, signal::resolution(position) / std::sqrt(12.0));
   s.time = record.time;
-  s.torque = signal::low_pass(record.column(record::Channel::motor_torque), t, s.cutoff);
+  s.torque = over_second_difference(record.column(record::Channel::motor_torque));
   const std::vector<double> speed = signal::derivative(position, t);
   const double sharp_cutoff = std::clamp(speed_bandwidth(s.position_noise, speed, t),
                                          std::min(kSignBandwidth * s.cutoff, 0.4 / t), 0.4 / t);
   const std::vector<double> sharp = signal::low_pass(speed, t, sharp_cutoff);
   std::vector<double> sign(n);
   for (std::size_t k = 0; k < n; ++k) sign[k] = (sharp[k] > 0) - (sharp[k] < 0);
-  s.columns.resize(n, 4);
-  const std::vector<double> filtered[] = {signal::low_pass(second_derivative(position, t), t, s.cutoff),
-                                          signal::low_pass(speed, t, s.cutoff),
-                                          signal::low_pass(sign, t, s.cutoff)};
-  for (int i = 0; i < 3; ++i)
-    s.columns.col(i) = Eigen::Map<const Eigen::VectorXd>(filtered[i].data(), Eigen::Index(n));
-  s.columns.col(3).setOnes();
   const double threshold = kStanding * speed_noise(s.position_noise, sharp_cutoff, t);
-  const auto masked = standing(sharp, threshold, 0.5 / (s.cutoff * t));
+  s.slides = sliding(sharp, threshold, 1 + std::lround(kReach / (sharp_cutoff * t)));
+  s.columns.resize(n, 4);
+  const std::vector<double> filtered[] = {
+      low_pass_sliding(s, second_derivative(position, t)), low_pass_sliding(s, over_second_difference(speed)),
+      low_pass_sliding(s, sign), low_pass_sliding(s, std::vector<double>(n, 1))};
+  for (int i = 0; i < 4; ++i)
+    s.columns.col(i) = Eigen::Map<const Eigen::VectorXd>(filtered[i].data(), Eigen::Index(n));
   const auto end = static_cast<std::size_t>(std::ceil(1 / (s.cutoff * t)));
   for (std::size_t k = end; k + end < n; ++k)
-    if (!masked[k]) s.used.push_back(Eigen::Index(k));
+    if (s.slides[k] != 0) s.used.push_back(Eigen::Index(k));
   return s;
 }
 
@@ -146,7 +164,7 @@ void require_both_directions(const std::string& name, const Signals& s) {
 double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
   const Eigen::MatrixXd q = signal::orthonormal_basis(a);
   const auto left = [&](double delay) {
-    const Eigen::VectorXd b = picked(signal::delayed(s.torque, delay), s.used);
+    const Eigen::VectorXd b = picked(low_pass_sliding(s, signal::delayed(s.torque, delay)), s.used);
     return (b - q * (q.transpose() * b)).squaredNorm();
   };
   return boost::math::tools::brent_find_minima(left, -kLargestDelay, kLargestDelay, kDelayBits).first;
@@ -155,7 +173,7 @@ double best_delay(const Signals& s, const Eigen::MatrixXd& a) {
 /// The delay is one more column: what the torque would gain by one sample of it.
 Eigen::MatrixXd with_delay_column(const Signals& s, const Eigen::MatrixXd& a, double delay) {
   Eigen::MatrixXd all(a.rows(), a.cols() + 1);
-  all << a, picked(signal::derivative(signal::delayed(s.torque, delay), 1), s.used);
+  all << a, picked(low_pass_sliding(s, signal::derivative(signal::delayed(s.torque, delay), 1)), s.used);
   return all;
 }
 
@@ -174,8 +192,8 @@ struct Solution {
 
 /// White noise of the position, differentiated twice up to the cutoff: the square of the gain (2 pi f)^2
 /// integrated.
-double acceleration_noise(const Signals& s) {
-  return s.position_noise * std::pow(2 * M_PI * s.cutoff, 2) * std::sqrt(2 * s.cutoff * s.interval / 5);
+double acceleration_noise(const Signals& s, double position_noise) {
+  return position_noise * std::pow(2 * M_PI * s.cutoff, 2) * std::sqrt(2 * s.cutoff * s.interval / 5);
 }
 
 /// Fitted minus true values that the noise of the acceleration makes, which is known and not correlated with
@@ -184,7 +202,7 @@ double acceleration_noise(const Signals& s) {
 Eigen::VectorXd noise_bias(const Signals& s, const Eigen::MatrixXd& a, const signal::LeastSquaresFit& fit) {
   const Eigen::VectorXd unit = a.colwise().norm().cwiseInverse();
   Eigen::MatrixXd normal = signal::gram(Eigen::MatrixXd(a * unit.asDiagonal()));
-  const double noise = double(a.rows()) * std::pow(acceleration_noise(s) * unit[0], 2);
+  const double noise = double(a.rows()) * std::pow(acceleration_noise(s, s.position_error) * unit[0], 2);
   normal(0, 0) -= noise;
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(a.cols());
   gradient[0] = -noise * fit.values[0] / unit[0];
@@ -194,7 +212,7 @@ Eigen::VectorXd noise_bias(const Signals& s, const Eigen::MatrixXd& a, const sig
 Solution solve(const Signals& s, const Eigen::MatrixXd& a, double delay, bool estimated) {
   Solution out;
   out.delay = delay;
-  out.fit = signal::fit_linear(a, picked(signal::delayed(s.torque, delay), s.used));
+  out.fit = signal::fit_linear(a, picked(low_pass_sliding(s, signal::delayed(s.torque, delay)), s.used));
   const Eigen::MatrixXd all = estimated ? with_delay_column(s, a, delay) : a;
   out.error = signal::jackknife_covariance(all, out.fit.residuals, block_of_rows(s)).diagonal().cwiseSqrt();
   out.error *=
@@ -211,7 +229,7 @@ Solution solve(const Signals& s, const Eigen::MatrixXd& a, double delay, bool es
 double floor_of(const record::Record& record, const Signals& s, double inertia, double torque_size) {
   const double left = signal::noise_after_low_pass(s.interval, s.cutoff);
   const double torque = signal::white_noise(record.column(record::Channel::motor_torque)) * left;
-  return std::hypot(torque, inertia * acceleration_noise(s)) / torque_size;
+  return std::hypot(torque, inertia * acceleration_noise(s, s.position_noise)) / torque_size;
 }
 
 double spread(const Eigen::VectorXd& values) {
@@ -269,7 +287,8 @@ double relative_error(const OneInertia& machine, const record::Record& recorded)
   const record::Record record = record::evenly_sampled(recorded);
   const Signals s = prepare(record, machine.cutoff);
   if (s.used.size() < 2) throw CannotIdentify(record.name + ": stands still");
-  const Eigen::VectorXd torque = picked(signal::delayed(s.torque, machine.delay.value / s.interval), s.used);
+  const Eigen::VectorXd torque =
+      picked(low_pass_sliding(s, signal::delayed(s.torque, machine.delay.value / s.interval)), s.used);
   const Eigen::Vector4d p(machine.inertia.value, machine.viscous.value, machine.coulomb.value,
                           machine.offset.value);
   const Eigen::VectorXd residual = torque - picked(s.columns, s.used) * p;
