@@ -34,8 +34,9 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
     return fmt::format("on the unseen record it explains {:.2g} % of what {} has above the noise: too little",
                        100 * decrease / above, name);
   if (is.total() < settings.below_noise * is.noise)
-    return fmt::format("on the unseen record it leaves less of {} than noise does: it explains the noise",
-                       name);
+    return fmt::format(
+        "on the unseen record it leaves {:.2g} times of {} what noise does: it explains the noise",
+        std::sqrt(is.total() / is.noise), name);
   if (before.deflection.empty()) return "";
   const TestGain other =
       test_gain(left(before, !deflection, settings), left(after, !deflection, settings), settings);

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/spectrum.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 
@@ -21,10 +22,17 @@ double low_pass_gain(double frequency, double cutoff, double interval) {
   return 1 / (1 + std::pow(std::tan(M_PI * frequency * interval) / std::tan(M_PI * cutoff * interval), 8));
 }
 
+/// Not more than the median of fourth differences tells: the spectrum ends in noise where a signal is sampled
+/// fast; where it is not, the motion after a reversal reaches to its end, which that median hardly feels.
+double by_median(const std::vector<double>& values, double spectral) {
+  const double median = signal::noise_from_differences(values, 4);
+  return median > 0 ? std::min(spectral, median) : spectral;
+}
+
 double noise_deviation(const std::vector<double>& position) {
   const double step = signal::resolution(position);
-  return step > 0 ? std::max(step / std::sqrt(12.0), signal::white_noise(position))
-                  : signal::position_noise(position);
+  return step > 0 ? std::max(step / std::sqrt(12.0), by_median(position, signal::white_noise(position)))
+                  : by_median(position, signal::position_noise(position));
 }
 
 /// Variance per line of the load position's noise at (i + 1/2) / (2 lines interval): white beyond the
@@ -77,7 +85,7 @@ NoiseFloors noise_floors(const model::Rig& rig, const ServoData& data, const std
       free ? load_noise(data, load) : std::vector<double>(data.size() / 2, 0.0);
   const double lines = double(load_power.size());
   const double motor_power = std::pow(noise_deviation(data.motor), 2) / lines,
-               torque_power = std::pow(signal::white_noise(data.torque), 2) / lines;
+               torque_power = std::pow(by_median(data.torque, signal::white_noise(data.torque)), 2) / lines;
   double torque = 0, deflection = 0;
   for (std::size_t i = 0; i < load_power.size(); ++i) {
     const double f = 0.5 * (double(i) + 0.5) / (lines * data.interval);
