@@ -63,7 +63,10 @@ class Diagnoser:
         Diagnoser._count += 1
         self.name = "/diagnoser_%d" % Diagnoser._count
         self._folder = tempfile.TemporaryDirectory()
-        for key, value in {"folder": self._folder.name, **(parameters or {})}.items():
+        defaults = {"folder": self._folder.name}
+        if "TSAN_OPTIONS" in os.environ:
+            defaults["job_memory"] = 1e6  # GB: ThreadSanitizer maps 34 TB when a job starts
+        for key, value in {**defaults, **(parameters or {})}.items():
             rospy.set_param("%s/%s" % (self.name, key), value)
         program = roslib.packages.find_node(PACKAGE, "diagnoser")[0]
         self._log = tempfile.TemporaryFile(mode="w+")
