@@ -80,7 +80,8 @@ Machine with_friction_again(Machine machine, const Machine& declared) {
                                    [&](const FitParameter& d) { return d.name == p.name; });
     if (!known) continue;
     const rig_file::RigParameter& friction = rig_file::servo_parameter(p.name);
-    if (friction.is_friction() && !friction.is_asymmetry() && p.get(machine.rig) <= 0)
+    if (friction.kind == rig_file::ParameterKind::coulomb_friction && !friction.is_asymmetry() &&
+        p.get(machine.rig) <= 0)
       p.set(machine.rig, p.get(declared.rig));
   }
   return machine;

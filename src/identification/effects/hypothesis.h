@@ -57,7 +57,7 @@ Hypothesis with_rejected(Hypothesis h, const std::string& effect, const std::str
 /// All effects that were rejected and are not in it after all, each with the latest reason.
 std::vector<RejectedEffect> rejected_effects(const Hypothesis& h);
 
-/// Friction that came out at or below 0 without an effect is where the model no longer feels it: with the
+/// Dry friction that came out at or below 0 without an effect is where the model no longer feels it: with the
 /// effect its fit starts at the declared value again.
 Machine with_friction_again(Machine machine, const Machine& declared);
 
