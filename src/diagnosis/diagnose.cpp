@@ -35,6 +35,7 @@ LostMotionSettings read_lost_motion(const YamlReader& yaml) {
   lost_motion.torque = yaml.number("torque", Range::positive());
   lost_motion.subtract_elastic_deflection =
       yaml.choice("elastic_deflection", {"included", "subtracted"}) == "subtracted";
+  lost_motion.elastic_uncertainty = yaml.number_or("elastic_uncertainty", kNaN, Range::not_negative());
   return lost_motion;
 }
 
@@ -103,7 +104,6 @@ DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
   if (const auto apd = yaml.optional_map("apd")) settings.apd = read_apd(*apd);
   if (const auto lost_motion = yaml.optional_map("lost_motion"))
     settings.lost_motion = read_lost_motion(*lost_motion);
-  if (settings.lost_motion) settings.lost_motion->elastic_uncertainty = 2 * settings.stiffness_uncertainty;
   if (const auto coherence = yaml.optional_map("coherence")) settings.coherence = read_coherence(*coherence);
   if (const auto limits = yaml.optional_map("limits")) settings.limits = read_limits(*limits);
   return settings;
