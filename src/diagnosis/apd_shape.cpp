@@ -8,8 +8,11 @@ namespace {
 
 Estimate answer(const FamilyMatch& match, const MonitoringCurve& curve, std::size_t periods) {
   Estimate estimate;
-  estimate.message = fmt::format("rms distance {:.3g} from the nearest distribution of {} over {} period(s)",
-                                 match.misfit, curve.conditions.rig, periods);
+  estimate.message = fmt::format(
+      "rms distance {:.3g} from the nearest distribution of {} over {} period(s), simulated records were "
+      "within "
+      "{:.3g}",
+      match.misfit, curve.conditions.rig, periods, match.usual_misfit);
   const double span = curve.points.back().backlash - curve.points.front().backlash;
   estimate.lower = match.lower;
   if (!match.touches_end) estimate.upper = match.upper;

@@ -242,7 +242,7 @@ CurveMatch match_curve(const record::Record& record, const ApdResult& apd, const
   if (match.family->fits_no_member()) {
     const std::string reason = fmt::format(
         "the distribution is {:.3g} (rms) from the nearest of {}, simulated records were within {:.3g}: the "
-        "machine does something that the rig does not contain",
+        "machine does something that the rig does not contain, or has other values than the rig file",
         match.family->misfit, curve->conditions.rig, match.family->usual_misfit);
     match.mismatch = Mismatch{Mismatch::Concern::curve, reason};
     match.refused = refuse(Status::out_of_domain, reason);

@@ -37,12 +37,12 @@ void read(const YamlReader& yaml, const char* value_key, const char* interval_ke
 
 Baseline baseline_of(const Diagnosis& diagnosis, const std::string& rig, const std::string& rig_digest) {
   const Verdict& verdict = diagnosis.verdict;
+  if (!verdict.dissenters.empty())
+    throw BadData(rig, "no baseline, the estimates contradict each other: " + verdict.message);
   // An open or missing interval does not tell how sure the baseline is.
   if (!std::isfinite(verdict.backlash_angle) || !std::isfinite(verdict.angle_lower) ||
       !std::isfinite(verdict.angle_upper))
     throw BadData(rig, "no baseline, there is no value with an interval: " + verdict.message);
-  if (!verdict.dissenters.empty())
-    throw BadData(rig, "no baseline, the estimates contradict each other: " + verdict.message);
   Baseline baseline;
   baseline.rig = rig;
   baseline.rig_digest = rig_digest;

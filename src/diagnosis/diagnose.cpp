@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/apd_shape.h"
+#include "backlash_diagnosis/diagnosis/declared_lock.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 
 namespace backlash::diagnosis {
@@ -34,17 +35,39 @@ LostMotionSettings read_lost_motion(const YamlReader& yaml) {
   lost_motion.torque = yaml.number("torque", Range::positive());
   lost_motion.subtract_elastic_deflection =
       yaml.choice("elastic_deflection", {"included", "subtracted"}) == "subtracted";
+  lost_motion.elastic_uncertainty = yaml.number_or("elastic_uncertainty", kNaN, Range::not_negative());
   return lost_motion;
+}
+
+Estimate not_locked(const std::string& reason) {
+  Estimate estimate;
+  estimate.status = Status::out_of_domain;
+  estimate.message = reason;
+  return estimate;
+}
+
+/// What the rig file says of a locked output; checks nothing where the output is free or no limits are given.
+DeclaredLock declared_lock(const DiagnosisSettings& settings) {
+  DeclaredLock lock;
+  const auto& rig = settings.position_difference;
+  if (!rig || !rig->output_locked || !settings.limits) return lock;
+  lock.elastic_deflection = rig->elastic_deflection;
+  lock.play = settings.limits->angular ? settings.limits->stop : settings.limits->stop / rig->base_radius;
+  return lock;
 }
 
 template <Estimate (*Estimator)(const ApdResult&, const CurveMatch&, const MonitoringCurve*)>
 Estimate by_apd(const DiagnosisInput& in) {
   if (!in.settings.apd) return not_served("the rig file declares no diagnosis.apd");
-  return Estimator(*in.apd, in.match, in.curve);
+  Estimate estimate =
+      in.lock_contradicted ? not_locked(*in.lock_contradicted) : Estimator(*in.apd, in.match, in.curve);
+  estimate.witness = "distribution";
+  return estimate;
 }
 
 Estimate by_lost_motion(const DiagnosisInput& in) {
   if (!in.settings.lost_motion) return not_served("the rig file declares no diagnosis.lost_motion");
+  if (in.lock_contradicted) return not_locked(*in.lock_contradicted);
   return estimate_lost_motion(in.record, *in.settings.lost_motion);
 }
 
@@ -55,6 +78,7 @@ Estimate by_position_difference(const DiagnosisInput& in) {
 
 Estimate by_momentum_transfer(const DiagnosisInput& in) {
   if (!in.settings.momentum_transfer) return not_served("the rig tells no inertia to go by");
+  if (in.lock_contradicted) return not_locked(*in.lock_contradicted);
   return estimate_momentum_transfer(in.record, *in.settings.momentum_transfer);
 }
 
@@ -80,7 +104,6 @@ DiagnosisSettings read_diagnosis_settings(const YamlReader& yaml) {
   if (const auto apd = yaml.optional_map("apd")) settings.apd = read_apd(*apd);
   if (const auto lost_motion = yaml.optional_map("lost_motion"))
     settings.lost_motion = read_lost_motion(*lost_motion);
-  if (settings.lost_motion) settings.lost_motion->elastic_uncertainty = 2 * settings.stiffness_uncertainty;
   if (const auto coherence = yaml.optional_map("coherence")) settings.coherence = read_coherence(*coherence);
   if (const auto limits = yaml.optional_map("limits")) settings.limits = read_limits(*limits);
   return settings;
@@ -136,7 +159,8 @@ Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings
   CurveMatch match;
   if (settings.apd) match = match_curve(record, *diagnosis.apd, *settings.apd, curve);
   diagnosis.mismatch = match.mismatch;
-  const DiagnosisInput input{record, settings, curve, diagnosis.apd, match};
+  const DiagnosisInput input{record,        settings, curve,
+                             diagnosis.apd, match,    lock_contradicted(record, declared_lock(settings))};
   for (const DiagnosisMethod& each : diagnosis_method_table()) {
     if (!method.empty() && method != each.name) continue;
     diagnosis.estimates.push_back(

@@ -33,7 +33,8 @@ bool is_event(const std::string& text) {
 }
 
 bool is_grade(const std::string& text) {
-  for (const Grade grade : {Grade::good, Grade::watch, Grade::service, Grade::stop, Grade::cannot_tell})
+  for (const Grade grade :
+       {Grade::good, Grade::watch, Grade::service, Grade::stop, Grade::ungraded, Grade::cannot_tell})
     if (text == to_string(grade)) return true;
   return false;
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "backlash_diagnosis/base/text.h"
@@ -45,38 +46,69 @@ bool sharper(const Estimates& all, int a, int b) {
   return a < b;
 }
 
-/// Whether the verdict should use set `a` instead of set `b`: it is larger, or equally large with narrower
-/// intervals. Both sorted.
-bool better(const Estimates& all, const Set& a, const Set& b) {
-  if (a.size() != b.size()) return a.size() > b.size();
-  for (std::size_t i = 0; i < a.size(); ++i)
-    if (width(all[a[i]]) != width(all[b[i]])) return width(all[a[i]]) < width(all[b[i]]);
-  return false;
+/// The highest lower end among them is common to intervals on a line that overlap in pairs.
+bool share_a_point(const Estimates& all, const Set& set) {
+  double lower = 0, least_upper = kInfinity;
+  for (const int i : set) {
+    lower = std::max(lower, all[i].angle_lower);
+    least_upper = std::min(least_upper, upper(all[i]));
+  }
+  return lower <= least_upper;
 }
 
-/// All largest sets of sound estimates whose intervals share a point, the best one first. Intervals on a line
-/// that overlap in pairs share a point, and the highest lower end among them is one. Estimates without
-/// interval agree with nobody and count only where there is nothing else.
-std::vector<Set> agreeing_sets(const Estimates& all) {
-  std::vector<Set> sets;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!is_sound(all[i]) || !has_interval(all[i])) continue;
-    const double point = all[i].angle_lower;
-    Set set;
-    for (std::size_t k = 0; k < all.size(); ++k)
-      if (is_sound(all[k]) && all[k].angle_lower <= point && point <= upper(all[k]))
-        set.push_back(static_cast<int>(k));
-    std::sort(set.begin(), set.end(), [&all](int a, int b) { return sharper(all, a, b); });
-    if (std::find(sets.begin(), sets.end(), set) == sets.end()) sets.push_back(set);
-  }
-  if (sets.empty()) {
+template <typename Keep>
+Set filtered(const Set& set, Keep keep) {
+  Set kept;
+  std::copy_if(set.begin(), set.end(), std::back_inserter(kept), keep);
+  return kept;
+}
+
+bool same_witness(const Estimate& a, const Estimate& b) {
+  return &a == &b || (!a.witness.empty() && a.witness == b.witness);
+}
+
+/// Without those whose witness contradicts itself, unless no other witness is there.
+Set consistent(const Estimates& all, const Set& sound) {
+  Set kept = filtered(sound, [&](int i) {
+    return share_a_point(all, filtered(sound, [&](int k) { return same_witness(all[i], all[k]); }));
+  });
+  return kept.empty() ? sound : kept;
+}
+
+/// Who the verdict stands on, and why the others do not count.
+struct Choice {
+  Set members, dissenters;
+  std::string reason;  // of the choice, where there are dissenters
+};
+
+/// See combine(). Estimates without interval agree with nobody and count only where there is nothing else.
+Choice choose(const Estimates& all) {
+  Choice choice;
+  Set sound;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (is_sound(all[i]) && has_interval(all[i])) sound.push_back(static_cast<int>(i));
+  if (sound.empty()) {
     const auto blind = std::find_if(all.begin(), all.end(), is_sound);
-    if (blind != all.end()) sets.push_back({static_cast<int>(blind - all.begin())});
+    if (blind != all.end()) choice.members = {static_cast<int>(blind - all.begin())};
+    return choice;
   }
-  std::stable_sort(sets.begin(), sets.end(),
-                   [&all](const Set& a, const Set& b) { return better(all, a, b); });
-  while (sets.size() > 1 && sets.back().size() < sets.front().size()) sets.pop_back();
-  return sets;
+  choice.members = consistent(all, sound);
+  if (choice.members.size() < sound.size()) choice.reason = "what rests on the same contradicts itself";
+  if (!share_a_point(all, choice.members)) {
+    const Set measured = filtered(choice.members, [&](int i) { return all[i].from_record; });
+    choice.reason = "the record itself shows what the others take from the rig file: is it this machine's?";
+    if (measured.empty() || !share_a_point(all, measured)) {
+      choice.members.clear();
+      choice.reason = "nothing on the record tells who is right";
+    } else {
+      choice.members = measured;
+    }
+  }
+  choice.dissenters = filtered(sound, [&](int i) {
+    return std::find(choice.members.begin(), choice.members.end(), i) == choice.members.end();
+  });
+  std::sort(choice.members.begin(), choice.members.end(), [&](int a, int b) { return sharper(all, a, b); });
+  return choice;
 }
 
 /// A value with its interval; NaN where not known, an open end is infinite.
@@ -141,8 +173,9 @@ Amount growth_since(const Baseline& b, const Amount& now, bool angular) {
     return {kNaN, now.lower - up, kInfinity};
   }
   const double growth = now.value - then.value;
-  return {growth, growth - std::hypot(now.value - now.lower, then.upper - then.value),
-          growth + std::hypot(now.upper - now.value, then.value - then.lower)};
+  const auto apart = [](double a, double b) { return std::isnan(a - b) ? 0 : a - b; };  // not told: exact
+  return {growth, growth - std::hypot(now.value - now.lower, apart(then.upper, then.value)),
+          growth + std::hypot(now.upper - now.value, apart(then.value, then.lower))};
 }
 
 /// A verdict in the making.
@@ -150,9 +183,8 @@ struct Judge {
   const Estimates& all;
   const std::optional<Limits>& limits;
   const std::optional<Baseline>& baseline;
-  Set members, dissenters;
-  bool undecided = false;  // contradiction without arbiter
-  bool angular = false;    // what is graded and shown
+  const Choice choice;
+  bool angular = false;  // what is graded and shown
   Amount now, growth;
 
   const char* unit() const { return angular ? " rad" : " m"; }
@@ -163,68 +195,53 @@ struct Judge {
     return std::isfinite(level(g)) ? g : a;
   }
 
-  void choose(const std::vector<Set>& sets) {
-    members = sets.front();
-    // Sets of one size that share the sharpest member are no contradiction: the members' order decides.
-    for (const Set& other : sets)
-      undecided |= std::find(other.begin(), other.end(), members.front()) == other.end();
-    if (undecided)
-      members = *std::max_element(sets.begin(), sets.end(), [this](const Set& a, const Set& b) {
-        return level(combination(all, a, true)) < level(combination(all, b, true));
-      });
-    for (std::size_t i = 0; i < all.size(); ++i)
-      if (is_sound(all[i]) && has_interval(all[i]) &&
-          std::find(members.begin(), members.end(), static_cast<int>(i)) == members.end())
-        dissenters.push_back(static_cast<int>(i));
+  /// The worst grade that the interval reaches. An interval that is not known may reach all.
+  Grade worst() const {
+    const double up = graded(now).upper;
+    return grade_of(std::isnan(up) ? kInfinity : up, *limits);
   }
 
-  /// The combination, widened to hold the dissenters where none can say who is right.
-  Amount amount(bool in_angles) const {
-    Amount a = combination(all, members, in_angles);
-    if (!undecided) return a;
-    for (const int i : dissenters) {
-      const Amount other = amount_of(all[i], in_angles);
-      a.lower = std::fmin(a.lower, other.lower);
-      a.upper = std::fmax(a.upper, other.upper);
-    }
-    return a;
+  Grade best() const {
+    const double low = graded(now).lower;
+    return grade_of(std::isnan(low) ? 0 : low, *limits);
   }
 
   Grade grade() const {
-    const Amount g = graded(combination(all, members, angular));
+    const Amount g = graded(now);
     if (!std::isfinite(level(g))) return Grade::cannot_tell;
     const bool bound = std::isnan(g.value);
-    if (!limits) return bound || undecided ? Grade::cannot_tell : Grade::good;
-    const Grade by_limits = grade_of(level(g), *limits);
-    return bound && by_limits == Grade::good ? Grade::cannot_tell : by_limits;
+    if (!limits) return bound ? Grade::cannot_tell : Grade::ungraded;
+    const Grade by_value = grade_of(level(g), *limits);
+    if (by_value != Grade::good || worst() == Grade::good) return by_value;
+    return bound ? Grade::cannot_tell : Grade::watch;
   }
 
-  /// The worse grade that the interval reaches into, if any.
-  std::string not_excluded(Grade given) const {
-    if (!limits || given == Grade::cannot_tell) return {};
-    const Grade worst = grade_of(graded(now).upper, *limits);
-    return worst > given ? std::string(", but ") + to_string(worst) + " cannot be excluded" : std::string();
+  /// The other grades that the interval reaches into.
+  std::string may_be(Grade given) const {
+    if (given == Grade::ungraded) return " (no limits are given)";
+    if (given == Grade::cannot_tell) return {};
+    std::string others;
+    if (best() < given) others = to_string(best());
+    if (worst() > given) others += (others.empty() ? "" : " or ") + std::string(to_string(worst()));
+    return others.empty() ? others : ", may be " + others;
   }
 
-  std::string contradictions(Grade given) const {
+  std::string contradictions() const {
     std::vector<std::string> parts;
-    for (const int i : dissenters) {
+    for (const int i : choice.dissenters) {
       const Amount a = amount_of(all[i], angular);
       std::string part = all[i].method + " " + shown(a, unit());
-      if (limits && !undecided && grade_of(level(graded(a)), *limits) > given)
-        part += std::string(", ") + to_string(grade_of(level(graded(a)), *limits)) + " by itself";
+      if (limits) part += std::string(", ") + to_string(grade_of(level(graded(a)), *limits)) + " by itself";
       parts.push_back(part);
     }
-    if (parts.empty()) return {};
-    const std::string who = "; disagree: " + joined(parts);
-    return undecided ? who + "; nothing tells who is right, graded by the larger" : who;
+    return parts.empty() ? std::string() : "; disagree: " + joined(parts) + "; " + choice.reason;
   }
 
   std::string since_baseline() const {
     if (!baseline || !std::isfinite(level(growth))) return {};
     std::string text = ", grown by " + shown(growth, unit()) + " since the baseline";
     const auto& then = baseline->methods;
-    const bool shared = std::any_of(members.begin(), members.end(), [&](int i) {
+    const bool shared = std::any_of(choice.members.begin(), choice.members.end(), [&](int i) {
       return std::find(then.begin(), then.end(), all[i].method) != then.end();
     });
     return then.empty() || shared ? text : text + " (by other methods: " + joined(then) + ")";
@@ -236,7 +253,8 @@ double closed(double end) {
 }
 
 void put(Verdict& verdict, const Judge& judge) {
-  const Amount length = judge.amount(false), angle = judge.amount(true);
+  const Amount length = combination(judge.all, judge.choice.members, false),
+               angle = combination(judge.all, judge.choice.members, true);
   verdict.backlash = length.value;
   verdict.lower = closed(length.lower);
   verdict.upper = closed(length.upper);
@@ -269,6 +287,8 @@ const char* to_string(Grade grade) {
       return "service";
     case Grade::stop:
       return "stop";
+    case Grade::ungraded:
+      return "ungraded";
     case Grade::cannot_tell:
       break;
   }
@@ -277,26 +297,29 @@ const char* to_string(Grade grade) {
 
 Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limits>& limits,
                 const std::optional<Baseline>& baseline) {
-  const std::vector<Set> sets = agreeing_sets(estimates);
-  if (sets.empty()) return nothing_sound(estimates);
-  Judge judge{estimates, limits, baseline, {}, {}, false, false, {}, {}};
-  judge.choose(sets);
-  judge.angular = limits ? limits->angular : std::isnan(level(combination(estimates, judge.members, false)));
-  judge.now = judge.amount(judge.angular);
-  if (baseline) judge.growth = growth_since(*baseline, judge.now, judge.angular);
+  Judge judge{estimates, limits, baseline, choose(estimates), false, {}, {}};
+  const auto& [members, dissenters, reason] = judge.choice;
+  if (members.empty() && dissenters.empty()) return nothing_sound(estimates);
+  const Set& shown_ones = members.empty() ? dissenters : members;
+  judge.angular = limits ? limits->angular : std::isnan(level(combination(estimates, shown_ones, false)));
   Verdict verdict;
-  verdict.members = judge.members;
-  verdict.dissenters = judge.dissenters;
-  verdict.estimate = judge.members.front();
-  verdict.agreement = !judge.dissenters.empty()  ? "disagree: " + names(estimates, judge.dissenters)
-                      : judge.members.size() > 1 ? "agree"
-                                                 : "single";
+  verdict.members = members;
+  verdict.dissenters = dissenters;
+  verdict.agreement = !dissenters.empty()  ? "disagree: " + names(estimates, dissenters)
+                      : members.size() > 1 ? "agree"
+                                           : "single";
+  if (members.empty()) {
+    verdict.message = "cannot tell" + judge.contradictions();
+    return verdict;
+  }
+  verdict.estimate = members.front();
+  judge.now = combination(estimates, members, judge.angular);
+  if (baseline) judge.growth = growth_since(*baseline, judge.now, judge.angular);
   put(verdict, judge);
   verdict.grade = judge.grade();
-  verdict.message = std::string(to_string(verdict.grade)) + judge.not_excluded(verdict.grade) +
-                    ": backlash " + shown(judge.now, judge.unit()) + " by " +
-                    names(estimates, judge.members) + judge.since_baseline() +
-                    judge.contradictions(verdict.grade);
+  verdict.message = std::string(to_string(verdict.grade)) + judge.may_be(verdict.grade) + ": backlash " +
+                    shown(judge.now, judge.unit()) + " by " + names(estimates, members) +
+                    judge.since_baseline() + judge.contradictions();
   return verdict;
 }
 

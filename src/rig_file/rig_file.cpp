@@ -7,20 +7,38 @@
 #include "backlash_diagnosis/base/digest.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
+#include "backlash_diagnosis/rig_file/declared_uncertainty.h"
 #include "default_rig.h"
 
 namespace backlash::rig_file {
 namespace {
 
+/// Where the file does not say how well it knows the elastic deflection that lost_motion subtracts. A mesh of
+/// angles is one spring with all that is merged into it, of the stated uncertainty.
+double default_uncertainty(const model::Rig& rig, const model::GearTrain& train,
+                           const diagnosis::DiagnosisSettings& settings) {
+  if (rig.mesh.angular())
+    return settings.stiffness_uncertainty > 0 ? 2 * settings.stiffness_uncertainty
+                                              : DeclaredUncertainty::kCoupling;
+  const double torque = settings.lost_motion->torque, all = train.elastic_deflection(torque);
+  const double coupling = rig.input_coupling.rigid ? 0 : torque / rig.input_coupling.stiffness;
+  return elastic_uncertainty(coupling, std::fmax(0, all - coupling));
+}
+
 /// What the estimators need to know of the rig.
 void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings) {
   const auto train = std::make_shared<model::GearTrain>(rig);  // refuses what cannot move
-  if (rig.mesh.rigid) return;                                  // nothing that could have play
+  if (rig.mesh.rigid) {                                        // nothing that could have play
+    if (settings.lost_motion) settings.lost_motion->elastic_uncertainty = 0;
+    return;
+  }
   const auto deflection = [train](double torque) { return train->elastic_deflection(torque); };
   const double base_radius = rig.mesh.angular() ? kNaN : 1 / rig.backlash_angle(1);
   if (settings.lost_motion) {
     settings.lost_motion->elastic_deflection = deflection;
     settings.lost_motion->base_radius = base_radius;
+    if (std::isnan(settings.lost_motion->elastic_uncertainty))
+      settings.lost_motion->elastic_uncertainty = default_uncertainty(rig, *train, settings);
   }
   const model::Coupling& coupling = rig.input_coupling;
   const double motor = rig.motor.inertia + 0.5 * coupling.inertia;
@@ -48,6 +66,13 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
 }
 
 }  // namespace
+
+double elastic_uncertainty(double coupling, double flank) {
+  using Known = DeclaredUncertainty;
+  const double softest = std::pow(Known::kContactFactor, 2.0 / 3) - 1;  // theory: Hertz
+  const double all = coupling + flank;
+  return all > 0 ? (Known::kCoupling * coupling + softest * flank) / all : 0;
+}
 
 RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   const YamlReader yaml = YamlReader::from_text(text, source);

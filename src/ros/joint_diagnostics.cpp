@@ -19,6 +19,7 @@ constexpr double kAnotherTime = 3600;  // s: stamps so old or new are of a recor
 unsigned char level_of(diagnosis::Grade grade) {
   switch (grade) {
     case diagnosis::Grade::good:
+    case diagnosis::Grade::ungraded:
       return DiagnosticStatus::OK;
     case diagnosis::Grade::watch:
       return DiagnosticStatus::WARN;

@@ -65,7 +65,7 @@ Command command() {
       "diagnose_record new.csv --rig rig.yaml --save-baseline healthy.yaml --json new.json",
       "diagnose_record old.csv --rig rig.yaml --baseline healthy.yaml --json old.json"};
   c.exit_codes =
-      "  0   healthy\n"
+      "  0   healthy, or ungraded: no limits are given\n"
       "  1   watch\n"
       "  2   fault found: service or stop\n"
       "  3   inconclusive: the estimates cannot tell, or not well enough for --save-baseline\n";
@@ -75,6 +75,7 @@ Command command() {
 int exit_code(diagnosis::Grade grade) {
   switch (grade) {
     case diagnosis::Grade::good:
+    case diagnosis::Grade::ungraded:
       return kHealthy;
     case diagnosis::Grade::watch:
       return kWatch;

@@ -125,19 +125,25 @@ TEST(Verdict, AMemberThatKnowsNoLengthSaysNothingOfLengths) {
   EXPECT_EQ(v.grade, Grade::good);
 }
 
-TEST(Verdict, SaysWhatTheIntervalDoesNotExclude) {
+TEST(Verdict, GradesByTheWholeInterval) {
   EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.05e-4)}), "good: "));
-  EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.2e-4)}), "good, but watch cannot be excluded: "));
-  EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.7e-4)}), "good, but service cannot be excluded: "));
-  EXPECT_TRUE(mentions(combined({ok("m", 1.6e-4, 0.5e-4)}), "service, but stop cannot be excluded: "));
-  EXPECT_TRUE(mentions(combined({ok("m", 3e-4, 1e-4)}), "stop: "));
-  EXPECT_TRUE(mentions(combined({at_least("m", 1.2e-4)}), "watch, but stop cannot be excluded: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.2e-4)}), "watch, may be good: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 0.9e-4, 0.7e-4)}), "watch, may be good or service: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 1.2e-4, 0.25e-4)}), "watch, may be good: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 1.6e-4, 0.5e-4)}), "service, may be watch or stop: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 3e-4, 0.9e-4)}), "stop: "));
+  EXPECT_TRUE(mentions(combined({ok("m", 3e-4, 1.2e-4)}), "stop, may be service: "));
+  EXPECT_TRUE(mentions(combined({at_least("m", 1.2e-4)}), "watch, may be stop: "));
+  Estimate blind = ok("blind", 5e-5, 1e-6);  // nothing says that it is good
+  blind.lower = blind.upper = blind.angle_lower = blind.angle_upper = kNaN;
+  EXPECT_TRUE(mentions(combined({blind}), "watch, may be good or stop: "));
 }
 
 TEST(Verdict, GradesAtTheLimits) {
   const std::vector<std::pair<double, Grade>> cases = {
-      {0, Grade::good},         {0.999e-4, Grade::good},   {1e-4, Grade::watch}, {1.49e-4, Grade::watch},
-      {1.5e-4, Grade::service}, {1.99e-4, Grade::service}, {2e-4, Grade::stop},  {1, Grade::stop}};
+      {0, Grade::good},          {0.989e-4, Grade::good}, {0.991e-4, Grade::watch},  // + 1e-6
+      {1e-4, Grade::watch},      {1.49e-4, Grade::watch}, {1.5e-4, Grade::service},
+      {1.99e-4, Grade::service}, {2e-4, Grade::stop},     {1, Grade::stop}};
   for (const auto& [value, grade] : cases) {
     const Verdict v = combined({ok("m", value, 1e-6)});
     EXPECT_EQ(v.grade, grade) << value;
@@ -146,54 +152,67 @@ TEST(Verdict, GradesAtTheLimits) {
   }
 }
 
-TEST(Verdict, WithoutLimitsASoundEstimateIsGood) {
-  EXPECT_EQ(combined({ok("m", 1, 0.1)}, std::nullopt).grade, Grade::good);
+TEST(Verdict, WithoutLimitsNothingIsGraded) {
+  const Verdict v = combined({ok("m", 1, 0.1)}, std::nullopt);
+  EXPECT_EQ(v.grade, Grade::ungraded);
+  EXPECT_EQ(v.backlash, 1);
+  EXPECT_TRUE(mentions(v, "ungraded (no limits are given): backlash 1 m")) << v.message;
   EXPECT_EQ(combined({at_least("m", 1)}, std::nullopt).grade, Grade::cannot_tell);
 }
 
-TEST(Verdict, DisagreementIsToldWithTheNames) {
-  Verdict v = combined({ok("a", 5e-5, 1e-6), ok("b", 6e-5, 1e-5), ok("c", 9e-5, 2e-6), ok("d", 2e-5, 2e-6)});
-  EXPECT_EQ(v.estimate, 0);
-  EXPECT_EQ(v.agreement, "disagree: c, d");
-  EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_EQ(v.members, (std::vector<int>{0, 1}));
-  EXPECT_EQ(v.dissenters, (std::vector<int>{2, 3}));
-  EXPECT_LT(v.upper, 6e-5);  // outvoted: their values are named, but not held by the interval
-  EXPECT_TRUE(mentions(v, "disagree: c 9e-05 m (95 %: 8.8e-05 to 9.2e-05), d 2e-05 m")) << v.message;
-  EXPECT_FALSE(mentions(v, "by itself")) << v.message;
-  v = combined({ok("a", 5e-5, 1e-6), ok("b", 5.1e-5, 1e-6), ok("c", 1.6e-4, 1e-6)});
-  EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_TRUE(mentions(v, "c 0.00016 m (95 %: 0.000159 to 0.000161), service by itself")) << v.message;
-  v = combined({ok("a", 5e-5, 1e-5), ok("b", 7e-5, 1e-5 + 1e-12)});  // the intervals just touch
+Estimate of_witness(const std::string& witness, Estimate e) {
+  e.witness = witness;
+  return e;
+}
+
+Estimate measured(Estimate e) {
+  e.from_record = true;
+  return e;
+}
+
+TEST(Verdict, ManyDoNotOutvoteOne) {
+  for (const int others : {1, 2, 5}) {
+    std::vector<Estimate> all = {ok("right", 5e-5, 1e-6)};
+    for (int i = 0; i < others; ++i) all.push_back(of_witness("curve", ok("apd", 1.6e-4, 1e-5)));
+    for (const std::optional<Limits>& limits : {std::optional<Limits>(kLimits), std::optional<Limits>()}) {
+      const Verdict v = combined(all, limits);
+      EXPECT_EQ(v.grade, Grade::cannot_tell);
+      EXPECT_EQ(v.estimate, -1);
+      EXPECT_TRUE(std::isnan(v.backlash) && std::isnan(v.lower) && std::isnan(v.backlash_angle));
+      EXPECT_EQ(v.dissenters.size(), all.size());
+      EXPECT_TRUE(mentions(v, "cannot tell; disagree: right 5e-05 m (95 %: 4.9e-05 to 5.1e-05)"))
+          << v.message;
+      EXPECT_TRUE(mentions(v, "nothing on the record tells who is right")) << v.message;
+    }
+  }
+  const Verdict v = combined({ok("a", 5e-5, 1e-5), ok("b", 7e-5, 1e-5 + 1e-12)});  // the intervals just touch
   EXPECT_EQ(v.agreement, "agree");
 }
 
-TEST(Verdict, WithoutArbiterTheLargerIsGraded) {
-  const std::vector<Estimate> two = {ok("sharp", 5e-5, 1e-6), ok("b", 1.6e-4, 1e-5)};
-  Verdict v = combined(two);
-  EXPECT_EQ(v.grade, Grade::service);
-  EXPECT_EQ(v.estimate, 1);
-  EXPECT_EQ(v.agreement, "disagree: sharp");
-  EXPECT_EQ(v.backlash, 1.6e-4);
-  EXPECT_EQ(v.lower, 5e-5 - 1e-6);  // holds what the other says, too
-  EXPECT_EQ(v.upper, 1.6e-4 + 1e-5);
-  EXPECT_NEAR(v.angle_lower, kToAngle * v.lower, 1e-15);
-  EXPECT_TRUE(mentions(v, "sharp 5e-05 m")) << v.message;
-  EXPECT_TRUE(mentions(v, "nothing tells who is right, graded by the larger")) << v.message;
-  EXPECT_EQ(combined(two, std::nullopt).grade, Grade::cannot_tell);  // nothing to grade the larger by
-  // A wide one that agrees with both arbitrates nothing ...
-  v = combined({two[0], ok("wide", 1e-4, 6e-5), two[1]});
-  EXPECT_EQ(v.grade, Grade::service);
-  EXPECT_EQ(v.members, (std::vector<int>{2, 1}));
-  // ... but the sharpest, where it lies between two others, does.
-  v = combined({ok("low", 4e-5, 1e-5), ok("sharp", 5e-5, 1e-6), ok("high", 6.1e-5, 1.05e-5)});
-  EXPECT_EQ(v.estimate, 1);
-  EXPECT_EQ(v.members, (std::vector<int>{1, 0}));
-  EXPECT_EQ(v.agreement, "disagree: high");
-  EXPECT_FALSE(mentions(v, "nothing tells")) << v.message;
-  // The order of the estimates does not matter.
-  std::vector<Estimate> reversed(two.rbegin(), two.rend());
-  EXPECT_EQ(combined(reversed).message, combined(two).message);
+TEST(Verdict, WhatTheRecordShowsStandsAgainstWhatIsDeclared) {
+  const Verdict v =
+      combined({of_witness("curve", ok("shape", 1.6e-4, 1e-5)), measured(ok("walls", 5e-5, 1e-6)),
+                of_witness("curve", ok("skewness", 1.7e-4, 1e-5)), ok("momentum", 5e-5, 1e-5)});
+  EXPECT_EQ(v.backlash, 5e-5);
+  EXPECT_EQ(v.members, (std::vector<int>{1}));
+  EXPECT_EQ(v.grade, Grade::good);
+  EXPECT_EQ(v.agreement, "disagree: shape, skewness, momentum");
+  EXPECT_TRUE(mentions(v, "service by itself")) << v.message;
+  EXPECT_TRUE(mentions(v, "is it this machine's?")) << v.message;
+  // Two measurements that contradict each other settle nothing.
+  EXPECT_EQ(
+      combined({measured(ok("a", 5e-5, 1e-6)), measured(ok("b", 9e-5, 1e-6)), ok("c", 9e-5, 1e-6)}).grade,
+      Grade::cannot_tell);
+}
+
+TEST(Verdict, AWitnessThatContradictsItselfIsNotHeard) {
+  const std::vector<Estimate> apd = {of_witness("curve", ok("skewness", 2e-5, 5e-6)),
+                                     of_witness("curve", ok("shape", 5e-5, 5e-6))};
+  EXPECT_EQ(combined(apd).grade, Grade::cannot_tell);
+  const Verdict v = combined({apd[0], apd[1], ok("walls", 5e-5, 1e-6)});
+  EXPECT_EQ(v.members, (std::vector<int>{2}));
+  EXPECT_EQ(v.dissenters, (std::vector<int>{0, 1}));
+  EXPECT_TRUE(mentions(v, "contradicts itself")) << v.message;
 }
 
 TEST(Verdict, ALowerBoundAlone) {
@@ -208,13 +227,8 @@ TEST(Verdict, ALowerBoundAlone) {
 
 TEST(Verdict, ALowerBoundBesideASoundEstimate) {
   Verdict v = combined({at_least("apd", 2e-4), ok("lost", 5e-5, 1e-6)});
-  EXPECT_EQ(v.estimate, 0);
-  EXPECT_EQ(v.grade, Grade::stop);
-  EXPECT_EQ(v.agreement, "disagree: lost");
-  EXPECT_TRUE(std::isnan(v.backlash) && std::isnan(v.upper));
-  EXPECT_EQ(v.lower, 5e-5 - 1e-6);
-  v = combined({at_least("apd", 2e-4), ok("lost", 5e-5, 1e-6), ok("two", 5e-5, 1e-5)});  // outvoted
-  EXPECT_EQ(v.grade, Grade::good);
+  EXPECT_EQ(v.grade, Grade::cannot_tell);
+  EXPECT_EQ(v.agreement, "disagree: apd, lost");
   EXPECT_TRUE(mentions(v, "disagree: apd at least 0.0002 m, stop by itself")) << v.message;
   v = combined({at_least("low", 1e-4), at_least("high", 2e-4)});
   EXPECT_EQ(v.estimate, 1);
@@ -268,7 +282,7 @@ TEST(Verdict, GrowthHasTheUncertaintyOfNowAndThen) {
   EXPECT_TRUE(mentions(v, "grown by 9e-05 m (95 %: 7.7e-05 to 9.583e-05) since the baseline")) << v.message;
   EXPECT_EQ(v.message.find("good: "), 0u) << v.message;
   v = combined({ok("m", 1.4e-4, 15e-6)}, kLimits, baseline);
-  EXPECT_TRUE(mentions(v, "good, but watch cannot be excluded")) << v.message;
+  EXPECT_TRUE(mentions(v, "watch, may be good: ")) << v.message;
   EXPECT_FALSE(mentions(v, "other methods"));
   v = combined({ok("b", 1.4e-4, 5e-6)}, kLimits, baseline);
   EXPECT_TRUE(mentions(v, "(by other methods: m)")) << v.message;
@@ -288,7 +302,7 @@ TEST(Verdict, Angles) {
   v = combined({angles_only(ok("m", 5e-5, 1e-6))}, limits, baseline);
   EXPECT_NEAR(v.growth, 0.5e-3, 1e-15);
   EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_EQ(combined({angles_only(ok("m", 5e-5, 1e-6))}, std::nullopt).grade, Grade::good);
+  EXPECT_EQ(combined({angles_only(ok("m", 5e-5, 1e-6))}, std::nullopt).grade, Grade::ungraded);
   EXPECT_EQ(combined({angles_only(at_least("m", 5e-5))}, limits).grade, Grade::service);
   // A limit in metres cannot grade an angle.
   EXPECT_EQ(combined({angles_only(ok("m", 5e-5, 1e-6))}, kLimits).grade, Grade::cannot_tell);
@@ -350,6 +364,7 @@ TEST(Grade, Names) {
   EXPECT_STREQ(to_string(Grade::watch), "watch");
   EXPECT_STREQ(to_string(Grade::service), "service");
   EXPECT_STREQ(to_string(Grade::stop), "stop");
+  EXPECT_STREQ(to_string(Grade::ungraded), "ungraded");
   EXPECT_STREQ(to_string(Grade::cannot_tell), "cannot_tell");
 }
 

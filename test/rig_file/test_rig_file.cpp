@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/rig_file/declared_uncertainty.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "support/data.h"
 
@@ -190,6 +191,14 @@ TEST(RigFile, AnAngularMeshHasNoBaseRadius) {
   EXPECT_TRUE(file.rig.mesh.angular());
   EXPECT_TRUE(std::isnan(file.diagnosis.lost_motion->base_radius));
   EXPECT_TRUE(file.diagnosis.limits->angular);
+}
+
+// By hand: the spring softer by 12 %, and a contact of a 2.5th of the stiffness, 2.5^(2/3) = 1.842.
+TEST(DeclaredUncertainty, IsThatOfTheSpringAndOfTheContact) {
+  EXPECT_NEAR(elastic_uncertainty(3, 0), 0.12, 1e-12);
+  EXPECT_NEAR(elastic_uncertainty(0, 2), 0.842, 1e-3);
+  EXPECT_NEAR(elastic_uncertainty(3, 1), (0.36 + 0.842) / 4, 1e-3);
+  EXPECT_EQ(elastic_uncertainty(0, 0), 0);
 }
 
 }  // namespace

@@ -44,7 +44,8 @@ struct DiagnosisInput {
   const DiagnosisSettings& settings;
   const MonitoringCurve* curve;
   const std::optional<ApdResult>& apd;
-  const CurveMatch& match;  // of the record and the curve
+  const CurveMatch& match;                       // of the record and the curve
+  std::optional<std::string> lock_contradicted;  // why the output is not locked although the file says so
 };
 
 /// An estimator: its name in reports, what it needs in plain words, and itself. All are in one table, in the

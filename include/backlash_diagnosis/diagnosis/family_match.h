@@ -14,8 +14,12 @@ struct FamilyMatch {
   double usual_misfit = kNaN;         // the largest among the simulated records there
 
   /// Whether the record is farther from the whole family than chance explains: the machine does something
-  /// that the rig does not contain.
-  bool fits_no_member() const { return misfit > 2 * usual_misfit; }
+  /// that the rig does not contain, or has other values.
+  bool fits_no_member() const { return misfit > kLargestMisfit * usual_misfit; }
+
+  /// Choice, by simulation: of the largest misfit among the simulated records. See
+  /// doc/reference/estimators.md.
+  static constexpr double kLargestMisfit = 1.25;
 };
 
 /// Compares samples of whole periods with the curve's family (which must be there), at any noise of a range

@@ -12,7 +12,7 @@
 
 namespace backlash::diagnosis {
 
-enum class Grade { good, watch, service, stop, cannot_tell };
+enum class Grade { good, watch, service, stop, ungraded, cannot_tell };  // ungraded: a value, but no limits
 const char* to_string(Grade grade);
 
 struct Verdict {
@@ -28,8 +28,7 @@ struct Verdict {
 };
 
 /// Sound are estimates with status ok, and with above_range where they give a lower bound. They agree where
-/// their intervals have a point in common. The verdict stands on the largest set of those that agree; of
-/// several the one with the sharpest member.
+/// their intervals have a point in common. The verdict stands on all sound estimates if they agree.
 ///
 /// Combination: the weighted mean of the members' values, of their lower and of their upper ends, weight
 /// 1 / width^2 (inverse variance; lower bounds and estimates without interval have weight 0). The members
@@ -39,15 +38,18 @@ struct Verdict {
 /// never narrower than the best member's. (Covariance intersection of scalars, after Julier and Uhlmann 1997,
 /// is the best member alone; it is as honest but takes nothing from the others.)
 ///
-/// Contradiction: a larger set outvotes the others, which are named with their values and, where they would
-/// grade worse, with that grade. Where another set is as large, none can arbitrate: the verdict stands on the
-/// set with more backlash, as a needless inspection costs less than a broken tooth, and its interval is
-/// widened to hold the others. Without limits such a contradiction is cannot_tell.
+/// Contradiction: never settled by the number of methods, as those that share signal, curve or declared
+/// values err together. Estimates of one Estimate::witness that contradict each other are left out where
+/// there is another witness. Then what was measured on the record (Estimate::from_record) stands against
+/// what takes the machine from the rig file: the contradiction shows that the file may be wrong. Where that
+/// does not settle it the verdict is cannot_tell, without a value.
 ///
-/// Grade: of the combined value by the limits, or with a baseline of its growth since then; without limits a
-/// sound estimate is good. Where the interval reaches into a worse grade the message says so. Lower bounds
-/// alone are graded by the highest of them, or cannot_tell below `watch`. The interval of the growth adds the
-/// uncertainties of now and then as independent ones: different records; what they share cancels.
+/// Grade: by the limits, of the combined value or with a baseline of its growth since then. `good` only where
+/// the whole interval is below `watch`; a value below it with an interval that is not is `watch`. The message
+/// tells the other grades that the interval reaches into. Without limits a value is `ungraded`. Lower bounds
+/// alone are graded by the highest of them, or cannot_tell below `watch` and without limits. The interval of
+/// the growth adds the uncertainties of now and then as independent ones: different records; what they share
+/// cancels. A baseline without interval is taken as exact.
 Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limits>& limits,
                 const std::optional<Baseline>& baseline);
 
