@@ -59,8 +59,8 @@ DeclaredLock declared_lock(const DiagnosisSettings& settings) {
 template <Estimate (*Estimator)(const ApdResult&, const CurveMatch&, const MonitoringCurve*)>
 Estimate by_apd(const DiagnosisInput& in) {
   if (!in.settings.apd) return not_served("the rig file declares no diagnosis.apd");
-  Estimate estimate =
-      in.lock_contradicted ? not_locked(*in.lock_contradicted) : Estimator(*in.apd, in.match, in.curve);
+  Estimate estimate = in.lock_contradicted && !in.match.refused ? not_locked(*in.lock_contradicted)
+                                                                : Estimator(*in.apd, in.match, in.curve);
   estimate.witness = "distribution";
   return estimate;
 }

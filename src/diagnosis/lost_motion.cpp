@@ -292,6 +292,7 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
   estimate.backlash = settings.base_radius * estimate.backlash_angle;
   estimate.lower = settings.base_radius * estimate.angle_lower;
   estimate.upper = settings.base_radius * estimate.angle_upper;
+  estimate.declared = elastic;
   estimate.components = parts.components;
   estimate.components->at_torque = settings.subtract_elastic_deflection ? torque : walls.level;
   estimate.message = describe(walls, settings, play, parts);

@@ -30,8 +30,12 @@ double upper(const Estimate& e) {
   return std::isnan(e.angle_upper) ? kInfinity : e.angle_upper;
 }
 
+/// Of the interval without what declared values leave open: all methods rest on them, few include it.
 double width(const Estimate& e) {
-  return std::isnan(e.angle_lower) ? kInfinity : upper(e) - e.angle_lower;
+  if (std::isnan(e.angle_lower) || !std::isfinite(upper(e))) return kInfinity;
+  if (!(e.declared > 0)) return upper(e) - e.angle_lower;
+  const double half = std::max(upper(e) - e.backlash_angle, e.backlash_angle - e.angle_lower);
+  return 2 * std::sqrt(std::max(0.0, half * half - e.declared * e.declared));
 }
 
 bool has_interval(const Estimate& e) {

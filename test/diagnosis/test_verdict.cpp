@@ -205,6 +205,15 @@ TEST(Verdict, WhatTheRecordShowsStandsAgainstWhatIsDeclared) {
       Grade::cannot_tell);
 }
 
+// An interval of 10 um, of which 8 um by declared values, leaves 6 um of its own: as sharp as the other.
+TEST(Verdict, DeclaredValuesWidenTheIntervalNotTheWeight) {
+  Estimate walls = ok("walls", 5e-5, 10e-6);
+  walls.declared = kToAngle * 8e-6;
+  const Verdict v = combined({walls, ok("b", 5.2e-5, 6e-6)});
+  EXPECT_NEAR(v.backlash, 5.1e-5, 1e-15);
+  EXPECT_NEAR(v.lower, 5.1e-5 - 8e-6, 1e-15);
+}
+
 TEST(Verdict, AWitnessThatContradictsItselfIsNotHeard) {
   const std::vector<Estimate> apd = {of_witness("curve", ok("skewness", 2e-5, 5e-6)),
                                      of_witness("curve", ok("shape", 5e-5, 5e-6))};

@@ -41,6 +41,7 @@ struct Estimate {
   double angle_lower = kNaN, angle_upper = kNaN;  ///< rad, 95 % interval of backlash_angle
   double skewness = kNaN;  ///< of the class values of the APD, where the method uses it
   std::optional<PlayComponents> components;
+  double declared = 0;  ///< rad, >= 0, half width of the 95 % interval by declared values alone, where known
   std::string witness;  ///< equal for methods that share signal, curve and declared values; empty: its own
   bool from_record = false;  ///< what the value depends on was measured on the record, not declared
   std::string message;       ///< the reason of the status, or how the value came about

@@ -31,12 +31,13 @@ struct Verdict {
 /// their intervals have a point in common. The verdict stands on all sound estimates if they agree.
 ///
 /// Combination: the weighted mean of the members' values, of their lower and of their upper ends, weight
-/// 1 / width^2 (inverse variance; lower bounds and estimates without interval have weight 0). The members
-/// come from one record and share its noise, sampling and model, so their errors are correlated by an unknown
-/// amount. The standard deviation of a weighted mean is at most the weighted mean of the standard deviations,
-/// with equality for full correlation: the interval promises its 95 % whatever the correlation is, and is
-/// never narrower than the best member's. (Covariance intersection of scalars, after Julier and Uhlmann 1997,
-/// is the best member alone; it is as honest but takes nothing from the others.)
+/// 1 / width^2 (inverse variance; lower bounds and estimates without interval have weight 0), the width being
+/// without Estimate::declared: all methods rest on declared values, and few include that in the interval. The
+/// members come from one record and share its noise, sampling and model, so their errors are correlated by an
+/// unknown amount. The standard deviation of a weighted mean is at most the weighted mean of the standard
+/// deviations, with equality for full correlation: the interval promises its 95 % whatever the correlation
+/// is, and is never narrower than the best member's. (Covariance intersection of scalars, after Julier and
+/// Uhlmann 1997, is the best member alone; it is as honest but takes nothing from the others.)
 ///
 /// Contradiction: never settled by the number of methods, as those that share signal, curve or declared
 /// values err together. Estimates of one Estimate::witness that contradict each other are left out where
