@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "contact_edge.h"
 #include "sampling.h"
 
 namespace backlash::identification {
@@ -308,6 +309,8 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   fit.fit.covariance *=
       std::pow(signal::student_t_quantile(0.975, std::max(1.0, free)) / signal::kNormalQuantile975, 2);
   add_timing(fit, start, records.records().front().data().interval);
+  const Eigen::VectorXd edge = shift_of_contact_edge(fit, records);
+  fit.fit.covariance += edge * edge.transpose();
   const Eigen::VectorXd bias = sampling_bias(fit, records);
   fit.fit.values -= bias;
   fit.machine = unknowns.machine(fit.fit.values);
