@@ -127,7 +127,8 @@ TEST(TraceReport, SaysWhetherAnErrorFallsStaysOrRises) {
 TEST(TraceReport, UnexplainedIsSaidWithItsSignature) {
   identification::Trace t = trace();
   t.verdict = identification::TraceVerdict::unexplained;
-  t.unexplained = identification::Unexplained{"deflection", "follows load position, order 7.3", {0.5, 0.4, 0.6}};
+  t.unexplained =
+      identification::Unexplained{"deflection", "follows load position, order 7.3", {0.5, 0.4, 0.6}};
   const Json json = Json::parse(trace_report_json(t, kInputs));
   EXPECT_EQ(json["verdict"], "unexplained");
   EXPECT_EQ(json["unexplained"]["channel"], "deflection");

@@ -97,7 +97,7 @@ TEST_F(JointMonitorTest, ASlowJointDelaysNobody) {
   EXPECT_EQ(slow.state().counters.accepted, 4000);
   std::string note;
   ros::Time stamp;
-  EXPECT_GE(slow.diagnose(10, 0, note, stamp).verdict.estimate, 0);  // the service answers as well
+  EXPECT_FALSE(slow.diagnose(10, 0, note, stamp).estimates.empty());  // the service answers as well
   EXPECT_EQ(note, "");
   allowed.set_value();
   slow.stop();

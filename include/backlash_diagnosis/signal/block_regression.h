@@ -12,7 +12,7 @@ struct BlockRegressionSettings {
   std::vector<double> ridges = {1e-4, 1e-3, 1e-2, 0.1, 1};  // choice: per sample, of columns of unit square
   int draws = 400;                                          // choice (time): of blocks, for the interval
   std::uint64_t seed = 1;                                   // choice
-  int flips = 39;  // theory: one share in forty is larger by chance than all of as many
+  int flips = 39;      // theory: one share in forty is larger by chance than all of as many
   double risk = 0.05;  // choice: of the interval, beyond both ends together
 };
 
