@@ -12,10 +12,10 @@ namespace {
 
 constexpr double kClear = 4;  // choice: standard errors, from which a value is told apart from zero
 
-/// "kg m^2, fitted +- 0.02", of a value that the file has divided by `divisor`.
+/// "kg m^2, fitted +- 0.02", of a value that the file has divided by `divisor`; "held" without an error.
 std::string fitted_comment(const FittedValues& found, const std::string& name, double divisor) {
   const double error = found.parameters.at(name).standard_error;
-  if (!std::isfinite(error)) return found.units.at(name) + ", fitted";
+  if (!std::isfinite(error)) return found.units.at(name) + ", held";
   return fmt::format("{}, fitted +- {:.2g}", found.units.at(name), error / divisor);
 }
 

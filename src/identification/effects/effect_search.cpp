@@ -64,7 +64,7 @@ void describe_machine(const SearchResult& result, const std::vector<ServoPredict
       fitted_values(*result.declared.base, result.declared.declared->parameters.size()).machine;
   const FittedValues values = fitted_values(*found.fitted, found.declared->parameters.size());
   trace.parameters = values.machine;
-  for (const std::string& name : found.held) trace.parameters[name] = {0, 0};
+  for (const auto& [name, value] : found.held) trace.parameters[name] = {value, std::nan("")};
   for (const Hypothesis* h : {&result.declared, &found})
     for (const FitParameter& p : h->base->start.parameters) trace.units[p.name] = p.unit;
   trace.steps = found_effects(found, values.effects, on_test, belief);

@@ -30,28 +30,13 @@ std::optional<FitParameter> negative_friction(const Hypothesis& h) {
   return difference != all.end() ? *difference : *negative;
 }
 
-/// A hypothesis to start a fit from, with this parameter 0 and no longer fitted.
-Hypothesis with_held(const Hypothesis& h, const FitParameter& parameter) {
-  Hypothesis held = h;
-  BandFit fitted = *h.fitted;
-  parameter.set(fitted.fit.machine.rig, 0);
-  held.fitted = std::make_shared<const BandFit>(std::move(fitted));
-  Machine declared = *h.declared;
-  declared.parameters.erase(std::remove_if(declared.parameters.begin(), declared.parameters.end(),
-                                           [&](const FitParameter& p) { return p.name == parameter.name; }),
-                            declared.parameters.end());
-  held.declared = std::make_shared<const Machine>(std::move(declared));
-  held.held.push_back(parameter.name);
-  return held;
-}
-
 }  // namespace
 
 Hypothesis hold_friction(const Hypothesis& before, const SearchContext& context) {
   const FitSettings& settings = context.settings.fit;
   Hypothesis h = before;
   while (const auto negative = negative_friction(h)) {
-    const Hypothesis held = with_held(h, *negative);
+    const Hypothesis held = with_held(h, *negative, 0);
     if (h.effects.empty()) {
       h = held;
       h.fitted = std::make_shared<const BandFit>(fit_in_band(context.data, start_with(held, {}, context),

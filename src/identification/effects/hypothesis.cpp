@@ -99,6 +99,20 @@ Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, cons
   return machine;
 }
 
+Hypothesis with_held(const Hypothesis& h, const FitParameter& parameter, double value) {
+  Hypothesis held = h;
+  BandFit fitted = *h.fitted;
+  parameter.set(fitted.fit.machine.rig, value);
+  held.fitted = std::make_shared<const BandFit>(std::move(fitted));
+  Machine declared = *h.declared;
+  declared.parameters.erase(std::remove_if(declared.parameters.begin(), declared.parameters.end(),
+                                           [&](const FitParameter& p) { return p.name == parameter.name; }),
+                            declared.parameters.end());
+  held.declared = std::make_shared<const Machine>(std::move(declared));
+  held.held[parameter.name] = value;
+  return held;
+}
+
 std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,
                                    const SearchContext& context) {
   auto fit = attempted(

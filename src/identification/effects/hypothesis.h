@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,7 +34,7 @@ struct Hypothesis {
   std::shared_ptr<const BandFit> fitted;    // with the effects; base if there are none
   std::vector<Effect> effects;
   bool other_teeth = false;              // not those that the rig file declares
-  std::vector<std::string> held;         // friction of the machine that is held at 0
+  std::map<std::string, double> held;    // parameters of the machine that are no longer fitted, and where
   std::vector<RejectedEffect> rejected;  // the latest last
 };
 
@@ -65,6 +66,9 @@ Machine with_friction_again(Machine machine, const Machine& declared);
 Machine extended(Machine machine, const Candidate& candidate, const SearchContext& context);
 /// The machine with these effects alone, at the values that it has now: a start for a fit.
 Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, const SearchContext& context);
+
+/// A hypothesis to start a fit from, with this parameter of the machine at `value` and no longer fitted.
+Hypothesis with_held(const Hypothesis& h, const FitParameter& parameter, double value);
 
 /// The same machine with these effects instead, fitted at weights of its own. Nothing where that fails.
 std::optional<Hypothesis> refitted(const Hypothesis& h, std::vector<Effect> effects,

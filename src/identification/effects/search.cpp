@@ -56,7 +56,7 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
                               [&](const Hypothesis& h) { told.hypothesis(h); }};
   SearchResult result{fit_declared(declared, context), {}};
   if (declared.coupled) {
-    result.found = result.declared;
+    result.found = believe_compliance(result.declared, unseen, context);
     return result;
   }
   Hypothesis h = add_effects_or_teeth(result.declared, context);

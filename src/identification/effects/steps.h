@@ -50,6 +50,10 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 /// error.
 Hypothesis believe(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);
 
+/// Of a machine that is coupled to other axes: with stiff teeth, unless the unseen record bears their
+/// compliance out.
+Hypothesis believe_compliance(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);
+
 /// Friction of the machine that comes out below 0 held at 0, one parameter after the other. Throws
 /// CannotIdentify where the machine cannot be fitted with that.
 Hypothesis hold_friction(const Hypothesis& h, const SearchContext& context);

@@ -48,6 +48,8 @@ std::vector<ServoPrediction> predicted_by_all(const Hypothesis& h, const ServoDa
                                               const FitSettings& settings) {
   std::vector<ServoPrediction> all = {predicted(h.base->fit.machine, record, settings)};
   for (const Effect& effect : h.effects) all.push_back(predicted(*effect.after, record, settings));
+  if (h.effects.empty() && h.fitted != h.base)
+    all.push_back(predicted(h.fitted->fit.machine, record, settings));
   return all;
 }
 

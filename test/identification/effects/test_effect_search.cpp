@@ -256,6 +256,35 @@ TEST(EffectSearch, FrictionIsNeverNegative) {
   EXPECT_EQ(trace.augmented.link.viscous_damping, 0);
 }
 
+/// A coupled machine of this stiffness, 10 s; its deflection also follows the torque by 1 / `by_coupling`.
+record::Record coupled_record(double stiffness, double by_coupling, std::uint64_t seed) {
+  rig_file::RigFile file = rig_file::load_rig_file(test::package_file("config/kr300.yaml"));
+  file.rig.mesh.contact = model::make_contact_law("linear", {{"stiffness", stiffness}, {"damping", 1e4}});
+  file.simulation.sensors.seed = seed;
+  file.simulation.excitation.frequency += 0.1 * double(seed);
+  record::Record record = simulation::simulate_record(file.rig, file.simulation, 10);
+  for (std::size_t k = 0; k < record.size(); ++k)
+    record.column(record::Channel::load_position)[k] -=
+        record.column(record::Channel::motor_torque)[k] / by_coupling;
+  return record;
+}
+
+// In one record another axis bends the structure as this one's torque goes, in the next it does not.
+TEST(EffectSearch, ACoupledMachineHasNoComplianceThatTheUnseenRecordContradicts) {
+  const model::Rig declared = rig_file::load_rig_file(test::package_file("config/kr300.yaml")).rig;
+  const double stiff = 1e9;
+  const Trace wrong =
+      trace_residual(declared, {coupled_record(stiff, 8e6, 1)}, coupled_record(stiff, INFINITY, 2));
+  EXPECT_LT(wrong.base_parameters.at("mesh_stiffness").value, 1.5e7);
+  EXPECT_GT(wrong.parameters.at("mesh_stiffness").value, 1e8);
+  EXPECT_TRUE(std::isnan(wrong.parameters.at("mesh_stiffness").standard_error));
+  EXPECT_LT(wrong.channels.at("deflection").after, 0.5 * wrong.channels.at("deflection").before);
+  // One that both records have stays.
+  const Trace right =
+      trace_residual(declared, {coupled_record(1.2e7, INFINITY, 1)}, coupled_record(1.2e7, INFINITY, 2));
+  EXPECT_NEAR(right.parameters.at("mesh_stiffness").value / 1.2e7, 1, 0.05);
+}
+
 TEST(EffectSearch, RefusesRecordsThatCannotTell) {
   const model::Rig rig = test::servo_file().rig;
   const record::Record record = simulation::simulate_record(rig, test::servo_run(11), 3);

@@ -269,7 +269,7 @@ TEST(HoldFriction, BelowZeroIsHeldAtZero) {
   const Hypothesis h = fit_declared(test::one_inertia_rig(), bench.context);
   EXPECT_NEAR(h.fitted->fit.machine.rig.motor.viscous_damping, -0.4, 0.03);
   const Hypothesis held = hold_friction(h, bench.context);
-  EXPECT_EQ(held.held, std::vector<std::string>{"motor_viscous"});
+  EXPECT_EQ(held.held, (std::map<std::string, double>{{"motor_viscous", 0}}));
   EXPECT_EQ(held.fitted->fit.machine.rig.motor.viscous_damping, 0);
   EXPECT_EQ(held.declared->parameters.size(), 2u);
 
