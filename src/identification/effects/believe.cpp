@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "found_effects.h"
+#include "local_strength.h"
 #include "steps.h"
 #include "unseen_gain.h"
 #include "unseen_record.h"
@@ -67,12 +68,24 @@ std::optional<std::size_t> vague(const Hypothesis& h, double least) {
   return std::nullopt;
 }
 
+/// Why the effect is not itself where it acts most; empty: it is.
+std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect, const BeliefSettings& settings) {
+  const auto local = local_strength(h, effect);
+  if (!local || local->ratio + settings.sure * local->standard_error > settings.least_local) return "";
+  return fmt::format(
+      "where it acts most it has {:.2g} +- {:.1g} of its strength: it stands in for something else",
+      local->ratio, local->standard_error);
+}
+
 /// The first effect that is not to be believed, and why.
 std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
                                                                 const SearchContext& context) {
   const BeliefSettings& settings = context.settings.belief;
   if (const auto at = vague(h, settings.least_z))
     return std::pair{*at, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
+  for (std::size_t i = 0; i < h.effects.size(); ++i)
+    if (std::string why = weak_where_it_acts(h, i, settings); !why.empty())
+      return std::pair{i, std::move(why)};
   const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
     std::string why = contradicted(on_unseen[i], on_unseen[i + 1], h.effects[i].gain.deflection, settings);

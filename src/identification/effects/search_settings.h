@@ -26,8 +26,9 @@ struct TrialSettings {
   std::size_t most = 6;       // choice (time): candidates
   double worth_trying = 0.2;  // choice: of the best predicted gain
   double least_predicted =
-      0.3;               // simulation: of the gain that is asked for; sensitivities mislead by so much
-  double far_off = 1.2;  // simulation: times the wanted residuals, after the rough half of a fit
+      0.3;                 // simulation: of the gain that is asked for; sensitivities mislead by so much
+  double far_off = 1.2;    // simulation: times the wanted residuals, after the rough half of a fit
+  double other_order = 2;  // simulation: times the best residual: no other order brings one from farther
   double tie =
       0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
 };
@@ -79,6 +80,8 @@ struct BeliefSettings {
       0.64;             // theory: of the noise's square, its deviation known to a fifth: nothing leaves less
   double worse = 0.05;  // choice: of the other channel's error
   double least_z = 4;   // choice: of a strength, standard errors
+  double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
+  double sure = 2;           // theory: standard errors, 95 %
 };
 
 /// What a residual may still follow (explainable.h).

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "identification/effects/contact_shape.h"
 #include "identification/effects/learned.h"
+#include "identification/effects/local_strength.h"
 #include "identification/effects/search.h"
 #include "identification/effects/steps.h"
 #include "support/one_inertia_bench.h"
@@ -260,6 +261,27 @@ TEST(DropStandIns, OfTwoInertiasWhatLeavesMoreThanItExplains) {
   EXPECT_EQ(drop_stand_ins(that_leaves(2.2, 1.9, servo, bench), bench.context).effects.size(), 1u);
   EXPECT_EQ(drop_stand_ins(that_leaves(20, 15, test::one_inertia_rig(), bench), bench.context).effects.size(),
             1u);
+}
+
+/// Strength of a Stribeck friction that is fitted to this machine, where it acts most.
+LocalStrength of_stribeck(const OneInertiaMachine& machine) {
+  const SearchBench bench{machine};
+  Effect stribeck;
+  stribeck.candidate = {"stribeck", {{{"torque", 0.5}, {"speed", 0.5}, {"exponent", 2}}}};
+  stribeck.candidate.terms[0].set_choice("body", "motor");
+  const auto with = refitted(fit_declared(test::one_inertia_rig(), bench.context), {stribeck}, bench.context);
+  return local_strength(with.value(), 0).value();
+}
+
+// A friction that rises faster from 1 rad/s on bends as if it fell at low speeds. Three standard errors.
+TEST(LocalStrength, OfAnEffectIsItsStrengthAndOfAStandInIsNot) {
+  OneInertiaMachine falls, rises;
+  falls.extra = [](double, double w) { return std::copysign(1.5 * std::exp(-w * w / 0.25), w); };
+  rises.extra = [](double, double w) { return std::copysign(2 * std::max(0.0, std::fabs(w) - 1), w); };
+  const LocalStrength right = of_stribeck(falls), wrong = of_stribeck(rises);
+  EXPECT_NEAR(right.ratio, 1, 3 * right.standard_error);
+  EXPECT_LT(right.standard_error, 0.1);
+  EXPECT_LT(wrong.ratio + 3 * wrong.standard_error, 0.5);
 }
 
 TEST(HoldFriction, BelowZeroIsHeldAtZero) {
