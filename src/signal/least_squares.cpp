@@ -154,71 +154,44 @@ Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
   return variance(j, r) * (unit.asDiagonal() * symmetric_inverse(gram(scaled)) * unit.asDiagonal());
 }
 
-constexpr double kAsPredicted = 0.75;  // simulation: of the predicted decrease; then the Jacobian is updated
-
-/// Where the search is. The Jacobian is in units of `scale`; after a step it is either computed anew or
-/// updated by what the step showed (Broyden 1965), which costs nothing.
-struct Descent {
-  const ResidualFunction& residuals;
-  const Eigen::VectorXd& scale;
-  const NonlinearOptions& options;
-  Eigen::VectorXd p, r;
-  Eigen::MatrixXd j;
-  double damping = 1e-3;
-  int renewals = 0;
-  bool fresh = false, done = false;
-
-  void renew() {
-    j = jacobian(residuals, p, r, scale, options);
-    fresh = true;
-    done = renewals++ == options.iterations;
-  }
-
-  void accept(const Eigen::VectorXd& step, const Eigen::VectorXd& moved) {
-    const Eigen::VectorXd predicted = r + j * step;
-    const double decrease = r.squaredNorm() - moved.squaredNorm(), gain = decrease / r.squaredNorm();
-    const bool as_predicted = decrease > kAsPredicted * (r.squaredNorm() - predicted.squaredNorm());
-    p += scale.cwiseProduct(step);
-    r = moved;
-    damping = std::max(kLeastDamping, damping / 10);
-    const bool little = gain < options.tolerance || step.norm() < options.tolerance;
-    if (little && fresh) {
-      done = true;
-      fresh = false;
-    } else if (little || !as_predicted) {
-      renew();
-    } else {
-      j += (moved - predicted) * (step.transpose() / step.squaredNorm());
-      fresh = false;
-    }
-  }
-
-  void advance() {
-    Eigen::MatrixXd damped = gram(j);
-    damped.diagonal() *= 1 + damping;
-    const Eigen::VectorXd step = -solve_symmetric(damped, j.transpose() * r);
-    const Eigen::VectorXd moved = try_residuals(residuals, p + scale.cwiseProduct(step));
-    if (moved.size() == r.size() && moved.squaredNorm() < r.squaredNorm()) return accept(step, moved);
-    if (!fresh) return renew();
-    damping *= 10;
-    done = damping > kMostDamping || step.norm() < options.tolerance;
-  }
-};
-
 }  // namespace
 
 LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::VectorXd& start,
                               const Eigen::VectorXd& scale, const NonlinearOptions& options) {
-  Descent d{residuals, scale, options, start, residuals(start), {}};
-  if (!usable(d.r)) throw CannotIdentify("the model cannot be evaluated at the start values");
-  d.renew();
-  while (!d.done) d.advance();
+  Eigen::VectorXd p = start, r = residuals(p);
+  if (!usable(r)) throw CannotIdentify("the model cannot be evaluated at the start values");
+  double damping = 1e-3;
+  bool done = false;
+  Eigen::MatrixXd j = jacobian(residuals, p, r, scale, options);
+  for (int i = 0; i < options.iterations && !done; ++i) {
+    const Eigen::MatrixXd normal = gram(j);
+    const Eigen::VectorXd gradient = j.transpose() * r;
+    for (bool better = false; !better && !done;) {
+      Eigen::MatrixXd damped = normal;
+      damped.diagonal() *= 1 + damping;
+      const Eigen::VectorXd step = -solve_symmetric(damped, gradient);
+      const Eigen::VectorXd q = p + scale.cwiseProduct(step);
+      const Eigen::VectorXd moved = try_residuals(residuals, q);
+      better = moved.size() == r.size() && moved.squaredNorm() < r.squaredNorm();
+      if (better) {
+        const double gain = 1 - moved.squaredNorm() / r.squaredNorm();
+        done = gain < options.tolerance || step.norm() < options.tolerance;
+        p = q;
+        r = moved;
+        damping = std::max(kLeastDamping, damping / 10);
+      } else {
+        damping *= 10;
+        done = damping > kMostDamping || step.norm() < options.tolerance;
+      }
+    }
+    if (!done || i == 0) j = jacobian(residuals, p, r, scale, options);
+  }
   LeastSquaresFit fit;
-  fit.values = d.p;
-  fit.residuals = d.r;
-  fit.jacobian = d.j * scale.cwiseInverse().asDiagonal();
-  fit.covariance = covariance(fit.jacobian, d.r);
-  fit.deviation = std::sqrt(variance(fit.jacobian, d.r));
+  fit.values = p;
+  fit.residuals = r;
+  fit.jacobian = j * scale.cwiseInverse().asDiagonal();
+  fit.covariance = covariance(fit.jacobian, r);
+  fit.deviation = std::sqrt(variance(fit.jacobian, r));
   return fit;
 }
 

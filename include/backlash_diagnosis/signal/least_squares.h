@@ -33,18 +33,17 @@ LeastSquaresFit fit_robust(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 using ResidualFunction = std::function<Eigen::VectorXd(const Eigen::VectorXd& parameters)>;
 
 struct NonlinearOptions {
-  int iterations = 30;  // Jacobians that are computed after the first, at most
+  int iterations = 30;
   double tolerance =
       1e-6;            // of the relative decrease of the sum of squares, and of the step in units of `scale`
   double step = 1e-4;  // of the forward differences, in units of `scale`
   bool parallel = false;  // differences on all processors: the function is called from several threads
 };
 
-/// Levenberg and Marquardt with forward differences, between which the Jacobian is updated by what the steps
-/// show (Broyden 1965) as long as they lead where it says. `scale` holds one typical size > 0 per parameter.
-/// Values for which the function throws Error or gives a number that is not finite are taken for too far.
-/// Covariance from the Jacobian and the residuals' own variance. Throws CannotIdentify where the start itself
-/// is refused or a parameter changes nothing.
+/// Levenberg and Marquardt with forward differences. `scale` holds one typical size > 0 per parameter. Values
+/// for which the function throws Error or gives a number that is not finite are taken for too far. Covariance
+/// from the Jacobian and the residuals' own variance. Throws CannotIdentify where the start itself is refused
+/// or a parameter changes nothing.
 LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::VectorXd& start,
                               const Eigen::VectorXd& scale, const NonlinearOptions& options = {});
 

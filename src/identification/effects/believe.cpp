@@ -47,31 +47,37 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   return "";
 }
 
-/// The first effect whose strength does not stand out of its error; an effect of several terms needs one that
-/// does.
-std::optional<std::size_t> vague(const Hypothesis& h, double least) {
+/// The strengths of each effect's terms; none of a map.
+std::vector<std::vector<signal::Measured>> strengths(const Hypothesis& h) {
   const std::vector<signal::Measured> all = fitted_values(*h.fitted, h.declared->parameters.size()).effects;
+  std::vector<std::vector<signal::Measured>> out;
   std::size_t at = 0;
-  for (std::size_t i = 0; i < h.effects.size(); ++i) {
-    const Candidate& candidate = h.effects[i].candidate;
-    const model::TermType& type = model::term_type(candidate.id);
-    double clearest = 0;
-    for (std::size_t t = 0; t < candidate.terms.size(); ++t) {
-      if (type.map)
-        clearest = INFINITY;
-      else
-        clearest = std::max(clearest, std::fabs(all.at(at).value) / all.at(at).standard_error);
-      at += fitted_count(candidate, t);
+  for (const Effect& effect : h.effects) {
+    out.emplace_back();
+    for (std::size_t t = 0; t < effect.candidate.terms.size(); ++t) {
+      if (!model::term_type(effect.candidate.id).map) out.back().push_back(all.at(at));
+      at += fitted_count(effect.candidate, t);
     }
-    if (clearest < least) return i;
   }
-  return std::nullopt;
+  return out;
+}
+
+/// Does not stand out of its error; an effect of several terms needs one that does.
+bool is_vague(const std::vector<signal::Measured>& strengths, double least) {
+  return !strengths.empty() && std::all_of(strengths.begin(), strengths.end(), [&](const auto& m) {
+    return !(std::fabs(m.value) >= least * m.standard_error);
+  });
 }
 
 /// Why the effect is not itself where it acts most; empty: it is.
-std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect, const BeliefSettings& settings) {
-  const auto local = local_strength(h, effect);
-  if (!local || local->ratio + settings.sure * local->standard_error > settings.least_local) return "";
+std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect,
+                               const std::vector<signal::Measured>& strengths,
+                               const BeliefSettings& settings) {
+  if (strengths.size() != 1) return "";
+  const auto local = local_strength(h, effect, strengths.front());
+  if (!local || local->standard_error > settings.local_error ||
+      local->ratio + settings.sure * local->standard_error > settings.least_local)
+    return "";
   return fmt::format(
       "where it acts most it has {:.2g} +- {:.1g} of its strength: it stands in for something else",
       local->ratio, local->standard_error);
@@ -81,10 +87,12 @@ std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect, const Be
 std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
                                                                 const SearchContext& context) {
   const BeliefSettings& settings = context.settings.belief;
-  if (const auto at = vague(h, settings.least_z))
-    return std::pair{*at, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
+  const auto all = strengths(h);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
-    if (std::string why = weak_where_it_acts(h, i, settings); !why.empty())
+    if (is_vague(all[i], settings.least_z))
+      return std::pair{i, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
+  for (std::size_t i = 0; i < h.effects.size(); ++i)
+    if (std::string why = weak_where_it_acts(h, i, all[i], settings); !why.empty())
       return std::pair{i, std::move(why)};
   const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
   for (std::size_t i = 0; i < h.effects.size(); ++i) {

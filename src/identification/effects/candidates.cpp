@@ -83,9 +83,12 @@ std::vector<ParameterValues> probes(const model::TermType& type, const Parameter
 struct Probed {
   const model::TermType* type;
   ParameterValues shape;
-  std::string group;        // kind and choices
-  double strength;          // of the probes
-  Eigen::MatrixXd columns;  // what is left of the sensitivities; none where the machine explains them itself
+  std::string group;  // kind and choices
+  double strength;    // of the probes
+  // What is left of the sensitivities, 0 where the machine explains them itself. A long record has much of
+  // it, so it is kept only of terms that are tried in pairs.
+  Eigen::MatrixXd columns = {};
+  Candidate alone = {};
 };
 
 void probe(Probed& p, const MachineFit& fit, const RecordSet& records, const OrthogonalPart& orthogonal,
@@ -174,7 +177,7 @@ std::vector<Probed> all_probes(const model::Rig& rig, const model::MotionRange& 
       std::string group = type.id;
       for (const ParameterSpec& spec : type.parameters)
         if (!spec.choices.empty()) group += " " + shape.choice(spec.name);
-      all.push_back({&type, shape, group, strength, {}});
+      all.push_back({&type, shape, group, strength});
     }
   }
   return all;
@@ -209,17 +212,20 @@ std::vector<Candidate> screen(const MachineFit& fit, const RecordSet& records,
   std::vector<Probed> all =
       all_probes(fit.machine.rig, range, ResidualOrders(fit, records, orthogonal), settings);
   for_each_in_parallel(int(all.size()), [&](int i) {
+    Probed& p = all[std::size_t(i)];
     try {
-      probe(all[i], fit, records, orthogonal, now, settings.telling);
+      probe(p, fit, records, orthogonal, now, settings.telling);
     } catch (const Cancelled&) {
       throw;
     } catch (const Error&) {  // a load that runs away with it: no candidate
-      all[i].columns.setZero(now.size(), 1);
+      p.columns.setZero(now.size(), 1);
     }
+    p.alone = single(p, left);
+    if (!p.type->search->pairs) p.columns.resize(0, 0);
   });
   std::map<std::string, Candidate> best;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    keep_better(best, all[i].group, single(all[i], left));
+    keep_better(best, all[i].group, all[i].alone);
     if (!all[i].type->search->pairs) continue;
     for (std::size_t j = 0; j < i; ++j)
       if (all[j].group == all[i].group) keep_better(best, all[i].group + " pair", pair(all[j], all[i], left));

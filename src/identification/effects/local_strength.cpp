@@ -29,7 +29,8 @@ Columns columns_of(const Hypothesis& h) {
   for (const Effect& effect : h.effects) {
     c.strength.push_back(at);
     for (std::size_t t = 0; t < effect.candidate.terms.size(); ++t) {
-      const auto shapes = Eigen::Index(fitted_shapes(effect.candidate, t).size()),
+      const bool map = model::term_type(effect.candidate.id).map.has_value();
+      const auto shapes = Eigen::Index(map ? 0 : fitted_shapes(effect.candidate, t).size()),
                  all = Eigen::Index(fitted_count(effect.candidate, t));
       for (Eigen::Index i = 0; i < all - shapes; ++i) c.free.push_back(at + i);
       at += all;
@@ -60,7 +61,8 @@ std::vector<Eigen::Index> rows_where_it_acts(const Hypothesis& h, const Eigen::V
 
 }  // namespace
 
-std::optional<LocalStrength> local_strength(const Hypothesis& h, std::size_t effect) {
+std::optional<LocalStrength> local_strength(const Hypothesis& h, std::size_t effect,
+                                            const signal::Measured& judged) {
   const Candidate& candidate = h.effects[effect].candidate;
   if (candidate.terms.size() != 1 || model::term_type(candidate.id).map) return std::nullopt;
   const signal::LeastSquaresFit& fit = h.fitted->fit.fit;
@@ -78,9 +80,10 @@ std::optional<LocalStrength> local_strength(const Hypothesis& h, std::size_t eff
   const auto at = std::find(columns.free.begin(), columns.free.end(), strength) - columns.free.begin();
   const double variance = (residuals + part * step).squaredNorm() / double(rows.size());
   const double error = unit[at] * std::sqrt(variance * signal::symmetric_inverse(normal)(at, at));
-  const FitParameter& p = h.fitted->start.parameters[std::size_t(strength)];
-  const double size = p.positive ? 1 : std::fabs(p.get(h.fitted->fit.machine.rig));
-  return LocalStrength{1 + step[at] / (p.positive ? 1 : p.get(h.fitted->fit.machine.rig)), error / size};
+  const double one = h.fitted->start.parameters[std::size_t(strength)].positive ? 1 : judged.value;
+  const double independent = std::sqrt(fit.covariance(strength, strength)) / std::fabs(one),
+               correlation = std::max(1.0, judged.standard_error / std::fabs(judged.value) / independent);
+  return LocalStrength{1 + step[at] / one, correlation * error / std::fabs(one)};
 }
 
 }  // namespace backlash::identification

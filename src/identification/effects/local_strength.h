@@ -15,7 +15,9 @@ struct LocalStrength {
 };
 
 /// By a linear step from the fit; parameters of the machine and of other effects are free, shapes of terms
-/// are not. Of an effect with one term; nothing for several and for maps.
-std::optional<LocalStrength> local_strength(const Hypothesis& h, std::size_t effect);
+/// are not. Of an effect with one term; nothing for several and for maps. `judged`: strength as
+/// fitted; what its error is larger than that of independent rows this one is as well.
+std::optional<LocalStrength> local_strength(const Hypothesis& h, std::size_t effect,
+                                            const signal::Measured& judged);
 
 }  // namespace backlash::identification

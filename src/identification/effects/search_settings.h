@@ -28,7 +28,6 @@ struct TrialSettings {
   double least_predicted =
       0.3;                 // simulation: of the gain that is asked for; sensitivities mislead by so much
   double far_off = 1.2;    // simulation: times the wanted residuals, after the rough half of a fit
-  double other_order = 2;  // simulation: times the best residual: no other order brings one from farther
   double tie =
       0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
 };
@@ -81,6 +80,7 @@ struct BeliefSettings {
   double worse = 0.05;  // choice: of the other channel's error
   double least_z = 4;   // choice: of a strength, standard errors
   double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
+  double local_error = 0.1;  // choice: of a strength; where it is told worse the rest of the record counts
   double sure = 2;           // theory: standard errors, 95 %
 };
 

@@ -66,23 +66,6 @@ std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, cons
   return trial;
 }
 
-namespace {
-
-/// Of those that may become the best; `trials` come best first.
-void free_orders(const Hypothesis& h, std::vector<Trial>& trials, const SearchContext& context) {
-  const bool found = std::any_of(trials.begin(), trials.end(), [&](const Trial& t) {
-    return clearly_right(h.fitted->records.misfit(t.fit.machine), context);
-  });
-  double best = INFINITY;
-  for (Trial& trial : trials) {
-    if (!found && trial.residual < context.settings.trials.other_order * best)
-      trial = with_free_orders(h, trial, context);
-    best = std::min(best, trial.residual);
-  }
-}
-
-}  // namespace
-
 Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
                   const SearchContext& context) {
   const TrialSettings& settings = context.settings.trials;
@@ -100,15 +83,13 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
     }
     context.tell(fmt::format("trying {} (predicted gain {:.3g})", c.id, c.gain));
     if (auto trial = tried(h, c, context))
-      all.fitted.push_back(*trial);
+      all.fitted.push_back(with_free_orders(h, *trial, context));
     else
       all.rejected.push_back({c.id, "the machine cannot be fitted with it"});
   }
   auto& fitted = all.fitted;
-  const auto less = [](const Trial& a, const Trial& b) { return a.residual < b.residual; };
-  std::stable_sort(fitted.begin(), fitted.end(), less);
-  free_orders(h, fitted, context);
-  std::stable_sort(fitted.begin(), fitted.end(), less);
+  std::stable_sort(fitted.begin(), fitted.end(),
+                   [](const Trial& a, const Trial& b) { return a.residual < b.residual; });
   const auto tied = std::find_if(fitted.begin(), fitted.end(), [&](const Trial& t) {
     return t.residual > (1 + settings.tie) * fitted.front().residual;
   });
@@ -121,7 +102,9 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
 Trial with_free_orders(const Hypothesis& h, const Trial& trial, const SearchContext& context) {
   const std::vector<double>& held = trial.candidate.held_orders;
   const auto left = [&](const Trial& t) { return size(h.fitted->records.misfit(t.fit.machine)); };
-  if (std::all_of(held.begin(), held.end(), [](double error) { return error == 0; })) return trial;
+  if (std::all_of(held.begin(), held.end(), [](double error) { return error == 0; }) ||
+      clearly_right(h.fitted->records.misfit(trial.fit.machine), context))
+    return trial;
   Candidate free = trial.candidate;
   free.held_orders.clear();
   context.tell("fitting the order of " + free.id);

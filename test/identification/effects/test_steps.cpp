@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "identification/effects/contact_shape.h"
+#include "identification/effects/found_effects.h"
 #include "identification/effects/learned.h"
 #include "identification/effects/local_strength.h"
 #include "identification/effects/search.h"
@@ -270,7 +271,9 @@ LocalStrength of_stribeck(const OneInertiaMachine& machine) {
   stribeck.candidate = {"stribeck", {{{"torque", 0.5}, {"speed", 0.5}, {"exponent", 2}}}};
   stribeck.candidate.terms[0].set_choice("body", "motor");
   const auto with = refitted(fit_declared(test::one_inertia_rig(), bench.context), {stribeck}, bench.context);
-  return local_strength(with.value(), 0).value();
+  const signal::Measured strength =
+      fitted_values(*with->fitted, with->declared->parameters.size()).effects.at(0);
+  return local_strength(with.value(), 0, strength).value();
 }
 
 // A friction that rises faster from 1 rad/s on bends as if it fell at low speeds. Three standard errors.
