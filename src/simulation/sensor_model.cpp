@@ -76,7 +76,9 @@ model::Observation SensorModel::measure(const model::Observation& exact) {
     return settings_.of(channel).declared ? measure(channel, value) : std::nan("");
   };
   measured.motor_current = if_declared(record::Channel::motor_current, exact.motor_current);
-  measured.output_torque = if_declared(record::Channel::output_torque, exact.output_torque);
+  if (settings_.of(record::Channel::output_torque)
+          .declared)  // else as it is: live joint states always had it
+    measured.output_torque = measure(record::Channel::output_torque, exact.output_torque);
   measured.acceleration = if_declared(record::Channel::acceleration, exact.acceleration);
   return measured;
 }

@@ -212,7 +212,7 @@ TEST(SensorModel, CurrentAndAccelerationAreMeasuredWhereTheRigDeclaresThem) {
   const SensorsSettings none = read_sensors(YamlReader::from_text("{sampling_rate: 1, seed: 1}", "rig.yaml"));
   EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).motor_current));
   EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).acceleration));
-  EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).output_torque));
+  EXPECT_EQ(SensorModel(none).measure(exact).output_torque, 4);
   const SensorsSettings both = read_sensors(YamlReader::from_text(
       "{sampling_rate: 1, seed: 1, motor_current: {offset: 0.5}, acceleration: {resolution: 7}, "
       "output_torque: {reversed: true, offset: 1}}",
