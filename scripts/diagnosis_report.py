@@ -83,7 +83,7 @@ def span(data):
 
 
 def time_pictures(data):
-    for names in (("motor_torque", "sensor_torque"), ("motor_current",), ("acceleration",),
+    for names in (("motor_torque", "sensor_torque", "output_torque"), ("motor_current",), ("acceleration",),
                   ("motor_position", "load_position")):
         present = [name for name in names if name in data.channels]
         if present:

@@ -15,9 +15,9 @@ import plotting  # noqa: E402
 plt = plotting.pyplot()
 plt.rcParams["agg.path.chunksize"] = 10000  # long records
 
-CHANNELS = ("motor_torque", "sensor_torque", "motor_current", "motor_velocity", "load_velocity", "acceleration",
+CHANNELS = ("motor_torque", "sensor_torque", "output_torque", "motor_current", "motor_velocity", "load_velocity", "acceleration",
             "motor_position", "load_position", "reference_position")
-COLOURS = {"motor": "tab:blue", "load": "tab:orange", "sensor": "tab:green"}
+COLOURS = {"motor": "tab:blue", "load": "tab:orange", "sensor": "tab:green", "output": "tab:red"}
 
 
 def load(path):
@@ -47,7 +47,7 @@ def panels(record):
     """Unit and lines of each panel: (label, values)."""
     def lines(*names):
         return [(name, record[name]) for name in names if name in record]
-    result = [("torque [N m]", lines("motor_torque", "sensor_torque")), ("current [A]", lines("motor_current")),
+    result = [("torque [N m]", lines("motor_torque", "sensor_torque", "output_torque")), ("current [A]", lines("motor_current")),
               ("speed [rad/s]", lines("motor_velocity", "load_velocity")),
               ("acceleration [rad/s$^2$]", lines("acceleration")),
               ("position [rad]", lines("motor_position", "load_position", "reference_position"))]

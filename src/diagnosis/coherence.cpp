@@ -56,13 +56,20 @@ struct Signals {
   double rate = 0;
 };
 
+/// What drives the motor. A factor does not change the coherence, so that a current needs no torque constant.
+record::Channel driving(const record::Record& record) {
+  const bool current_only =
+      !record.has(record::Channel::motor_torque) && record.has(record::Channel::motor_current);
+  return current_only ? record::Channel::motor_current : record::Channel::motor_torque;
+}
+
 Signals collect(const record::Record& record, const CoherenceSettings& settings) {
-  for (const record::Channel channel : {record::Channel::motor_torque, settings.response})
+  for (const record::Channel channel : {driving(record), settings.response})
     if (!record.has(channel))
       throw Refusal{Status::insufficient_data, "the record has no " + record::channel_name(channel)};
   Signals signals;
   const double interval = record.sampling_interval();
-  signals.torque = record.column(record::Channel::motor_torque);
+  signals.torque = record.column(driving(record));
   signals.response = record.column(settings.response);
   for (std::size_t i = 0; i < record.size(); ++i) {
     if (!std::isfinite(signals.torque[i]) || !std::isfinite(signals.response[i]))
@@ -132,7 +139,7 @@ Band excited_band(const CoherenceSpectrum& spectrum, const CoherenceSettings& se
 }
 
 void require_random(const record::Record& record) {
-  const std::vector<double>& torque = record.column(record::Channel::motor_torque);
+  const std::vector<double>& torque = record.column(driving(record));
   const double k = kurtosis(torque);
   if (k < kKurtosisLow || k > kKurtosisHigh)
     throw Refusal{
@@ -194,6 +201,8 @@ void fill(const record::Record& record, const CoherenceSettings& settings, Coher
   found.loss = std::min(1.0, loss);
   found.deviation = std::sqrt(variance * signal::kHannLines / lines);
   judge(settings, found);
+  if (driving(record) == record::Channel::motor_current)
+    found.message += "; driven by motor_current, as the baseline must be";
 }
 
 }  // namespace

@@ -54,15 +54,31 @@ void check(const PositionDifferenceSettings& s) {
   require(!(s.base_radius <= 0), "base_radius", s.base_radius, "must be > 0");
 }
 
+/// Torque at the motor_position axis that tells the flanks apart: one record's columns differ in what lies
+/// between sensor and teeth.
+struct FlankTorque {
+  const std::vector<double>& values;
+  double factor;        // to the motor_position axis
+  bool behind = false;  // the gear: the motor's inertia is not between
+};
+
+FlankTorque flank_torque(const record::Record& record, const PositionDifferenceSettings& settings) {
+  using record::Channel;
+  for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
+    if (record.has(channel)) return {record.column(channel), 1};
+  if (!record.has(Channel::output_torque))
+    throw Refusal{Status::insufficient_data,
+                  "the record has no motor_torque, sensor_torque or output_torque to tell the flanks apart"};
+  const double sign = settings.output_torque_reversed ? -1 : 1;
+  return {record.column(Channel::output_torque), sign / settings.load_ratio, true};
+}
+
 TwoEncoders collect(const record::Record& record, const PositionDifferenceSettings& settings) {
   for (const record::Channel channel : {record::Channel::motor_position, record::Channel::load_position})
     if (!record.has(channel))
       throw Refusal{Status::insufficient_data, "the record has no " + record::channel_name(channel)};
-  const bool motor = record.has(record::Channel::motor_torque);
-  const auto& torque = record.column(motor ? record::Channel::motor_torque : record::Channel::sensor_torque);
-  if (torque.empty())
-    throw Refusal{Status::insufficient_data,
-                  "the record has neither motor_torque nor sensor_torque to tell the flanks apart"};
+  const FlankTorque source = flank_torque(record, settings);
+  const std::vector<double>& torque = source.values;
   const auto &q_motor = record.column(record::Channel::motor_position),
              &q_load = record.column(record::Channel::load_position);
   TwoEncoders motion;
@@ -72,7 +88,7 @@ TwoEncoders collect(const record::Record& record, const PositionDifferenceSettin
     if (!std::isfinite(torque[i]) || !std::isfinite(q_motor[i]) || !std::isfinite(q_load[i])) continue;
     motion.unbroken.push_back(record.time[i] - last < kBroken * motion.interval);
     last = record.time[i];
-    motion.torque.push_back(torque[i]);
+    motion.torque.push_back(source.factor * torque[i]);
     motion.motor.push_back(q_motor[i]);
     motion.load.push_back(settings.load_ratio * q_load[i]);
   }
@@ -224,14 +240,14 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
     throw Refusal{Status::out_of_domain,
                   fmt::format("the output moves by {:.4g} rad although the rig says that it is locked",
                               travel(motion.load))};
-  if (settings.output_locked) require_possible(motion, settings.motor_inertia);
+  const double inertia = flank_torque(record, settings).behind ? 0 : settings.motor_inertia;
+  if (settings.output_locked) require_possible(motion, inertia);
   FlankModel model;
   model.elastic = settings.elastic_deflection;
-  model.inertia = settings.motor_inertia;
+  model.inertia = inertia;
   model.elastic_deviation = settings.elastic_uncertainty / 1.96;
   model.moving = load_moves(motion);
-  const signal::Measured skew =
-      model.moving ? clear_skew(motion, settings.motor_inertia) : signal::Measured{0, 0};
+  const signal::Measured skew = model.moving ? clear_skew(motion, inertia) : signal::Measured{0, 0};
   const auto [fit, longer] = fit_record(without_skew(motion, skew.value), model);
   require_sound(fit);
   const double skewed = gap_change(motion, model, skew, fit.gap);

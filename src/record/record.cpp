@@ -14,20 +14,20 @@ namespace {
 const std::array<std::string, kChannelCount>& channel_names() {
   static const std::array<std::string, kChannelCount> names = {
       "motor_torque",  "motor_position",     "motor_velocity", "load_position", "load_velocity",
-      "sensor_torque", "reference_position", "motor_current",  "acceleration"};
+      "sensor_torque", "reference_position", "motor_current",  "acceleration",  "output_torque"};
   return names;
 }
 
 }  // namespace
 
 const std::array<Channel, kChannelCount> kChannels = {
-    Channel::motor_torque,       Channel::motor_position, Channel::motor_velocity,
-    Channel::load_position,      Channel::load_velocity,  Channel::sensor_torque,
-    Channel::reference_position, Channel::motor_current,  Channel::acceleration};
+    Channel::motor_torque,  Channel::motor_position, Channel::motor_velocity,     Channel::load_position,
+    Channel::load_velocity, Channel::sensor_torque,  Channel::reference_position, Channel::motor_current,
+    Channel::acceleration,  Channel::output_torque};
 
-const std::array<Channel, 6> kBacklashChannels = {Channel::motor_torque,   Channel::sensor_torque,
-                                                  Channel::motor_position, Channel::load_position,
-                                                  Channel::motor_current,  Channel::acceleration};
+const std::array<Channel, 7> kBacklashChannels = {
+    Channel::motor_torque,  Channel::sensor_torque, Channel::motor_position, Channel::load_position,
+    Channel::motor_current, Channel::acceleration,  Channel::output_torque};
 
 const std::string& channel_name(Channel channel) {
   return channel_names()[static_cast<std::size_t>(channel)];
@@ -37,6 +37,7 @@ const char* channel_unit(Channel channel) {
   switch (channel) {
     case Channel::motor_torque:
     case Channel::sensor_torque:
+    case Channel::output_torque:
       return "N m";
     case Channel::motor_position:
     case Channel::load_position:

@@ -95,6 +95,9 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
       std::isnan(file.rig.torque_constant))
     yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
   fill_from_rig(file.rig, file.diagnosis);
+  if (file.diagnosis.position_difference)
+    file.diagnosis.position_difference->output_torque_reversed =
+        file.simulation.sensors.of(record::Channel::output_torque).reversed;
   return file;
 }
 

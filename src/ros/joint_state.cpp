@@ -131,6 +131,7 @@ void JointStateReader::take(const sensor_msgs::JointState& m, std::size_t i, int
     case kLoad:
       at(values, record::Channel::load_position) = position;
       at(values, record::Channel::load_velocity) = velocity;
+      at(values, record::Channel::output_torque) = effort;
       break;
     case kReference:
       at(values, record::Channel::reference_position) = position;
@@ -155,7 +156,7 @@ record::ChannelValues read_joint_state(const sensor_msgs::JointState& m, const s
 void add_joint_state(const model::Observation& o, const JointNames& names, sensor_msgs::JointState& m) {
   add(m, names.motor, o.motor_position, o.motor_velocity, o.motor_torque);
   add(m, names.sensor, o.sensor_twist, o.sensor_twist_rate, o.sensor_torque);
-  add(m, names.load, o.load_position, o.load_velocity, o.load_torque);
+  add(m, names.load, o.load_position, o.load_velocity, o.output_torque);
   add(m, names.current, kAbsent, kAbsent, o.motor_current);
   add(m, names.accelerometer, kAbsent, kAbsent, o.acceleration);
 }
@@ -175,7 +176,8 @@ sensor_msgs::JointState make_joint_state(const record::Record& record, std::size
   add(m, names.motor, get(record::Channel::motor_position), get(record::Channel::motor_velocity),
       get(record::Channel::motor_torque));
   add(m, names.sensor, kAbsent, kAbsent, get(record::Channel::sensor_torque));
-  add(m, names.load, get(record::Channel::load_position), get(record::Channel::load_velocity), kAbsent);
+  add(m, names.load, get(record::Channel::load_position), get(record::Channel::load_velocity),
+      get(record::Channel::output_torque));
   add(m, names.reference, get(record::Channel::reference_position), kAbsent, kAbsent);
   add(m, names.current, kAbsent, kAbsent, get(record::Channel::motor_current));
   add(m, names.accelerometer, kAbsent, kAbsent, get(record::Channel::acceleration));

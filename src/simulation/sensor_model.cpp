@@ -15,6 +15,7 @@ SensorSettings read_sensor(const YamlReader& yaml) {
   sensor.noise = yaml.number_or("noise", 0, Range::not_negative());
   sensor.resolution = yaml.number_or("resolution", 0, Range::not_negative());
   sensor.offset = yaml.number_or("offset", 0, Range::any());
+  sensor.reversed = yaml.boolean_or("reversed", false);
   if (yaml.has("limit")) sensor.limit = yaml.number("limit", Range::positive());
   return sensor;
 }
@@ -56,7 +57,7 @@ void SensorModel::set_noise(record::Channel channel, double noise) {
 double SensorModel::measure(record::Channel channel, double exact) {
   const std::size_t i = static_cast<std::size_t>(channel);
   const SensorSettings& sensor = settings_.channels[i];
-  double value = exact + sensor.offset;
+  double value = (sensor.reversed ? -exact : exact) + sensor.offset;
   if (sensor.noise > 0) value += sensor.noise * noise_[i]->normal();
   value = std::clamp(value, -sensor.limit, sensor.limit);
   if (sensor.resolution > 0) value = std::round(value / sensor.resolution) * sensor.resolution;
@@ -64,7 +65,7 @@ double SensorModel::measure(record::Channel channel, double exact) {
 }
 
 model::Observation SensorModel::measure(const model::Observation& exact) {
-  model::Observation measured = exact;  // the twist and the load torque have no sensor of their own
+  model::Observation measured = exact;  // the twist has no sensor of its own
   measured.motor_torque = measure(record::Channel::motor_torque, exact.motor_torque);
   measured.motor_position = measure(record::Channel::motor_position, exact.motor_position);
   measured.motor_velocity = measure(record::Channel::motor_velocity, exact.motor_velocity);
@@ -75,6 +76,9 @@ model::Observation SensorModel::measure(const model::Observation& exact) {
     return settings_.of(channel).declared ? measure(channel, value) : std::nan("");
   };
   measured.motor_current = if_declared(record::Channel::motor_current, exact.motor_current);
+  if (settings_.of(record::Channel::output_torque)
+          .declared)  // else as it is: live joint states always had it
+    measured.output_torque = measure(record::Channel::output_torque, exact.output_torque);
   measured.acceleration = if_declared(record::Channel::acceleration, exact.acceleration);
   return measured;
 }

@@ -113,6 +113,8 @@ record::Record simulate_record(const model::Rig& rig, const SimulationSettings& 
       record.column(record::Channel::sensor_torque).push_back(o.sensor_torque);
     if (!std::isnan(o.motor_current))
       record.column(record::Channel::motor_current).push_back(o.motor_current);
+    if (settings.sensors.of(record::Channel::output_torque).declared && !std::isnan(o.output_torque))
+      record.column(record::Channel::output_torque).push_back(o.output_torque);
     if (!std::isnan(o.acceleration)) record.column(record::Channel::acceleration).push_back(o.acceleration);
   }
   if (progress) progress(1, "simulating");

@@ -32,6 +32,8 @@ double signal_of(const model::Observation& o, record::Channel channel) {
       return o.load_velocity;
     case record::Channel::sensor_torque:
       return o.sensor_torque;
+    case record::Channel::output_torque:
+      return o.output_torque;
     case record::Channel::motor_current:
       return o.motor_current;
     case record::Channel::acceleration:

@@ -134,6 +134,18 @@ TEST(CoherenceDetector, FindsANonlinearityAgainstTheHealthyMachine) {
   EXPECT_FALSE(open.nonlinear);
 }
 
+// Theory: a factor changes no coherence, so the motor's current or voltage alone says what its torque says.
+TEST(CoherenceDetector, TheMotorsCurrentServesAsWell) {
+  record::Record current = record_of(slightly_noisy);
+  const CoherenceDetection torque = detect_nonlinearity(current, settings());
+  for (const double value : current.column(record::Channel::motor_torque))
+    current.column(record::Channel::motor_current).push_back(-value / 0.03);
+  current.column(record::Channel::motor_torque).clear();
+  const CoherenceDetection found = detect_nonlinearity(current, settings());
+  ASSERT_EQ(found.status, Status::ok) << found.message;
+  EXPECT_NEAR(found.loss, torque.loss, 1e-12);
+}
+
 TEST(CoherenceDetector, RefusesTorqueThatIsNotRandomAndBroad) {
   const auto status = [](const std::function<double(double)>& torque) {
     std::vector<double> t;

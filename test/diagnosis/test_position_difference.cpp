@@ -103,6 +103,48 @@ TEST(PositionDifference, FreePlayOfAServoWhoseLoadMoves) {
   }
 }
 
+/// The record of a torque sensor behind the gear instead of the motor's torque: the torque that the servo's
+/// load takes.
+record::Record with_output_torque(const Servo& servo, double sign) {
+  record::Record r = servo.record();
+  r.column(record::Channel::motor_torque).clear();
+  Random random(5);
+  for (const double t : r.time)
+    r.column(record::Channel::output_torque)
+        .push_back(sign * (servo.transmitted(t) + servo.torque_noise * random.normal()));
+  return r;
+}
+
+TEST(PositionDifference, ATorqueSensorBehindTheGearTellsTheFlanksAsWell) {
+  for (const double gap : {0.0, 5e-4, 2e-3})
+    for (const double sign : {1.0, -1.0}) {
+      Servo servo;
+      servo.gap = gap;
+      PositionDifferenceSettings s = settings();
+      s.output_torque_reversed = sign < 0;
+      const Estimate e = estimate_position_difference(with_output_torque(servo, sign), s);
+      ASSERT_EQ(e.status, Status::ok) << e.message;
+      EXPECT_NEAR(e.backlash_angle, gap, 2 * kNear) << e.message;
+      EXPECT_LE(e.angle_lower, gap);
+      EXPECT_GE(e.angle_upper, gap);
+      s.output_torque_reversed =
+          sign > 0;  // refused, or right by the few windows in which the torque is small
+      const Estimate wrong = estimate_position_difference(with_output_torque(servo, sign), s);
+      if (wrong.status != Status::ok) continue;
+      EXPECT_LE(wrong.angle_lower, gap);
+      EXPECT_GE(wrong.angle_upper, gap);
+    }
+  // At an axis that turns twice as fast as the load the sensor's torque counts half, angles twice.
+  PositionDifferenceSettings s = settings();
+  s.load_ratio = 2;
+  s.elastic_deflection = [](double torque) { return 4 * torque / kStiffness; };
+  record::Record r = with_output_torque(Servo(), 1);
+  for (double& q : r.column(record::Channel::motor_position)) q *= 2;
+  const Estimate e = estimate_position_difference(r, s);
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_NEAR(e.backlash_angle, 2 * kGap, 4 * kNear);
+}
+
 TEST(PositionDifference, TheRecordKnowsComplianceInertiaAndFrictionBetterThanTheRigFile) {
   Servo servo;
   servo.stiffness = 0.6 * kStiffness;

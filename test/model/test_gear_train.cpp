@@ -129,7 +129,7 @@ TEST(GearTrain, GearAndLinkMoveAsOneBehindARigidOutput) {
               1e-9 * rate[5]);  // 1 um is the difference of angles near 1.5 mrad
   const Observation o = train.observe(s.data(), 0);
   EXPECT_EQ(o.load_velocity, 0.4);
-  EXPECT_TRUE(std::isnan(o.load_torque));
+  EXPECT_TRUE(std::isnan(o.output_torque));
 }
 
 TEST(GearTrain, LockedGearIsAWallOnBothSides) {
@@ -285,7 +285,7 @@ TEST(GearTrain, MotorSideRigIsTheSameMachine) {
   EXPECT_DOUBLE_EQ(on_motor.sensor_twist_rate, -1 * n);
   EXPECT_EQ(on_motor.load_position, -0.0002);
   EXPECT_EQ(on_motor.load_velocity, 4);
-  EXPECT_NEAR(on_motor.load_torque, 6000 * 0.0003, 1e-12);
+  EXPECT_NEAR(on_motor.output_torque, 6000 * 0.0003, 1e-12);
   EXPECT_NEAR(a.elastic_deflection(0.01), n * b.elastic_deflection(0.01 * n), 1e-15);
 }
 

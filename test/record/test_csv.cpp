@@ -91,7 +91,7 @@ TEST(Csv, HarmlessVariationsReadTheSame) {
 
 TEST(Csv, OneSampleAndAnyTellingChannelIsEnough) {
   for (const char* channel : {"motor_torque", "sensor_torque", "motor_position", "load_position",
-                              "motor_current", "acceleration"}) {
+                              "motor_current", "acceleration", "output_torque"}) {
     EXPECT_EQ(parse("time," + std::string(channel) + "\n0,1\n").column(channel_from_name(channel)).size(),
               1u);
   }
@@ -107,10 +107,10 @@ TEST(Csv, MalformedHeadersAreRefusedWithPlaceAndReason) {
   const std::string known =
       "known are time, motor_torque, motor_position, motor_velocity, load_position, load_velocity, "
       "sensor_torque, "
-      "reference_position, motor_current, acceleration";
+      "reference_position, motor_current, acceleration, output_torque";
   const std::string needed =
       "no torque, position, current or acceleration: needs at least one of motor_torque, sensor_torque, "
-      "motor_position, load_position, motor_current, acceleration; "
+      "motor_position, load_position, motor_current, acceleration, output_torque; "
       "there are: ";
   const Malformed cases[] = {
       {"", "run.csv:1: empty, expected column names"},
@@ -297,7 +297,7 @@ TEST_F(CsvFileTest, WhatCouldNotBeReadBackIsNotWritten) {
               r.column(Channel::sensor_torque).clear();
             }),
             "noise: a record needs at least one of motor_torque, sensor_torque, motor_position, "
-            "load_position, motor_current, acceleration to be written");
+            "load_position, motor_current, acceleration, output_torque to be written");
   EXPECT_EQ(broken([](Record& r) { r.column(Channel::motor_torque).pop_back(); }),
             "noise: motor_torque has 2 values, time has 3");
   EXPECT_EQ(broken([](Record& r) { r.column(Channel::sensor_torque)[1] = std::nan(""); }),

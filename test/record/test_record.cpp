@@ -31,6 +31,7 @@ TEST(Record, ChannelNamesAreTheColumnNamesAndInvertible) {
   EXPECT_EQ(channel_name(Channel::reference_position), "reference_position");
   EXPECT_EQ(channel_name(Channel::motor_current), "motor_current");
   EXPECT_EQ(channel_name(Channel::acceleration), "acceleration");
+  EXPECT_EQ(channel_name(Channel::output_torque), "output_torque");
   std::set<std::string> names;
   for (const Channel channel : kChannels) {
     EXPECT_EQ(channel_from_name(channel_name(channel)), channel);
@@ -42,6 +43,7 @@ TEST(Record, ChannelNamesAreTheColumnNamesAndInvertible) {
 TEST(Record, ChannelsHaveTheUnitsOfARotaryAxis) {
   EXPECT_STREQ(channel_unit(Channel::motor_torque), "N m");
   EXPECT_STREQ(channel_unit(Channel::sensor_torque), "N m");
+  EXPECT_STREQ(channel_unit(Channel::output_torque), "N m");
   EXPECT_STREQ(channel_unit(Channel::load_position), "rad");
   EXPECT_STREQ(channel_unit(Channel::motor_velocity), "rad/s");
   EXPECT_STREQ(channel_unit(Channel::motor_current), "A");

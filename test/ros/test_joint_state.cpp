@@ -29,6 +29,13 @@ TEST(JointState, CurrentAndAccelerationAreEffortsOfNamesOfTheirOwn) {
   EXPECT_TRUE(std::isnan(of(values, record::Channel::motor_position)));
 }
 
+TEST(JointState, TheEffortOfTheLoadIsTheTorqueBehindTheGear) {
+  sensor_msgs::JointState m;
+  m.name = {"elbow_load"};
+  m.effort = {-3};
+  EXPECT_EQ(of(read_joint_state(m, "elbow", "joint_states"), record::Channel::output_torque), -3);
+}
+
 TEST(JointState, EitherNameAloneIsTheJoint) {
   for (const std::string suffix : {"_current", "_accelerometer"}) {
     sensor_msgs::JointState m;

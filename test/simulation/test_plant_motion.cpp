@@ -131,7 +131,7 @@ TEST(PlantMotion, ComesToRestAtTheStaticDeflection) {
       const double expected = gap + train.elastic_deflection(torque);
       EXPECT_NEAR(plant.observe().motor_position, expected, 1e-6 * std::fabs(expected));
       EXPECT_NEAR(plant.observe().sensor_torque, torque, 1e-6 * std::fabs(torque));
-      EXPECT_NEAR(plant.observe().load_torque, torque * ratio, 1e-6 * std::fabs(torque * ratio));
+      EXPECT_NEAR(plant.observe().output_torque, torque * ratio, 1e-6 * std::fabs(torque * ratio));
     }
 }
 

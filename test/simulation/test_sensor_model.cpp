@@ -202,21 +202,24 @@ TEST(SensorModel, EachValueOfAnObservationHasItsOwnSensor) {
   EXPECT_EQ(measured.load_velocity, 8 + offset(record::Channel::load_velocity));
   EXPECT_EQ(measured.sensor_twist, 5);  // no sensor of their own
   EXPECT_EQ(measured.sensor_twist_rate, 6);
-  EXPECT_EQ(measured.load_torque, 9);
 }
 
 TEST(SensorModel, CurrentAndAccelerationAreMeasuredWhereTheRigDeclaresThem) {
   model::Observation exact{};
   exact.motor_current = 2;
   exact.acceleration = 300;
+  exact.output_torque = 4;
   const SensorsSettings none = read_sensors(YamlReader::from_text("{sampling_rate: 1, seed: 1}", "rig.yaml"));
   EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).motor_current));
   EXPECT_TRUE(std::isnan(SensorModel(none).measure(exact).acceleration));
+  EXPECT_EQ(SensorModel(none).measure(exact).output_torque, 4);
   const SensorsSettings both = read_sensors(YamlReader::from_text(
-      "{sampling_rate: 1, seed: 1, motor_current: {offset: 0.5}, acceleration: {resolution: 7}}",
+      "{sampling_rate: 1, seed: 1, motor_current: {offset: 0.5}, acceleration: {resolution: 7}, "
+      "output_torque: {reversed: true, offset: 1}}",
       "rig.yaml"));
   EXPECT_EQ(SensorModel(both).measure(exact).motor_current, 2.5);
   EXPECT_EQ(SensorModel(both).measure(exact).acceleration, 301);
+  EXPECT_EQ(SensorModel(both).measure(exact).output_torque, -3);
 }
 
 SensorsSettings read(const std::string& text) {

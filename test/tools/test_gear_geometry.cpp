@@ -78,7 +78,10 @@ TEST_F(GearGeometryCommand, APairThatDoesNotRunIsTold) {
   expect_contains(outcome.err, "contact ratio 0.98");
   const Json j = Json::parse(outcome.out);
   EXPECT_EQ(j["geometry"]["faults"].size(), 1u);
-  EXPECT_TRUE(j["mesh_stiffness"]["laws"]["step"]["mean"].is_null());
+  // On average 0.98901 pairs (standard involute theory) of 1.051e9 N/m each touch.
+  EXPECT_NEAR(j["mesh_stiffness"]["laws"]["step"]["mean"], 0.98901 * 1.051e9, 1e6);
+  const Json apart = Json::parse(run("gear_geometry --centre-distance-change 1e-3 --json -").out);
+  EXPECT_TRUE(apart["mesh_stiffness"]["laws"]["step"]["mean"].is_null());
   EXPECT_EQ(run("gear_geometry --teeth1 12 --teeth2 12").code, 2);
   EXPECT_EQ(run("gear_geometry --centre-distance-change 620e-6 --table 2").code, 2);
 }

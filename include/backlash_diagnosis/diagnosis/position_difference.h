@@ -53,6 +53,9 @@ struct PositionDifferenceSettings {
   /// The rig says so; then a load_position that moves by more than 5 % of motor_position is refused.
   bool output_locked = false;
 
+  /// output_torque has the other sign than the rig's load: sensors: output_torque: {reversed: true}.
+  bool output_torque_reversed = false;
+
   /// s, by which load_position is later than motor_position, as declared: taken out first.
   double encoder_skew = 0;
 
@@ -66,7 +69,8 @@ struct PositionDifferenceSettings {
 ///   out_of_domain      the output moves although it is locked; torque does not press both flanks; the
 ///   deflection does not follow the torque; the
 ///                      encoders differ by more than 1 % in scale; the play is negative beyond the interval
-/// Torque is motor_torque where present, else sensor_torque.
+/// Torque is motor_torque where present, else sensor_torque, else output_torque, which the motor's inertia
+/// and friction do not reach: the friction in the fit is then that between the teeth and the sensor.
 Estimate estimate_position_difference(const record::Record& record,
                                       const PositionDifferenceSettings& settings);
 

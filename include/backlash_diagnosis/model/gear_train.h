@@ -44,7 +44,7 @@ struct Observation {
   double sensor_torque;
   double sensor_twist, sensor_twist_rate;  // rad, rad/s, twist of the input coupling; NaN if rigid
   double load_position, load_velocity;     // as a load encoder of wrong scale shows them (Sensing)
-  double load_torque;                      // N m, spring torque of the output coupling; NaN if rigid
+  double output_torque;  // N m, at the load, spring torque of the output coupling; NaN if rigid
   double
       motor_current;  // A, motor_torque / torque constant: an ideal current control; NaN without the constant
   double acceleration;  // rad/s^2, of the gear; of the pinion (as motor_position) where the gear cannot move

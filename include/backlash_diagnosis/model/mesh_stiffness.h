@@ -24,6 +24,8 @@
 // Eqs. 2.28 and 2.29, after Kuang and Yang (1992). Steel only (E from 180 to 220 GPa), 12 to 100 teeth, shift
 // -0.6 to 0.6.
 //
+// Contact ratios below 1, down to 0.9: no pair touches for the rest of the cycle, and k is 0.
+//
 // All laws are linear: the stiffness does not depend on the load. Extended contact under load is left out;
 // the `transition` stands for it, see below.
 #pragma once

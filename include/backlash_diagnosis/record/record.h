@@ -21,9 +21,11 @@ enum class Channel {
   sensor_torque,       // N m, torque in the input coupling
   reference_position,  // rad
   motor_current,       // A, of the motor
-  acceleration,  // rad/s^2 (linear axis: m/s^2), of the load gear or whatever part carries the accelerometer
+  acceleration,   // rad/s^2 (linear axis: m/s^2), of the load gear or whatever part carries the accelerometer
+  output_torque,  // N m, in the output coupling, behind the gear; > 0 drives the load forward; never
+                  // motor-side
 };
-constexpr std::size_t kChannelCount = 9;
+constexpr std::size_t kChannelCount = 10;
 extern const std::array<Channel, kChannelCount> kChannels;
 
 /// Column name of a channel in a CSV, the same as its enumerator.
@@ -36,7 +38,7 @@ const char* channel_unit(Channel channel);
 Channel channel_from_name(const std::string& name);
 
 /// The channels in which backlash can be seen: a record needs at least one of them.
-extern const std::array<Channel, 6> kBacklashChannels;
+extern const std::array<Channel, 7> kBacklashChannels;
 
 /// One sample of all channels; NaN where there is none.
 using ChannelValues = std::array<double, kChannelCount>;

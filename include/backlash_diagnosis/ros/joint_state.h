@@ -4,7 +4,7 @@
 //
 //   <joint>_motor       position = motor_position    velocity = motor_velocity   effort = motor_torque
 //   <joint>_sensor      position = twist of the input coupling (not recorded)    effort = sensor_torque
-//   <joint>_load        position = load_position     velocity = load_velocity
+//   <joint>_load        position = load_position     velocity = load_velocity   effort = output_torque
 //   <joint>_reference   position = reference_position
 //   <joint>_current         effort = motor_current [A]
 //   <joint>_accelerometer   effort = acceleration [rad/s^2]

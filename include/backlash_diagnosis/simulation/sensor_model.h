@@ -3,6 +3,8 @@
 //
 //   measured = round(clamp(exact + offset + noise, -limit, limit) / resolution) * resolution
 //
+// with -exact for a sensor that is `reversed`.
+//
 // Each channel draws from a generator of its own, so that a sensor added or removed leaves the others' noise
 // unchanged.
 #pragma once
@@ -23,7 +25,9 @@ struct SensorSettings {
   double resolution = 0;  // width of a step; 0: none
   double offset = 0;
   double limit = std::numeric_limits<double>::infinity();  // saturation at +-limit
-  bool declared = false;  // in the rig file; motor_current and acceleration are recorded only then
+  bool declared =
+      false;  // in the rig file; motor_current, acceleration and output_torque are recorded only then
+  bool reversed = false;  // shows the negative of what the channel means
 };
 
 /// All sensors of a rig, and how they sample.
