@@ -39,9 +39,10 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
         "on the unseen record it leaves {:.2g} times of {} what noise does: it explains the noise",
         std::sqrt(is.total() / is.noise), name);
   if (before.deflection.empty()) return "";
-  const TestGain other =
-      test_gain(left(before, !deflection, settings), left(after, !deflection, settings), settings);
-  if (other.upper < 0 && other.value < -settings.worse)
+  const Left other_was = left(before, !deflection, settings), other_is = left(after, !deflection, settings);
+  const TestGain other = test_gain(other_was, other_is, settings);
+  const double price = (other_is.total() - other_was.total()) / other_was.noise;
+  if (other.upper < 0 && other.value < -settings.worse && price > settings.price * decrease / was.noise)
     return fmt::format("on the unseen record it makes the error of {} worse, by {}", names[!deflection],
                        interval({-other.value, -other.upper, -other.lower}));
   return "";

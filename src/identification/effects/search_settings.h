@@ -26,8 +26,8 @@ struct TrialSettings {
   std::size_t most = 6;       // choice (time): candidates
   double worth_trying = 0.2;  // choice: of the best predicted gain
   double least_predicted =
-      0.3;                 // simulation: of the gain that is asked for; sensitivities mislead by so much
-  double far_off = 1.2;    // simulation: times the wanted residuals, after the rough half of a fit
+      0.3;               // simulation: of the gain that is asked for; sensitivities mislead by so much
+  double far_off = 1.2;  // simulation: times the wanted residuals, after the rough half of a fit
   double tie =
       0.005;  // choice: of the residuals: then the term with the fewest shapes, gravity before cogging
 };
@@ -78,7 +78,9 @@ struct BeliefSettings {
   double below_noise =
       0.64;             // theory: of the noise's square, its deviation known to a fifth: nothing leaves less
   double worse = 0.05;  // choice: of the other channel's error
-  double least_z = 4;   // choice: of a strength, standard errors
+  double price =
+      0.1;  // choice: of the decrease, each in the noise of its channel: growth of the other channel
+  double least_z = 4;        // choice: of a strength, standard errors
   double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
   double local_error = 0.1;  // choice: of a strength; where it is told worse the rest of the record counts
   double sure = 2;           // theory: standard errors, 95 %
