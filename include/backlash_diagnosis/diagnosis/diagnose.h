@@ -11,11 +11,12 @@
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 #include "backlash_diagnosis/diagnosis/verdict.h"
+#include "backlash_diagnosis/diagnosis/waveform.h"
 
 namespace backlash::diagnosis {
 
 /// What a rig file says under `diagnosis`, and what its estimators need of the rig (position_difference,
-/// momentum_transfer). An absent part means that its estimator cannot be served.
+/// momentum_transfer, waveform). An absent part means that its estimator cannot be served.
 struct DiagnosisSettings {
   /// How well the rig file knows the machine: relative standard deviation of the stiffness of its couplings.
   double stiffness_uncertainty = 0;
@@ -23,6 +24,7 @@ struct DiagnosisSettings {
   std::optional<LostMotionSettings> lost_motion;
   std::optional<PositionDifferenceSettings> position_difference;
   std::optional<MomentumTransferSettings> momentum_transfer;
+  std::optional<WaveformSettings> waveform;
   std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
 };
