@@ -83,8 +83,7 @@ Estimate by_momentum_transfer(const DiagnosisInput& in) {
 }
 
 Estimate by_waveform(const DiagnosisInput& in) {
-  if (!in.settings.waveform)
-    return not_served("the rig has no torque sensor before a Hunt-Crossley mesh with a locked output");
+  if (!in.settings.waveform) return not_served(in.settings.no_waveform);
   if (in.lock_contradicted) return not_locked(*in.lock_contradicted);
   return estimate_waveform(in.record, *in.settings.waveform);
 }

@@ -111,6 +111,8 @@ Choice choose(const Estimates& all) {
   choice.dissenters = filtered(sound, [&](int i) {
     return std::find(choice.members.begin(), choice.members.end(), i) == choice.members.end();
   });
+  const Set fitted = filtered(choice.members, [&](int i) { return all[i].fits_machine; });
+  if (!fitted.empty()) choice.members = fitted;
   std::sort(choice.members.begin(), choice.members.end(), [&](int a, int b) { return sharper(all, a, b); });
   return choice;
 }

@@ -21,7 +21,7 @@ constexpr double kFinest =
 constexpr double kErrors = 2;          // half width in standard errors, 95 %
 constexpr double kMostLeftOut = 0.34;  // of the windows: choice
 constexpr double kMostPrior = 36;      // sum of squares of 19 values in spreads: theory, 1 % of chi^2
-constexpr double kFarthest = 4;      // spreads, of one value: choice
+constexpr double kFarthest = 4;        // spreads, of one value: choice
 constexpr double kMostNoise = 1.3;     // residual per noise of the signal: choice
 // Of the swing, part of the residual that is no noise: simulation, see test_waveform.cpp.
 constexpr double kMostStructure[kWaveformChannels] = {0.01, 0.0006};
@@ -111,7 +111,7 @@ void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settin
   e.backlash_angle = e.backlash / per_angle;
   e.angle_lower = e.lower / per_angle, e.angle_upper = e.upper / per_angle;
   if (!position) e.declared = below / per_angle;  // nearly all of it, by the symmetry
-  e.from_record = true;
+  e.from_record = e.fits_machine = true;
   e.message = message_of(s, position);
   e.status = e.lower > 0 ? Status::ok : Status::below_range;
   if (e.lower > 0) return;

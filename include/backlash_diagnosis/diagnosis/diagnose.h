@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
@@ -25,6 +26,14 @@ struct DiagnosisSettings {
   std::optional<PositionDifferenceSettings> position_difference;
   std::optional<MomentumTransferSettings> momentum_transfer;
   std::optional<WaveformSettings> waveform;
+  std::string no_waveform =  // why not, where it is absent
+      "the rig has no torque sensor before a Hunt-Crossley mesh with a locked output";
+
+  /// Without the estimator that takes seconds.
+  void leave_out_waveform() {
+    waveform.reset();
+    no_waveform = "takes seconds: not run here, but by diagnose_record";
+  }
   std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
 };
