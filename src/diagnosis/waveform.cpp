@@ -19,6 +19,7 @@ namespace {
 constexpr double kFinest =
     6e-7;  // m, half width: flanks are no smoother (ground, Ra 0.3 um), equations no finer
 constexpr double kErrors = 2;          // half width in standard errors, 95 %
+constexpr double kErrorsAlone = 2.2;   // of torque alone, by priors that are choices: simulation
 constexpr double kMostLeftOut = 0.34;  // of the windows: choice
 constexpr double kMostPrior = 36;      // sum of squares of 19 values in spreads: theory, 1 % of chi^2
 constexpr double kFarthest = 4;        // spreads, of one value: choice
@@ -86,7 +87,8 @@ void refuse(const WaveformSolution& s) {
   if (sum > kMostPrior || std::fabs(s.z[worst]) > kFarthest)
     throw Refusal{Status::out_of_domain,
                   "the record fits only a machine far from that of the rig file: " + value_text(s, worst)};
-  if (s.rival_cost < kRivalCost && std::fabs(std::log(s.rival / s.half_gap)) > kRivalApart)
+  if (s.rival_cost < kRivalCost &&
+      2 * std::fabs(s.rival - s.half_gap) > std::max(kFinest, 2 * kRivalApart * s.half_gap))
     throw Refusal{Status::ambiguous, fmt::format("backlash of {:.4g} m and of {:.4g} m fit the record alike",
                                                  2 * s.half_gap, 2 * s.rival)};
 }
@@ -104,8 +106,8 @@ std::string message_of(const WaveformSolution& s, bool position) {
 void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settings, bool position) {
   const double per_angle = settings.base_radius;
   e.backlash = 2 * s.half_gap;
-  const double below = e.backlash * (1 - std::exp(-kErrors * s.log_error));
-  const double above = e.backlash * (std::exp(kErrors * s.log_error) - 1);
+  const double half = (position ? kErrors : kErrorsAlone) * s.log_error;
+  const double below = e.backlash * (1 - std::exp(-half)), above = e.backlash * (std::exp(half) - 1);
   e.lower = std::max(0.0, e.backlash - std::hypot(below, kFinest));
   e.upper = e.backlash + std::hypot(above, kFinest);
   e.backlash_angle = e.backlash / per_angle;

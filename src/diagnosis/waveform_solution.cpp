@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "waveform_solution.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -15,8 +17,8 @@ namespace backlash::diagnosis {
 namespace {
 
 // All choices, tried on simulated machines, but where another origin is given.
-constexpr int kMostWindows = 16;       // beyond them the errors do not shrink: priors and equations limit
-constexpr int kSearchWindows = 6;      // for the first guesses
+constexpr int kMostWindows = 12;       // beyond them the errors do not shrink: priors and equations limit
+constexpr int kSearchWindows = 4;      // for the first guesses
 constexpr double kStepsPerRing = 155;  // of the integration
 constexpr double kStepPerTime = 1;     // step times fastest frequency: Runge and Kutta's is stable to 2.8
 constexpr double kStiffer = 3;         // the output may be so much stiffer than declared
@@ -25,8 +27,10 @@ constexpr double kWideGap = 3;         // spread of the logarithm of the gap: ne
 constexpr double kGuesses[] = {0.1, 0.3, 0.8, 2,
                                4.5};  // half gaps per twist of the sensor, along the line of action
 constexpr double kFirstLoss = 0.2;    // spreads, of what cannot be below 0: from there its slope is not seen
-constexpr double kSure = 3;           // standard deviations of the correlation of white noise
-constexpr double kLeftOut = 4;        // times the median misfit of the windows
+constexpr double kHopeless = 4;       // times the noise, or this share of the swing: far from any fit
+constexpr double kHopelessSwing = 0.02;
+constexpr double kSure = 3;     // standard deviations of the correlation of white noise
+constexpr double kLeftOut = 4;  // times the median misfit of the windows
 
 double twist_length(const WaveformSettings& s, double level) {
   return s.base_radius * level / s.sensor_stiffness;
@@ -122,6 +126,7 @@ class Solver {
       fit.run(stage(look, search_set()));
       measure_noise(fit, search_set());
     }
+    refuse_early();
     for (const Look& look : kSearch) fit.run(starts_of_the_others(look));
     fit.run(stage(kMiddle[1], used_));
     leave_out(fit);
@@ -208,6 +213,23 @@ class Solver {
     }
   }
 
+  /// Nothing that comes later would mend this.
+  void refuse_early() const {
+    const double noise = signal_noise(kTorqueChannel);
+    if (noise_[kTorqueChannel] > kHopeless * std::max(noise, kHopelessSwing * swing_[kTorqueChannel]))
+      throw Refusal{
+          Status::out_of_domain,
+          fmt::format("the machine of the rig file, whatever its values, does not explain the torque: "
+                      "{:.2g} % of its swing are left",
+                      100 * noise_[kTorqueChannel] / swing_[kTorqueChannel])};
+  }
+
+  /// At most, by itself.
+  double signal_noise(WaveformChannel channel) const {
+    const double period = 2.0 * (data_.windows[1].first - data_.windows[0].first);
+    return signal::estimate_noise(channel == kTorqueChannel ? data_.torque : data_.position, period).upper;
+  }
+
   /// Windows whose motion the start values do not catch.
   void leave_out(const WaveformFit& fit) {
     for (int c = 0; c < channels(); ++c) {
@@ -231,10 +253,8 @@ class Solver {
       }
     }
     const double variance = squares / count, chance = kSure * variance / std::sqrt(2 * count);
-    const auto& signal = channel == kTorqueChannel ? data_.torque : data_.position;
-    const double period = 2.0 * (data_.windows[1].first - data_.windows[0].first);
-    return {std::sqrt(variance), std::sqrt(std::max(0.0, neighbours / count - chance)),
-            signal::estimate_noise(signal, period).upper, swing_[channel]};
+    return {std::sqrt(variance), std::sqrt(std::max(0.0, neighbours / count - chance)), signal_noise(channel),
+            swing_[channel]};
   }
 
   WaveformSolution told(const WaveformFit& fit, const WaveformPriors& priors) const {
