@@ -68,6 +68,12 @@ int WaveformFit::rows(std::size_t window) const {
   return stage_.lengths[window] * (data_.position.empty() ? 1 : 2);
 }
 
+WaveformGrid WaveformFit::grid() const {
+  WaveformGrid grid = data_.grid;
+  if (stage_.coarse) grid.steps = (grid.steps + 1) / 2;
+  return grid;
+}
+
 void WaveformFit::put(const VectorXd& z, const WaveformStart& start, std::size_t set,
                       WaveformSets& sets) const {
   for (int k = 0; k < kGlobalValues; ++k) sets[static_cast<std::size_t>(k)][set] = value(k, z[k]);
@@ -110,7 +116,7 @@ WaveformFit::Part WaveformFit::linearise(std::size_t window) const {
       }
       put(z, start, static_cast<std::size_t>(i), sets);
     }
-    move_waveform(data_.windows[window], data_.grid, stage_.lengths[window], sets, motion);
+    move_waveform(data_.windows[window], grid(), stage_.lengths[window], sets, motion);
     for (int i = 0; i < kWaveformSets && first + i < runs; ++i)
       residuals(window, motion, static_cast<std::size_t>(i), columns.col(first + i).data());
   }
@@ -179,7 +185,7 @@ std::vector<double> WaveformFit::settle(std::size_t window, std::vector<Trial>& 
         const std::size_t run = std::min(first + i, runs - 1);
         put(trials[run * count / runs].point.z, start_of(run), i, sets);
       }
-      move_waveform(data_.windows[window], data_.grid, stage_.lengths[window], sets, motion);
+      move_waveform(data_.windows[window], grid(), stage_.lengths[window], sets, motion);
       for (std::size_t i = 0; i < kWaveformSets && first + i < runs; ++i)
         residuals(window, motion, i, to.col(static_cast<Eigen::Index>(first + i)).data());
     }
@@ -288,7 +294,7 @@ std::vector<double> WaveformFit::residual(std::size_t window, WaveformChannel ch
   for (std::size_t i = 0; i < kWaveformSets; ++i) put(point.z, point.starts[window], i, sets);
   const WaveformWindow& w = data_.windows[window];
   const int length = std::max(stage_.lengths[window], 1);
-  move_waveform(w, data_.grid, length, sets, motion);
+  move_waveform(w, grid(), length, sets, motion);
   const auto& measured = channel == kTorqueChannel ? data_.torque : data_.position;
   const auto& moved = channel == kTorqueChannel ? motion.torque : motion.position;
   std::vector<double> r;

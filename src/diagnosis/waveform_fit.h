@@ -51,6 +51,7 @@ class WaveformFit {
     double noise[kWaveformChannels];  // standard deviations
     int iterations;
     bool central;              // differences
+    bool coarse = false;       // half of the steps of the integration
     bool starts_only = false;  // the shared values stay
   };
 
@@ -78,6 +79,7 @@ class WaveformFit {
 
   bool used(std::size_t window) const { return stage_.lengths[window] > 0; }
   int rows(std::size_t window) const;
+  WaveformGrid grid() const;
   void put(const Eigen::VectorXd& z, const WaveformStart& start, std::size_t set, WaveformSets& sets) const;
   void residuals(std::size_t window, const WaveformMotion& motion, std::size_t set, double* to) const;
   double start_cost(std::size_t window, const WaveformStart& start) const;

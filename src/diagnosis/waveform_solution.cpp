@@ -22,6 +22,7 @@ constexpr int kSearchWindows = 4;      // for the first guesses
 constexpr double kStepsPerRing = 155;  // of the integration
 constexpr double kStepPerTime = 1;     // step times fastest frequency: Runge and Kutta's is stable to 2.8
 constexpr double kStiffer = 3;         // the output may be so much stiffer than declared
+constexpr double kCoarse = 0.01;       // of the swing, noise above which a coarse integration will do
 constexpr double kModelError = 0.002;  // of the swing: no model is better
 constexpr double kWideGap = 3;         // spread of the logarithm of the gap: next to nothing is known
 constexpr double kGuesses[] = {0.1, 0.3, 0.8, 2,
@@ -155,6 +156,7 @@ class Solver {
       stage.noise[c] = std::hypot(std::max(noise_[c], kModelError * swing_[c]), look.noise * swing_[c]);
     stage.iterations = look.iterations;
     stage.central = look.central;
+    stage.coarse = look.noise >= kCoarse;
     return stage;
   }
 
