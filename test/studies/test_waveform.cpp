@@ -27,13 +27,13 @@ using record::Channel;
 constexpr double kDuration = 0.45;  // s, after two periods of settling
 constexpr double kRate = 2000;      // Hz
 
-/// All values of the rig off at once, as far as two of the estimator's spreads.
+/// All values of the rig off at once, as far as one of the estimator's spreads and more.
 rig_file::RigFile drawn(std::uint64_t seed, double backlash) {
   rig_file::RigFile file = rig_file::default_rig_file();
   Random random(seed);
   const auto times = [&](double factor) { return std::exp(random.uniform(-1, 1) * std::log(factor)); };
   model::Rig& rig = file.rig;
-  rig.motor.inertia *= times(1.25), rig.pinion.inertia *= times(1.25), rig.gear.inertia *= times(1.25);
+  rig.motor.inertia *= times(1.15), rig.pinion.inertia *= times(1.15), rig.gear.inertia *= times(1.15);
   rig.motor.viscous_damping *= times(2);
   rig.motor.coulomb_friction = std::max(0.0, random.uniform(-0.004, 0.004));
   rig.input_coupling.stiffness *= times(1.12), rig.input_coupling.damping *= times(3);
