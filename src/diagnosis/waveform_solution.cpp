@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -226,10 +227,16 @@ class Solver {
                       100 * noise_[kTorqueChannel] / swing_[kTorqueChannel])};
   }
 
-  /// At most, by itself.
+  /// At most, by itself: a signal at rest between two steps of its resolution shows no noise.
   double signal_noise(WaveformChannel channel) const {
     const double period = 2.0 * (data_.windows[1].first - data_.windows[0].first);
-    return signal::estimate_noise(channel == kTorqueChannel ? data_.torque : data_.position, period).upper;
+    std::vector<double> values = channel == kTorqueChannel ? data_.torque : data_.position;
+    const double noise = signal::estimate_noise(values, period).upper;
+    std::sort(values.begin(), values.end());
+    double step = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 1; i < values.size(); ++i)
+      if (values[i] > values[i - 1]) step = std::min(step, values[i] - values[i - 1]);
+    return std::isfinite(step) ? std::max(noise, step) : noise;
   }
 
   /// Windows whose motion the start values do not catch.
