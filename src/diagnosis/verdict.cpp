@@ -82,7 +82,7 @@ Set consistent(const Estimates& all, const Set& sound) {
 /// Who the verdict stands on, and why the others do not count.
 struct Choice {
   Set members, dissenters;
-  bool agree = false;  // others say the same and are not needed
+  Set agree;           // say the same as the members and are not needed
   std::string reason;  // of the choice, where there are dissenters
 };
 
@@ -114,7 +114,7 @@ Choice choose(const Estimates& all) {
   });
   const Set fitted = filtered(choice.members, [&](int i) { return all[i].fits_machine; });
   if (!fitted.empty()) {
-    choice.agree = choice.members.size() > 1;
+    choice.agree = filtered(choice.members, [&](int i) { return !all[i].fits_machine; });
     choice.members = fitted;
   }
   std::sort(choice.members.begin(), choice.members.end(), [&](int a, int b) { return sharper(all, a, b); });
@@ -315,9 +315,9 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
   Verdict verdict;
   verdict.members = members;
   verdict.dissenters = dissenters;
-  verdict.agreement = !dissenters.empty()                        ? "disagree: " + names(estimates, dissenters)
-                      : members.size() > 1 || judge.choice.agree ? "agree"
-                                                                 : "single";
+  verdict.agreement = !dissenters.empty() ? "disagree: " + names(estimates, dissenters)
+                      : members.size() > 1 || !judge.choice.agree.empty() ? "agree"
+                                                                          : "single";
   if (members.empty()) {
     verdict.message = "cannot tell" + judge.contradictions();
     return verdict;
@@ -327,9 +327,11 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
   if (baseline) judge.growth = growth_since(*baseline, judge.now, judge.angular);
   put(verdict, judge);
   verdict.grade = judge.grade();
-  verdict.message = std::string(to_string(verdict.grade)) + judge.may_be(verdict.grade) + ": backlash " +
-                    shown(judge.now, judge.unit()) + " by " + names(estimates, members) +
-                    judge.since_baseline() + judge.contradictions();
+  verdict.message =
+      std::string(to_string(verdict.grade)) + judge.may_be(verdict.grade) + ": backlash " +
+      shown(judge.now, judge.unit()) + " by " + names(estimates, members) +
+      (judge.choice.agree.empty() ? "" : " (" + names(estimates, judge.choice.agree) + " agree)") +
+      judge.since_baseline() + judge.contradictions();
   return verdict;
 }
 
