@@ -19,7 +19,7 @@ namespace {
 constexpr double kFinest =
     6e-7;  // m, half width: flanks are no smoother (ground, Ra 0.3 um), equations no finer
 constexpr double kErrors = 2;          // half width in standard errors, 95 %
-constexpr double kErrorsAlone = 2.2;   // of torque alone, by priors that are choices: simulation
+constexpr double kErrorsAlone = 2.1;   // of torque alone, by priors that are choices: simulation
 constexpr double kMostLeftOut = 0.34;  // of the windows: choice
 constexpr double kMostPrior = 36;      // sum of squares of 19 values in spreads: theory, 1 % of chi^2
 constexpr double kFarthest = 4;        // spreads, of one value: choice

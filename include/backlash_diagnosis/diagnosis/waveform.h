@@ -43,8 +43,7 @@ struct WaveformSettings {
 /// How well the values above are known: one standard deviation, of the logarithm where it says "factor".
 /// Choices.
 struct WaveformSpread {
-  static constexpr double kStiffness =
-      0.06;  ///< factor, of the torque sensor: 12 % at 95 %, as a torsion spring
+  static constexpr double kStiffness = 0.09;     ///< factor, of the torque sensor: 18 % at 95 %
   static constexpr double kInertia = 0.15;       ///< factor: 30 % at 95 %, by a drawing
   static constexpr double kMotorDamping = 0.5;   ///< factor: 2.7 at 95 %
   static constexpr double kSensorDamping = 1.3;  ///< factor: 13 at 95 %, no data sheet has it
