@@ -11,7 +11,8 @@ sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import plotting  # noqa: E402
 
 COLOURS = {"apd_skewness": "tab:orange", "apd_shape": "tab:blue", "lost_motion": "tab:green",
-           "position_difference": "tab:purple", "momentum_transfer": "tab:brown", "combined": "black"}
+           "position_difference": "tab:purple", "momentum_transfer": "tab:brown", "waveform": "tab:cyan",
+           "combined": "black"}
 
 
 def answers(study, method, position):

@@ -82,6 +82,12 @@ Estimate by_momentum_transfer(const DiagnosisInput& in) {
   return estimate_momentum_transfer(in.record, *in.settings.momentum_transfer);
 }
 
+Estimate by_waveform(const DiagnosisInput& in) {
+  if (!in.settings.waveform) return not_served(in.settings.no_waveform);
+  if (in.lock_contradicted) return not_locked(*in.lock_contradicted);
+  return estimate_waveform(in.record, *in.settings.waveform);
+}
+
 CoherenceSettings read_coherence(const YamlReader& yaml) {
   CoherenceSettings coherence;
   coherence.segment = yaml.number("segment", Range::positive());
@@ -121,6 +127,8 @@ const std::vector<DiagnosisMethod>& diagnosis_method_table() {
        by_position_difference},
       {"momentum_transfer", "motor_torque, and motor_velocity or motor_position", false,
        by_momentum_transfer},
+      {"waveform", "motor_torque (square wave) and sensor_torque; motor_position sharpens it", false,
+       by_waveform},
   };
   return methods;
 }

@@ -82,6 +82,7 @@ Set consistent(const Estimates& all, const Set& sound) {
 /// Who the verdict stands on, and why the others do not count.
 struct Choice {
   Set members, dissenters;
+  Set agree;           // say the same as the members and are not needed
   std::string reason;  // of the choice, where there are dissenters
 };
 
@@ -111,6 +112,11 @@ Choice choose(const Estimates& all) {
   choice.dissenters = filtered(sound, [&](int i) {
     return std::find(choice.members.begin(), choice.members.end(), i) == choice.members.end();
   });
+  const Set fitted = filtered(choice.members, [&](int i) { return all[i].fits_machine; });
+  if (!fitted.empty()) {
+    choice.agree = filtered(choice.members, [&](int i) { return !all[i].fits_machine; });
+    choice.members = fitted;
+  }
   std::sort(choice.members.begin(), choice.members.end(), [&](int a, int b) { return sharper(all, a, b); });
   return choice;
 }
@@ -302,16 +308,16 @@ const char* to_string(Grade grade) {
 Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limits>& limits,
                 const std::optional<Baseline>& baseline) {
   Judge judge{estimates, limits, baseline, choose(estimates), false, {}, {}};
-  const auto& [members, dissenters, reason] = judge.choice;
+  const Set &members = judge.choice.members, &dissenters = judge.choice.dissenters;
   if (members.empty() && dissenters.empty()) return nothing_sound(estimates);
   const Set& shown_ones = members.empty() ? dissenters : members;
   judge.angular = limits ? limits->angular : std::isnan(level(combination(estimates, shown_ones, false)));
   Verdict verdict;
   verdict.members = members;
   verdict.dissenters = dissenters;
-  verdict.agreement = !dissenters.empty()  ? "disagree: " + names(estimates, dissenters)
-                      : members.size() > 1 ? "agree"
-                                           : "single";
+  verdict.agreement = !dissenters.empty() ? "disagree: " + names(estimates, dissenters)
+                      : members.size() > 1 || !judge.choice.agree.empty() ? "agree"
+                                                                          : "single";
   if (members.empty()) {
     verdict.message = "cannot tell" + judge.contradictions();
     return verdict;
@@ -321,9 +327,11 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
   if (baseline) judge.growth = growth_since(*baseline, judge.now, judge.angular);
   put(verdict, judge);
   verdict.grade = judge.grade();
-  verdict.message = std::string(to_string(verdict.grade)) + judge.may_be(verdict.grade) + ": backlash " +
-                    shown(judge.now, judge.unit()) + " by " + names(estimates, members) +
-                    judge.since_baseline() + judge.contradictions();
+  verdict.message =
+      std::string(to_string(verdict.grade)) + judge.may_be(verdict.grade) + ": backlash " +
+      shown(judge.now, judge.unit()) + " by " + names(estimates, members) +
+      (judge.choice.agree.empty() ? "" : " (" + names(estimates, judge.choice.agree) + " agree)") +
+      judge.since_baseline() + judge.contradictions();
   return verdict;
 }
 

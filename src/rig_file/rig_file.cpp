@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "backlash_diagnosis/base/digest.h"
 #include "backlash_diagnosis/base/file.h"
@@ -25,6 +26,35 @@ double default_uncertainty(const model::Rig& rig, const model::GearTrain& train,
   return elastic_uncertainty(coupling, std::fmax(0, all - coupling));
 }
 
+/// Of a rig that the estimator's equations describe; nothing of any other.
+std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
+  const model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
+  if (in.rigid || out.rigid || !rig.link_locked || rig.mesh.rigid || rig.mesh.angular() ||
+      rig.mesh.variation || rig.reduction_ratio != 1 || rig.linear || !rig.terms.empty() || rig.coupled)
+    return std::nullopt;
+  if (rig.mesh.contact_spec().law != "hunt_crossley" || rig.mesh.contact_spec().values.at("exponent") != 1.5)
+    return std::nullopt;
+  if (rig.pinion.viscous_damping != 0 || rig.gear.viscous_damping != 0 || rig.motor.viscous_asymmetry != 0 ||
+      rig.motor.coulomb_asymmetry != 0)
+    return std::nullopt;
+  diagnosis::WaveformSettings s;
+  s.base_radius = rig.mesh.base_radius;
+  s.motor_inertia = rig.motor.inertia + 0.5 * in.inertia;
+  s.pinion_inertia = rig.pinion.inertia + 0.5 * in.inertia;
+  s.gear_inertia = rig.gear.inertia + 0.5 * out.inertia;
+  s.motor_damping = rig.motor.viscous_damping;
+  s.dry_friction = rig.motor.coulomb_friction;
+  s.sensor_stiffness = in.stiffness, s.sensor_damping = in.damping;
+  s.output_stiffness = out.stiffness, s.output_damping = out.damping;
+  s.contact_stiffness = rig.mesh.contact_spec().values.at("stiffness");
+  s.contact_loss = rig.mesh.contact_spec().values.at("alpha");
+  s.sensor_with_damper = rig.sensor_with_damper;
+  for (const double value : {s.motor_inertia, s.pinion_inertia, s.gear_inertia, s.motor_damping,
+                             s.sensor_damping, s.output_damping, s.contact_loss})
+    if (!(value > 0)) return std::nullopt;  // a factor of nothing is nothing
+  return s;
+}
+
 /// What the estimators need to know of the rig.
 void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings) {
   const auto train = std::make_shared<model::GearTrain>(rig);  // refuses what cannot move
@@ -40,6 +70,7 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
     if (std::isnan(settings.lost_motion->elastic_uncertainty))
       settings.lost_motion->elastic_uncertainty = default_uncertainty(rig, *train, settings);
   }
+  settings.waveform = waveform_of(rig);
   const model::Coupling& coupling = rig.input_coupling;
   const double motor = rig.motor.inertia + 0.5 * coupling.inertia;
   const double pinion = rig.pinion.inertia + 0.5 * coupling.inertia;

@@ -34,6 +34,7 @@ JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis)
       stream_(stream_settings(settings_)),
       on_diagnosis_(std::move(on_diagnosis)),
       worker_([this](const DiagnosisTask& task) { work(task); }) {
+  diagnosis_settings_.leave_out_waveform();
   if (settings_.baseline) set_baseline(settings_.baseline);
   if (settings_.curve) {
     curve_warning_ = settings_.curve_warning;

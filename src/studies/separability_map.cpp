@@ -168,6 +168,7 @@ Separability map_separability(const rig_file::RigFile& file, const diagnosis::Mo
   check(file, curve, disturbances, request);
   diagnosis::DiagnosisSettings believed = file.diagnosis;
   believed.lost_motion = std::nullopt;
+  believed.leave_out_waveform();
   Separability all;
   all.slope = slope_of(curve);
   const double first = curve.points.front().backlash, last = curve.points.back().backlash;

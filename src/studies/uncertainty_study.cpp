@@ -52,8 +52,10 @@ diagnosis::Estimate combined(const diagnosis::Verdict& verdict) {
 }
 
 std::vector<diagnosis::Estimate> estimates_of(const record::Record& record, const rig_file::RigFile& file,
-                                              const diagnosis::MonitoringCurve& curve) {
-  const diagnosis::Diagnosis diagnosis = diagnosis::diagnose(record, file.diagnosis, &curve);
+                                              const diagnosis::MonitoringCurve& curve, bool waveform) {
+  diagnosis::DiagnosisSettings settings = file.diagnosis;
+  if (!waveform) settings.leave_out_waveform();
+  const diagnosis::Diagnosis diagnosis = diagnosis::diagnose(record, settings, &curve);
   std::vector<diagnosis::Estimate> all = diagnosis.estimates;
   all.push_back(combined(diagnosis.verdict));
   return all;
@@ -156,9 +158,11 @@ std::vector<StudyTrial> run_study(const rig_file::RigFile& rig_file, const diagn
   for_each_in_parallel(request.records, ticker, [&](int i) {
     const Draw d = draw(request, apd.period, static_cast<std::uint64_t>(i));
     const record::Record record = simulate_draw(file, d);
-    trials[2 * i] = {"", d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
-    trials[2 * i + 1] = {"",        d.backlash, d.noise,
-                         d.periods, false,      estimates_of(signal_alone(record, apd.signal), file, curve)};
+    trials[2 * i] = {"",        d.backlash, d.noise,
+                     d.periods, true,       estimates_of(record, file, curve, request.waveform)};
+    trials[2 * i + 1] = {
+        "",        d.backlash, d.noise,
+        d.periods, false,      estimates_of(signal_alone(record, apd.signal), file, curve, request.waveform)};
     ticker.tick();
   });
   return trials;
@@ -212,10 +216,12 @@ std::vector<StudyTrial> run_variants(const rig_file::RigFile& rig_file,
     Draw d = draw(request, apd.period, static_cast<std::uint64_t>(request.records) + i);
     d.backlash += variant.shortest * request.max_backlash;
     const record::Record record = simulate_variant(file, variant, d, apd.settling_periods);
-    trials[2 * i] = {variant.name, d.backlash, d.noise, d.periods, true, estimates_of(record, file, curve)};
-    trials[2 * i + 1] = {variant.name, d.backlash,
-                         d.noise,      d.periods,
-                         false,        estimates_of(signal_alone(record, apd.signal), file, curve)};
+    trials[2 * i] = {variant.name, d.backlash, d.noise,
+                     d.periods,    true,       estimates_of(record, file, curve, request.waveform)};
+    trials[2 * i + 1] = {
+        variant.name, d.backlash,
+        d.noise,      d.periods,
+        false,        estimates_of(signal_alone(record, apd.signal), file, curve, request.waveform)};
     ticker.tick();
   });
   return trials;

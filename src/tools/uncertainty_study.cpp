@@ -40,6 +40,7 @@ Command command() {
       {"variants", "N", "records of each wrong condition; default: 40"},
       {"sample-rate", "HZ", "default: the rig file's"},
       {"seed", "N", "of all random numbers; default: 1"},
+      {"waveform", "", "also run the estimator waveform: seconds a record"},
       {"plot", "OUT.png", "also draw errors and coverage"},
   };
   c.notes =
@@ -160,6 +161,7 @@ int study(const Arguments& arguments) {
   studies::StudyRequest request;
   request.records = static_cast<int>(arguments.integer("records", request.records, 1, 1'000'000));
   request.seed = arguments.integer("seed", request.seed, 0, std::uint64_t{1} << 53);
+  request.waveform = arguments.has("waveform");
   request.sampling_rate = arguments.number("sample-rate", request.sampling_rate, Range::positive());
   const int variants = static_cast<int>(arguments.integer("variants", 40, 1, 1'000'000));
   const rig_file::RigFile file = rig_file::load_rig_file(rig);

@@ -170,6 +170,20 @@ Estimate measured(Estimate e) {
   return e;
 }
 
+TEST(Verdict, WhatHasFittedTheMachineAnswersAlone) {
+  Estimate fitted = measured(ok("fitted", 5e-5, 4e-6));
+  fitted.fits_machine = true;
+  const Verdict agree = combined({fitted, ok("sharp", 5.3e-5, 1e-6)});
+  EXPECT_EQ(agree.agreement, "agree");
+  EXPECT_EQ(agree.members, std::vector<int>({0}));
+  EXPECT_EQ(agree.backlash, 5e-5);
+  EXPECT_EQ(agree.lower, 4.6e-5);
+  const Verdict apart = combined({fitted, ok("sharp", 9e-5, 1e-6)});
+  EXPECT_EQ(apart.members, std::vector<int>({0}));
+  EXPECT_EQ(apart.agreement, "disagree: sharp");
+  EXPECT_EQ(apart.backlash, 5e-5);
+}
+
 TEST(Verdict, ManyDoNotOutvoteOne) {
   for (const int others : {1, 2, 5}) {
     std::vector<Estimate> all = {ok("right", 5e-5, 1e-6)};

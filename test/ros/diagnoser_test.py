@@ -67,6 +67,9 @@ class DiagnoserTest(unittest.TestCase):
                 if estimate.method == "momentum_transfer":  # needs faster sampling
                     self.assertEqual(estimate.status_name, "out_of_domain", estimate.message)
                     continue
+                if estimate.method == "waveform":  # takes seconds, offline only
+                    self.assertEqual(estimate.status_name, "insufficient_data", estimate.message)
+                    continue
                 self.assertIn(estimate.status_name, ("ok", "ambiguous", "above_range"), estimate.message)
                 open_end = math.isnan(estimate.upper)  # a lower bound only, which no sound estimate may be
                 self.assertFalse(open_end and estimate.status_name == "ok", estimate.message)

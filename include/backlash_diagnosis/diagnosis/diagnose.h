@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
@@ -11,11 +12,12 @@
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 #include "backlash_diagnosis/diagnosis/position_difference.h"
 #include "backlash_diagnosis/diagnosis/verdict.h"
+#include "backlash_diagnosis/diagnosis/waveform.h"
 
 namespace backlash::diagnosis {
 
 /// What a rig file says under `diagnosis`, and what its estimators need of the rig (position_difference,
-/// momentum_transfer). An absent part means that its estimator cannot be served.
+/// momentum_transfer, waveform). An absent part means that its estimator cannot be served.
 struct DiagnosisSettings {
   /// How well the rig file knows the machine: relative standard deviation of the stiffness of its couplings.
   double stiffness_uncertainty = 0;
@@ -23,6 +25,15 @@ struct DiagnosisSettings {
   std::optional<LostMotionSettings> lost_motion;
   std::optional<PositionDifferenceSettings> position_difference;
   std::optional<MomentumTransferSettings> momentum_transfer;
+  std::optional<WaveformSettings> waveform;
+  std::string no_waveform =  // why not, where it is absent
+      "the rig has no torque sensor before a Hunt-Crossley mesh with a locked output";
+
+  /// Without the estimator that takes seconds.
+  void leave_out_waveform() {
+    waveform.reset();
+    no_waveform = "takes seconds: not run here, but by diagnose_record";
+  }
   std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
 };

@@ -43,8 +43,10 @@ struct Estimate {
   std::optional<PlayComponents> components;
   double declared = 0;  ///< rad, >= 0, half width of the 95 % interval by declared values alone, where known
   std::string witness;  ///< equal for methods that share signal, curve and declared values; empty: its own
-  bool from_record = false;  ///< what the value depends on was measured on the record, not declared
-  std::string message;       ///< the reason of the status, or how the value came about
+  bool from_record = false;   ///< what the value depends on was measured on the record, not declared
+  bool fits_machine = false;  // of from_record: the values of the machine that other methods take from the
+                              // rig file were fitted with it, so that they add nothing
+  std::string message;        ///< the reason of the status, or how the value came about
 };
 
 }  // namespace backlash::diagnosis

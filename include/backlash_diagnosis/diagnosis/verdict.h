@@ -39,6 +39,9 @@ struct Verdict {
 /// is, and is never narrower than the best member's. (Covariance intersection of scalars, after Julier and
 /// Uhlmann 1997, is the best member alone; it is as honest but takes nothing from the others.)
 ///
+/// Where one of the members has fitted the machine's values to the record (Estimate::fits_machine), the
+/// verdict is its answer alone: the others agree, but rest on values that may be wrong.
+///
 /// Contradiction: never settled by the number of methods, as those that share signal, curve or declared
 /// values err together. Estimates of one Estimate::witness that contradict each other are left out where
 /// there is another witness. Then what was measured on the record (Estimate::from_record) stands against

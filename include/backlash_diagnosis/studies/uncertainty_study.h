@@ -23,6 +23,7 @@ struct StudyRequest {
   int fewest_periods = 5, most_periods = 20;
   std::vector<double> noise = {0.005, 0.01, 0.02, 0.05, 0.1, 0.2};  // of the signal's rms, >= 0
   std::uint64_t seed = 1;
+  bool waveform = false;  // the estimator that takes seconds a record
 };
 
 /// One record and what was said about it. The last estimate, "combined", is that of the verdict.

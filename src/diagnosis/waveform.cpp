@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/diagnosis/waveform.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
+#include "refusal.h"
+#include "waveform_solution.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+constexpr double kFinest =
+    6e-7;  // m, half width: flanks are no smoother (ground, Ra 0.3 um), equations no finer
+constexpr double kErrors = 2;          // half width in standard errors, 95 %
+constexpr double kErrorsAlone = 2.1;   // of torque alone, by priors that are choices: simulation
+constexpr double kMostLeftOut = 0.34;  // of the windows: choice
+constexpr double kMostPrior = 36;      // sum of squares of 19 values in spreads: theory, 1 % of chi^2
+constexpr double kFarthest = 4;        // spreads, of one value: choice
+constexpr double kMostNoise = 1.3;     // residual per noise of the signal: choice
+// Of the swing, part of the residual that is no noise: simulation, see test_waveform.cpp.
+constexpr double kMostStructure[kWaveformChannels] = {0.01, 0.0006};
+constexpr double kFar = 1, kKnown = 0.5;  // spreads, of a value that the message tells: choices
+constexpr double kRivalCost = 9;          // chi^2 of three standard errors
+constexpr double kRivalApart = 0.1;       // of the gap: choice
+
+void check(const WaveformSettings& s) {
+  const auto require = [](const char* name, double value) {
+    if (!(value > 0 && std::isfinite(value)))
+      throw InvalidParameter(std::string("waveform.") + name, value, "must be > 0");
+  };
+  require("base_radius", s.base_radius);
+  require("motor_inertia", s.motor_inertia);
+  require("pinion_inertia", s.pinion_inertia);
+  require("gear_inertia", s.gear_inertia);
+  require("motor_damping", s.motor_damping);
+  require("sensor_stiffness", s.sensor_stiffness);
+  require("sensor_damping", s.sensor_damping);
+  require("output_stiffness", s.output_stiffness);
+  require("output_damping", s.output_damping);
+  require("contact_stiffness", s.contact_stiffness);
+  require("contact_loss", s.contact_loss);
+  if (!(s.dry_friction >= 0)) throw InvalidParameter("waveform.dry_friction", s.dry_friction, "must be >= 0");
+}
+
+std::string value_text(const WaveformSolution& s, std::size_t k) {
+  return fmt::format("{} {:.3g}, {:.1f} standard deviations from what the file says",
+                     waveform_value_name(static_cast<int>(k)), s.values[k], std::fabs(s.z[k]));
+}
+
+void refuse_misfit(const WaveformSolution& s) {
+  static const char* const kNames[] = {"torque", "position"};
+  for (int c = 0; c < kWaveformChannels; ++c) {
+    const WaveformMisfit& m = s.misfit[c];
+    if (m.structure > kMostStructure[c] * m.swing)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("the machine of the rig file, whatever its values, does not explain the {}: "
+                                "{:.2g} % of its swing are left that are no noise",
+                                kNames[c], 100 * m.structure / m.swing)};
+    if (m.rms > kMostNoise * m.noise && m.rms > kMostStructure[c] * m.swing)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("the machine of the rig file, whatever its values, does not explain the {}: "
+                                "what is left is {:.2g} times its noise",
+                                kNames[c], m.rms / m.noise)};
+  }
+}
+
+void refuse(const WaveformSolution& s) {
+  if (s.left_out > kMostLeftOut * s.windows)
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("about {} of {} reversals the motion is not that of the machine of the rig file",
+                    s.left_out, s.windows)};
+  refuse_misfit(s);
+  double sum = 0;
+  std::size_t worst = kHalfGap + 1;
+  for (std::size_t k = kHalfGap + 1; k < kGlobalValues; ++k) {
+    sum += s.z[k] * s.z[k];
+    if (std::fabs(s.z[k]) > std::fabs(s.z[worst])) worst = k;
+  }
+  if (sum > kMostPrior || std::fabs(s.z[worst]) > kFarthest)
+    throw Refusal{Status::out_of_domain,
+                  "the record fits only a machine far from that of the rig file: " + value_text(s, worst)};
+  if (s.rival_cost < kRivalCost &&
+      2 * std::fabs(s.rival - s.half_gap) > std::max(kFinest, 2 * kRivalApart * s.half_gap))
+    throw Refusal{Status::ambiguous, fmt::format("backlash of {:.4g} m and of {:.4g} m fit the record alike",
+                                                 2 * s.half_gap, 2 * s.rival)};
+}
+
+std::string message_of(const WaveformSolution& s, bool position) {
+  std::string text = fmt::format("fitted to {} of {} reversals, {}", s.windows - s.left_out, s.windows,
+                                 position ? "torque and position" : "torque alone");
+  if (!position) text += ": limited by the declared stiffness of the sensor and by inertias";
+  std::vector<std::string> found;
+  for (std::size_t k = kHalfGap + 1; k <= kContactLoss; ++k)
+    if (std::fabs(s.z[k]) > kFar && s.told[k] < kKnown) found.push_back(value_text(s, k));
+  return found.empty() ? text : text + "; the record shows " + joined(found);
+}
+
+void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settings, bool position) {
+  const double per_angle = settings.base_radius;
+  e.backlash = 2 * s.half_gap;
+  const double half = (position ? kErrors : kErrorsAlone) * s.log_error;
+  const double below = e.backlash * (1 - std::exp(-half)), above = e.backlash * (std::exp(half) - 1);
+  e.lower = std::max(0.0, e.backlash - std::hypot(below, kFinest));
+  e.upper = e.backlash + std::hypot(above, kFinest);
+  e.backlash_angle = e.backlash / per_angle;
+  e.angle_lower = e.lower / per_angle, e.angle_upper = e.upper / per_angle;
+  if (!position) e.declared = below / per_angle;  // nearly all of it, by the symmetry
+  e.from_record = e.fits_machine = true;
+  e.message = message_of(s, position);
+  e.status = e.lower > 0 ? Status::ok : Status::below_range;
+  if (e.lower > 0) return;
+  e.message = "no more play than equations of rigid flanks can tell; " + e.message;
+  e.backlash = e.backlash_angle = kNaN;
+}
+
+}  // namespace
+
+Estimate estimate_waveform(const record::Record& record, const WaveformSettings& settings) {
+  check(settings);
+  return estimate_or_refusal("waveform", [&](Estimate& estimate) {
+    using record::Channel;
+    for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
+      if (!record.has(channel))
+        throw Refusal{Status::insufficient_data, "needs " + record::channel_name(channel)};
+    for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque, Channel::motor_position})
+      for (const double value : record.column(channel))
+        if (!std::isfinite(value))
+          throw Refusal{Status::insufficient_data, record::channel_name(channel) + " has gaps"};
+    const WaveformSolution solution = solve_waveform(record, settings);
+    refuse(solution);
+    fill(estimate, solution, settings, record.has(Channel::motor_position));
+  });
+}
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "waveform_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// All choices, tried on simulated machines.
+constexpr double kFirstDamping = 1e-2, kLeastDamping = 1e-9, kMostDamping = 1e5;
+constexpr double kDampings[] = {30, 1, 0.03, 0.001};
+constexpr double kHarder = 1e3;         // times the damping where nothing improves
+constexpr double kLongestMove = 1.5;    // spreads, of a value in one step
+constexpr double kEnough = 0.05;        // gain of cost below which a stage ends; 1 is a standard error
+constexpr double kEnoughOfCost = 1e-5;  // the same, relative
+constexpr double kFirstStep = 1e-3;     // spreads
+constexpr double kStepPerError = 0.3;   // step of a difference per standard error with all else known
+constexpr double kShortestStep = 1e-6, kLongestStep = 1e-2;          // spreads
+constexpr double kStartStep = 1e-5;                                  // of the level
+constexpr double kStartSpread[kStartValues] = {0.4, 0.4, 0.2, 0.2};  // of the level
+
+}  // namespace
+
+/// Normal equations of one window.
+struct WaveformFit::Part {
+  MatrixXd shared, mixed, own;
+  VectorXd toward, own_toward;
+  double cost = 0;
+};
+
+struct WaveformFit::Trial {
+  WaveformPoint point;
+  double damping;
+};
+
+WaveformFit::WaveformFit(const WaveformData& data, const WaveformPriors& priors)
+    : data_(data), priors_(priors), steps_(VectorXd::Constant(kGlobalValues, kFirstStep)) {
+  for (int k = 0; k < kGlobalValues; ++k)
+    if (priors_[static_cast<std::size_t>(k)].fitted) fitted_.push_back(k);
+  point.z = VectorXd::Zero(kGlobalValues);
+  for (const WaveformWindow& window : data.windows) {
+    const auto reversal = static_cast<int>(std::lround(window.reversal / data.grid.interval));
+    double mean = 0;
+    for (int i = 0; i < reversal; ++i)
+      mean += data.torque[static_cast<std::size_t>(window.first + i)] / reversal;
+    const double load = std::max(0.0, window.side * mean);
+    guesses_.push_back(WaveformStart(load, load, 0, 0));
+  }
+  point.starts = guesses_;
+  for (int k = 0; k < kStartValues; ++k) start_spread_[k] = kStartSpread[k] * data.level;
+}
+
+double WaveformFit::value(int which, double z) const {
+  const WaveformPrior& prior = priors_[static_cast<std::size_t>(which)];
+  return prior.factor ? prior.value * std::exp(prior.spread * z) : prior.value + prior.spread * z;
+}
+
+int WaveformFit::rows(std::size_t window) const {
+  return stage_.lengths[window] * (data_.position.empty() ? 1 : 2);
+}
+
+WaveformGrid WaveformFit::grid() const {
+  WaveformGrid grid = data_.grid;
+  if (stage_.coarse) grid.steps = (grid.steps + 1) / 2;
+  return grid;
+}
+
+void WaveformFit::put(const VectorXd& z, const WaveformStart& start, std::size_t set,
+                      WaveformSets& sets) const {
+  for (int k = 0; k < kGlobalValues; ++k) sets[static_cast<std::size_t>(k)][set] = value(k, z[k]);
+  for (int k = 0; k < kStartValues; ++k) sets[static_cast<std::size_t>(kGlobalValues + k)][set] = start[k];
+}
+
+void WaveformFit::residuals(std::size_t window, const WaveformMotion& motion, std::size_t set,
+                            double* to) const {
+  const auto first = static_cast<std::size_t>(data_.windows[window].first);
+  const auto length = static_cast<std::size_t>(stage_.lengths[window]);
+  for (std::size_t i = 0; i < length; ++i)
+    *to++ = (data_.torque[first + i] - motion.torque[i][set]) / stage_.noise[kTorqueChannel];
+  if (data_.position.empty()) return;
+  for (std::size_t i = 0; i < length; ++i)
+    *to++ = (data_.position[first + i] - motion.position[i][set]) / stage_.noise[kPositionChannel];
+}
+
+double WaveformFit::start_cost(std::size_t window, const WaveformStart& start) const {
+  return (start - guesses_[window]).cwiseQuotient(start_spread_).squaredNorm();
+}
+
+WaveformFit::Part WaveformFit::linearise(std::size_t window) const {
+  const auto shared = static_cast<int>(moving_.size()), all = shared + kStartValues;
+  const int sides = stage_.central ? 2 : 1, runs = 1 + sides * all;
+  const double start_step = kStartStep * data_.level;
+  const auto step_of = [&](int k) {
+    return k < shared ? steps_[moving_[static_cast<std::size_t>(k)]] : start_step;
+  };
+  MatrixXd columns(rows(window), runs);
+  WaveformSets sets;
+  WaveformMotion motion;
+  for (int first = 0; first < runs; first += kWaveformSets) {
+    for (int i = 0; i < kWaveformSets; ++i) {
+      VectorXd z = point.z;
+      WaveformStart start = point.starts[window];
+      const int run = first + i, k = (run - 1) / sides;
+      if (run > 0 && run < runs) {
+        const double step = (run - 1) % sides == 0 ? step_of(k) : -step_of(k);
+        (k < shared ? z[moving_[static_cast<std::size_t>(k)]] : start[k - shared]) += step;
+      }
+      put(z, start, static_cast<std::size_t>(i), sets);
+    }
+    move_waveform(data_.windows[window], grid(), stage_.lengths[window], sets, motion);
+    for (int i = 0; i < kWaveformSets && first + i < runs; ++i)
+      residuals(window, motion, static_cast<std::size_t>(i), columns.col(first + i).data());
+  }
+  MatrixXd slopes(rows(window), all);
+  for (int k = 0; k < all; ++k)
+    slopes.col(k) =
+        (columns.col(1 + sides * k) - columns.col(stage_.central ? 2 + 2 * k : 0)) / (sides * step_of(k));
+  const MatrixXd normal = signal::gram(slopes);
+  const VectorXd toward = -signal::transposed_product(slopes, columns.col(0));
+  Part part{normal.topLeftCorner(shared, shared),
+            normal.topRightCorner(shared, kStartValues),
+            normal.bottomRightCorner(kStartValues, kStartValues),
+            toward.head(shared),
+            toward.tail(kStartValues),
+            columns.col(0).squaredNorm() + start_cost(window, point.starts[window])};
+  const WaveformStart weight = start_spread_.cwiseAbs2().cwiseInverse();
+  part.own.diagonal() += weight;
+  part.own_toward -= weight.cwiseProduct(point.starts[window] - guesses_[window]);
+  return part;
+}
+
+/// The step of a damping; shared values first, then those of each window that follow from them.
+WaveformFit::Trial WaveformFit::trial(const std::vector<Part>& parts, double damping) const {
+  const auto shared = static_cast<Eigen::Index>(moving_.size());
+  MatrixXd normal = MatrixXd::Identity(shared, shared);
+  VectorXd toward(shared);
+  for (Eigen::Index k = 0; k < shared; ++k) toward[k] = -point.z[moving_[static_cast<std::size_t>(k)]];
+  for (std::size_t w = 0; w < parts.size(); ++w)
+    if (used(w)) normal += parts[w].shared;
+  normal.diagonal() *= 1 + damping;
+  std::vector<MatrixXd> own(parts.size());
+  for (std::size_t w = 0; w < parts.size(); ++w) {
+    if (!used(w)) continue;
+    own[w] = parts[w].own;
+    own[w].diagonal() *= 1 + damping;
+    MatrixXd right(kStartValues, shared + 1);
+    right << parts[w].mixed.transpose(), parts[w].own_toward;
+    const MatrixXd solved = signal::solve_symmetric(own[w], right);
+    normal -= parts[w].mixed * solved.leftCols(shared);
+    toward += parts[w].toward - parts[w].mixed * solved.col(shared);
+  }
+  VectorXd move = shared > 0 ? VectorXd(signal::solve_symmetric(normal, toward)) : VectorXd();
+  move = move.cwiseMax(-kLongestMove).cwiseMin(kLongestMove);
+  Trial result{point, damping};
+  for (Eigen::Index k = 0; k < shared; ++k) result.point.z[moving_[static_cast<std::size_t>(k)]] += move[k];
+  for (std::size_t w = 0; w < parts.size(); ++w)
+    if (used(w))
+      result.point.starts[w] +=
+          signal::solve_symmetric(own[w], parts[w].own_toward - parts[w].mixed.transpose() * move).col(0);
+  return result;
+}
+
+/// The start values of a window for each trial, one step of Gauss and Newton nearer to their best for its
+/// shared values, where that is better; the costs.
+std::vector<double> WaveformFit::settle(std::size_t window, std::vector<Trial>& trials) const {
+  constexpr std::size_t kRuns = 1 + kStartValues;
+  const double step = kStartStep * data_.level;
+  const std::size_t count = trials.size();
+  MatrixXd r(rows(window), count * kRuns), better(rows(window), count);
+  const auto move = [&](const auto& start_of, MatrixXd& to) {
+    WaveformSets sets;
+    WaveformMotion motion;
+    const auto runs = static_cast<std::size_t>(to.cols());
+    for (std::size_t first = 0; first < runs; first += kWaveformSets) {
+      for (std::size_t i = 0; i < kWaveformSets; ++i) {
+        const std::size_t run = std::min(first + i, runs - 1);
+        put(trials[run * count / runs].point.z, start_of(run), i, sets);
+      }
+      move_waveform(data_.windows[window], grid(), stage_.lengths[window], sets, motion);
+      for (std::size_t i = 0; i < kWaveformSets && first + i < runs; ++i)
+        residuals(window, motion, i, to.col(static_cast<Eigen::Index>(first + i)).data());
+    }
+  };
+  move(
+      [&](std::size_t run) {
+        WaveformStart start = trials[run / kRuns].point.starts[window];
+        if (run % kRuns > 0) start[static_cast<Eigen::Index>(run % kRuns - 1)] += step;
+        return start;
+      },
+      r);
+  const WaveformStart weight = start_spread_.cwiseAbs2().cwiseInverse();
+  std::vector<WaveformStart> next;
+  std::vector<double> costs;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto base = static_cast<Eigen::Index>(i * kRuns);
+    const WaveformStart& start = trials[i].point.starts[window];
+    const MatrixXd slopes = (r.middleCols(base + 1, kStartValues).colwise() - r.col(base)) / step;
+    MatrixXd normal = signal::gram(slopes);
+    normal.diagonal() += weight;
+    const VectorXd toward =
+        -signal::transposed_product(slopes, r.col(base)) - weight.cwiseProduct(start - guesses_[window]);
+    next.push_back(start + WaveformStart(signal::solve_symmetric(normal, toward).col(0)));
+    costs.push_back(r.col(base).squaredNorm() + start_cost(window, start));
+  }
+  move([&](std::size_t run) { return next[run]; }, better);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double cost = better.col(static_cast<Eigen::Index>(i)).squaredNorm() + start_cost(window, next[i]);
+    if (!(cost < costs[i])) continue;
+    costs[i] = cost;
+    trials[i].point.starts[window] = next[i];
+  }
+  return costs;
+}
+
+std::vector<double> WaveformFit::costs(std::vector<Trial>& trials) const {
+  std::vector<std::vector<double>> of(data_.windows.size());
+  for_each_in_parallel(static_cast<int>(of.size()), [&](int index) {
+    const auto w = static_cast<std::size_t>(index);
+    if (used(w)) of[w] = settle(w, trials);
+  });
+  std::vector<double> sums;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    double sum = trials[i].point.z.squaredNorm();
+    for (const std::vector<double>& each : of)
+      if (!each.empty()) sum += each[i];
+    sums.push_back(std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity());
+  }
+  return sums;
+}
+
+/// One linearisation, and the best of several dampings. False where none improves.
+bool WaveformFit::iterate() {
+  std::vector<Part> parts(data_.windows.size());
+  for_each_in_parallel(static_cast<int>(parts.size()), [&](int w) {
+    if (used(static_cast<std::size_t>(w)))
+      parts[static_cast<std::size_t>(w)] = linearise(static_cast<std::size_t>(w));
+  });
+  ++iterations_;
+  const auto shared = static_cast<Eigen::Index>(moving_.size());
+  cost_ = point.z.squaredNorm();
+  information_ = MatrixXd::Identity(shared, shared);
+  VectorXd alone = VectorXd::Ones(shared);
+  for (std::size_t w = 0; w < parts.size(); ++w) {
+    if (!used(w)) continue;
+    cost_ += parts[w].cost;
+    alone += parts[w].shared.diagonal();
+    information_ +=
+        parts[w].shared - parts[w].mixed * signal::solve_symmetric(parts[w].own, parts[w].mixed.transpose());
+  }
+  for (Eigen::Index k = 0; k < shared; ++k)
+    steps_[moving_[static_cast<std::size_t>(k)]] =
+        std::clamp(kStepPerError / std::sqrt(alone[k]), kShortestStep, kLongestStep);
+  std::vector<Trial> trials;
+  for (const double factor : kDampings) trials.push_back(trial(parts, damping_ * factor));
+  const std::vector<double> all = costs(trials);
+  const auto best = static_cast<std::size_t>(std::min_element(all.begin(), all.end()) - all.begin());
+  gain_ = cost_ - all[best];
+  if (!(gain_ > 0)) return false;
+  point = trials[best].point;
+  damping_ = std::max(kLeastDamping, trials[best].damping);
+  cost_ = all[best];
+  return true;
+}
+
+double WaveformFit::run(const Stage& stage) {
+  stage_ = stage;
+  moving_ = stage.starts_only ? std::vector<int>() : fitted_;
+  damping_ = kFirstDamping;
+  for (int i = 0; i < stage.iterations && damping_ < kMostDamping; ++i) {
+    if (!iterate())
+      damping_ *= kHarder;
+    else if (gain_ < kEnough + kEnoughOfCost * cost_)
+      break;
+  }
+  return cost_;
+}
+
+MatrixXd WaveformFit::covariance() const {
+  return signal::symmetric_inverse(information_);
+}
+
+std::vector<double> WaveformFit::residual(std::size_t window, WaveformChannel channel) const {
+  WaveformSets sets;
+  WaveformMotion motion;
+  for (std::size_t i = 0; i < kWaveformSets; ++i) put(point.z, point.starts[window], i, sets);
+  const WaveformWindow& w = data_.windows[window];
+  const int length = std::max(stage_.lengths[window], 1);
+  move_waveform(w, grid(), length, sets, motion);
+  const auto& measured = channel == kTorqueChannel ? data_.torque : data_.position;
+  const auto& moved = channel == kTorqueChannel ? motion.torque : motion.position;
+  std::vector<double> r;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(length); ++i)
+    r.push_back(measured[static_cast<std::size_t>(w.first) + i] - moved[i][0]);
+  return r;
+}
+
+}  // namespace backlash::diagnosis

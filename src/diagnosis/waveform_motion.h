@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a gear train with a torque sensor and a locked output moves about one reversal of its torque, for
+// several sets of values at once:
+//
+//   Jm qm'' = tau + offset + slope qm - cm qm' - dry tanh(qm' / friction_speed) - T
+//   Jp qp'' = T - F rb                       T = Ki (qm - qp) + Ci (qm' - qp')
+//   Jg qg'' = F rb - Ko qg - Co qg'          F = K d^1.5 max(0, 1 + 3/2 alpha d'),  d = |rb (qp - qg)| - gap
+//
+// F has the sign of qp - qg (Hunt and Crossley 1975; Sarkar, Ellis and Moore 1997, Eqs. 8 to 12). `offset`
+// and `slope` stand for cogging and gravity within the small travel. The sensors:
+//
+//   torque = gain Ki (qm - qp) + bias, a first-order lag and a delay later        position = qm + zero
+//
+// The classical Runge-Kutta method with a fixed step: every set of values makes the same steps, so that
+// differences between sets are smooth.
+#pragma once
+
+#include <array>
+#include <vector>
+
+namespace backlash::diagnosis {
+
+/// Values of the machine, of its sensors, then of the start of one window.
+enum WaveformValue {
+  kHalfGap,           // m, half of the backlash
+  kMotorDamping,      // cm, N m s/rad
+  kDryFriction,       // N m, < 0 counts as 0
+  kFrictionSpeed,     // rad/s, > 0
+  kSensorStiffness,   // Ki, N m/rad
+  kSensorDamping,     // Ci, N m s/rad
+  kMotorInertia,      // Jm, kg m^2
+  kPinionInertia,     // Jp
+  kGearInertia,       // Jg
+  kOutputStiffness,   // Ko, N m/rad
+  kOutputDamping,     // Co, N m s/rad
+  kContactStiffness,  // K, N/m^1.5
+  kContactLoss,       // alpha, s/m
+  kSensorGain,        // -
+  kSensorBias,        // N m
+  kSensorLag,         // s
+  kSensorTime,        // s, time constant of a first-order lag besides, < 0 counts as 0
+  kSwitchDelay,       // s, by which the torque switches later than the window says
+  kDriveOffset,       // N m
+  kDriveSlope,        // N m/rad
+  kPositionZero,      // rad
+  kGlobalValues,
+  kStartTwist = kGlobalValues,  // N m: Ki (qm - qp), towards the flank that is loaded
+  kStartFlank,                  // N m: torque on that flank; < 0: off it by -kStartFlank / Ki
+  kStartTwistRate,              // N m per ms: Ki (qm' - qp')
+  kStartPinionRate,             // N m per ms: Ki qp'
+  kAllValues,
+  kStartValues = kAllValues - kGlobalValues
+};
+
+constexpr int kWaveformSets = 8;  // moved at once: two registers of AVX2, so that their waits overlap
+using WaveformSets = std::array<std::array<double, kWaveformSets>, kAllValues>;
+
+/// A stretch of evenly spaced samples about one reversal.
+struct WaveformWindow {
+  double side = 1;               // sign of the torque before the reversal
+  double before = 0, after = 0;  // N m, torque of the motor
+  double reversal = 0;           // s after the first sample
+  int first = 0, samples = 0;    // in the record
+};
+
+struct WaveformGrid {
+  double interval = 0;              // s, between samples
+  int steps = 1;                    // of the integration per sample
+  double base_radius = 0;           // m
+  bool sensor_with_damper = false;  // the sensor shows T and not the spring's share
+};
+
+/// One column per set; all have `samples` rows.
+struct WaveformMotion {
+  std::vector<std::array<double, kWaveformSets>> torque, position;
+};
+
+/// `motion` keeps its memory from call to call.
+void move_waveform(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+                   const WaveformSets& sets, WaveformMotion& motion);
+
+}  // namespace backlash::diagnosis

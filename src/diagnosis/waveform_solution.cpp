@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "waveform_solution.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "backlash_diagnosis/signal/noise.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "refusal.h"
+#include "waveform_windows.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+// All choices, tried on simulated machines, but where another origin is given.
+constexpr int kMostWindows = 12;       // beyond them the errors do not shrink: priors and equations limit
+constexpr int kSearchWindows = 4;      // for the first guesses
+constexpr double kStepsPerRing = 155;  // of the integration
+constexpr double kStepPerTime = 1;     // step times fastest frequency: Runge and Kutta's is stable to 2.8
+constexpr double kStiffer = 3;         // the output may be so much stiffer than declared
+constexpr double kCoarse = 0.01;       // of the swing, noise above which a coarse integration will do
+constexpr double kModelError = 0.002;  // of the swing: no model is better
+constexpr double kWideGap = 3;         // spread of the logarithm of the gap: next to nothing is known
+constexpr double kGuesses[] = {0.1, 0.3, 0.8, 2,
+                               4.5};  // half gaps per twist of the sensor, along the line of action
+constexpr double kFirstLoss = 0.2;    // spreads, of what cannot be below 0: from there its slope is not seen
+constexpr double kHopeless = 4;       // times the noise, or this share of the swing: far from any fit
+constexpr double kHopelessSwing = 0.02;
+constexpr double kSure = 3;     // standard deviations of the correlation of white noise
+constexpr double kLeftOut = 4;  // times the median misfit of the windows
+
+double twist_length(const WaveformSettings& s, double level) {
+  return s.base_radius * level / s.sensor_stiffness;
+}
+
+double ring_of(const WaveformSettings& s) {
+  return 2 * M_PI / std::sqrt(s.sensor_stiffness * (1 / s.motor_inertia + 1 / s.pinion_inertia));
+}
+
+WaveformGrid grid_of(const WaveformSettings& s, double interval) {
+  const double fastest = std::sqrt(kStiffer * s.output_stiffness / s.gear_inertia);
+  const double step = std::min(ring_of(s) / kStepsPerRing, kStepPerTime / fastest);
+  return {interval, static_cast<int>(std::ceil(interval / step - 1e-6)), s.base_radius, s.sensor_with_damper};
+}
+
+double half_swing(const std::vector<double>& values) {
+  return values.empty() ? 1 : signal::quantile_range(values, 0.001) / 2;
+}
+
+WaveformPriors priors_of(const WaveformSettings& s, const WaveformData& data) {
+  using Spread = WaveformSpread;
+  const double position = data.position.empty() ? 1 : half_swing(data.position);
+  const double middle = data.position.empty() ? 0 : signal::median(data.position);
+  WaveformPriors p;
+  p[kHalfGap] = {twist_length(s, data.level), kWideGap, true};
+  p[kMotorDamping] = {s.motor_damping, Spread::kMotorDamping, true};
+  p[kDryFriction] = {s.dry_friction, Spread::kDryFriction * data.level};
+  p[kFrictionSpeed] = {Spread::kSlow, Spread::kFrictionSpeed, true};
+  p[kSensorStiffness] = {s.sensor_stiffness, Spread::kStiffness, true};
+  p[kSensorDamping] = {s.sensor_damping, Spread::kSensorDamping, true};
+  p[kMotorInertia] = {s.motor_inertia, Spread::kInertia, true};
+  p[kPinionInertia] = {s.pinion_inertia, Spread::kInertia, true};
+  p[kGearInertia] = {s.gear_inertia, Spread::kInertia, true};
+  p[kOutputStiffness] = {s.output_stiffness, Spread::kMesh, true};
+  p[kOutputDamping] = {s.output_damping, Spread::kMesh, true};
+  p[kContactStiffness] = {s.contact_stiffness, Spread::kMesh, true};
+  p[kContactLoss] = {s.contact_loss, Spread::kMesh, true};
+  p[kSensorGain] = {1, Spread::kGain, true};
+  p[kSensorBias] = {0, Spread::kBias * data.level};
+  p[kSensorLag] = {0, Spread::kLag};
+  p[kSensorTime] = {0, Spread::kLag};
+  p[kSwitchDelay] = {0, data.grid.interval / 2};  // theory: it is seen a sample late at most
+  p[kDriveOffset] = {0, Spread::kDrive * data.level};
+  p[kDriveSlope] = {0, Spread::kDriveSlope * s.sensor_stiffness};
+  p[kPositionZero] = {middle, position, false, !data.position.empty()};
+  return p;
+}
+
+/// Least standard error of the logarithm of the gap from torque alone: by the symmetry of waveform.h the
+/// torque says nothing of the factor c, so that the priors alone hold it. Theory.
+double symmetry_error(const WaveformPriors& priors) {
+  constexpr std::pair<int, double> kScaled[] = {
+      {kMotorDamping, 1},       {kSensorStiffness, 1}, {kSensorDamping, 1},   {kMotorInertia, 1},
+      {kPinionInertia, 1},      {kGearInertia, 1},     {kOutputStiffness, 1}, {kOutputDamping, 1},
+      {kContactStiffness, 2.5}, {kContactLoss, 1}};
+  double information = 0;
+  for (const auto& [value, power] : kScaled)
+    information += std::pow(power / priors[static_cast<std::size_t>(value)].spread, 2);
+  return 1 / std::sqrt(information);
+}
+
+/// How far a stage looks, in cycles of the ring, and how much of the swing it takes as noise.
+struct Look {
+  double rings, noise;
+  int iterations;
+  bool central;
+};
+constexpr Look kSearch[] = {{3, 0.1, 6, false}, {3, 0.03, 6, false}, {5, 0.03, 5, false}};
+constexpr Look kMiddle[] = {{8, 0.01, 8, false}, {12, 0.004, 8, true}};
+constexpr Look kLast = {12, 0, 15, true};
+
+class Solver {
+ public:
+  Solver(const record::Record& record, const WaveformSettings& settings)
+      : settings_(settings), ring_(ring_of(settings)) {
+    data_.windows = waveform_windows(record, ring_, kMostWindows);
+    data_.torque = record.column(record::Channel::sensor_torque);
+    data_.position = record.column(record::Channel::motor_position);
+    data_.grid = grid_of(settings, record.sampling_interval());
+    for (const WaveformWindow& w : data_.windows)
+      data_.level +=
+          (std::fabs(w.before) + std::fabs(w.after)) / 2 / static_cast<double>(data_.windows.size());
+    swing_[kTorqueChannel] = half_swing(data_.torque);
+    swing_[kPositionChannel] = half_swing(data_.position);
+    for (int c = 0; c < kWaveformChannels; ++c) noise_[c] = 0;
+    used_.assign(data_.windows.size(), true);
+  }
+
+  WaveformSolution solve() {
+    const WaveformPriors priors = priors_of(settings_, data_);
+    WaveformFit fit = searched(priors);
+    for (const Look& look : kMiddle) {
+      fit.run(stage(look, search_set()));
+      measure_noise(fit, search_set());
+    }
+    refuse_early();
+    for (const Look& look : kSearch) fit.run(starts_of_the_others(look));
+    fit.run(stage(kMiddle[1], used_));
+    leave_out(fit);
+    measure_noise(fit, used_);
+    fit.run(stage(kLast, used_));
+    leave_out(fit);
+    measure_noise(fit, used_);
+    fit.run(stage(kLast, used_));
+    return told(fit, priors);
+  }
+
+ private:
+  std::vector<bool> search_set() const {
+    std::vector<bool> set(data_.windows.size(), false);
+    const std::size_t pairs = set.size() / 2, take = std::min<std::size_t>(pairs, kSearchWindows / 2);
+    for (std::size_t i = 0; i < take; ++i) set[i * pairs / take * 2] = set[i * pairs / take * 2 + 1] = true;
+    return set;
+  }
+
+  WaveformFit::Stage stage(const Look& look, const std::vector<bool>& set) const {
+    WaveformFit::Stage stage;
+    for (std::size_t w = 0; w < set.size(); ++w)
+      stage.lengths.push_back(
+          set[w] ? waveform_length(data_.windows[w], look.rings, ring_, data_.grid.interval) : 0);
+    for (int c = 0; c < kWaveformChannels; ++c)
+      stage.noise[c] = std::hypot(std::max(noise_[c], kModelError * swing_[c]), look.noise * swing_[c]);
+    stage.iterations = look.iterations;
+    stage.central = look.central;
+    stage.coarse = look.noise >= kCoarse;
+    return stage;
+  }
+
+  WaveformFit::Stage starts_of_the_others(const Look& look) const {
+    std::vector<bool> set = search_set();
+    set.flip();
+    WaveformFit::Stage only = stage(look, set);
+    only.starts_only = true;
+    return only;
+  }
+
+  /// The best of several guesses of the gap.
+  WaveformFit searched(const WaveformPriors& priors) {
+    std::vector<WaveformFit> fits;
+    std::vector<double> costs;
+    for (const double guess : kGuesses) {
+      fits.emplace_back(data_, priors);
+      fits.back().point.z[kHalfGap] = std::log(guess) / kWideGap;
+      fits.back().point.z[kDryFriction] = fits.back().point.z[kSensorTime] = kFirstLoss;
+      double cost = 0;
+      for (const Look& look : kSearch) cost = fits.back().run(stage(look, search_set()));
+      costs.push_back(cost);
+    }
+    std::vector<std::size_t> order(costs.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return costs[a] < costs[b]; });
+    WaveformFit& best = fits[order[0]];
+    for (const std::size_t i : order) {  // the best that went elsewhere
+      const double apart = fits[i].value(kHalfGap) / best.value(kHalfGap);
+      if (std::fabs(std::log(apart)) < 0.05) continue;
+      const double first = best.run(stage(kMiddle[0], search_set()));
+      const double second = fits[i].run(stage(kMiddle[0], search_set()));
+      rival_cost_ = std::fabs(second - first);
+      WaveformFit& loser = second < first ? best : fits[i];
+      rival_ = loser.value(kHalfGap);
+      return second < first ? fits[i] : best;
+    }
+    return best;
+  }
+
+  double window_rms(const WaveformFit& fit, std::size_t window, WaveformChannel channel) const {
+    double sum = 0;
+    const std::vector<double> r = fit.residual(window, channel);
+    for (const double e : r) sum += e * e / static_cast<double>(r.size());
+    return std::sqrt(sum);
+  }
+
+  int channels() const { return data_.position.empty() ? 1 : 2; }
+
+  void measure_noise(const WaveformFit& fit, const std::vector<bool>& set) {
+    for (int c = 0; c < channels(); ++c) {
+      std::vector<double> rms;
+      for (std::size_t w = 0; w < used_.size(); ++w)
+        if (set[w]) rms.push_back(window_rms(fit, w, static_cast<WaveformChannel>(c)));
+      noise_[c] = signal::median(rms);
+    }
+  }
+
+  /// Nothing that comes later would mend this.
+  void refuse_early() const {
+    const double noise = signal_noise(kTorqueChannel);
+    if (noise_[kTorqueChannel] > kHopeless * std::max(noise, kHopelessSwing * swing_[kTorqueChannel]))
+      throw Refusal{
+          Status::out_of_domain,
+          fmt::format("the machine of the rig file, whatever its values, does not explain the torque: "
+                      "{:.2g} % of its swing are left",
+                      100 * noise_[kTorqueChannel] / swing_[kTorqueChannel])};
+  }
+
+  /// At most, by itself: a signal at rest between two steps of its resolution shows no noise.
+  double signal_noise(WaveformChannel channel) const {
+    const double period = 2.0 * (data_.windows[1].first - data_.windows[0].first);
+    std::vector<double> values = channel == kTorqueChannel ? data_.torque : data_.position;
+    const double noise = signal::estimate_noise(values, period).upper;
+    std::sort(values.begin(), values.end());
+    double step = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 1; i < values.size(); ++i)
+      if (values[i] > values[i - 1]) step = std::min(step, values[i] - values[i - 1]);
+    return std::isfinite(step) ? std::max(noise, step) : noise;
+  }
+
+  /// Windows whose motion the start values do not catch.
+  void leave_out(const WaveformFit& fit) {
+    for (int c = 0; c < channels(); ++c) {
+      std::vector<double> rms;
+      for (std::size_t w = 0; w < used_.size(); ++w)
+        rms.push_back(window_rms(fit, w, static_cast<WaveformChannel>(c)));
+      const double most = std::max(signal::median(rms), kModelError * swing_[c]) * std::sqrt(kLeftOut);
+      for (std::size_t w = 0; w < used_.size(); ++w)
+        if (!(rms[w] <= most)) used_[w] = false;
+    }
+  }
+
+  WaveformMisfit misfit(const WaveformFit& fit, WaveformChannel channel) const {
+    double squares = 0, neighbours = 0, count = 0;
+    for (std::size_t w = 0; w < used_.size(); ++w) {
+      if (!used_[w]) continue;
+      const std::vector<double> r = fit.residual(w, channel);
+      for (std::size_t i = 2; i < r.size(); ++i) {
+        squares += r[i] * r[i], ++count;
+        neighbours += r[i] * (r[i - 1] + r[i - 2]) / 2;
+      }
+    }
+    const double variance = squares / count, chance = kSure * variance / std::sqrt(2 * count);
+    return {std::sqrt(variance), std::sqrt(std::max(0.0, neighbours / count - chance)), signal_noise(channel),
+            swing_[channel]};
+  }
+
+  WaveformSolution told(const WaveformFit& fit, const WaveformPriors& priors) const {
+    WaveformSolution s;
+    s.half_gap = fit.value(kHalfGap);
+    const Eigen::MatrixXd covariance = fit.covariance();
+    s.z.assign(fit.point.z.data(), fit.point.z.data() + kGlobalValues);
+    s.told.assign(kGlobalValues, 1);
+    for (std::size_t i = 0; i < fit.fitted().size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      s.told[static_cast<std::size_t>(fit.fitted()[i])] = std::sqrt(covariance(k, k));
+    }
+    for (int k = 0; k < kGlobalValues; ++k) s.values.push_back(fit.value(k));
+    s.log_error = kWideGap * s.told[kHalfGap];
+    if (data_.position.empty()) s.log_error = std::max(s.log_error, symmetry_error(priors));
+    for (int c = 0; c < channels(); ++c) s.misfit[c] = misfit(fit, static_cast<WaveformChannel>(c));
+    s.windows = static_cast<int>(used_.size());
+    s.left_out = static_cast<int>(std::count(used_.begin(), used_.end(), false));
+    s.iterations = fit.iterations();
+    s.cost = fit.cost();
+    s.rival = rival_, s.rival_cost = rival_cost_;
+    return s;
+  }
+
+  const WaveformSettings& settings_;
+  double ring_;
+  WaveformData data_;
+  double swing_[kWaveformChannels], noise_[kWaveformChannels];
+  std::vector<bool> used_;
+  double rival_ = kNaN, rival_cost_ = kNaN;
+};
+
+}  // namespace
+
+const char* waveform_value_name(int which) {
+  static const char* const names[kGlobalValues] = {"half gap",
+                                                   "motor damping",
+                                                   "dry friction",
+                                                   "speed of dry friction",
+                                                   "sensor stiffness",
+                                                   "sensor damping",
+                                                   "motor inertia",
+                                                   "pinion inertia",
+                                                   "gear inertia",
+                                                   "output stiffness",
+                                                   "output damping",
+                                                   "contact stiffness",
+                                                   "contact loss",
+                                                   "sensor gain",
+                                                   "sensor bias",
+                                                   "delay of the sensor",
+                                                   "time constant of the sensor",
+                                                   "delay of the torque",
+                                                   "offset of the drive",
+                                                   "slope of the drive",
+                                                   "zero of the position"};
+  return names[which];
+}
+
+WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings) {
+  return Solver(record, settings).solve();
+}
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The fit of a machine to the windows of a record, from many guesses to one answer with its error.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/waveform.h"
+#include "waveform_fit.h"
+
+namespace backlash::diagnosis {
+
+/// What a channel leaves unexplained.
+struct WaveformMisfit {
+  double rms = 0;        // of the residual, unit of the channel
+  double structure = 0;  // the same of its part that is surely no white noise
+  double noise = 0;      // of the channel by itself, at most
+  double swing = 0;      // of the channel
+};
+
+struct WaveformSolution {
+  double half_gap = kNaN;      // m
+  double log_error = kNaN;     // standard error of its logarithm
+  std::vector<double> z;       // values in spreads from the declared ones
+  std::vector<double> values;  // in their units
+  std::vector<double> told;  // share of the prior spread that the record leaves, per value; 1: tells nothing
+  WaveformMisfit misfit[kWaveformChannels];
+  int windows = 0, left_out = 0, iterations = 0;
+  double cost = 0;
+  double rival = kNaN;       // m, half gap of the next best guess
+  double rival_cost = kNaN;  // its cost more than that of the best, at the same stage
+};
+
+/// Throws Refusal where the record cannot be used.
+WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings);
+
+/// Name of a value for messages.
+const char* waveform_value_name(int which);
+
+}  // namespace backlash::diagnosis

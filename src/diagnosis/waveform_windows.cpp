@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "waveform_windows.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "refusal.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+constexpr double kLeadRings = 1.3;       // before the reversal: choice, tells the start
+constexpr double kTailRings = 11.7;      // after it: choice, the motion has died out
+constexpr double kShortestRings = 5;     // of a half period: choice, the first impacts are in it
+constexpr double kSamplesPerRing = 3;    // fewest: choice, 2 are the least in theory
+constexpr double kUneven = 0.02;         // of an interval, largest error of a stamp: choice
+constexpr double kBetween = 0.5;         // of the level; what is below is on its way
+constexpr double kMostBetween = 0.05;    // share of samples: a sine has 0.23, noise of a fifth 0.006
+constexpr double kLargestSpread = 0.25;  // of the level, standard deviation about it: choice; a sine has 0.3
+constexpr std::size_t kFewest = 4;       // windows: choice
+
+void check_even(const record::Record& record) {
+  const double dt = record.sampling_interval();
+  double least = 0, most = 0;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const double off = record.time[i] - record.time[0] - static_cast<double>(i) * dt;
+    least = std::min(least, off), most = std::max(most, off);
+  }
+  if (most - least > kUneven * dt * (1 + 0.01 * static_cast<double>(record.size())))
+    throw Refusal{Status::out_of_domain, "the samples are not evenly spaced in time"};
+}
+
+struct Square {
+  double level[2];             // N m, backward and forward
+  std::vector<int> reversals;  // first sample after each
+};
+
+Square square_of(const std::vector<double>& torque) {
+  std::vector<double> half[2], size;
+  for (const double t : torque) half[t > 0].push_back(t), size.push_back(std::fabs(t));
+  if (half[0].size() < kFewest || half[1].size() < kFewest)
+    throw Refusal{Status::insufficient_data, "the torque never reverses"};
+  const double level = signal::median(size);
+  Square square{{signal::median(half[0]), signal::median(half[1])}, {}};
+  int state = torque[0] > 0 ? 1 : 0;
+  double between = 0, squares = 0;
+  for (std::size_t i = 0; i < torque.size(); ++i) {
+    const int now = torque[i] > kBetween * level ? 1 : torque[i] < -kBetween * level ? 0 : state;
+    if (now != state) square.reversals.push_back(static_cast<int>(i));
+    state = now;
+    between += std::fabs(torque[i]) < kBetween * level;
+    squares += std::pow(torque[i] - square.level[state], 2);
+  }
+  const auto count = static_cast<double>(torque.size());
+  if (!(level > 0) || between > kMostBetween * count || std::sqrt(squares / count) > kLargestSpread * level)
+    throw Refusal{Status::out_of_domain, "the torque of the motor is no square wave, which the method needs"};
+  return square;
+}
+
+/// Where each reversal was, in samples, from a line through them all: a steady period that is no whole number
+/// of samples is then known more finely than one.
+std::vector<double> steady(const std::vector<int>& reversals) {
+  const auto n = static_cast<double>(reversals.size());
+  double mean = 0, slope = 0, squares = 0;
+  for (const int r : reversals) mean += r / n;
+  for (std::size_t k = 0; k < reversals.size(); ++k) {
+    const double x = static_cast<double>(k) - (n - 1) / 2;
+    slope += x * reversals[k], squares += x * x;
+  }
+  slope /= squares;
+  std::vector<double> line;
+  for (std::size_t k = 0; k < reversals.size(); ++k)
+    line.push_back(mean + slope * (static_cast<double>(k) - (n - 1) / 2));
+  for (std::size_t k = 0; k < reversals.size(); ++k)
+    if (std::fabs(line[k] - reversals[k]) > 0.75) return {reversals.begin(), reversals.end()};
+  return line;
+}
+
+}  // namespace
+
+int waveform_lead(double ring, double interval) {
+  return static_cast<int>(std::lround(kLeadRings * ring / interval));
+}
+
+int waveform_length(const WaveformWindow& window, double rings, double ring, double interval) {
+  const int wanted = waveform_lead(ring, interval) + static_cast<int>(std::lround(rings * ring / interval));
+  return std::min(window.samples, wanted);
+}
+
+std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most) {
+  const double dt = record.sampling_interval();
+  if (!(dt * kSamplesPerRing < ring))
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("a sample each {:.3g} s does not resolve the ring of {:.3g} s", dt, ring)};
+  check_even(record);
+  const Square square = square_of(record.column(record::Channel::motor_torque));
+  if (square.reversals.size() < kFewest)
+    throw Refusal{Status::insufficient_data, "fewer than four reversals of the torque"};
+  const std::vector<double> at = steady(square.reversals);
+  const int lead = waveform_lead(ring, dt), tail = static_cast<int>(std::lround(kTailRings * ring / dt));
+  std::vector<WaveformWindow> all;
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const int r = square.reversals[k];
+    const int end = k + 1 < at.size() ? square.reversals[k + 1] : static_cast<int>(record.size());
+    WaveformWindow w;
+    w.first = r - lead;
+    w.samples = std::min(lead + tail, end - w.first);
+    if (w.first < 0 || w.samples < lead + kShortestRings * ring / dt) continue;
+    const bool forward = record.column(record::Channel::motor_torque)[static_cast<std::size_t>(r)] > 0;
+    w.side = forward ? -1 : 1;
+    w.before = square.level[!forward], w.after = square.level[forward];
+    w.reversal = (at[k] - w.first) * dt;
+    all.push_back(w);
+  }
+  if (all.size() < kFewest)
+    throw Refusal{Status::insufficient_data, "fewer than four reversals of the torque with time to settle"};
+  std::vector<WaveformWindow> chosen;  // in pairs: one reversal to either side
+  const std::size_t pairs = std::min(all.size(), static_cast<std::size_t>(most)) / 2;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    const std::size_t k = i * (all.size() / 2) / pairs * 2;
+    chosen.push_back(all[k]), chosen.push_back(all[k + 1]);
+  }
+  return chosen;
+}
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The reversals of a square-wave torque in a record, and the windows about them.
+#pragma once
+
+#include <vector>
+
+#include "backlash_diagnosis/record/record.h"
+#include "waveform_motion.h"
+
+namespace backlash::diagnosis {
+
+/// Throws Refusal where the torque is no square wave, or the samples are uneven or too few.
+///   ring     s, cycle of the motor against the pinion: sets the scale of all times
+///   longest  the most windows to return, spread evenly over the record
+std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most);
+
+/// Samples before the reversal, and after it for a stage of the fit that looks `rings` cycles far.
+int waveform_lead(double ring, double interval);
+int waveform_length(const WaveformWindow& window, double rings, double ring, double interval);
+
+}  // namespace backlash::diagnosis
