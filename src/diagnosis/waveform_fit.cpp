@@ -51,9 +51,9 @@ WaveformFit::WaveformFit(const WaveformData& data, const WaveformPriors& priors)
     const auto reversal = static_cast<int>(std::lround(window.reversal / data.grid.interval));
     double mean = 0;
     for (int i = 0; i < reversal; ++i)
-      mean += data.torque[static_cast<std::size_t>(window.first + i)] / reversal;
+      mean += data.torque[window.first + static_cast<std::size_t>(i)] / reversal;
     const double load = std::max(0.0, window.side * mean);
-    guesses_.push_back(WaveformStart(load, load, 0, 0));
+    guesses_.emplace_back(load, load, 0, 0);
   }
   point.starts = guesses_;
   for (int k = 0; k < kStartValues; ++k) start_spread_[k] = kStartSpread[k] * data.level;
@@ -77,7 +77,8 @@ WaveformGrid WaveformFit::grid() const {
 void WaveformFit::put(const VectorXd& z, const WaveformStart& start, std::size_t set,
                       WaveformSets& sets) const {
   for (int k = 0; k < kGlobalValues; ++k) sets[static_cast<std::size_t>(k)][set] = value(k, z[k]);
-  for (int k = 0; k < kStartValues; ++k) sets[static_cast<std::size_t>(kGlobalValues + k)][set] = start[k];
+  for (int k = 0; k < kStartValues; ++k)
+    sets[std::size_t{kGlobalValues} + static_cast<std::size_t>(k)][set] = start[k];
 }
 
 void WaveformFit::residuals(std::size_t window, const WaveformMotion& motion, std::size_t set,
@@ -208,7 +209,7 @@ std::vector<double> WaveformFit::settle(std::size_t window, std::vector<Trial>& 
     normal.diagonal() += weight;
     const VectorXd toward =
         -signal::transposed_product(slopes, r.col(base)) - weight.cwiseProduct(start - guesses_[window]);
-    next.push_back(start + WaveformStart(signal::solve_symmetric(normal, toward).col(0)));
+    next.emplace_back(start + WaveformStart(signal::solve_symmetric(normal, toward).col(0)));
     costs.push_back(r.col(base).squaredNorm() + start_cost(window, start));
   }
   move([&](std::size_t run) { return next[run]; }, better);

@@ -117,7 +117,7 @@ class Solver {
           (std::fabs(w.before) + std::fabs(w.after)) / 2 / static_cast<double>(data_.windows.size());
     swing_[kTorqueChannel] = half_swing(data_.torque);
     swing_[kPositionChannel] = half_swing(data_.position);
-    for (int c = 0; c < kWaveformChannels; ++c) noise_[c] = 0;
+    for (double& noise : noise_) noise = 0;
     used_.assign(data_.windows.size(), true);
   }
 
