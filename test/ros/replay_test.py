@@ -77,6 +77,8 @@ class ReplayTest(unittest.TestCase):
     def assert_like_offline(self, answer, report):
         self.assertEqual(len(answer.estimates), len(report["estimates"]))
         for live, stored in zip(answer.estimates, report["estimates"]):
+            if live.method == "waveform":  # takes seconds, offline only
+                continue
             self.assertEqual((live.method, live.status_name), (stored["method"], stored["status"]))
             for key, value in (("backlash", live.backlash), ("backlash_angle", live.backlash_angle),
                                ("skewness", live.skewness)):
