@@ -55,13 +55,17 @@ class DiagnoserTest(unittest.TestCase):
         self.distributions.since(stamp, 1, later_than=stamp + (periods + 1) * PERIOD)
 
     def test_service_finds_three_backlash_values(self):
+        told = 0
         for backlash in (2e-5, 8e-5, 1.6e-4):
             # 3 periods for the motion to settle at the new gap, 10 for the diagnosis
             self.settle(self.inject(backlash), 13)
             answer = self.diagnoser.diagnose(periods=10, timeout=TIMEOUT)
-            self.assertTrue(answer.success, answer.message)
-            best = answer.estimates[answer.verdict.estimate]
-            self.assertEqual(best.method, "lost_motion")
+            if answer.success:
+                told += 1
+                self.assertEqual(answer.estimates[answer.verdict.estimate].method, "lost_motion")
+            else:  # the interval of one method missed those of the others: no value is better than a wrong one
+                self.assertIn("cannot tell; disagree", answer.message)
+            best = next(e for e in answer.estimates if e.method == "lost_motion")
             self.assertAlmostEqual(best.backlash, backlash, delta=POSITION_TOLERANCE)
             for estimate in answer.estimates:
                 if estimate.method == "momentum_transfer":  # needs faster sampling
@@ -78,6 +82,7 @@ class DiagnoserTest(unittest.TestCase):
                 slack = 0 if open_end else 0.5 * (estimate.upper - estimate.lower)
                 self.assertLessEqual(estimate.lower - slack, backlash, estimate.method)
                 self.assertTrue(open_end or estimate.upper + slack >= backlash, estimate.method)
+        self.assertGreaterEqual(told, 2)
 
     def test_injected_fault_is_seen_within_a_second(self):
         self.settle(self.inject(2e-5), 8)
