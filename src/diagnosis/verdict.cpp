@@ -14,6 +14,9 @@ namespace backlash::diagnosis {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Theory: times the 95 % interval, four standard deviations. Of five right intervals one in five times misses
+// another, and that is no contradiction.
+constexpr double kContradiction = 2;
 using Estimates = std::vector<Estimate>;
 using Set = std::vector<int>;  // indices of estimates
 
@@ -50,12 +53,15 @@ bool sharper(const Estimates& all, int a, int b) {
   return a < b;
 }
 
-/// The highest lower end among them is common to intervals on a line that overlap in pairs.
-bool share_a_point(const Estimates& all, const Set& set) {
+/// The highest lower end among them is common to intervals on a line that overlap in pairs. `times`: as wide
+/// as they are, to either side of their values.
+bool share_a_point(const Estimates& all, const Set& set, double times) {
   double lower = 0, least_upper = kInfinity;
   for (const int i : set) {
-    lower = std::max(lower, all[i].angle_lower);
-    least_upper = std::min(least_upper, upper(all[i]));
+    const Estimate& e = all[i];
+    const double more = std::isfinite(e.backlash_angle) ? times - 1 : 0;
+    lower = std::max(lower, e.angle_lower - (more > 0 ? more * (e.backlash_angle - e.angle_lower) : 0));
+    least_upper = std::min(least_upper, upper(e) + (more > 0 ? more * (upper(e) - e.backlash_angle) : 0));
   }
   return lower <= least_upper;
 }
@@ -74,7 +80,8 @@ bool same_witness(const Estimate& a, const Estimate& b) {
 /// Without those whose witness contradicts itself, unless no other witness is there.
 Set consistent(const Estimates& all, const Set& sound) {
   Set kept = filtered(sound, [&](int i) {
-    return share_a_point(all, filtered(sound, [&](int k) { return same_witness(all[i], all[k]); }));
+    return share_a_point(all, filtered(sound, [&](int k) { return same_witness(all[i], all[k]); }),
+                         kContradiction);
   });
   return kept.empty() ? sound : kept;
 }
@@ -99,10 +106,10 @@ Choice choose(const Estimates& all) {
   }
   choice.members = consistent(all, sound);
   if (choice.members.size() < sound.size()) choice.reason = "what rests on the same contradicts itself";
-  if (!share_a_point(all, choice.members)) {
+  if (!share_a_point(all, choice.members, kContradiction)) {
     const Set measured = filtered(choice.members, [&](int i) { return all[i].from_record; });
     choice.reason = "the record itself shows what the others take from the rig file: is it this machine's?";
-    if (measured.empty() || !share_a_point(all, measured)) {
+    if (measured.empty() || !share_a_point(all, measured, kContradiction)) {
       choice.members.clear();
       choice.reason = "nothing on the record tells who is right";
     } else {
@@ -133,6 +140,17 @@ Amount amount_of(const Estimate& e, bool angular) {
   return a;
 }
 
+/// Intervals that miss each other and do not contradict: the truth may lie in any of them.
+Amount hull(const Estimates& all, const Set& members, Amount sum, bool angular) {
+  for (const int i : members) {
+    const Amount a = amount_of(all[i], angular);
+    if (std::isnan(a.value)) continue;
+    sum.lower = std::min(sum.lower, a.lower);
+    sum.upper = std::max(sum.upper, a.upper);
+  }
+  return sum;
+}
+
 /// See combine(). Members are sorted, the sharpest first. A member that knows no length says nothing of
 /// lengths.
 Amount combination(const Estimates& all, const Set& members, bool angular) {
@@ -148,7 +166,8 @@ Amount combination(const Estimates& all, const Set& members, bool angular) {
     sum = {sum.value + weight * a.value, sum.lower + weight * a.lower, sum.upper + weight * a.upper};
     weights += weight;
   }
-  return {sum.value / weights, sum.lower / weights, sum.upper / weights};
+  const Amount mean = {sum.value / weights, sum.lower / weights, sum.upper / weights};
+  return share_a_point(all, members, 1) ? mean : hull(all, members, mean, angular);
 }
 
 /// Value, or lower bound where there is none: what is compared and graded.

@@ -60,6 +60,16 @@ bool mentions(const Verdict& v, const std::string& words) {
   return v.message.find(words) != std::string::npos;
 }
 
+// 8e-5 +- 2e-6 and 8.5e-5 +- 2e-6 lie 3.5 standard deviations apart, 8.9e-5 six.
+TEST(Verdict, IntervalsThatJustMissEachOtherWidenTheAnswer) {
+  const Verdict near = combined({ok("a", 8e-5, 2e-6), ok("b", 8.5e-5, 2e-6)});
+  EXPECT_EQ(near.agreement, "agree");
+  EXPECT_NEAR(near.backlash, 8.25e-5, 1e-12);
+  EXPECT_NEAR(near.lower, 7.8e-5, 1e-12);
+  EXPECT_NEAR(near.upper, 8.7e-5, 1e-12);
+  EXPECT_EQ(combined({ok("a", 8e-5, 2e-6), ok("b", 8.9e-5, 2e-6)}).grade, Grade::cannot_tell);
+}
+
 TEST(Verdict, CombinesWhatAgreesSharpestFirst) {
   const Verdict v = combined({ok("wide", 9e-5, 3e-5), unable("off", Status::out_of_domain, "x"),
                               ok("narrow", 8e-5, 1e-6), ok("middle", 8e-5, 1e-5)});
