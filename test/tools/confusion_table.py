@@ -2,16 +2,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs trace_residual on machines that it has never seen and says how often it names what they lack.
 
-Makes a seeded suite of machines with make_machine (one, two, three or no undeclared effects, and effects that no
-dictionary holds; clean, and with 20 % torque noise), runs trace_residual on each and compares what it adds with the
+Makes a seeded suite of machines with make_machine (servos with one, two, three or no undeclared effects, and effects
+that no dictionary holds, clean and with 20 % torque noise; joints with one encoder in a position loop), runs trace_residual on each and compares what it adds with the
 truth. Prints a line per machine, the confusion table and the totals against the goals, and writes all as JSON.
-Exit code: 0 where every goal is met, 1 where not, 64 usage, 66 executable or rig missing.
+Exit code: 0 where every goal is met, 1 where not, 64 usage, 66 executable missing.
 """
 import argparse
 import collections
 import concurrent.futures
 import json
 import os
+import secrets
 import shutil
 import subprocess
 import sys
@@ -47,33 +48,43 @@ LUGRE, HERTZ = ["--friction", "lugre"], ["--contact", "hertz"]
 COARSE, STILL, SHORT = ["--encoder-bits", "18"], ["--no-dither"], ["--duration", "10"]
 NOISY = ["--noise-share", "0.2"]
 
-Case = collections.namedtuple("Case", "name effects options noisy")
+JOINTS = ["none"] * 4 + ["gravity,load_dependent_friction"] * 6 + [
+    "load_dependent_friction", "load_dependent_friction", "gravity", "gravity", "stribeck", "stribeck", "gravity,stribeck",
+    "quadratic_drag", "gravity,quadratic_drag", "asymmetric_viscous", "gravity,asymmetric_viscous",
+    "position_dependent_friction", "gravity,position_dependent_friction", "friction_drift", "gravity,friction_drift",
+    "cogging", "cogging", "gravity,cogging", "gravity,cogging", "stribeck,load_dependent_friction",
+    "gravity,stribeck,load_dependent_friction", "gravity,cogging,friction_drift"]
+RIGS = {"servo": "config/two_inertia_servo.yaml", "joint": "config/ur5_joint.yaml"}
+GROUPS = ("clean", "noisy", "joint")
+
+Case = collections.namedtuple("Case", "name effects options group")
 
 
 def suite(first_seed):
     """The cases; every one has a seed of its own."""
     cases = []
 
-    def add(effects, options, noisy):
+    def add(effects, options, group):
         seed = first_seed + len(cases)
         how = "_".join(o.lstrip("-").replace("-", "_") for o in options if o not in ("--friction", "--contact"))
-        name = "_".join(filter(None, [f"{len(cases):02d}", "noisy" if noisy else "clean",
-                                      effects.replace(",", "+"), how]))
-        options = ["--seed", str(seed), "--effects", effects] + options + (NOISY if noisy else [])
-        cases.append(Case(name, effects, options, noisy))
+        name = "_".join(filter(None, [f"{len(cases):03d}", group, effects.replace(",", "+"), how]))
+        more = {"clean": [], "noisy": NOISY, "joint": ["--machine", "joint"]}[group]
+        cases.append(Case(name, effects, ["--seed", str(seed), "--effects", effects] + options + more, group))
 
     for options in ([], [], LUGRE, HERTZ, COARSE, STILL, SHORT):
-        add("none", options, False)
+        add("none", options, "clean")
     for effects in NAMED + PAIRS + TRIPLES + OUTSIDE:
-        add(effects, [], False)
+        add(effects, [], "clean")
     for options in ([], LUGRE, HERTZ, COARSE, SHORT):
-        add("none", options, True)
+        add("none", options, "noisy")
     variants = ([], SHORT, LUGRE, SHORT + LUGRE)
     for i, effects in enumerate(NAMED + PAIRS[:4] + TRIPLES[:2] + OUTSIDE):
-        add(effects, variants[i % len(variants)], True)
+        add(effects, variants[i % len(variants)], "noisy")
     for effects, options in (("gravity", HERTZ), ("cogging", COARSE), ("varying_backlash", COARSE),
                              ("stribeck", STILL), ("transmission_error", HERTZ), ("torque_saturation", LUGRE)):
-        add(effects, options, False)
+        add(effects, options, "clean")
+    for effects in JOINTS:
+        add(effects, [], "joint")
     return cases
 
 
@@ -143,7 +154,7 @@ def worst_channel(channels):
 
 def judge(case, truth, outcome, report):
     """One machine: what was found, and which goals it meets."""
-    result = {"name": case.name, "noisy": case.noisy, "true": sorted(truth["undeclared_effects"]),
+    result = {"name": case.name, "group": case.group, "true": sorted(truth["undeclared_effects"]),
               "found": [], "verdict": "failed", "channels": {}, "seconds": outcome["seconds"],
               "code": outcome["code"], "outside": bool(truth["outside_dictionary"]), "score": "wrong", "worse": False}
     if report is None:
@@ -169,7 +180,8 @@ def judge(case, truth, outcome, report):
 def run_case(case, args):
     folder = args.folder / case.name
     make(case, folder, args.make)
-    outcome = trace(folder, args.trace, args.rig, args.timeout)
+    rig = REPOSITORY / RIGS["joint" if case.group == "joint" else "servo"]
+    outcome = trace(folder, args.trace, str(rig), args.timeout)
     report = None
     if outcome["code"] in RESULT_CODES:
         report = json.loads((folder / "report" / "report.json").read_text())
@@ -254,18 +266,20 @@ def print_totals(title, figures):
 
 def read_arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--rig", default=str(REPOSITORY / "config/two_inertia_servo.yaml"), help="declared model")
     parser.add_argument("--trace", help="path of trace_residual (default: PATH, then the workspace)")
     parser.add_argument("--make", help="path of make_machine (default: PATH, then the workspace)")
     parser.add_argument("--only", default="", metavar="PATTERN", help="machines whose name contains it")
     parser.add_argument("--quick", action="store_true", help="12 machines")
-    parser.add_argument("--seed", type=int, default=1000, help="of the first machine (default: %(default)s)")
+    parser.add_argument("--seed", type=int, help="of the first machine (default: drawn, and printed)")
     parser.add_argument("--jobs", type=int, default=2, help="at the same time (default: %(default)s)")
     parser.add_argument("--timeout", type=float, default=900, help="s, per machine (default: %(default)s)")
     parser.add_argument("--keep", metavar="DIR", help="work here, keep all, skip what is made and run already")
     parser.add_argument("--json", metavar="FILE", help="all results (default: confusion_table.json in --keep)")
     parser.add_argument("--list", action="store_true", help="names of the machines")
     args = parser.parse_args()
+    if args.seed is None:
+        args.seed = secrets.randbelow(2**31)
+        print(f"--seed {args.seed}", flush=True)
     if args.jobs < 1:
         parser.error("--jobs: at least 1")
     return args
@@ -298,26 +312,23 @@ def main():
             print(f"confusion_table: --{tool}: executable not found", file=sys.stderr)
             return 66
         setattr(args, tool, path)
-    if not Path(args.rig).is_file():
-        print(f"confusion_table: {args.rig}: not found", file=sys.stderr)
-        return 66
 
     with tempfile.TemporaryDirectory() as scratch:
         args.folder = Path(args.keep or scratch).resolve()
         args.folder.mkdir(parents=True, exist_ok=True)
         results = run_all(cases, args)
     summary = {}
-    for title, part in (("Clean", [r for r in results if not r["noisy"]]),
-                        ("Noisy", [r for r in results if r["noisy"]])):
+    for group in GROUPS:
+        part = [r for r in results if r["group"] == group]
         if part:
-            print(f"\n== {title}")
+            print(f"\n== {group}")
             print_confusion(confusion(part))
-            summary[title.lower()] = totals(part)
-            print_totals(title, summary[title.lower()])
+            summary[group] = totals(part)
+            print_totals(group, summary[group])
     output = args.json or (args.keep and str(Path(args.keep) / "confusion_table.json"))
     if output:
         table = {true: dict(row) for true, row in confusion(results).items()}
-        Path(output).write_text(json.dumps({"schema_version": 1, "totals": summary, "confusion": table,
+        Path(output).write_text(json.dumps({"schema_version": 1, "seed": args.seed, "totals": summary, "confusion": table,
                                             "machines": results}, indent=1) + "\n")
     return 0 if all(all(half["goals"].values()) for half in summary.values()) else 1
 

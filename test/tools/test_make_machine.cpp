@@ -114,6 +114,20 @@ class MakeMachine : public CommandTest {
     return result;
   }
 
+  Values column(const std::string& name, std::size_t which) const {
+    std::istringstream text(read(name));
+    std::string line;
+    std::getline(text, line);
+    Values result;
+    while (std::getline(text, line)) {
+      std::istringstream cells(line);
+      std::string cell;
+      for (std::size_t i = 0; i <= which; ++i) std::getline(cells, cell, ',');
+      result.push_back(std::stod(cell));
+    }
+    return result;
+  }
+
   double rig(const char* name) const { return truth_["rig"][name]["value"]; }
   double of(const char* effect, const char* name) const { return truth_["undeclared_effects"][effect][name]; }
 
@@ -308,7 +322,61 @@ TEST_F(MakeMachine, TeethAreAsTheTruthSays) {
   EXPECT_LT(median_size(residual) / 0.6745, 1.5 * noise);
 }
 
+TEST_F(MakeMachine, ServosMayHaveAnotherRate) {
+  done("make_machine --seed 3 --rate 2000 --duration 2 --out fast");
+  const Values time = column("fast/train.csv", 0);
+  ASSERT_EQ(time.size(), 4000u);
+  for (std::size_t k = 0; k < time.size(); ++k) ASSERT_NEAR(time[k], 5e-4 * double(k), 1e-9);
+}
+
+TEST_F(MakeMachine, StrengthIsTimesWhatIsDrawn) {
+  const std::string how = "--seed 6 --duration 1 --effects gravity,cogging,delay,stribeck";
+  make(how);
+  const nlohmann::json whole = truth_["undeclared_effects"];
+  make(how + " --strength 0.25");
+  for (const char* id : {"gravity", "cogging", "delay", "stribeck"})
+    EXPECT_DOUBLE_EQ(of(id, "A"), 0.25 * whole[id]["A"].get<double>()) << id;
+}
+
+// The current against Newton's law, written down here anew, where the joint slides: what is left is noise.
+TEST_F(MakeMachine, AJointKeepsNewtonsLaw) {
+  done(
+      "make_machine --machine joint --seed 12 --rate 500 --duration 40 "
+      "--effects gravity,load_dependent_friction --out joint");
+  truth_ = nlohmann::json::parse(read("joint/truth.json"));
+  const auto own = [this](const char* name) { return truth_["joint"][name].get<double>(); };
+  const Values time = column("joint/train.csv", 0), current = column("joint/train.csv", 1);
+  const Values q = column("joint/train.csv", 2);
+  // Over 2 n samples of whatever distance a parabola through three points: its slope and curvature.
+  const std::size_t n = 20;
+  double squares = 0, wrong = 0;
+  std::size_t count = 0;
+  for (std::size_t k = n; k + n < q.size(); ++k) {
+    const double before = time[k] - time[k - n], after = time[k + n] - time[k];
+    const double first = (q[k] - q[k - n]) / before, second = (q[k + n] - q[k]) / after;
+    const double speed = (first * after + second * before) / (before + after);
+    const double acceleration = 2 * (second - first) / (before + after);
+    if (std::abs(speed) < 0.3) continue;
+    const double load =
+        own("inertia") * acceleration + of("gravity", "A") * std::sin(q[k] + of("gravity", "p"));
+    const double predicted =
+        load + own("viscous") * speed +
+        std::copysign(own("coulomb") + of("load_dependent_friction", "A") * std::abs(load), speed);
+    squares += current[k] * current[k];
+    wrong += (current[k] - predicted) * (current[k] - predicted);
+    ++count;
+  }
+  ASSERT_GT(count, 3000u);
+  // Noise of the current and, of similar size, what 40 ms of curvature hide of the loop's answer to it.
+  EXPECT_LT(std::sqrt(wrong / double(count)), 2 * own("noise") + 0.02);
+  EXPECT_GT(std::sqrt(squares / double(count)), 1);
+}
+
 TEST_F(MakeMachine, RefusesWhatItDoesNotKnow) {
+  EXPECT_EQ(run("make_machine --seed 1 --out x --machine crane").code, 64);
+  EXPECT_EQ(run("make_machine --seed 1 --out x --machine joint --effects transmission_error").code, 64);
+  EXPECT_EQ(run("make_machine --seed 1 --out x --rate 1").code, 64);
+  EXPECT_EQ(run("make_machine --seed 1 --out x --strength -1").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --effects rust").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --friction oil").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --order -3").code, 64);

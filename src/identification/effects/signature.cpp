@@ -17,14 +17,16 @@ bool worth_saying(const Remainder& r, double part, const ExplainableSettings& se
   return r.signal > 0 && part * r.rms >= settings.worth_saying * r.signal;
 }
 
-bool explainable(const Remainder& r, const ExplainableSettings& settings) {
-  return r.explainable.value >= settings.near_zero && r.explainable.lower > 0 &&
-         r.explainable.value > r.explainable.chance &&
-         worth_saying(r, std::sqrt(r.explainable.value), settings);
-}
-
 bool beyond_noise(const Remainder& r, const ExplainableSettings& settings) {
   return r.rms > settings.clear * r.floor && worth_saying(r, 1, settings);
+}
+
+/// Well above the noise of the sensors the whole remainder is the model's lack, of which the states need show
+/// but a part; else only what they show can be told from noise.
+bool explainable(const Remainder& r, const ExplainableSettings& settings) {
+  const double part = beyond_noise(r, settings) ? 1 : std::sqrt(r.explainable.value);
+  return r.explainable.value >= settings.near_zero && r.explainable.lower > 0 &&
+         r.explainable.value > r.explainable.chance && worth_saying(r, part, settings);
 }
 
 std::string followed_states(const Remainder& r, const ExplainableSettings& settings) {

@@ -8,9 +8,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double kMillisecond = 1e-3;  // s
+
 Wave draw_wave(Random& random, const Circumstances& circumstances, double smallest, double largest,
                int first_order, int last_order) {
-  const double amplitude = random.uniform(smallest, largest);
+  const double amplitude = circumstances.strength * random.uniform(smallest, largest);
   const int order = random.whole(first_order, last_order);
   return {amplitude, circumstances.order > 0 ? circumstances.order : order, random.phase()};
 }
@@ -23,42 +25,42 @@ double inside(Random& random, const Travel& travel) {
   return travel.from + (travel.to - travel.from) * random.uniform(0.25, 0.75);
 }
 
-Json asymmetric_coulomb(Random& random, const Circumstances&, Machine& machine) {
+Json asymmetric_coulomb(Random& random, const Circumstances& circumstances, Machine& machine) {
   Friction& f = machine.motor.friction;
-  f.asymmetric_coulomb = random.sign() * random.uniform(0.1, 0.3) * f.coulomb;
+  f.asymmetric_coulomb = circumstances.strength * random.sign() * random.uniform(0.1, 0.3) * f.coulomb;
   return {{"motor friction", "Coulomb + A forward, Coulomb - A backward"}, {"A", f.asymmetric_coulomb}};
 }
 
-Json asymmetric_viscous(Random& random, const Circumstances&, Machine& machine) {
+Json asymmetric_viscous(Random& random, const Circumstances& circumstances, Machine& machine) {
   double& more = machine.motor.friction.asymmetric_viscous;
-  more = random.uniform(25, 70);
+  more = circumstances.strength * random.uniform(25, 70);
   return {{"motor friction", "+ A*w where w > 0"}, {"A", more}};
 }
 
-Json stribeck(Random& random, const Circumstances&, Machine& machine) {
+Json stribeck(Random& random, const Circumstances& circumstances, Machine& machine) {
   Friction& f = machine.motor.friction;
-  f.stribeck = random.uniform(0.35, 0.7) * f.coulomb;
+  f.stribeck = circumstances.strength * random.uniform(0.35, 0.7) * f.coulomb;
   f.stribeck_speed = random.uniform(0.015, 0.05);
   return {{"motor friction", "+ A*exp(-(w/ws)^2)*sign(w)"}, {"A", f.stribeck}, {"ws", f.stribeck_speed}};
 }
 
-Json quadratic_drag(Random& random, const Circumstances&, Machine& machine) {
+Json quadratic_drag(Random& random, const Circumstances& circumstances, Machine& machine) {
   const bool at_motor = random.chance(0.5);
   double& drag = (at_motor ? machine.motor : machine.load).friction.quadratic;
-  drag = random.uniform(50, 140);
+  drag = circumstances.strength * random.uniform(50, 140);
   return {{at_motor ? "motor friction" : "load friction", "+ A*w*abs(w)"}, {"A", drag}};
 }
 
-Json square_root_friction(Random& random, const Circumstances&, Machine& machine) {
+Json square_root_friction(Random& random, const Circumstances& circumstances, Machine& machine) {
   const bool at_motor = random.chance(0.5);
   double& friction = (at_motor ? machine.motor : machine.load).friction.square_root;
-  friction = random.uniform(25, 60);
+  friction = circumstances.strength * random.uniform(25, 60);
   return {{at_motor ? "motor friction" : "load friction", "+ A*sqrt(abs(w))*sign(w)"}, {"A", friction}};
 }
 
-Json load_dependent_friction(Random& random, const Circumstances&, Machine& machine) {
+Json load_dependent_friction(Random& random, const Circumstances& circumstances, Machine& machine) {
   double& share = machine.motor.friction.load_dependent;
-  share = random.uniform(0.05, 0.15);
+  share = circumstances.strength * random.uniform(0.05, 0.15);
   return {{"motor friction", "+ A*abs(T)*sign(w), T = torque through the mesh"}, {"A", share}};
 }
 
@@ -70,12 +72,13 @@ Json position_dependent_friction(Random& random, const Circumstances& circumstan
 
 Json friction_drift(Random& random, const Circumstances& circumstances, Machine& machine) {
   double& rate = machine.motor.friction.drift;
-  rate = random.sign() * random.uniform(0.25, 0.5) / circumstances.duration;
+  rate = circumstances.strength * random.sign() * random.uniform(0.25, 0.5) / circumstances.duration;
   return {{"motor friction", "Coulomb*(1 + A*t), t = time in the record"}, {"A", rate}};
 }
 
-Json gravity(Random& random, const Circumstances&, Machine& machine) {
-  machine.gravity = {random.uniform(25, 80), random.uniform(-Random::kPi, Random::kPi)};
+Json gravity(Random& random, const Circumstances& circumstances, Machine& machine) {
+  machine.gravity = {circumstances.strength * random.uniform(25, 80),
+                     random.uniform(-Random::kPi, Random::kPi)};
   return {{"load torque", "A*sin(q+p), q = load position, opposing"},
           {"A", machine.gravity.amplitude},
           {"p", machine.gravity.phase}};
@@ -110,42 +113,43 @@ Json varying_backlash(Random& random, const Circumstances& circumstances, Machin
   return drawn;
 }
 
-Json mesh_hardening(Random& random, const Circumstances&, Machine& machine) {
+Json mesh_hardening(Random& random, const Circumstances& circumstances, Machine& machine) {
   Mesh& mesh = machine.mesh;
   const double penetration = mesh.working_torque / mesh.stiffness;
-  mesh.hardening = random.uniform(0.25, 0.6) / (penetration * penetration);
+  mesh.hardening = circumstances.strength * random.uniform(0.25, 0.6) / (penetration * penetration);
   return {{"torque of a flank", "k*d*(1 + A*d^2), d = penetration [rad]"}, {"A", mesh.hardening}};
 }
 
 // The other reading, a speed ratio that varies and so lets the angles creep apart, is in no dictionary:
 // creep.
-Json varying_reduction_ratio(Random& random, const Circumstances&, Machine& machine) {
+Json varying_reduction_ratio(Random& random, const Circumstances& circumstances, Machine& machine) {
   double& change = machine.mesh.ratio_per_torque;
-  change = random.sign() * random.uniform(2.5e-7, 6e-7);
+  change = circumstances.strength * random.sign() * random.uniform(2.5e-7, 6e-7);
   return {{"motor angle at the mesh", "q*(1 + A*T), T = torque through the mesh"}, {"A", change}};
 }
 
-Json encoder_scale(Random& random, const Circumstances&, Machine& machine) {
-  const double error = random.sign() * random.uniform(8e-5, 3e-4);
+Json encoder_scale(Random& random, const Circumstances& circumstances, Machine& machine) {
+  const double error = circumstances.strength * random.sign() * random.uniform(8e-5, 3e-4);
   machine.sensors.load_gain = 1 + error;
   return {{"load encoder", "shows (1 + A)*q"}, {"A", error}};
 }
 
-Json delay(Random& random, const Circumstances&, Machine& machine) {
-  machine.sensors.latency = random.uniform(1, 4) * kInterval;
+Json delay(Random& random, const Circumstances& circumstances, Machine& machine) {
+  machine.sensors.latency = circumstances.strength * random.uniform(1, 4) * kMillisecond;
   return {{"torque", "acts A [s] after its stamp, against both angles"}, {"A", machine.sensors.latency}};
 }
 
-Json presliding(Random& random, const Circumstances&, Machine& machine) {
+Json presliding(Random& random, const Circumstances& circumstances, Machine& machine) {
   Friction& f = machine.motor.friction;
-  f.bristle_length = random.uniform(4e-4, 1.5e-3);
+  f.bristle_length = circumstances.strength * random.uniform(4e-4, 1.5e-3);
   f.bristle_damping = 0;
   return {{"motor friction", "Dahl: Coulomb*z, z' = (w - abs(w)*z)/A"}, {"A", f.bristle_length}};
 }
 
 Json local_fault(Random& random, const Circumstances& circumstances, Machine& machine) {
   Bump& fault = machine.mesh.gap_fault;
-  fault = {random.uniform(3e-4, 7e-4), inside(random, circumstances.travel), random.uniform(0.04, 0.1)};
+  fault = {circumstances.strength * random.uniform(3e-4, 7e-4), inside(random, circumstances.travel),
+           random.uniform(0.04, 0.1)};
   return {{"backlash_angle(q)", "b + A*exp(-((q-c)/s)^2), q = load position"},
           {"A", fault.height},
           {"c", fault.centre},

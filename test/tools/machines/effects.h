@@ -17,6 +17,7 @@ struct Circumstances {
   double duration = 30;  // s, of a record
   Travel travel;         // rad, that both records share
   double order = 0;      // 1/rad, of every wave over a position; 0: drawn
+  double strength = 1;   // times what is drawn of each effect
 };
 
 struct Effect {

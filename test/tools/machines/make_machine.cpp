@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "effects.h"
+#include "joint.h"
 
 namespace machines {
 namespace {
@@ -18,8 +19,9 @@ using Json = nlohmann::ordered_json;
 
 struct Options {
   std::uint64_t seed = 0;
-  std::string effects, friction, contact, out;
-  double noise = 1, noise_share = 0, noise_corner = 0, skew = 0, duration = 30, order = 0;
+  std::string machine, effects, friction, contact, out;
+  double noise = 1, noise_share = 0, noise_corner = 0, skew = 0, duration = 30, order = 0, strength = 1,
+         rate = 0;
   int encoder_bits = 0;
   bool dither = true;
 };
@@ -74,7 +76,7 @@ Motions draw_motions(const Options& options) {
     const Travel a = travel_of(motions.train, options.duration),
                  b = travel_of(motions.test, options.duration);
     const Travel common{std::max(a.from, b.from), std::min(a.to, b.to)};
-    motions.circumstances = {options.duration, common, options.order};
+    motions.circumstances = {options.duration, common, options.order, options.strength};
     if (common.to - common.from >= 0.5 * std::min(a.to - a.from, b.to - b.from)) return motions;
   }
 }
@@ -134,20 +136,64 @@ double standard_deviation(const std::vector<Row>& rows) {
   return std::sqrt(squares / static_cast<double>(rows.size()));
 }
 
-void make(const Options& options) {
+void write_truth(const Options& options, const Json& truth) {
+  std::ofstream file(options.out + "/truth.json");
+  file << truth.dump(1) << '\n';
+  if (!file.flush()) throw std::runtime_error("cannot write " + options.out + "/truth.json");
+}
+
+const JointEffect& joint_effect(const std::string& id) {
+  for (const JointEffect& effect : joint_effects())
+    if (effect.id == id) return effect;
+  throw std::invalid_argument("no such effect of a joint: " + id);
+}
+
+void make_joint(const Options& options) {
+  Random random(options.seed, "joint");
+  Joint joint = draw_joint(random, options.rate);
+  Json undeclared = Json::object();
+  if (options.effects != "none")
+    for (const std::string& id : split(options.effects)) {
+      Random own(options.seed, id);
+      undeclared[id] = joint_effect(id).add(own, options.strength, options.duration, joint);
+    }
+  const bool moves = random.chance(0.5);
+  Random train(options.seed, "train"), test(options.seed, "test");
+  const std::vector<JointRow> first = run_joint(joint, moves, options.duration, train),
+                              second = run_joint(joint, moves, options.duration * 5 / 8, test);
+  std::filesystem::create_directories(options.out);
+  write_csv(first, options.out + "/train.csv");
+  write_csv(second, options.out + "/test.csv");
+  write_truth(options, {{"undeclared_effects", undeclared},
+                        {"joint",
+                         {{"inertia", joint.inertia},
+                          {"viscous", joint.friction.viscous},
+                          {"coulomb", joint.friction.coulomb},
+                          {"noise", joint.noise}}},
+                        {"outside_dictionary", Json::array()},
+                        {"made_with",
+                         {{"seed", options.seed},
+                          {"duration", options.duration},
+                          {"strength", options.strength},
+                          {"rate", joint.rate},
+                          {"jitter", joint.jitter},
+                          {"motion", moves ? "moves" : "sines"}}}});
+}
+
+void make_servo(const Options& options) {
   Machine machine = draw_machine(options);
   const Motions motions = draw_motions(options);
   const Added added = add_effects(options, motions.circumstances, machine);
-  std::vector<Row> train = run(machine, motions.train, options.duration);
-  std::vector<Row> test = run(machine, motions.test, options.duration);
+  std::vector<Row> train = run(machine, motions.train, options.duration, 1 / options.rate);
+  std::vector<Row> test = run(machine, motions.test, options.duration, 1 / options.rate);
   if (options.noise_share > 0) machine.sensors.torque_noise = options.noise_share * standard_deviation(train);
   Random train_noise(options.seed, "noise of train"), test_noise(options.seed, "noise of test");
-  measure(machine.sensors, train_noise, train);
-  measure(machine.sensors, test_noise, test);
+  measure(machine.sensors, 1 / options.rate, train_noise, train);
+  measure(machine.sensors, 1 / options.rate, test_noise, test);
 
   std::filesystem::create_directories(options.out);
-  write_csv(train, options.out + "/train.csv");
-  write_csv(test, options.out + "/test.csv");
+  write_csv(train, 1 / options.rate, options.out + "/train.csv");
+  write_csv(test, 1 / options.rate, options.out + "/test.csv");
   const Json truth{{"undeclared_effects", added.undeclared},
                    {"rig", rig(machine)},
                    {"outside_dictionary", added.outside},
@@ -159,14 +205,14 @@ void make(const Options& options) {
                      {"contact", options.contact},
                      {"dither", options.dither},
                      {"duration", options.duration},
+                     {"rate", options.rate},
+                     {"strength", options.strength},
                      {"noise_corner", options.noise_corner},
                      {"encoder_skew", options.skew},
                      {"test_motion", motions.test_kind},
                      {"motor_resolution", machine.sensors.motor_resolution},
                      {"load_resolution", machine.sensors.load_resolution}}}};
-  std::ofstream file(options.out + "/truth.json");
-  file << truth.dump(1) << '\n';
-  if (!file.flush()) throw std::runtime_error("cannot write " + options.out + "/truth.json");
+  write_truth(options, truth);
 }
 
 void one_of(const std::string& name, const std::string& value, const std::vector<std::string>& known) {
@@ -182,6 +228,8 @@ bool read_options(int argc, char** argv, Options& options) {
   add("help,h", "this text");
   add("seed", po::value(&options.seed)->required(), "everything random follows from it");
   add("out", po::value(&options.out)->required(), "folder for train.csv, test.csv and truth.json");
+  add("machine", po::value(&options.machine)->default_value("servo"),
+      "servo (two inertias, two encoders, speed loop) or joint (one encoder, position loop)");
   add("effects", po::value(&options.effects)->default_value("none"), "ids, with commas, or none");
   add("friction", po::value(&options.friction)->default_value("coulomb"), "coulomb or lugre");
   add("contact", po::value(&options.contact)->default_value("linear"), "linear or hertz");
@@ -191,7 +239,10 @@ bool read_options(int argc, char** argv, Options& options) {
   add("noise-corner", po::value(&options.noise_corner)->default_value(0),
       "Hz, above which the torque noise falls (first order, of the same size); 0: white");
   add("skew", po::value(&options.skew)->default_value(0), "s, by which the load encoder is late");
-  add("duration", po::value(&options.duration)->default_value(30), "of a record [s]");
+  add("duration", po::value(&options.duration), "of a record [s]; 30, of a joint 80");
+  add("strength", po::value(&options.strength)->default_value(1),
+      "times the size of every effect: where does it stop to be seen?");
+  add("rate", po::value(&options.rate), "Hz, of the loop and the record; 1000, of a joint drawn");
   add("order", po::value(&options.order)->default_value(0),
       "of every effect that is a wave over a position, per turn of the load, any number; 0: drawn");
   add("encoder-bits", po::value(&options.encoder_bits)->default_value(0),
@@ -205,12 +256,21 @@ bool read_options(int argc, char** argv, Options& options) {
     return false;
   }
   if (given.count("list") != 0) {
-    for (const Effect& effect : all_effects()) {
-      std::cout << effect.id << (effect.in_dictionary ? "\n" : " *\n");
-    }
+    const bool joint = given["machine"].as<std::string>() == "joint";
+    for (const Effect& effect : all_effects())
+      if (!joint) std::cout << effect.id << (effect.in_dictionary ? "\n" : " *\n");
+    for (const JointEffect& effect : joint_effects())
+      if (joint) std::cout << effect.id << "\n";
     return false;
   }
   po::notify(given);
+  one_of("machine", options.machine, {"servo", "joint"});
+  const bool joint = options.machine == "joint";
+  if (given.count("duration") == 0) options.duration = joint ? 80 : 30;
+  if (given.count("rate") == 0) options.rate = joint ? 0 : 1000;
+  if (!(options.strength >= 0)) throw po::error("--strength is not negative");
+  if (given.count("rate") != 0 && !(options.rate >= 50 && options.rate <= 4000))
+    throw po::error("--rate: 50 to 4000 Hz");
   one_of("friction", options.friction, {"coulomb", "lugre"});
   one_of("contact", options.contact, {"linear", "hertz"});
   if (!(options.duration >= 1 && options.duration <= 600)) throw po::error("--duration: 1 to 600 s");
@@ -228,7 +288,8 @@ bool read_options(int argc, char** argv, Options& options) {
 int main(int argc, char** argv) {
   machines::Options options;
   try {
-    if (machines::read_options(argc, argv, options)) machines::make(options);
+    if (!machines::read_options(argc, argv, options)) return 0;
+    (options.machine == "joint" ? machines::make_joint : machines::make_servo)(options);
     return 0;
   } catch (const boost::program_options::error& error) {
     std::cerr << "make_machine: " << error.what() << '\n';

@@ -11,15 +11,18 @@
 namespace machines {
 namespace {
 
-constexpr int kSteps = 50;  // per sample: 20 us, a period of the mesh has a thousand
+constexpr double kStep = 2e-5;        // s: a period of the mesh has a thousand
+constexpr double kTravelStep = 1e-3;  // s
 
 /// PI control of the motor's speed; gain and limit as the records in undeclared/ show them.
 class SpeedControl {
  public:
+  explicit SpeedControl(double interval) : interval_(interval) {}
+
   double torque(double wanted, double speed, double extra) {
     const double error = wanted - speed;
     const double torque = kGain * error + integral_ + extra;
-    if (std::abs(torque) < kLimit) integral_ += kGain / kIntegralTime * error * kInterval;
+    if (std::abs(torque) < kLimit) integral_ += kGain / kIntegralTime * error * interval_;
     return std::clamp(torque, -kLimit, kLimit);
   }
 
@@ -27,7 +30,7 @@ class SpeedControl {
   static constexpr double kGain = 4800;         // N m s/rad
   static constexpr double kIntegralTime = 0.3;  // s
   static constexpr double kLimit = 2440;        // N m
-  double integral_ = 0;
+  double interval_, integral_ = 0;
 };
 
 double sum(const std::vector<Tone>& tones, double time) {
@@ -72,52 +75,44 @@ Reference draw_reference(const std::string& kind, bool dither, Random& random) {
 Travel travel_of(const Reference& reference, double duration) {
   Travel travel;
   double position = 0;
-  for (double time = 0; time < duration; time += kInterval) {
-    position += sum(reference.speed, time) * kInterval;
+  for (double time = 0; time < duration; time += kTravelStep) {
+    position += sum(reference.speed, time) * kTravelStep;
     travel.from = std::min(travel.from, position);
     travel.to = std::max(travel.to, position);
   }
   return travel;
 }
 
-namespace {
-
-/// The row that shows what was at this step; none between two samples.
-Row* shown(std::vector<Row>& rows, std::size_t step) {
-  return step % kSteps == 0 && step / kSteps < rows.size() ? &rows[step / kSteps] : nullptr;
-}
-
-}  // namespace
-
-std::vector<Row> run(const Machine& machine, const Reference& reference, double duration) {
-  const auto samples = static_cast<std::size_t>(std::lround(duration / kInterval));
-  const auto steps = [](double time) {
-    return static_cast<std::size_t>(std::lround(time / kInterval * kSteps));
-  };
+std::vector<Row> run(const Machine& machine, const Reference& reference, double duration, double interval) {
+  const auto samples = static_cast<std::size_t>(std::lround(duration / interval));
+  const auto per_sample = static_cast<std::size_t>(std::lround(interval / kStep));
+  const auto steps = [](double time) { return static_cast<std::size_t>(std::lround(time / kStep)); };
   const std::size_t late = steps(machine.sensors.latency),
                     load_late = late + steps(machine.sensors.load_skew);
   std::vector<Row> rows(samples);
+  const auto shown = [&](std::size_t step) {  // none between two samples
+    return step % per_sample == 0 && step / per_sample < samples ? &rows[step / per_sample] : nullptr;
+  };
   Plant plant(machine);
-  SpeedControl control;
+  SpeedControl control(interval);
   for (std::size_t k = 0; k < samples; ++k) {
-    const double time = static_cast<double>(k) * kInterval;
+    const double time = static_cast<double>(k) * interval;
     const double torque =
         control.torque(sum(reference.speed, time), plant.motor_speed(), sum(reference.torque, time));
     rows[k].torque = torque;
-    for (std::size_t i = 0; i < kSteps; ++i) {
-      const std::size_t step = k * kSteps + i;
-      if (Row* row = shown(rows, step + late)) row->motor_position = plant.motor_position();
-      if (Row* row = shown(rows, step + load_late))
+    for (std::size_t step = k * per_sample; step < (k + 1) * per_sample; ++step) {
+      if (Row* row = shown(step + late)) row->motor_position = plant.motor_position();
+      if (Row* row = shown(step + load_late))
         row->load_position = plant.load_position() * machine.sensors.load_gain;
-      plant.step(torque, kInterval / kSteps);
+      plant.step(torque, kStep);
     }
   }
   return rows;  // before `late` angles are 0, where the machine starts from rest
 }
 
-void measure(const Sensors& sensors, Random& random, std::vector<Row>& rows) {
+void measure(const Sensors& sensors, double interval, Random& random, std::vector<Row>& rows) {
   const double memory =
-      sensors.noise_corner > 0 ? std::exp(-2 * Random::kPi * sensors.noise_corner * kInterval) : 0;
+      sensors.noise_corner > 0 ? std::exp(-2 * Random::kPi * sensors.noise_corner * interval) : 0;
   double noise = random.normal();
   for (Row& row : rows) {
     row.torque += sensors.torque_noise * noise;
@@ -127,12 +122,12 @@ void measure(const Sensors& sensors, Random& random, std::vector<Row>& rows) {
   }
 }
 
-void write_csv(const std::vector<Row>& rows, const std::string& path) {
+void write_csv(const std::vector<Row>& rows, double interval, const std::string& path) {
   std::FILE* file = std::fopen(path.c_str(), "w");
   if (file == nullptr) throw std::runtime_error("cannot write " + path);
   std::fputs("time,motor_torque,motor_position,load_position\n", file);
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    std::fprintf(file, "%.4f,%.4f,%.9f,%.9f\n", static_cast<double>(k) * kInterval, rows[k].torque,
+    std::fprintf(file, "%.4f,%.4f,%.9f,%.9f\n", static_cast<double>(k) * interval, rows[k].torque,
                  rows[k].motor_position, rows[k].load_position);
   }
   if (std::fclose(file) != 0) throw std::runtime_error("cannot write " + path);

@@ -36,15 +36,13 @@ struct Row {
   double torque, motor_position, load_position;
 };
 
-constexpr double kInterval = 1e-3;  // s, between samples
-
-/// Rows at 0, kInterval, ... below duration, from rest at 0, before noise and quantisation: the torque that
+/// Rows at 0, interval, ... below duration, from rest at 0, before noise and quantisation: the torque that
 /// acts from the row's time on, held to the next, and both angles as the sensors see them.
-std::vector<Row> run(const Machine& machine, const Reference& reference, double duration);
+std::vector<Row> run(const Machine& machine, const Reference& reference, double duration, double interval);
 
 /// Adds noise, rounds to what the encoders resolve.
-void measure(const Sensors& sensors, Random& random, std::vector<Row>& rows);
+void measure(const Sensors& sensors, double interval, Random& random, std::vector<Row>& rows);
 
-void write_csv(const std::vector<Row>& rows, const std::string& path);
+void write_csv(const std::vector<Row>& rows, double interval, const std::string& path);
 
 }  // namespace machines
