@@ -49,6 +49,16 @@ TEST(Signature, AHundredthOfTheSignalIsWithinWhatAnyModelNeglects) {
   EXPECT_FALSE(signature({c}, false, {}));
 }
 
+// What the states show of it is less than a hundredth of the signal, but what is left is more and is no
+// noise.
+TEST(Signature, APartThatShowsSpeaksForAllThatIsLeft) {
+  ChannelRemainder c = left_of_torque(0.2, 0.1, 1.2);
+  c.left.signal = 600;
+  EXPECT_TRUE(signature({c}, false, {}));
+  c.left.floor = 9;  // mostly noise, of which nothing can be said
+  EXPECT_FALSE(signature({c}, false, {}));
+}
+
 TEST(Signature, TakesTheChannelOfWhichMostIsExplainable) {
   ChannelRemainder deflection = left_of_torque(0.3, 0.2, 1);
   deflection.channel = "deflection";
