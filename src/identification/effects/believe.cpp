@@ -42,7 +42,9 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   const Left other_was = left(before, !deflection, settings), other_is = left(after, !deflection, settings);
   const TestGain other = test_gain(other_was, other_is, settings);
   const double price = (other_is.total() - other_was.total()) / other_was.noise;
-  if (other.upper < 0 && other.value < -settings.worse && price > settings.price * decrease / was.noise)
+  const bool at_noise = other_is.total() < settings.at_noise * settings.at_noise * other_is.noise;
+  const bool dear = !at_noise || price > settings.price * decrease / was.noise;
+  if (other.upper < 0 && other.value < -settings.worse && dear)
     return fmt::format("on the unseen record it makes the error of {} worse, by {}", names[!deflection],
                        interval({-other.value, -other.upper, -other.lower}));
   return "";

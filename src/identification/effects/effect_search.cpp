@@ -106,9 +106,18 @@ void describe_errors(const SearchResult& result, const std::vector<ServoPredicti
   if (last.rig.coupled) forget_torque(trace);
 }
 
+/// What the effects of a channel took away, as a share of its signal; 0 where it has none.
+double explained(const std::string& channel, const Trace& trace) {
+  const bool any = std::any_of(trace.steps.begin(), trace.steps.end(),
+                               [&](const FoundEffect& step) { return step.channel == channel; });
+  const TraceChannel& c = trace.channels.at(channel);
+  return any ? std::sqrt(std::max(0.0, c.before * c.before - c.after * c.after)) : 0;
+}
+
 /// What is left of each channel, of the training records and of the unseen one.
 std::vector<ChannelRemainder> remainders(const SearchResult& result, const ServoPrediction& on_test,
-                                         const Records& records, const SearchSettings& settings) {
+                                         const Records& records, const SearchSettings& settings,
+                                         const Trace& trace) {
   const Machine& last = result.found.fitted->fit.machine;
   std::vector<Predicted> train;
   for (std::size_t i = 0; i < records.train.size(); ++i)
@@ -122,6 +131,8 @@ std::vector<ChannelRemainder> remainders(const SearchResult& result, const Servo
     all.push_back({channel, "", remainder(train, deflection, settings.fit.cutoff, settings.explainable)});
     all.push_back({channel, " on the unseen record",
                    remainder(test, deflection, settings.fit.cutoff, settings.explainable)});
+    for (auto c = all.end() - 2; c != all.end(); ++c)
+      c->left.explained = explained(channel, trace) * c->left.signal;
   }
   return all;
 }
@@ -168,7 +179,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
         "they are in "
         "the model, but nothing is called missing for it");
   note_shape_of_friction(found, settings.shape_of_friction, trace);
-  judge_remainder(remainders(result, on_test.back(), records, settings), settings.explainable, trace);
+  judge_remainder(remainders(result, on_test.back(), records, settings, trace), settings.explainable, trace);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
 }

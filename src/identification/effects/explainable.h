@@ -26,9 +26,10 @@ struct Follows {
 
 /// What is left of one channel.
 struct Remainder {
-  double rms = 0;     // N m or rad
-  double floor = 0;   // the same unit: what the noise of the sensors leaves
-  double signal = 0;  // the same unit: standard deviation of what was measured
+  double rms = 0;        // N m or rad
+  double floor = 0;      // the same unit: what the noise of the sensors leaves
+  double signal = 0;     // the same unit: standard deviation of what was measured
+  double explained = 0;  // the same unit: what the found effects of this channel took away; 0: none
   signal::PredictedShare explainable;
   std::vector<Follows> follows;  // each state alone, the one that says most first
   /// Of 20 parts of the records, the largest sum of squares over their mean: noise that does not change is

@@ -38,7 +38,7 @@ struct AcceptanceSettings {
   double earlier_part = 0.6;      // choice: of each record, that the later part is predicted from
   double earlier_gain = 0.5;      // choice: of the least gain, on the later part
   double most_blocks = 0.6;       // choice: share of the blocks that must get better
-  double least_in_noise = 0.012;  // choice: gain that always is enough in a residual that is mostly noise
+  double least_in_noise = 0.006;  // choice: gain that always is enough in a residual that is mostly noise
   double sure = 5.5;      // theory: standard deviations that noise does not reach in a thousand trials
   double near_floor = 2;  // choice: times the floor: what is left is mostly noise
   double noise = 0.01;  // choice: of the signal: a floor above it may hide something, what is below may stay
@@ -78,8 +78,10 @@ struct BeliefSettings {
   double below_noise =
       0.64;             // theory: of the noise's square, its deviation known to a fifth: nothing leaves less
   double worse = 0.05;  // choice: of the other channel's error
-  double price =
-      0.1;  // choice: of the decrease, each in the noise of its channel: growth of the other channel
+  // A channel that is left with little but noise may get worse by a part of what the other gains, each in its
+  // noise: the fit weighs both.
+  double at_noise = 1.3;     // simulation: times the noise
+  double price = 0.1;        // choice
   double least_z = 4;        // choice: of a strength, standard errors
   double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
   double local_error = 0.1;  // choice: of a strength; where it is told worse the rest of the record counts
@@ -96,9 +98,10 @@ struct ExplainableSettings {
   std::size_t least_samples = 200;  // choice: fewer tell nothing
   double near_zero = 0.1;           // choice: share of a residual: less is nothing that matters
   double worth_saying = 0.01;  // choice: of the signal: what is smaller lies within what any model neglects
-  double worth_naming = 0.05;  // choice: share of a residual, of a single state
-  double clear = 2;            // choice: times the floor of the sensors, beyond which noise needs a word
-  double uneven = 4;           // theory: coloured noise with ten values in a part stays below
+  double part_of_explained = 0.3;  // choice: of what effects explain: they must not leave as much
+  double worth_naming = 0.05;      // choice: share of a residual, of a single state
+  double clear = 2;                // choice: times the floor of the sensors, beyond which noise needs a word
+  double uneven = 4;               // theory: coloured noise with ten values in a part stays below
 };
 
 struct SearchSettings {

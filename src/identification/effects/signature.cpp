@@ -13,8 +13,12 @@ namespace {
 
 constexpr std::size_t kMostNames = 3;  // choice
 
+/// Of the signal; beside an effect that is smaller itself, of that.
 bool worth_saying(const Remainder& r, double part, const ExplainableSettings& settings) {
-  return r.signal > 0 && part * r.rms >= settings.worth_saying * r.signal;
+  const double of_signal = settings.worth_saying * r.signal;
+  const double least =
+      r.explained > 0 ? std::min(of_signal, settings.part_of_explained * r.explained) : of_signal;
+  return r.signal > 0 && part * r.rms >= least;
 }
 
 bool beyond_noise(const Remainder& r, const ExplainableSettings& settings) {
@@ -27,6 +31,11 @@ bool explainable(const Remainder& r, const ExplainableSettings& settings) {
   const double part = beyond_noise(r, settings) ? 1 : std::sqrt(r.explainable.value);
   return r.explainable.value >= settings.near_zero && r.explainable.lower > 0 &&
          r.explainable.value > r.explainable.chance && worth_saying(r, part, settings);
+}
+
+/// Too much for noise of any colour: it comes and goes; or two encoders differ by it, whose noise is white.
+bool no_noise(const ChannelRemainder& c, const ExplainableSettings& settings) {
+  return beyond_noise(c.left, settings) && (c.left.unevenness > settings.uneven || c.channel == "deflection");
 }
 
 std::string followed_states(const Remainder& r, const ExplainableSettings& settings) {
@@ -47,11 +56,14 @@ Unexplained described(const ChannelRemainder& c, bool linear, const ExplainableS
                 {r.explainable.value, r.explainable.lower, r.explainable.upper}};
   const std::string states = followed_states(r, settings);
   if (!explainable(r, settings))
-    u.signature += "follows no state of the machine, but comes and goes, which noise does not";
+    u.signature += r.unevenness > settings.uneven
+                       ? "follows no state of the machine, but comes and goes, which noise does not"
+                       : "follows no state of the machine, but encoders have no such noise: what has "
+                         "happened before matters";
   else
     u.signature +=
-        fmt::format("follows{}{} of its variance could be explained by the state of the machine",
-                    states.empty() ? " " : states + "; ", fmt::format("{:.0f} %", 100 * r.explainable.value));
+        fmt::format("follows{}; {:.0f} % of its variance could be explained by the state of the machine",
+                    states.empty() ? " no single state" : states, 100 * r.explainable.value);
   return u;
 }
 
@@ -67,9 +79,7 @@ std::optional<Unexplained> signature(const std::vector<ChannelRemainder>& all, b
   for (const ChannelRemainder& c : all) {
     if (explainable(c.left, settings) && (!most || explainable_part(c.left) > explainable_part(most->left)))
       most = &c;
-    if (beyond_noise(c.left, settings) && c.left.unevenness > settings.uneven &&
-        (!uneven || c.left.unevenness > uneven->left.unevenness))
-      uneven = &c;
+    if (no_noise(c, settings) && (!uneven || c.left.unevenness > uneven->left.unevenness)) uneven = &c;
   }
   if (!most) most = uneven;
   return most ? std::make_optional(described(*most, linear, settings)) : std::nullopt;
@@ -79,7 +89,7 @@ std::vector<std::string> noise_notes(const std::vector<ChannelRemainder>& all,
                                      const ExplainableSettings& settings) {
   std::vector<std::string> notes;
   for (const ChannelRemainder& c : all)
-    if (beyond_noise(c.left, settings) && !explainable(c.left, settings))
+    if (beyond_noise(c.left, settings) && !explainable(c.left, settings) && !no_noise(c, settings))
       notes.push_back(fmt::format(
           "what is left of {}{} is {:.1f} times what the noise of the sensors leaves, and follows no state "
           "of "

@@ -12,6 +12,9 @@ namespace {
 constexpr double kRidge =
     1e-10;  // theory: of a squared sensitivity: what only the left-out rows tell stays where it is
 
+constexpr double kDampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1};  // choice: of a squared sensitivity
+constexpr double kNoWorse = 1.02;  // choice: of a sum of squares, what is lost to a linear step
+
 double duration(const PreparedServo& record) {
   return double(record.data().size()) * record.data().interval;
 }
@@ -25,13 +28,13 @@ std::vector<Eigen::Index> rows_where(const RecordSet& records, const Wanted& wan
   return rows;
 }
 
-/// Fitted values without these rows, by a linear step from the fit.
+/// Fitted values without these rows, by a linear step from the fit; damped as Marquardt does.
 Eigen::VectorXd without(const signal::LeastSquaresFit& fit, const Eigen::MatrixXd& normal,
-                        const std::vector<Eigen::Index>& rows) {
+                        const std::vector<Eigen::Index>& rows, double damping = 0) {
   const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
   const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd rest = unit.asDiagonal() * (normal - signal::gram(j)) * unit.asDiagonal();
-  rest.diagonal().array() += kRidge;
+  rest.diagonal().array() += kRidge + damping;
   const Eigen::VectorXd gradient = j.transpose() * fit.residuals(rows);
   return unit.asDiagonal() * signal::solve_symmetric(rest, unit.asDiagonal() * gradient);
 }
@@ -67,6 +70,38 @@ Squares all_but_worst(const std::vector<double>& before, const std::vector<doubl
 
 }  // namespace
 
+namespace {
+
+std::vector<Eigen::Index> late_rows(const RecordSet& records, const AcceptanceSettings& settings) {
+  return rows_where(records, [&](const RecordSet::Row& row) {
+    return row.time > settings.earlier_part * duration(records.records()[row.record]);
+  });
+}
+
+/// The later rows, with what the earlier ones say. The step that the later ones are left out by is linear:
+/// where it leads to a machine that leaves more of the earlier rows than before it is no fit of them, and a
+/// shorter one is taken.
+Eigen::VectorXd forward(const signal::LeastSquaresFit& f, const Machine& start, const RecordSet& records,
+                        const Eigen::MatrixXd& normal, const AcceptanceSettings& settings) {
+  const auto late = late_rows(records, settings);
+  const double all = f.residuals.squaredNorm(), earlier = all - f.residuals(late).squaredNorm();
+  Eigen::VectorXd r = f.residuals(late);
+  for (const double damping : kDampings) {
+    const Eigen::VectorXd change = without(f, normal, late, damping);
+    r = f.residuals(late) + f.jacobian(late, Eigen::all) * change;
+    try {
+      const Machine machine = Unknowns(start).machine(f.values + change);
+      const Eigen::VectorXd rows = records.rows(machine.rig, machine.calibrations);
+      r = rows(late);
+      if (rows.squaredNorm() - r.squaredNorm() <= kNoWorse * earlier) return r;
+    } catch (const Error&) {  // the step leads out of what a rig may be
+    }
+  }
+  return r;
+}
+
+}  // namespace
+
 HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& records,
                  const AcceptanceSettings& settings) {
   const signal::LeastSquaresFit& f = fit.fit;
@@ -84,17 +119,8 @@ HeldOut held_out(const MachineFit& fit, const Machine& start, const RecordSet& r
     out.torque.push_back(torque);
     out.deflection.push_back(deflection);
   }
-  const auto late = rows_where(records, [&](const RecordSet::Row& row) {
-    return row.time > settings.earlier_part * duration(records.records()[row.record]);
-  });
-  const Eigen::VectorXd change = without(f, normal, late);
-  Eigen::VectorXd r = f.residuals(late) + f.jacobian(late, Eigen::all) * change;
-  try {
-    const Machine earlier = Unknowns(start).machine(f.values + change);
-    r = records.rows(earlier.rig, earlier.calibrations)(late);
-  } catch (const Error&) {  // the linear step leads out of what a rig may be; the linear prediction stands
-  }
-  add_squares(records, late, r, out.torque_forward, out.deflection_forward);
+  const Eigen::VectorXd late = forward(f, start, records, normal, settings);
+  add_squares(records, late_rows(records, settings), late, out.torque_forward, out.deflection_forward);
   return out;
 }
 

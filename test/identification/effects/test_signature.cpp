@@ -59,6 +59,25 @@ TEST(Signature, APartThatShowsSpeaksForAllThatIsLeft) {
   EXPECT_FALSE(signature({c}, false, {}));
 }
 
+// An effect of a hundredth of the signal that leaves half of that: another one stands behind it.
+TEST(Signature, BesideASmallEffectLessIsWorthSaying) {
+  ChannelRemainder c = left_of_torque(0.5, 0.4, 1.2);
+  c.left.signal = 2000;
+  EXPECT_FALSE(signature({c}, false, {}));
+  c.left.explained = 20;
+  EXPECT_TRUE(signature({c}, false, {}));
+  c.left.explained = 200;
+  EXPECT_FALSE(signature({c}, false, {}));
+}
+
+TEST(Signature, TwoEncodersDoNotWander) {
+  ChannelRemainder c = left_of_torque(0.02, -0.01, 1.5);
+  c.channel = "deflection";
+  const auto u = signature({c}, false, {});
+  ASSERT_TRUE(u);
+  EXPECT_NE(u->signature.find("encoders have no such noise"), std::string::npos) << u->signature;
+}
+
 TEST(Signature, TakesTheChannelOfWhichMostIsExplainable) {
   ChannelRemainder deflection = left_of_torque(0.3, 0.2, 1);
   deflection.channel = "deflection";
