@@ -112,7 +112,6 @@ struct SearchSettings {
     fit.iterations = 12;
     fit.other_starts = 4;
     fit.tolerance = 1e-5;
-    fit.step = 1e-4;  // simulation: orders of a position show better than over wider differences
     fit.calibration_delay =
         0.5;  // theory: samples, as far as a held torque may be misjudged; more is an effect
   }
