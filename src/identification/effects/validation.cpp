@@ -9,8 +9,9 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kRidge =
-    1e-10;  // theory: of a squared sensitivity: what only the left-out rows tell stays where it is
+constexpr double kRidge = 1e-10;  // theory: of a squared sensitivity
+constexpr double kTold =
+    0.05;  // choice: of a squared sensitivity; what the other rows hardly tell stays where it is
 
 constexpr double kDampings[] = {0, 1e-4, 1e-3, 1e-2, 0.1};  // choice: of a squared sensitivity
 constexpr double kNoWorse = 1.02;  // choice: of a sum of squares, what is lost to a linear step
@@ -34,9 +35,16 @@ Eigen::VectorXd without(const signal::LeastSquaresFit& fit, const Eigen::MatrixX
   const Eigen::MatrixXd j = fit.jacobian(rows, Eigen::all);
   const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd rest = unit.asDiagonal() * (normal - signal::gram(j)) * unit.asDiagonal();
+  Eigen::VectorXd gradient = unit.asDiagonal() * (j.transpose() * fit.residuals(rows));
+  for (Eigen::Index i = 0; i < rest.rows(); ++i) {
+    if (rest(i, i) >= kTold) continue;
+    rest.row(i).setZero();
+    rest.col(i).setZero();
+    rest(i, i) = 1;
+    gradient[i] = 0;
+  }
   rest.diagonal().array() += kRidge + damping;
-  const Eigen::VectorXd gradient = j.transpose() * fit.residuals(rows);
-  return unit.asDiagonal() * signal::solve_symmetric(rest, unit.asDiagonal() * gradient);
+  return unit.asDiagonal() * signal::solve_symmetric(rest, gradient);
 }
 
 void add_squares(const RecordSet& records, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& r,
