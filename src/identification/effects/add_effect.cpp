@@ -56,7 +56,7 @@ Hypothesis add_effect(const Hypothesis& before, const SearchContext& context) {
     std::vector<Effect> effects = h.effects;
     effects.push_back(
         {best.candidate, gain, alternatives(best, gain.total, trials.fitted, now, before, context), {}, {}});
-    if (auto with = refitted(h, std::move(effects), context)) return *with;
+    if (auto with = refitted(h, std::move(effects), context)) return with_best_shapes(*with, context);
     h = with_rejected(std::move(h), best.candidate.id, "the machine cannot be fitted with it at new weights");
   }
   return h;

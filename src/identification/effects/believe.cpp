@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "effect_roles.h"
 #include "found_effects.h"
 #include "local_strength.h"
 #include "steps.h"
@@ -65,6 +66,13 @@ std::vector<std::vector<signal::Measured>> strengths(const Hypothesis& h) {
   return out;
 }
 
+/// How far a delay is beyond what a held torque may be misjudged, and how well the records tell that.
+signal::Measured beyond_hold(const signal::Measured& delay, const SearchContext& context) {
+  const double interval = context.data.front().interval, hold = kUnsureOfHold * interval;
+  return {std::max(0.0, std::fabs(delay.value) - context.settings.fit.calibration_delay * interval),
+          std::sqrt(std::max(0.0, delay.standard_error * delay.standard_error - hold * hold))};
+}
+
 /// Does not stand out of its error; an effect of several terms needs one that does.
 bool is_vague(const std::vector<signal::Measured>& strengths, double least) {
   return !strengths.empty() && std::all_of(strengths.begin(), strengths.end(), [&](const auto& m) {
@@ -90,7 +98,10 @@ std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect,
 std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
                                                                 const SearchContext& context) {
   const BeliefSettings& settings = context.settings.belief;
-  const auto all = strengths(h);
+  auto all = strengths(h);
+  for (std::size_t i = 0; i < h.effects.size(); ++i)
+    if (is_delay(h.effects[i].candidate.id))
+      for (signal::Measured& m : all[i]) m = beyond_hold(m, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (is_vague(all[i], settings.least_z))
       return std::pair{i, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};

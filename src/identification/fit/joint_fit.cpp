@@ -25,9 +25,7 @@ constexpr double kVague = 30;  // choice: times the scale: standard deviation of
 constexpr double kDefaultGap = 1e-4;  // rad, choice: scale of an encoder offset where the rig has no gap
 constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
-constexpr double kSkewOfSample = 1e-3;  // simulation: samples, that interpolation leaves wrong of a skew
-constexpr double kUnsureOfHold = 0.3;  // samples, theory: 95 % reach from a torque that is held to one of the
-                                       // moment, half a sample earlier, which a record of a later one hides
+constexpr double kSkewOfSample = 1e-3;     // simulation: samples, that interpolation leaves wrong of a skew
 constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
 constexpr long kFewestBlocks = 4;          // choice: per unknown, for a covariance from blocks
 

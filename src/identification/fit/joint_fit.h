@@ -13,6 +13,10 @@
 
 namespace backlash::identification {
 
+/// Samples, theory: 95 % reach from a torque that is held to one of the moment, half a sample earlier, which
+/// a record of a later one hides. Counts in the error of a delay.
+constexpr double kUnsureOfHold = 0.3;
+
 /// A rig, what is unknown of it, and what belongs to each record.
 struct Machine {
   model::Rig rig;

@@ -144,6 +144,32 @@ TEST(EffectSearch, TwoEffectsAtOnce) {
     EXPECT_LT(i.after, 0.15) << i.channel << " " << i.input << " before " << i.before;
 }
 
+// Whether a torque is held between samples shifts it by up to half of one; one sample is more than that.
+TEST(EffectSearch, ATorqueThatIsASampleLateIsNamed) {
+  model::Rig machine = test::other_servo();
+  machine.terms.push_back(model::make_term("delay", {{"delay", 1.1e-3}}));
+  const Trace trace = traced(records_of(machine));
+  EXPECT_EQ(found(trace), std::set<std::string>{"delay"});
+  const signal::Measured delay = parameter(trace, "delay", "delay");
+  EXPECT_NEAR(delay.value, 1.1e-3, 2 * delay.standard_error);
+  EXPECT_GT(delay.standard_error, 0.2e-3);  // s, of the hold
+  expect_at_floor(trace);
+}
+
+// The motion hardly dwells at the speeds where the exponents 1 and 2 differ; only fitted do they tell.
+TEST(EffectSearch, TheExponentOfStribeckIsThatWhichLeavesLeast) {
+  model::Rig machine = test::other_servo();
+  ParameterValues values{{"torque", 25}, {"speed", 0.0255}, {"exponent", 2}};
+  values.set_choice("body", "motor");
+  machine.terms.push_back(model::make_term("stribeck", values));
+  const Trace trace = traced(records_of(machine, 10));
+  EXPECT_EQ(found(trace), std::set<std::string>{"stribeck"});
+  EXPECT_EQ(parameter(trace, "stribeck", "exponent").value, 2);
+  const signal::Measured torque = parameter(trace, "stribeck", "torque");
+  EXPECT_NEAR(torque.value, 25, 4 * torque.standard_error);
+  expect_at_floor(trace);
+}
+
 // A bump in the way of the motor, which no harmonic is.
 TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
   model::Rig machine = test::other_servo();
