@@ -126,6 +126,7 @@ std::string trace_report_json(const identification::Trace& trace, const TraceInp
         {"before", report::json_number(c.before)},
         {"after", report::json_number(c.after)},
         {"floor", report::json_number(c.floor)},
+        {"repeats", c.repeats},
         {"train_before", report::json_number(c.train_before)},
         {"train_after", report::json_number(c.train_after)},
         {"explainable", report::json_number(c.explainable.value)},

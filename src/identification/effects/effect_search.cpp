@@ -94,13 +94,20 @@ void describe_errors(const SearchResult& result, const std::vector<ServoPredicti
   const ServoPrediction before =
       result.found.other_teeth ? predicted(base, records.test, fit) : on_test.front();
   const ServoPrediction& after = on_test.back();
-  const auto channel = [&](const std::string& name, ChannelError ServoPrediction::*of) {
-    trace.channels[name] = {(before.*of).error, (after.*of).error, (after.*of).floor,
+  const auto channel = [&](const std::string& name, ChannelError ServoPrediction::*of, double sensors,
+                           double repeats) {
+    const double sensor_floor = (after.*of).floor;
+    trace.channels[name] = {(before.*of).error, (after.*of).error,
+                            sensors > 0 ? sensor_floor * std::max(1.0, repeats / sensors) : sensor_floor,
                             train_error(base, records.train, fit, of),
                             train_error(last, records.train, fit, of)};
+    trace.channels[name].repeats = repeats > 0;
   };
-  channel("torque", &ServoPrediction::torque_error);
-  if (!after.deflection.empty()) channel("deflection", &ServoPrediction::deflection_error);
+  const Predicted unseen{&records.test, after};
+  channel("torque", &ServoPrediction::torque_error, after.torque_floor, repeated_noise(unseen, false));
+  if (!after.deflection.empty())
+    channel("deflection", &ServoPrediction::deflection_error, after.deflection_floor,
+            repeated_noise(unseen, true));
   trace.series = trace_series(records.test, before, after);
   trace.independence = independence(trace.series, records.test, trace.cutoff);
   if (last.rig.coupled) forget_torque(trace);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "backlash_diagnosis/signal/order_spectrum.h"
+#include "backlash_diagnosis/signal/repetition.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "residual_orders.h"
 
@@ -56,7 +57,8 @@ void add_record(const Predicted& record, std::size_t number, bool deflection, do
   const std::vector<double>&measured = deflection ? p.measured_deflection : p.measured_torque,
         &predicted = deflection ? p.deflection : p.torque;
   const std::vector<char>& counts = deflection ? p.settled : p.counts;
-  const double floor = deflection ? p.deflection_floor : p.torque_floor;
+  const double floor =
+      std::max(deflection ? p.deflection_floor : p.torque_floor, repeated_noise(record, deflection));
   const std::vector<double> path = path_since_reversal(d);
   const std::vector<double> acceleration = d.smooth_acceleration.empty()
                                                ? signal::low_pass(d.motor_acceleration, d.interval, cutoff)
@@ -196,6 +198,16 @@ double deviation(const std::vector<double>& x) {
 }
 
 }  // namespace
+
+double repeated_noise(const Predicted& record, bool deflection) {
+  const auto lag = signal::repetition(record.data->motor);
+  if (!lag) return 0;
+  const ServoPrediction& p = record.prediction;
+  std::vector<double> left = deflection ? p.measured_deflection : p.measured_torque;
+  const std::vector<double>& predicted = deflection ? p.deflection : p.torque;
+  for (std::size_t k = 0; k < left.size(); ++k) left[k] -= predicted[k];
+  return signal::repeated_noise(left, deflection ? p.settled : p.counts, *lag);
+}
 
 Remainder remainder(const std::vector<Predicted>& records, bool deflection, double cutoff,
                     const ExplainableSettings& settings) {

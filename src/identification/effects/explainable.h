@@ -37,6 +37,10 @@ struct Remainder {
   double unevenness = 0;
 };
 
+/// What is left, measured minus predicted, differs by as much from one time to the next where the motion
+/// repeats; else 0.
+double repeated_noise(const Predicted& record, bool deflection);
+
 /// Of all samples that count. States: position (and the strongest orders of it), velocity, acceleration,
 /// transmitted torque and path since the last reversal, all of them as the model has them, and time. The
 /// measured torque is none of them: it holds its own noise.

@@ -79,9 +79,12 @@ struct Explainable {
 
 struct TraceChannel {
   double before = 0, after = 0;
-  double floor = 0;  // what the noise of the sensors alone leaves; all three relative, on the test record
+  // What noise alone leaves: of the sensors, or more where the motion repeats and what is left differs from
+  // one time to the next. All three relative, on the test record.
+  double floor = 0;
   double train_before = 0, train_after = 0;
   Explainable explainable;  // of the records where it is more: training or test
+  bool repeats = false;     // the motion of the test record repeats itself
 };
 
 /// An effect that was tried and is not in the model, and why.
