@@ -25,7 +25,8 @@ Hypothesis add_effects_or_teeth(const Hypothesis& h, const SearchContext& contex
 /// where there is no hardening, or they do not leave clearly less.
 std::optional<Hypothesis> with_other_teeth(const Hypothesis& h, const SearchContext& context);
 
-/// With other values of the shapes that are chosen and not fitted, such as an exponent, where they leave less.
+/// With other values of the shapes that are chosen and not fitted, such as an exponent, where they leave
+/// less.
 Hypothesis with_best_shapes(const Hypothesis& h, const SearchContext& context);
 
 /// Without one effect; those that came after it are fitted again, one by one.
