@@ -190,8 +190,9 @@ TEST(ToothPairs, NothingTouchesBeforeTheMostProtrusion) {
 TEST(ToothPairs, NonsenseIsRefused) {
   EXPECT_THROW(ToothPairs(cycle("step", 0, 0), {}), InvalidParameter);
   Rig rig = rig_with({}, 0);
-  rig.mesh.contact = make_contact_law(
-      "stereomechanical", {{"restitution", 0.8}, {"resting_speed", 1e-3}, {"stiffness", 1e8}, {"damping", 0}});
+  rig.mesh.contact =
+      make_contact_law("stereomechanical",
+                       {{"restitution", 0.8}, {"resting_speed", 1e-3}, {"stiffness", 1e8}, {"damping", 0}});
   ASSERT_TRUE(rig.mesh.contact->needs_impact_speed());
   EXPECT_THROW(GearTrain{rig}, InvalidParameter);
   const auto read = [](const std::string& mesh) {

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/gears.h"
 #include "support/rigs.h"
+#include "support/tooth_pairs.h"
 
 namespace backlash::simulation {
 namespace {
@@ -75,34 +76,6 @@ TEST(ToothPairsInMotion, EnergyIsKept) {
   }
 }
 
-/// One pair of the Lin and Parker law after Yumrukcal (2013), Eqs. 2.30 and 2.31, over the mean of the mesh,
-/// with a cubic at either end. Written apart from the code; u in base pitches.
-double weight(double u, double eps) {
-  const auto ramp = [](double x) {
-    const double t = std::clamp(x / kTransition + 0.5, 0.0, 1.0);
-    return t * t * (3 - 2 * t);
-  };
-  const double t = std::clamp(u / eps, 0.0, 1.0);
-  return ramp(u) * (1 - ramp(u - eps)) * (-1.8 * t * t + 1.8 * t + 0.55) / (0.85 * eps);
-}
-
-/// Depth [m] at which the pairs at `phase` carry the force, by bisection.
-double depth_at_rest(double phase, double force, const model::ToothErrors& e, double eps) {
-  double low = -100e-6, high = 100e-6;
-  for (int i = 0; i < 60; ++i) {
-    const double d = 0.5 * (low + high);
-    double sum = 0;
-    for (int pair = int(std::floor(phase)) - 3; pair <= int(std::floor(phase)) + 1; ++pair) {
-      const double u = phase - pair, t = u / eps;
-      const double error = e.slope * (t - 0.5) + e.crown * std::pow(2 * t - 1, 2) +
-                           e.pinion.runout * std::sin(2 * M_PI * pair / kPinion + e.pinion.phase);
-      sum += weight(u, eps) * kStiffness * std::max(0.0, d - error);
-    }
-    (sum > force ? high : low) = d;
-  }
-  return 0.5 * (low + high);
-}
-
 /// Amplitudes along the line of action [m] at the order of the teeth and of the pinion's turns.
 struct Wave {
   std::complex<double> teeth, pinion;
@@ -133,7 +106,9 @@ TEST(ToothPairsInMotion, ErrorsOfTheTeethAreATransmissionError) {
     model::Rig rig = rig_with(e, kDamping);
     rig.motor.inertia = 1e4;  // turns evenly, whatever it is spared
     const double r = rig.mesh.base_radius, force = kTorque / r;
-    const auto at_rest = [&](double phase) { return depth_at_rest(phase, force, e, eps); };
+    const auto at_rest = [&](double phase) {
+      return test::depth_at_rest({eps, kTransition, kStiffness, kPinion, kGear}, e, phase, force);
+    };
     const Wave expected = wave_of(at_rest, 1);
     ExcitationSettings brake = constant(-kTorque);
     brake.at_load = true;
