@@ -44,6 +44,7 @@ ProcedureReport run_gap_map(IdentificationCase& c) {
     for (const OneWay& b : runs) {
       if (!(a.speed > 0 && b.speed < 0)) continue;
       GapMapSettings settings;
+      settings.drive = c.drive;
       settings.stiffness = known(c, "mesh_stiffness");
       settings.friction_forward = load_friction_at(c, a.speed);
       settings.friction_reverse = load_friction_at(c, b.speed);
