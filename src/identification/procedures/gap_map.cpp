@@ -267,7 +267,6 @@ void say(GapMap& map) {
 /// From the runs what of the gap does not turn with the load.
 void take_waves_out(GapMap& map, Run& forward, Run& reverse, const GapMapSettings& settings) {
   GapWaveSettings of_waves;
-  of_waves.highest_load_order = settings.highest_order;
   of_waves.least_amplitude = kRelevant;
   of_waves.drive = settings.drive ? &*settings.drive : nullptr;
   map.waves =

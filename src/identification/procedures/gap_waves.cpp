@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kTurn = 2 * M_PI;
 constexpr double kLeastTurns = 1.02;   // theory: a turn and some of it twice, else whole orders say it all
-constexpr double kCellsPerWave = 10;   // choice: of the highest order
+constexpr double kCellsPerWave = 6;    // choice: of the highest order
 constexpr int kLeastSamples = 3;       // choice: per cell and run
 constexpr double kLopsided = 0.25;     // choice: of a cell, between the mean places of both runs
 constexpr std::size_t kMostWaves = 8;  // choice
@@ -80,6 +80,10 @@ void put_wave(const Cells& cells, double order, MatrixXd& a, Index column) {
   const double shown = of_cell(order, cells.width);
   a.col(column) = shown * (order * cells.place.array()).sin();
   a.col(column + 1) = shown * (order * cells.place.array()).cos();
+}
+
+int whole_orders(const GapWaveSettings& settings) {
+  return int(std::ceil(settings.highest_order));
 }
 
 /// A wave under way.
@@ -144,7 +148,7 @@ class Left {
 };
 
 /// k R + n of the drive, n = 0 first.
-std::vector<Trial> orders_of(const rig_file::Drive* drive, int whole, double highest) {
+std::vector<Trial> orders_of(const rig_file::Drive* drive, double highest) {
   std::vector<Trial> orders;
   if (!drive || drive->stages.empty()) return orders;
   const rig_file::Drive::Stage& last = drive->stages.back();
@@ -153,7 +157,7 @@ std::vector<Trial> orders_of(const rig_file::Drive* drive, int whole, double hig
     for (int k = 1; k <= kMultiples; ++k)
       for (const int n : {side, -side}) {
         const double order = k * ratio + n;
-        const bool of_load = order < whole + 0.5 && std::fabs(order - std::round(order)) < kWhole;
+        const bool of_load = std::fabs(order - std::round(order)) < kWhole;
         if (order > 0 && order <= highest && !of_load && (n != 0 || side == 0)) {
           orders.push_back({order, false, k, n, 1});
           if (side == 0) break;
@@ -168,7 +172,8 @@ class Search {
       : cells_(cells),
         turns_(turns),
         settings_(settings),
-        told_(orders_of(settings.drive, settings.highest_load_order, settings.highest_order)) {}
+        whole_(whole_orders(settings)),
+        told_(orders_of(settings.drive, settings.highest_order)) {}
 
   std::vector<GapWave> run() {
     while (waves_.size() < kMostWaves && (add(told()) || add(free()))) {
@@ -177,9 +182,7 @@ class Search {
   }
 
  private:
-  Left left(const std::vector<Trial>& waves) const {
-    return {cells_, columns(cells_, settings_.highest_load_order, waves)};
-  }
+  Left left(const std::vector<Trial>& waves) const { return {cells_, columns(cells_, whole_, waves)}; }
 
   /// The best of the drive's orders that are left.
   std::optional<Trial> told() const {
@@ -221,8 +224,7 @@ class Search {
     const GapWave wave = found_in(fitted(), waves_.size() - 1);
     // A free order that may be a whole one is the load's: the map over its turn has it.
     const double off = std::fabs(wave.order.value - std::round(wave.order.value));
-    const bool whole = waves_.back().free && wave.order.value < settings_.highest_load_order + 0.5 &&
-                       off < std::max(kWhole, kSame * wave.order.standard_error);
+    const bool whole = waves_.back().free && off < std::max(kWhole, kSame * wave.order.standard_error);
     if (whole || !(wave.amplitude.value > least_)) {
       waves_.pop_back();
       return false;
@@ -245,8 +247,8 @@ class Search {
   signal::LeastSquaresFit fitted() {
     signal::LeastSquaresFit fit;
     for (int turn = 0; turn < 3; ++turn) {
-      MatrixXd a = columns(cells_, settings_.highest_load_order, waves_);
-      const Index first = 1 + 2 * settings_.highest_load_order, linear = a.cols();
+      MatrixXd a = columns(cells_, whole_, waves_);
+      const Index first = 1 + 2 * whole_, linear = a.cols();
       std::vector<std::size_t> free;
       for (std::size_t k = 0; k < waves_.size(); ++k)
         if (waves_[k].free) free.push_back(k);
@@ -269,8 +271,8 @@ class Search {
   }
 
   GapWave found_in(const signal::LeastSquaresFit& fit, std::size_t k) const {
-    const Index at = 1 + 2 * settings_.highest_load_order + 2 * Index(k);
-    Index slope = 1 + 2 * settings_.highest_load_order + 2 * Index(waves_.size());
+    const Index at = 1 + 2 * whole_ + 2 * Index(k);
+    Index slope = 1 + 2 * whole_ + 2 * Index(waves_.size());
     for (std::size_t i = 0; i < k; ++i) slope += waves_[i].free;
     GapWave w;
     w.order = waves_[k].free ? fit.parameter(slope) : signal::Measured{0, 0};
@@ -300,6 +302,7 @@ class Search {
   const Cells& cells_;
   double turns_;
   GapWaveSettings settings_;
+  int whole_;  // orders 1, 2, ... of the load
   std::vector<Trial> told_, waves_;
   double least_ = 0;  // rad, amplitude
 };
@@ -321,8 +324,6 @@ double GapWaves::at(double position) const {
 }
 
 GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapWaveSettings& settings) {
-  if (settings.highest_load_order < 0)
-    throw InvalidParameter("highest_load_order", settings.highest_load_order, "must be >= 0");
   if (!(settings.highest_order > 0))
     throw InvalidParameter("highest_order", settings.highest_order, "must be > 0");
   if (!(settings.false_alarm > 0)) throw InvalidParameter("false_alarm", settings.false_alarm, "must be > 0");
@@ -333,7 +334,7 @@ GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapW
   result.turns = double(cells.place.size()) * width / kTurn;
   const bool told = result.turns_to_meet > 0;
   if (result.turns < kLeastTurns ||
-      cells.place.size() < 4 * (1 + 2 * settings.highest_load_order + 2 * Index(kMostWaves))) {
+      cells.place.size() < 2 * (1 + 2 * whole_orders(settings) + 3 * Index(kMostWaves))) {
     if (told)
       result.warnings.push_back(
           fmt::format("both runs share {:.3g} turns of the load, each at its own place: what of the gap "

@@ -12,9 +12,11 @@
 // the sum is the Fourier series of the gap over the angles of both, as far as the runs reach: with z1 and z2
 // teeth the same two meet again after z1 / gcd(z1, z2) turns of the load.
 //
-// All whole orders are fitted with every wave, so that a wave is only what they cannot say: in little more
-// than a turn that is told by the stretch that is visited twice. Orders that the drive tells are tried first,
-// then any other; each must pass an F-test (correlation of the residual considered).
+// All whole orders up to the highest are fitted with every wave, so that a wave is only what no gap of the
+// load can say, a local fault included: in little more than a turn that is told by the stretch that is
+// visited twice. A multiple of the pinion that is a whole number of the load is the load's. Orders that the
+// drive tells are tried first, then any other; each must pass an F-test (correlation of the residual
+// considered).
 #pragma once
 
 #include <string>
@@ -40,10 +42,9 @@ struct GapRun {
 };
 
 struct GapWaveSettings {
-  int highest_load_order = 20;             // of the whole orders beside the waves
-  double highest_order = 60;               // choice: three times that of the pinion of the thesis
-  double false_alarm = 1e-4;               // choice: of one wave, all orders considered
-  double least_amplitude = 1e-3;           // choice: of the mean
+  double highest_order = 60;      // choice: of all orders, three times that of the pinion of the thesis
+  double false_alarm = 1e-4;      // choice: of one wave, all orders considered
+  double least_amplitude = 1e-3;  // choice: of the mean
   const rig_file::Drive* drive = nullptr;  // may be null
 };
 
