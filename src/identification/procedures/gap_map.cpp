@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
@@ -267,8 +268,11 @@ void say(GapMap& map) {
 /// From the runs what of the gap does not turn with the load.
 void take_waves_out(GapMap& map, Run& forward, Run& reverse, const GapMapSettings& settings) {
   GapWaveSettings of_waves;
-  of_waves.least_amplitude = kRelevant;
   of_waves.drive = settings.drive ? &*settings.drive : nullptr;
+  const auto mean = [](const Values& x) {
+    return std::accumulate(x.begin(), x.end(), 0.0) / double(x.size());
+  };
+  of_waves.least_amplitude = kRelevant * std::fabs(mean(forward.difference) - mean(reverse.difference));
   map.waves =
       find_gap_waves({forward.load, forward.difference}, {reverse.load, reverse.difference}, of_waves);
   map.warnings = map.waves.warnings;

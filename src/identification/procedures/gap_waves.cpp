@@ -3,10 +3,13 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -29,16 +32,22 @@ constexpr int kSides = 2;              // choice: n, to either side
 constexpr double kPerLine = 3;         // theory: trial orders per line of the spectrum, 1 / turns
 constexpr double kSame = 3;            // theory: standard errors
 constexpr double kScale = 1e-3;        // choice: of the order, as far as an encoder's scale may be off
+constexpr double kBeside = 1e-6;       // choice: share of a wave beside the whole orders, to tell it by
 constexpr double kWhole = 0.02;        // choice: orders so near a whole one are the load's
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Separation of the flanks over places that both runs visited.
+/// What is fitted: the separation of the flanks over places that both runs visited, or each run over its own
+/// places, where `apart`.
 struct Cells {
-  VectorXd place, separation;  // rad
-  double width = 0;            // rad
+  VectorXd place, value;  // rad
+  VectorXd share;         // -, of the gap in the value: 1, or half with the sign of the run
+  bool apart = false;
+  double width = 0;  // rad
+  double turns = 0;  // of the load, of either run where apart
+  double freedom() const { return double(value.size()); }
 };
 
 struct Mean {
@@ -55,7 +64,11 @@ std::map<long, Mean> means_of(const GapRun& run, double width) {
   return means;
 }
 
-Cells cells_of(const GapRun& forward, const GapRun& reverse, double width) {
+VectorXd vector_of(const std::vector<double>& values) {
+  return Eigen::Map<const VectorXd>(values.data(), Index(values.size()));
+}
+
+Cells shared_cells(const GapRun& forward, const GapRun& reverse, double width) {
   const std::map<long, Mean> f = means_of(forward, width), r = means_of(reverse, width);
   std::vector<double> place, separation;
   for (const auto& [cell, a] : f) {
@@ -66,8 +79,28 @@ Cells cells_of(const GapRun& forward, const GapRun& reverse, double width) {
     place.push_back(0.5 * (a.load / a.count + b.load / b.count));
     separation.push_back(a.difference / a.count - b.difference / b.count);
   }
-  return {Eigen::Map<VectorXd>(place.data(), Index(place.size())),
-          Eigen::Map<VectorXd>(separation.data(), Index(separation.size())), width};
+  Cells cells;
+  cells.place = vector_of(place), cells.value = vector_of(separation);
+  cells.share = VectorXd::Ones(cells.place.size());
+  cells.width = width;
+  cells.turns = double(place.size()) * width / kTurn;
+  return cells;
+}
+
+Cells separate_cells(const GapRun& forward, const GapRun& reverse, double width) {
+  std::vector<double> place, value, share;
+  double least = std::numeric_limits<double>::infinity();
+  for (const GapRun* run : {&forward, &reverse}) {
+    const std::size_t before = place.size();
+    for (const auto& [cell, m] : means_of(*run, width)) {
+      if (m.count < kLeastSamples) continue;
+      place.push_back(m.load / m.count);
+      value.push_back(m.difference / m.count);
+      share.push_back(run == &forward ? 0.5 : -0.5);
+    }
+    least = std::min(least, double(place.size() - before) * width / kTurn);
+  }
+  return {vector_of(place), vector_of(value), vector_of(share), true, width, least};
 }
 
 /// What a mean over a cell leaves of a wave.
@@ -76,10 +109,20 @@ double of_cell(double order, double width) {
   return half > 0 ? std::sin(half) / half : 1;
 }
 
+/// Columns of one wave: of the gap, and of the centre line where that does not cancel; sine and cosine.
+Index columns_per_wave(const Cells& cells) {
+  return cells.apart ? 4 : 2;
+}
+
 void put_wave(const Cells& cells, double order, MatrixXd& a, Index column) {
   const double shown = of_cell(order, cells.width);
-  a.col(column) = shown * (order * cells.place.array()).sin();
-  a.col(column + 1) = shown * (order * cells.place.array()).cos();
+  const Eigen::ArrayXd sine = shown * (order * cells.place.array()).sin(),
+                       cosine = shown * (order * cells.place.array()).cos();
+  a.col(column) = cells.share.array() * sine;
+  a.col(column + 1) = cells.share.array() * cosine;
+  if (!cells.apart) return;
+  a.col(column + 2) = sine;
+  a.col(column + 3) = cosine;
 }
 
 int whole_orders(const GapWaveSettings& settings) {
@@ -94,14 +137,35 @@ struct Trial {
   double chance = 1;
 };
 
-/// Mean, whole orders, waves: sine and cosine.
-MatrixXd columns(const Cells& cells, int whole, const std::vector<Trial>& waves) {
-  MatrixXd a(cells.place.size(), 1 + 2 * whole + 2 * Index(waves.size()));
-  a.col(0).setOnes();
-  for (int n = 1; n <= whole; ++n) put_wave(cells, n, a, 2 * n - 1);
-  for (std::size_t k = 0; k < waves.size(); ++k)
-    put_wave(cells, waves[k].order, a, 1 + 2 * whole + 2 * Index(k));
+/// Without the waves: mean and whole orders; of runs apart with the scale of the motor, each for itself.
+MatrixXd base_columns(const Cells& cells, int whole) {
+  const Index n = cells.place.size(), per_run = cells.apart ? 2 + 2 * whole : 1 + 2 * whole;
+  MatrixXd a = MatrixXd::Zero(n, cells.apart ? 2 * per_run : per_run);
+  for (Index i = 0; i < n; ++i) {
+    Index c = cells.share[i] > 0 ? 0 : per_run;
+    a(i, c++) = 1;
+    for (int order = 1; order <= whole; ++order) {
+      a(i, c++) = std::sin(order * cells.place[i]);
+      a(i, c++) = std::cos(order * cells.place[i]);
+    }
+    if (cells.apart) a(i, c) = cells.place[i];
+  }
   return a;
+}
+
+MatrixXd columns(const Cells& cells, const MatrixXd& base, const std::vector<Trial>& waves) {
+  const Index per = columns_per_wave(cells);
+  MatrixXd a(base.rows(), base.cols() + per * Index(waves.size()));
+  a.leftCols(base.cols()) = base;
+  for (std::size_t k = 0; k < waves.size(); ++k)
+    put_wave(cells, waves[k].order, a, base.cols() + per * Index(k));
+  return a;
+}
+
+/// P(F > f); 1 where there is nothing to tell it by.
+double f_tail(double f, double of_wave, double freedom) {
+  if (!(f > 0) || !(freedom > 2)) return 1;
+  return cdf(complement(boost::math::fisher_f(of_wave, freedom), std::min(f, 1e100)));
 }
 
 /// What is left of the values beside some columns, and by how much less a further order leaves.
@@ -109,31 +173,29 @@ class Left {
  public:
   Left(const Cells& cells, const MatrixXd& a) : cells_(cells) {
     q_ = Eigen::HouseholderQR<MatrixXd>(a).householderQ() * MatrixXd::Identity(a.rows(), a.cols());
-    left_ = beside(cells.separation);
+    left_ = beside(cells.value);
     correlation_ = signal::correlation_length({left_.begin(), left_.end()});
   }
   double sum() const { return left_.squaredNorm(); }
 
   double gain(double order) const {
-    MatrixXd wave(cells_.place.size(), 2);
+    MatrixXd wave(cells_.place.size(), columns_per_wave(cells_));
     put_wave(cells_, order, wave, 0);
-    const double size = wave.squaredNorm();
+    wave.colwise().normalize();
     wave = beside(wave);
-    const Eigen::Matrix2d gram = wave.transpose() * wave;
-    // Less than 1e-6 of the wave is beside the whole orders: nothing to tell it by.
-    if (!(gram.determinant() > 1e-12 * size * size)) return 0;
-    const Eigen::Vector2d along = wave.transpose() * left_;
-    return along.dot(gram.inverse() * along);
+    const MatrixXd gram = wave.transpose() * wave;
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> parts(gram);
+    if (!(parts.eigenvalues()[0] > kBeside)) return 0;
+    const VectorXd along = parts.eigenvectors().transpose() * (wave.transpose() * left_);
+    return (along.array().square() / parts.eigenvalues().array()).sum();
   }
 
   /// Chance of this gain by noise alone, with `tried` orders.
   double chance(double gain, double tried) const {
-    const double rows = double(left_.size()) - double(q_.cols()) - 3;  // order, sine, cosine
-    const double freedom = rows / correlation_;
-    if (!(freedom > 2) || !(gain > 0)) return 1;
+    const double per = double(columns_per_wave(cells_));
+    const double rows = cells_.freedom() - double(q_.cols()) - per - 1;
     const double variance = std::max(sum() - gain, 1e-300) / rows;
-    const double f = gain / (2 * variance * correlation_);
-    return std::min(1.0, tried * std::pow(1 + 2 * f / freedom, -freedom / 2));
+    return std::min(1.0, tried * f_tail(gain / (per * variance * correlation_), per, rows / correlation_));
   }
 
  private:
@@ -168,12 +230,16 @@ std::vector<Trial> orders_of(const rig_file::Drive* drive, double highest) {
 
 class Search {
  public:
-  Search(const Cells& cells, double turns, const GapWaveSettings& settings)
+  Search(const Cells& cells, const GapWaveSettings& settings)
       : cells_(cells),
-        turns_(turns),
+        turns_(cells.turns),
         settings_(settings),
-        whole_(whole_orders(settings)),
+        base_(base_columns(cells, whole_orders(settings))),
+        per_(columns_per_wave(cells)),
         told_(orders_of(settings.drive, settings.highest_order)) {}
+
+  /// Orders that the two runs do not show alike.
+  const std::vector<double>& doubtful() const { return doubtful_; }
 
   std::vector<GapWave> run() {
     while (waves_.size() < kMostWaves && (add(told()) || add(free()))) {
@@ -182,7 +248,13 @@ class Search {
   }
 
  private:
-  Left left(const std::vector<Trial>& waves) const { return {cells_, columns(cells_, whole_, waves)}; }
+  Left left(const std::vector<Trial>& waves) const { return {cells_, columns(cells_, base_, waves)}; }
+
+  /// By a wave that the runs cannot tell from this order.
+  bool taken(double order) const {
+    return std::any_of(waves_.begin(), waves_.end(),
+                       [&](const Trial& w) { return std::fabs(w.order - order) < 0.5 / turns_; });
+  }
 
   /// The best of the drive's orders that are left.
   std::optional<Trial> told() const {
@@ -190,10 +262,7 @@ class Search {
     std::optional<Trial> best;
     double most = 0;
     for (const Trial& t : told_) {
-      const bool taken = std::any_of(waves_.begin(), waves_.end(), [&](const Trial& w) {
-        return std::fabs(w.order - t.order) < 0.5 / turns_;
-      });
-      const double gain = taken ? 0 : rest.gain(t.order);
+      const double gain = taken(t.order) ? 0 : rest.gain(t.order);
       if (gain > most) most = gain, best = t;
     }
     if (best) best->chance = rest.chance(most, double(told_.size()));
@@ -206,7 +275,7 @@ class Search {
     const double step = 1 / (kPerLine * turns_);
     double best = 0, most = 0;
     for (double order = 1; order <= settings_.highest_order; order += step) {
-      const double gain = rest.gain(order);
+      const double gain = taken(order) ? 0 : rest.gain(order);
       if (gain > most) most = gain, best = order;
     }
     if (most == 0) return std::nullopt;
@@ -220,16 +289,16 @@ class Search {
   bool add(const std::optional<Trial>& trial) {
     if (!trial || trial->chance > settings_.false_alarm) return false;
     waves_.push_back(*trial);
-    if (!trial->free) doubt_told();
-    const GapWave wave = found_in(fitted(), waves_.size() - 1);
-    // A free order that may be a whole one is the load's: the map over its turn has it.
-    const double off = std::fabs(wave.order.value - std::round(wave.order.value));
-    const bool whole = waves_.back().free && off < std::max(kWhole, kSame * wave.order.standard_error);
-    if (whole || !(wave.amplitude.value > least_)) {
-      waves_.pop_back();
-      return false;
+    try {
+      if (!trial->free) doubt_told();
+      const signal::Measured order = found_in(fitted(), waves_.size() - 1).order;
+      // A free order that may be a whole one is the load's: the map over its turn has it.
+      const double off = std::fabs(order.value - std::round(order.value));
+      if (!waves_.back().free || off > std::max(kWhole, kSame * order.standard_error)) return true;
+    } catch (const CannotIdentify&) {
     }
-    return true;
+    waves_.pop_back();
+    return false;
   }
 
   /// Whether the record says that the last wave, of the drive, has another order: then that, without a name.
@@ -243,27 +312,48 @@ class Search {
       waves_.back().pinion = waves_.back().load = 0;
   }
 
+  /// Of what the wave has in the values, with its columns in `a` and their sizes.
+  VectorXd slope_over_order(const MatrixXd& a, const VectorXd& size, std::size_t wave) const {
+    Eigen::ArrayXd slope = Eigen::ArrayXd::Zero(a.rows());
+    for (Index c = base_.cols() + per_ * Index(wave), end = c + per_; c < end; c += 2)
+      slope += size[c] * a.col(c + 1).array() - size[c + 1] * a.col(c).array();
+    return (cells_.place.array() - cells_.place.mean()) * slope;
+  }
+
+  /// Of runs apart, whether both show the wave with one order: gap and centre line with orders of their own,
+  /// so near that they look like one, would each spoil the other.
+  bool runs_agree(std::size_t wave) const {
+    if (!cells_.apart) return true;
+    MatrixXd a = columns(cells_, base_, waves_);
+    const VectorXd size = a.colPivHouseholderQr().solve(cells_.value),
+                   slope = slope_over_order(a, size, wave);
+    const Index linear = a.cols();
+    a.conservativeResize(Eigen::NoChange, linear + 2);
+    a.col(linear) = slope;
+    a.col(linear + 1) = 2 * cells_.share.array() * slope.array();
+    const signal::Measured apart = signal::fit_linear(a, cells_.value).parameter(linear + 1);
+    return std::fabs(apart.value) <= kSame * std::sqrt(correlation_) * apart.standard_error;
+  }
+
   /// All waves, and the slope over each free order; refines those.
   signal::LeastSquaresFit fitted() {
     signal::LeastSquaresFit fit;
-    for (int turn = 0; turn < 3; ++turn) {
-      MatrixXd a = columns(cells_, whole_, waves_);
-      const Index first = 1 + 2 * whole_, linear = a.cols();
+    constexpr int kRounds = 3;
+    for (int round = 0; round < kRounds; ++round) {
+      MatrixXd a = columns(cells_, base_, waves_);
+      const Index linear = a.cols();
       std::vector<std::size_t> free;
       for (std::size_t k = 0; k < waves_.size(); ++k)
         if (waves_[k].free) free.push_back(k);
-      const VectorXd size = a.colPivHouseholderQr().solve(cells_.separation);
+      const VectorXd size = a.colPivHouseholderQr().solve(cells_.value);
       a.conservativeResize(Eigen::NoChange, linear + Index(free.size()));
       for (std::size_t i = 0; i < free.size(); ++i) {
-        const Index at = first + 2 * Index(free[i]);
-        a.col(linear + Index(i)) = (cells_.place.array() - cells_.place.mean()) *
-                                   (size[at] * a.col(at + 1).array() - size[at + 1] * a.col(at).array());
+        a.col(linear + Index(i)) = slope_over_order(a, size, free[i]);
       }
-      fit = signal::fit_linear(a, cells_.separation);
-      least_ = settings_.least_amplitude * std::fabs(fit.values[0]);
-      const double root = signal::correlation_length({fit.residuals.begin(), fit.residuals.end()});
-      fit.covariance *= root;
-      if (turn == 2) break;
+      fit = signal::fit_linear(a, cells_.value);
+      correlation_ = signal::correlation_length({fit.residuals.begin(), fit.residuals.end()});
+      fit.covariance *= correlation_;
+      if (round == kRounds - 1) break;
       for (std::size_t i = 0; i < free.size(); ++i)
         waves_[free[i]].order += std::clamp(fit.values[linear + Index(i)], -0.3 / turns_, 0.3 / turns_);
     }
@@ -271,8 +361,8 @@ class Search {
   }
 
   GapWave found_in(const signal::LeastSquaresFit& fit, std::size_t k) const {
-    const Index at = 1 + 2 * whole_ + 2 * Index(k);
-    Index slope = 1 + 2 * whole_ + 2 * Index(waves_.size());
+    const Index at = base_.cols() + per_ * Index(k);
+    Index slope = base_.cols() + per_ * Index(waves_.size());
     for (std::size_t i = 0; i < k; ++i) slope += waves_[i].free;
     GapWave w;
     w.order = waves_[k].free ? fit.parameter(slope) : signal::Measured{0, 0};
@@ -286,6 +376,10 @@ class Search {
     w.phase.standard_error = std::hypot(w.phase.standard_error, w.order.standard_error * cells_.place.mean());
     w.pinion = waves_[k].pinion, w.load = waves_[k].load;
     w.chance = waves_[k].chance;
+    if (!cells_.apart) return w;  // else the gap's part of it
+    const Eigen::Vector2d both(s, c);
+    const double freedom = (cells_.freedom() - double(fit.values.size())) / correlation_;
+    w.chance = std::max(w.chance, f_tail(0.5 * both.dot(covariance.inverse() * both), 2, freedom));
     return w;
   }
 
@@ -293,7 +387,15 @@ class Search {
     std::vector<GapWave> all;
     if (waves_.empty()) return all;
     const signal::LeastSquaresFit fit = fitted();
-    for (std::size_t k = 0; k < waves_.size(); ++k) all.push_back(found_in(fit, k));
+    for (std::size_t k = 0; k < waves_.size(); ++k) {
+      const GapWave wave = found_in(fit, k);
+      if (wave.chance > settings_.false_alarm || !(wave.amplitude.value > settings_.least_amplitude))
+        continue;
+      if (runs_agree(k))
+        all.push_back(wave);
+      else
+        doubtful_.push_back(wave.order.value);
+    }
     std::sort(all.begin(), all.end(),
               [](const GapWave& a, const GapWave& b) { return a.order.value < b.order.value; });
     return all;
@@ -302,9 +404,11 @@ class Search {
   const Cells& cells_;
   double turns_;
   GapWaveSettings settings_;
-  int whole_;  // orders 1, 2, ... of the load
+  MatrixXd base_;
+  Index per_;
   std::vector<Trial> told_, waves_;
-  double least_ = 0;  // rad, amplitude
+  double correlation_ = 1;  // of the last fit
+  std::vector<double> doubtful_;
 };
 
 /// Of the load, until the same teeth of the last stage meet again; 0: not told.
@@ -330,20 +434,25 @@ GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapW
   GapWaves result;
   result.turns_to_meet = turns_to_meet(settings.drive);
   const double width = kTurn / (kCellsPerWave * settings.highest_order);
-  const Cells cells = cells_of(forward, reverse, width);
-  result.turns = double(cells.place.size()) * width / kTurn;
+  Cells cells = shared_cells(forward, reverse, width);
+  if (cells.turns < kLeastTurns) cells = separate_cells(forward, reverse, width);
+  result.turns = cells.turns;
   const bool told = result.turns_to_meet > 0;
-  if (result.turns < kLeastTurns ||
-      cells.place.size() < 2 * (1 + 2 * whole_orders(settings) + 3 * Index(kMostWaves))) {
+  if (result.turns < kLeastTurns) {
     if (told)
-      result.warnings.push_back(
-          fmt::format("both runs share {:.3g} turns of the load, each at its own place: what of the gap "
-                      "turns with the pinion "
-                      "needs more than {:.3g}",
-                      result.turns, kLeastTurns));
+      result.warnings.push_back(fmt::format(
+          "the runs cover {:.3g} turns of the load: what of the gap turns with the pinion needs more "
+          "than {:.3g}",
+          result.turns, kLeastTurns));
     return result;
   }
-  result.waves = Search(cells, result.turns, settings).run();
+  Search search(cells, settings);
+  result.waves = search.run();
+  for (const double order : search.doubtful())
+    result.warnings.push_back(fmt::format(
+        "order {:.4g} turns with another part than the load; whether with the gap or the centre line "
+        "alone the runs cannot tell, as they share no place",
+        order));
   if (told && result.turns_to_meet > result.turns + 0.05)
     result.warnings.push_back(fmt::format(
         "the same teeth meet again after {:.4g} turns of the load, the runs share {:.3g}: the map "

@@ -42,23 +42,24 @@ struct GapRun {
 };
 
 struct GapWaveSettings {
-  double highest_order = 60;      // choice: of all orders, three times that of the pinion of the thesis
-  double false_alarm = 1e-4;      // choice: of one wave, all orders considered
-  double least_amplitude = 1e-3;  // choice: of the mean
+  double highest_order = 60;   // choice: of all orders, three times that of the pinion of the thesis
+  double false_alarm = 1e-4;   // choice: of one wave, all orders considered
+  double least_amplitude = 0;  // rad; smaller ones are not told
   const rig_file::Drive* drive = nullptr;  // may be null
 };
 
 struct GapWaves {
   std::vector<GapWave> waves;  // by order
-  double turns = 0;            // of the load, that both runs visited
+  double turns = 0;            // of the load, that both runs visited, or each for itself
   double turns_to_meet = 0;    // after which the same teeth meet again; 0: the drive does not tell
   std::vector<std::string> warnings;
 
   double at(double position) const;  // rad, the sum of the waves; load position with its turns
 };
 
-/// Finds nothing, with a warning where the drive tells a pinion, in runs that share less than a turn or too
-/// few samples. Throws InvalidParameter for settings that are not > 0.
+/// Runs that share less than a turn of places, as two from one start, are fitted each over its own places,
+/// with a centre line of the same orders. Finds nothing, with a warning where the drive tells a pinion, in
+/// runs of less than a turn and some more. Throws InvalidParameter for settings that are not > 0.
 GapWaves find_gap_waves(const GapRun& forward, const GapRun& reverse, const GapWaveSettings& settings = {});
 
 }  // namespace backlash::identification
