@@ -536,6 +536,35 @@ double play_at_rest(const Motor& motor, const MomentumTransferSettings& s) {
   return differences.empty() ? kNaN : signal::median(std::move(differences)) - 2 * yields;
 }
 
+/// The crossings of the gap; refuses where they are too few or no free flights.
+std::vector<Crossing> free_crossings(const Flank& flank, double shortness) {
+  std::vector<Crossing> crossings = find_crossings(flank.torque, flank.level, flank.half, shortness);
+  if (crossings.empty())
+    throw Refusal{Status::out_of_domain, "the motor side never leaves one flank for the other"};
+  if (crossings.size() < kFewestCrossings)
+    throw Refusal{Status::insufficient_data, "the gap is crossed " + std::to_string(crossings.size()) +
+                                                 " times, needed are " + std::to_string(kFewestCrossings)};
+  const double in_flight = torque_in_flight(flank.torque, crossings, flank.half);
+  if (in_flight > kFlight * flank.level)
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("the motor side does not fly freely between the flanks: {:.4g} N m are left there, "
+                    "{:.4g} N m in contact; inertia, damping or friction are not as declared",
+                    in_flight, flank.level)};
+  return crossings;
+}
+
+/// Of a told torque: refuses what contradicts the places of rest.
+void check_rest(const Motor& motor, const MomentumTransferSettings& s, Estimate& estimate) {
+  const double least = play_at_rest(motor, s), upper = estimate.angle_upper;
+  if (upper > kOfRest * least) return;
+  estimate.angle_lower = estimate.angle_upper = kNaN;
+  throw Refusal{Status::out_of_domain,
+                fmt::format("the record has no motor_torque, and what is told from the motion contradicts "
+                            "itself: at most {:.3g} rad of flight, {:.3g} rad between the places of rest",
+                            upper, least)};
+}
+
 void fill(const record::Record& record, const MomentumTransferSettings& s, Estimate& estimate) {
   Motor motor = collect(record, s);
   const double cycle = internal_cycle(s);
@@ -551,19 +580,7 @@ void fill(const record::Record& record, const MomentumTransferSettings& s, Estim
   const Flank flank = calm_flank(motor, record.has(record::Channel::motor_velocity), s);
   const double shortness =
       shortness_of_impacts(flank.level, static_cast<double>(flank.half) * motor.interval, s);
-  const std::vector<Crossing> crossings = find_crossings(flank.torque, flank.level, flank.half, shortness);
-  if (crossings.empty())
-    throw Refusal{Status::out_of_domain, "the motor side never leaves one flank for the other"};
-  if (crossings.size() < kFewestCrossings)
-    throw Refusal{Status::insufficient_data, "the gap is crossed " + std::to_string(crossings.size()) +
-                                                 " times, needed are " + std::to_string(kFewestCrossings)};
-  const double in_flight = torque_in_flight(flank.torque, crossings, flank.half);
-  if (in_flight > kFlight * flank.level)
-    throw Refusal{
-        Status::out_of_domain,
-        fmt::format("the motor side does not fly freely between the flanks: {:.4g} N m are left there, "
-                    "{:.4g} N m in contact; inertia, damping or friction are not as declared",
-                    in_flight, flank.level)};
+  const std::vector<Crossing> crossings = free_crossings(flank, shortness);
   // The integral of a speed that jumps between two samples is known to half a sample too.
   const double blur = kTiming * (motor.tachometer ? 1 + shortness : 1);
   const double elastic_share = motor.torque_measured ? kElasticShare : kToldElasticShare;
@@ -592,17 +609,7 @@ void fill(const record::Record& record, const MomentumTransferSettings& s, Estim
                   "the pinion travels less than the flanks yield elastically: the rig is "
                   "not this machine"};
   }
-  if (!motor.torque_measured) {
-    const double least = play_at_rest(motor, s), upper = estimate.angle_upper;
-    if (!(upper > kOfRest * least)) {
-      estimate.angle_lower = estimate.angle_upper = kNaN;
-      throw Refusal{
-          Status::out_of_domain,
-          fmt::format("the record has no motor_torque, and what is told from the motion contradicts "
-                      "itself: at most {:.3g} rad of flight, {:.3g} rad between the places of rest",
-                      upper, least)};
-    }
-  }
+  if (!motor.torque_measured) check_rest(motor, s, estimate);
   estimate.status = estimate.angle_lower > 0 ? Status::ok : Status::below_range;
   estimate.backlash_angle = gap;
   estimate.backlash = s.base_radius * gap;

@@ -28,6 +28,9 @@
 // level is the one that leaves least torque on the flank in flight and least beside it at rest. What it gives
 // must not contradict the places where the motor rests. Any other torque is refused, mostly as no phase of
 // the period begins the crossings.
+// The level that is told takes up what is wrong with the declared inertia, and a constant friction: free
+// flight then says less of the machine than with a recorded torque. Of 400 simulated rigs of Sarkar's with
+// half gaps up to 100 um, 358 answers, 98 % of the intervals right, none off by half of its width.
 //
 // Needs motor_velocity (or motor_position, differentiated), and motor_torque but for a square wave; the motor
 // side must change flanks (square-wave or alternating torque), and the load must be locked, or load_position
