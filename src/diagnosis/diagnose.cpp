@@ -125,8 +125,8 @@ const std::vector<DiagnosisMethod>& diagnosis_method_table() {
       {"position_difference",
        "motor_position, load_position, and motor_torque, sensor_torque or output_torque", false,
        by_position_difference},
-      {"momentum_transfer", "motor_torque, and motor_velocity or motor_position", false,
-       by_momentum_transfer},
+      {"momentum_transfer", "motor_velocity or motor_position; motor_torque, unless that is a square wave",
+       false, by_momentum_transfer},
       {"waveform", "motor_torque (square wave) and sensor_torque; motor_position sharpens it", false,
        by_waveform},
   };

@@ -62,12 +62,17 @@ GearTrain::GearTrain(const Rig& rig)
       torque_constant_(rig.torque_constant),
       contact_(rig.mesh.contact),
       variation_(rig.mesh.variation),
+      pairs_(rig.mesh.rigid ? nullptr : rig.mesh.pairs),
+      protrusion_(pairs_ ? pairs_->most_protrusion() : 0),
       terms_(rig.terms),
       load_gain_(sensing(rig.terms).load_position_gain) {
   if (rig.mesh.rigid)
     contact_ = nullptr;
   else if (!contact_)
     throw InvalidParameter("mesh.contact", "none", "the mesh needs a contact law");
+  if (pairs_ && contact_->needs_impact_speed())
+    throw InvalidParameter("tooth_pairs", contact_->made_of.law,
+                           "needs the speed of one touch, pairs have several");
   set_backlash(rig.mesh.backlash);
   sum_inertia(rig);
   check_what_follows_torque();
@@ -89,7 +94,8 @@ GearTrain::GearTrain(const Rig& rig)
   const bool load_rubs = (dry || rubs(coulomb_.load)) && moves(kLink);
   if (dry || rubs(coulomb_.motor) || (load_rubs && one_body())) dry_ends_.push_back({kMotor, {}});
   if (load_rubs && !one_body()) dry_ends_.push_back({kLink, {}});
-  smooth_ = contact_ && !contact_->needs_impact_speed() && !variation_ && terms_.empty() && dry_ends_.empty();
+  smooth_ = contact_ && !contact_->needs_impact_speed() && !variation_ && !pairs_ && terms_.empty() &&
+            dry_ends_.empty();
 }
 
 void GearTrain::check_what_follows_torque() const {
@@ -162,14 +168,19 @@ FlankShift GearTrain::shift(const PartMotion& s, int side, double mesh_torque) c
   return sum;
 }
 
+ToothPairs::Place GearTrain::place_of(const PartMotion& s, int side, double penetration, double rate) const {
+  return {lever_ * s.q[kPinion], lever_ * s.w[kPinion], penetration, rate, side};
+}
+
 /// Of a flank that is closed by `penetration` [m], moving at `rate` [m/s].
 double GearTrain::flank_force(const PartMotion& s, int side, double penetration, double rate,
                               double mesh_torque) const {
-  double force = contact_->force(penetration, rate, impact_speed_);
+  double force = pairs_ ? pairs_->push(place_of(s, side, penetration, rate), *contact_).force
+                        : contact_->force(penetration, rate, impact_speed_);
   if (variation_) force *= variation_->factor(lever_ * s.q[kPinion], side);
   if (!loaded_) return force;
   double torque = lever_ * force;
-  const FlankLoad load{flank_point(s, side, mesh_torque), penetration / lever_, rate / lever_};
+  const FlankLoad load{flank_point(s, side, mesh_torque), std::max(0.0, penetration) / lever_, rate / lever_};
   for (const auto& term : terms_) term->load_flank(load, torque);
   return std::max(0.0, torque) / lever_;
 }
@@ -178,7 +189,7 @@ double GearTrain::flank_force(const PartMotion& s, int side, double penetration,
 inline double GearTrain::shifted_force(const PartMotion& s, int side, const FlankShift& at,
                                        double mesh_torque) const {
   const double penetration = side * gap_position(s) - acting_gap_ - lever_ * at.opening;
-  if (!(penetration > 0)) return 0;
+  if (!(penetration > -protrusion_)) return 0;
   const double rate =
       side * equations_.gap_rate(s) - lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
   return flank_force(s, side, penetration, rate, mesh_torque);
@@ -222,6 +233,18 @@ inline void GearTrain::press(int side, const FlankShift& at, double flank_torque
   torque[kGear] += flank_torque * (side + at.load_slope);
 }
 
+/// The same with what pairs of teeth spare the pinion.
+inline void GearTrain::press(const PartMotion& s, int side, const FlankShift& at, double flank_torque,
+                             double* torque) const {
+  press(side, at, flank_torque, torque);
+  if (!pairs_) return;
+  const double penetration = side * gap_position(s) - acting_gap_ - lever_ * at.opening;
+  if (!(penetration > -protrusion_)) return;
+  const double rate =
+      side * equations_.gap_rate(s) - lever_ * (at.motor_slope * s.w[kPinion] + at.load_slope * s.w[kGear]);
+  torque[kPinion] += lever_ * pairs_->push(place_of(s, side, penetration, rate), *contact_).spared;
+}
+
 /// Adds what both flanks do to pinion and gear and returns the mesh torque. A gap that a term closes
 /// altogether presses both flanks.
 double GearTrain::add_shaped_teeth(const PartMotion& s, double* torque) const {
@@ -229,7 +252,7 @@ double GearTrain::add_shaped_teeth(const PartMotion& s, double* torque) const {
   for (const int side : {1, -1}) {
     FlankShift at;
     const double t = lever_ * shaped_force(s, side, at);
-    press(side, at, t, torque);
+    press(s, side, at, t, torque);
     mesh_torque += side * t;
   }
   return mesh_torque;
@@ -283,7 +306,7 @@ EndFriction GearTrain::friction_under(const Motion& motion, const double* net) c
 
 /// Adds what the teeth do to pinion and gear and returns the mesh torque.
 inline double GearTrain::add_teeth(const PartMotion& s, double* torque) const {
-  if (shaped_ && contact_) return add_shaped_teeth(s, torque);
+  if ((shaped_ || pairs_) && contact_) return add_shaped_teeth(s, torque);
   const double mesh_torque = lever_ * contact_force(s);
   equations_.add_mesh(mesh_torque, torque);
   return mesh_torque;
@@ -397,7 +420,7 @@ GearTrain::Flanks GearTrain::flanks(double motor_position, double load_position)
 /// Infinite for a flank that cannot touch here, which saves computing its shape.
 FlankShift GearTrain::shift_within_reach(const PartMotion& s, int side) const {
   const double half = half_gap_ / lever_;
-  double nearest = half;
+  double nearest = half - protrusion_ / lever_;
   for (const Term* term : flank_terms_) nearest += term->least_opening(half);
   const double away = nearest - side * gap_position(s) / lever_;
   if (away > kWithinReach * half) return {std::numeric_limits<double>::infinity(), 0, 0};
@@ -412,7 +435,7 @@ GearTrain::LoadForces GearTrain::load_forces(const Motion& motion, const Flanks&
       const FlankShift& at = flanks[side > 0 ? 0 : 1];
       const double t = lever_ * shifted_force(s, side, at, 0);
       if (t == 0) continue;
-      press(side, at, t, torque);
+      press(s, side, at, t, torque);
       mesh_torque += side * t;
     }
     return mesh_torque;
@@ -473,7 +496,9 @@ double GearTrain::energy(const double* state) const {
     FlankShift at;
     if (shaped_) shaped_force(resting, side, at);
     const double penetration = side * gap_position(s) - half_gap_ - lever_ * at.opening;
-    if (penetration > 0)
+    if (pairs_)
+      energy += pairs_->elastic_energy(place_of(resting, side, penetration, 0), *contact_);
+    else if (penetration > 0)
       energy += contact_->elastic_energy(penetration) *
                 (variation_ ? variation_->factor(lever_ * s.q[kPinion], side) : 1);
   }

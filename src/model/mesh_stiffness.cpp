@@ -16,6 +16,7 @@ using PairStiffness = std::function<double(double life)>;
 // Of rigid teeth. Below one the next pair takes up at the depth that the gears have run ahead by; real teeth
 // then touch with their tips first, off the line of action. A choice that keeps that part of the cycle short.
 constexpr double kLeastContactRatio = 0.9;
+constexpr double kLifeStep = 1e-5;  // theory: differences, the laws are smooth over a whole life
 constexpr double kNewtonPerMicrometreMillimetre = 1e9;  // N/(um mm) in Pa
 
 void require(const std::string& name, double value, const Range& range) {
@@ -89,6 +90,12 @@ double ramp(double x, double width) {
   return t * t * (3 - 2 * t);
 }
 
+double ramp_slope(double x, double width) {
+  if (std::fabs(x) >= 0.5 * width) return 0;
+  const double t = x / width + 0.5;
+  return 6 * t * (1 - t) / width;
+}
+
 /// Simpson's rule; 0 for an empty interval.
 double integral(const std::function<double(double)>& f, double from, double to) {
   constexpr int kPanels = 200;  // even
@@ -127,6 +134,8 @@ double bending_stiffness(const SpurGear& gear, double module, double radius) {
 
 MeshStiffness::MeshStiffness(const GearPair& pair, const MeshStiffnessSettings& settings)
     : geometry_(gear_geometry(pair)),
+      pinion_teeth_(pair.pinion.teeth),
+      gear_teeth_(pair.gear.teeth),
       transition_(settings.transition),
       pair_stiffness_(pair_stiffness(pair, geometry_, settings)) {
   // What the cycle sums up over all pairs is one pair over its whole life; smooth between these places.
@@ -145,6 +154,20 @@ double MeshStiffness::of_pair(double travel) const {
   const double eps = geometry_.contact_ratio;
   const double share = ramp(travel, transition_) * (1 - ramp(travel - eps, transition_));
   return share > 0 ? share * pair_stiffness_(std::clamp(travel / eps, 0.0, 1.0)) : 0;
+}
+
+double MeshStiffness::slope_of_pair(double travel) const {
+  const double eps = geometry_.contact_ratio;
+  const double in = ramp(travel, transition_), out = 1 - ramp(travel - eps, transition_);
+  if (!(in * out > 0)) return 0;
+  const double share_slope =
+      ramp_slope(travel, transition_) * out - in * ramp_slope(travel - eps, transition_);
+  const double from = std::clamp(travel / eps - kLifeStep, 0.0, 1.0),
+               to = std::clamp(travel / eps + kLifeStep, 0.0, 1.0);
+  double slope = share_slope * pair_stiffness_(std::clamp(travel / eps, 0.0, 1.0));
+  if (travel > 0 && travel < eps)
+    slope += in * out * (pair_stiffness_(to) - pair_stiffness_(from)) / ((to - from) * eps);
+  return slope;
 }
 
 double MeshStiffness::stiffness(double phase) const {

@@ -72,6 +72,14 @@ Mesh read_mesh(const YamlReader& yaml) {
   mesh.start_in_gap = yaml.number_or("start_in_gap", 0, Range::between(-1, 1));
   const ContactSpec contact = read_contact_spec(yaml.map("contact"));
   mesh.contact = make_contact_law(contact.law, contact.values);
+  if (const auto pairs = yaml.optional_map("tooth_pairs")) {
+    if (yaml.has("stiffness_variation"))
+      yaml.fail("tooth_pairs", "holds the stiffness of each pair: leave stiffness_variation out");
+    if (mesh.contact->needs_impact_speed())
+      yaml.fail("tooth_pairs",
+                "the contact law " + contact.law + " needs the speed of one touch, pairs have several");
+    mesh.pairs = read_tooth_pairs(*pairs, mesh.base_radius);
+  }
   if (const auto variation = yaml.optional_map("stiffness_variation"))
     mesh.variation = read_stiffness_variation(*variation, mesh.base_radius);
   return mesh;

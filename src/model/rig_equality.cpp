@@ -47,9 +47,10 @@ bool operator==(const Coupling& a, const Coupling& b) {
 }
 
 bool operator==(const Mesh& a, const Mesh& b) {
-  const auto& [rigid, backlash, base_radius, start, contact, variation] = a;
+  const auto& [rigid, backlash, base_radius, start, contact, variation, pairs] = a;
   return rigid == b.rigid && backlash == b.backlash && same_number(base_radius, b.base_radius) &&
-         start == b.start_in_gap && same_contact(contact, b.contact) && variation == b.variation;
+         start == b.start_in_gap && same_contact(contact, b.contact) && variation == b.variation &&
+         pairs == b.pairs;
 }
 
 bool operator==(const Rig& a, const Rig& b) {

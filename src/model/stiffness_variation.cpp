@@ -40,21 +40,25 @@ MeshStiffnessSettings read_settings(const YamlReader& yaml) {
 
 }  // namespace
 
-StiffnessVariation::StiffnessVariation(MeshStiffness stiffness, double offset)
-    : stiffness_(std::move(stiffness)), offset_(offset) {
-  const GearGeometry& g = stiffness_.geometry();
+double MeshCycle::sum_of_phases() const {
+  const GearGeometry& g = stiffness.geometry();
   const double thickness =
       g.pinion.operating_tooth_thickness * g.pinion.base_radius / g.pinion.operating_radius;
-  reverse_ = (thickness + 2 * g.approach) / g.base_pitch;
+  return (thickness + 2 * g.approach) / g.base_pitch;
 }
+
+StiffnessVariation::StiffnessVariation(MeshCycle cycle)
+    : cycle_(std::move(cycle)), reverse_(cycle_.sum_of_phases()) {}
+
+StiffnessVariation::StiffnessVariation(MeshStiffness stiffness, double offset)
+    : StiffnessVariation(MeshCycle{std::move(stiffness), offset}) {}
 
 double StiffnessVariation::factor(double travel, double side) const {
-  const double phase = travel / stiffness_.geometry().base_pitch + offset_;
-  return stiffness_.stiffness(side > 0 ? phase : reverse_ - phase) / stiffness_.mean();
+  const double phase = cycle_.phase(travel);
+  return cycle_.stiffness.stiffness(side > 0 ? phase : reverse_ - phase) / cycle_.stiffness.mean();
 }
 
-std::shared_ptr<const StiffnessVariation> read_stiffness_variation(const YamlReader& yaml,
-                                                                   double base_radius) {
+MeshCycle read_mesh_cycle(const YamlReader& yaml, double base_radius) {
   const YamlReader gears = yaml.map("gear_pair");
   const GearPair pair = read_gear_pair(gears);
   const MeshStiffnessSettings settings = read_settings(yaml);
@@ -66,10 +70,15 @@ std::shared_ptr<const StiffnessVariation> read_stiffness_variation(const YamlRea
     if (!(std::fabs(radius - base_radius) <= 1e-3 * base_radius))
       gears.fail("gear_teeth", "the gear has base radius " + std::to_string(radius) + " m, the mesh " +
                                    std::to_string(base_radius) + " m");
-    return std::make_shared<StiffnessVariation>(std::move(stiffness), offset);
+    return {std::move(stiffness), offset};
   } catch (const InvalidParameter& error) {
     yaml.fail("gear_pair", error.what());
   }
+}
+
+std::shared_ptr<const StiffnessVariation> read_stiffness_variation(const YamlReader& yaml,
+                                                                   double base_radius) {
+  return std::make_shared<StiffnessVariation>(read_mesh_cycle(yaml, base_radius));
 }
 
 }  // namespace backlash::model

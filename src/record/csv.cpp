@@ -129,7 +129,7 @@ class Reader {
     for (const std::string_view field : fields_) add_column(std::string(field));
     if (time_column_ == kNone) lines_.fail("no column 'time'; there are: " + joined(names_));
     if (!has_required_channel(channels_)) {
-      lines_.fail("no torque, position, current or acceleration: needs at least one of " +
+      lines_.fail("no torque, position, speed of the motor, current or acceleration: needs at least one of " +
                   joined(required_names()) + "; there are: " + joined(names_));
     }
   }

@@ -25,9 +25,9 @@ const std::array<Channel, kChannelCount> kChannels = {
     Channel::load_velocity, Channel::sensor_torque,  Channel::reference_position, Channel::motor_current,
     Channel::acceleration,  Channel::output_torque};
 
-const std::array<Channel, 7> kBacklashChannels = {
-    Channel::motor_torque,  Channel::sensor_torque, Channel::motor_position, Channel::load_position,
-    Channel::motor_current, Channel::acceleration,  Channel::output_torque};
+const std::array<Channel, 8> kBacklashChannels = {
+    Channel::motor_torque,  Channel::sensor_torque, Channel::motor_position, Channel::motor_velocity,
+    Channel::load_position, Channel::motor_current, Channel::acceleration,   Channel::output_torque};
 
 const std::string& channel_name(Channel channel) {
   return channel_names()[static_cast<std::size_t>(channel)];

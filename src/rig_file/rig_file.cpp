@@ -30,7 +30,8 @@ double default_uncertainty(const model::Rig& rig, const model::GearTrain& train,
 std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   const model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
   if (in.rigid || out.rigid || !rig.link_locked || rig.mesh.rigid || rig.mesh.angular() ||
-      rig.mesh.variation || rig.reduction_ratio != 1 || rig.linear || !rig.terms.empty() || rig.coupled)
+      rig.mesh.variation || rig.mesh.pairs || rig.reduction_ratio != 1 || rig.linear || !rig.terms.empty() ||
+      rig.coupled)
     return std::nullopt;
   if (rig.mesh.contact_spec().law != "hunt_crossley" || rig.mesh.contact_spec().values.at("exponent") != 1.5)
     return std::nullopt;

@@ -168,9 +168,10 @@ class JointRun {
       if (!column.empty()) present.push_back(record::channel_name(channel));
     }
     if (!record_.can_show_backlash())
-      throw BadData(path_, "joint '" + printable(joint_) + "' on " + printable(topic_) +
-                               " has no torque, position, current or acceleration; it has: " +
-                               (present.empty() ? "nothing" : joined(present)));
+      throw BadData(path_,
+                    "joint '" + printable(joint_) + "' on " + printable(topic_) +
+                        " has no torque, position, speed of the motor, current or acceleration; it has: " +
+                        (present.empty() ? "nothing" : joined(present)));
   }
 
   std::string path_, topic_, joint_;

@@ -73,7 +73,8 @@ int identify_machine(const Arguments& arguments) {
   identification::Identification found;
   try {
     ProgressBar bar;
-    found = of_file(file.source, [&] { return identification::identify(file.rig, records, bar.progress()); });
+    found = of_file(file.source,
+                    [&] { return identification::identify(file.rig, records, bar.progress(), file.drive); });
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     return kInconclusive;

@@ -62,6 +62,46 @@ TEST(MomentumTransfer, TravelOfAFreeFlightFromRest) {
   }
 }
 
+// The same from the motion alone, of which the level of the torque is no part: the inertia scales it.
+TEST(MomentumTransfer, TravelOfAFreeFlightWithoutATorque) {
+  for (const double gap : {2e-3, 1e-2, 4e-2})
+    for (const bool tachometer : {true, false})
+      for (const double wrong : {1.0, 1.3}) {
+        record::Record record = crossing(gap);
+        record.column(record::Channel::motor_torque).clear();
+        record.column(tachometer ? record::Channel::motor_position : record::Channel::motor_velocity).clear();
+        MomentumTransferSettings s = settings();
+        s.motor_inertia *= wrong;
+        const Estimate e = estimate_momentum_transfer(record, s);
+        ASSERT_EQ(e.status, Status::ok) << tachometer << ' ' << gap << ' ' << e.message;
+        EXPECT_LE(e.angle_lower, 1.02 * gap) << tachometer << ' ' << gap;
+        EXPECT_GE(e.angle_upper, 0.98 * gap) << tachometer << ' ' << gap;
+        // Two samples of the speed at the impact.
+        EXPECT_NEAR(e.backlash_angle, gap, 2 * std::sqrt(2 * kTorque * gap / kInertia) / kRate);
+        EXPECT_NE(e.message.find("told from the motion"), std::string::npos) << e.message;
+      }
+}
+
+TEST(MomentumTransfer, WithoutATorqueOnlyASquareWaveIsTold) {
+  record::Record sine = crossing(0.01);  // a motor that swings freely
+  sine.column(record::Channel::motor_torque).clear();
+  record::Record still = sine, random = sine;
+  Random noise(3);
+  double speed = 0;
+  for (std::size_t i = 0; i < sine.size(); ++i) {
+    const double t = sine.time[i];
+    sine.column(record::Channel::motor_velocity)[i] = std::sin(20 * M_PI * t);
+    sine.column(record::Channel::motor_position)[i] = -std::cos(20 * M_PI * t) / (20 * M_PI);
+    still.column(record::Channel::motor_velocity)[i] = 1e-3 * noise.normal();
+    speed += 0.1 * noise.normal() - 0.01 * speed;
+    random.column(record::Channel::motor_velocity)[i] = speed;
+  }
+  for (const record::Record* r : {&sine, &still, &random}) {
+    const Estimate e = estimate_momentum_transfer(*r, settings());
+    EXPECT_TRUE(e.status == Status::insufficient_data || e.status == Status::out_of_domain) << e.message;
+  }
+}
+
 TEST(MomentumTransfer, ElasticDeflectionOfTheFlanksIsNoGap) {
   MomentumTransferSettings s = settings();
   const double all = estimate_momentum_transfer(crossing(0.04), s).backlash_angle;
@@ -102,9 +142,6 @@ TEST(MomentumTransfer, RefusesWhatItCannotSee) {
   EXPECT_EQ(estimate_momentum_transfer(crossing(0.01).slice(0, 0.12), settings()).status,
             Status::insufficient_data);
   record::Record r = crossing(0.01);
-  r.column(record::Channel::motor_torque).clear();
-  EXPECT_EQ(estimate_momentum_transfer(r, settings()).status, Status::insufficient_data);
-  r = crossing(0.01);
   r.column(record::Channel::motor_velocity).clear();
   r.column(record::Channel::motor_position).clear();
   EXPECT_EQ(estimate_momentum_transfer(r, settings()).status, Status::insufficient_data);

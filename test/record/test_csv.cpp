@@ -109,8 +109,9 @@ TEST(Csv, MalformedHeadersAreRefusedWithPlaceAndReason) {
       "sensor_torque, "
       "reference_position, motor_current, acceleration, output_torque";
   const std::string needed =
-      "no torque, position, current or acceleration: needs at least one of motor_torque, sensor_torque, "
-      "motor_position, load_position, motor_current, acceleration, output_torque; "
+      "no torque, position, speed of the motor, current or acceleration: needs at least one of motor_torque, "
+      "sensor_torque, "
+      "motor_position, motor_velocity, load_position, motor_current, acceleration, output_torque; "
       "there are: ";
   const Malformed cases[] = {
       {"", "run.csv:1: empty, expected column names"},
@@ -125,8 +126,8 @@ TEST(Csv, MalformedHeadersAreRefusedWithPlaceAndReason) {
       {"time,motor_torque,\n", "run.csv:1: column 3 has no name"},
       {"motor_torque\n1\n", "run.csv:1: no column 'time'; there are: motor_torque"},
       {"time\n0\n", "run.csv:1: " + needed + "time"},
-      {"time,motor_velocity,load_velocity,reference_position\n",
-       "run.csv:1: " + needed + "time, motor_velocity, load_velocity, reference_position"},
+      {"time,load_velocity,reference_position\n",
+       "run.csv:1: " + needed + "time, load_velocity, reference_position"},
       {"time;motor_torque\n0;1\n", "run.csv:1: separator is ';', expected ','"},
       {"time\tmotor_torque\n0\t1\n", "run.csv:1: separator is '\\t', expected ','"},
       {std::string("t\0ime,motor_torque\n", 19), "run.csv:1: contains a NUL byte: not a text file in UTF-8"},
@@ -297,7 +298,7 @@ TEST_F(CsvFileTest, WhatCouldNotBeReadBackIsNotWritten) {
               r.column(Channel::sensor_torque).clear();
             }),
             "noise: a record needs at least one of motor_torque, sensor_torque, motor_position, "
-            "load_position, motor_current, acceleration, output_torque to be written");
+            "motor_velocity, load_position, motor_current, acceleration, output_torque to be written");
   EXPECT_EQ(broken([](Record& r) { r.column(Channel::motor_torque).pop_back(); }),
             "noise: motor_torque has 2 values, time has 3");
   EXPECT_EQ(broken([](Record& r) { r.column(Channel::sensor_torque)[1] = std::nan(""); }),

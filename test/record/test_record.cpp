@@ -50,14 +50,14 @@ TEST(Record, ChannelsHaveTheUnitsOfARotaryAxis) {
   EXPECT_STREQ(channel_unit(Channel::acceleration), "rad/s^2");
 }
 
-TEST(Record, TellsByAnyTorquePositionCurrentOrAcceleration) {
+TEST(Record, TellsByAnyTorquePositionMotorSpeedCurrentOrAcceleration) {
   for (const Channel channel : kChannels) {
     Record record;
     record.time = {0};
     record.column(channel) = {1};
-    const bool rate_or_reference = channel == Channel::motor_velocity || channel == Channel::load_velocity ||
-                                   channel == Channel::reference_position;
-    EXPECT_EQ(record.can_show_backlash(), !rate_or_reference) << channel_name(channel);
+    const bool load_rate_or_reference =
+        channel == Channel::load_velocity || channel == Channel::reference_position;
+    EXPECT_EQ(record.can_show_backlash(), !load_rate_or_reference) << channel_name(channel);
   }
   EXPECT_FALSE(Record().can_show_backlash());
 }

@@ -135,6 +135,27 @@ TEST(RigEstimators, MomentumTransferOfTheLockedRig) {
   EXPECT_LT(by_position.median_error(), 4e-6);
 }
 
+// The same from a tachometer or an encoder of the motor alone: no torque is recorded.
+TEST(RigEstimators, MomentumTransferFromTheMotionAlone) {
+  Random random(12);
+  Score by_speed, by_position;
+  for (int i = 0; i < kCases; ++i) {
+    Case c = random_case(random, 100e-6, i % 2 ? 5000 : 10000);
+    const bool tachometer = i % 4 < 2;
+    c.record.column(record::Channel::motor_torque).clear();
+    c.record.column(tachometer ? record::Channel::motor_position : record::Channel::motor_velocity).clear();
+    const diagnosis::Estimate e = diagnosis::estimate_momentum_transfer(c.record, momentum_settings());
+    (tachometer ? by_speed : by_position).add(e, c.backlash);
+  }
+  EXPECT_GE(by_speed.answers, 26);  // large gaps, whose motion repeats less, may be refused
+  EXPECT_GE(by_position.answers, 25);
+  const int answers = by_speed.answers + by_position.answers;
+  EXPECT_GE(by_speed.right + by_position.right, answers - kCases + kFewestRight);
+  EXPECT_EQ(by_speed.far + by_position.far, 0);
+  EXPECT_LT(by_speed.median_error(), 4e-6);
+  EXPECT_LT(by_position.median_error(), 4e-6);
+}
+
 TEST(RigEstimators, MomentumTransferNeedsToSeeTheImpacts) {
   Random random(3);
   const Case slow = random_case(random, 100e-6, 1000);

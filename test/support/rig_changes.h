@@ -43,6 +43,12 @@ inline std::vector<RigChange> rig_changes() {
          r.mesh.variation = std::make_shared<model::StiffnessVariation>(
              model::MeshStiffness(sarkar_gears(), {"step", 1, 206e9, 0.3, 0.1}), 0);
        }},
+      {"mesh.pairs",
+       [](model::Rig& r) {
+         r.mesh.pairs = std::make_shared<model::ToothPairs>(
+             model::MeshCycle{model::MeshStiffness(sarkar_gears(), {"step", 1, 206e9, 0.3, 0.1}), 0},
+             model::ToothErrors{});
+       }},
       {"terms of the motor",
        [](model::Rig& r) {
          r.terms.push_back(model::make_term("cogging", {{"amplitude", 5}, {"order", 40}, {"phase", 0}}));

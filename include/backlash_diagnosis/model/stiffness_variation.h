@@ -23,8 +23,19 @@
 
 namespace backlash::model {
 
+/// Where in its mesh cycle a pair of gears is.
+struct MeshCycle {
+  MeshStiffness stiffness;
+  double offset;  // base pitches, phase of the forward flank at travel 0
+
+  double phase(double travel) const { return travel / stiffness.geometry().base_pitch + offset; }
+  /// 2 c of the header: the sum of both flanks' phases [base pitches].
+  double sum_of_phases() const;
+};
+
 class StiffnessVariation {
  public:
+  explicit StiffnessVariation(MeshCycle cycle);
   /// `offset` is the phase of the forward flank at travel 0 [base pitches].
   StiffnessVariation(MeshStiffness stiffness, double offset);
 
@@ -32,8 +43,8 @@ class StiffnessVariation {
   double factor(double travel, double side) const;
 
  private:
-  MeshStiffness stiffness_;
-  double offset_, reverse_;
+  MeshCycle cycle_;
+  double reverse_;
 };
 
 /// Reads `gear_train.mesh.stiffness_variation` of a rig whose load gear has this base radius [m]:
@@ -50,6 +61,7 @@ class StiffnessVariation {
 /// The gear pair says how its teeth meet. The play of the rig is that of mesh.backlash (or half_gap), which
 /// wear and set_backlash() change. Throws BadData, also where the gear's base radius differs from the rig's
 /// by more than 0.1 %.
+MeshCycle read_mesh_cycle(const YamlReader& yaml, double base_radius);
 std::shared_ptr<const StiffnessVariation> read_stiffness_variation(const YamlReader& yaml,
                                                                    double base_radius);
 

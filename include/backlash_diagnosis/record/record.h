@@ -38,7 +38,7 @@ const char* channel_unit(Channel channel);
 Channel channel_from_name(const std::string& name);
 
 /// The channels in which backlash can be seen: a record needs at least one of them.
-extern const std::array<Channel, 7> kBacklashChannels;
+extern const std::array<Channel, 8> kBacklashChannels;
 
 /// One sample of all channels; NaN where there is none.
 using ChannelValues = std::array<double, kChannelCount>;

@@ -12,13 +12,16 @@
 // configuration 1 of the thesis (friction system minus driver), which is what its unexplained ratio of
 // Section 6.3 looks like. The series is g(q) = mean + sum A_n sin(n q + phi_n). Orders are taken one after
 // the other while an F-test (2 parameters, Bonferroni over the orders that are left) finds them at
-// `false_alarm`.
+// `false_alarm`. What turns with another part than the load, as the pinion does, is found first and taken out
+// of both runs (gap_waves.h): its orders are no whole numbers, and over a turn it averages out.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/procedures/gap_waves.h"
 #include "backlash_diagnosis/identification/procedures/harmonics.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
@@ -28,10 +31,11 @@ namespace backlash::identification {
 struct GapMapSettings {
   signal::Measured stiffness;  // N m/rad; NaN: no correction of the wind-up
   signal::Measured friction_forward,
-      friction_reverse;       // N m, of the load, both > 0, at the speed of the runs
-  int bins = 180;             // per turn, 8 to 3600
-  int highest_order = 20;     // 0 to bins / 4
-  double false_alarm = 0.01;  // of "the gap varies", 1e-6 to 0.5
+      friction_reverse;                  // N m, of the load, both > 0, at the speed of the runs
+  int bins = 180;                        // per turn, 8 to 3600
+  int highest_order = 20;                // 0 to bins / 4
+  double false_alarm = 0.01;             // of "the gap varies", 1e-6 to 0.5
+  std::optional<rig_file::Drive> drive;  // whose last stage tells the orders of the pinion
 };
 
 /// Values at the middle of the bin; standard errors from the scatter inside, its correlation in time
@@ -52,13 +56,15 @@ struct GapMap {
   signal::Measured scale_forward, scale_reverse, scale;  // motor travel per load travel of the runs, and mean
   double forward_speed = 0, reverse_speed = 0;           // rad/s, of the load, medians
   std::vector<Harmonic> harmonics;                       // by order, those above a thousandth of the mean
-  double deviation = 0;                                  // rad, of the bins from the series
+  GapWaves waves;        // what turns with other parts; the bins and harmonics are without it
+  double deviation = 0;  // rad, of the bins from the series
   bool varies = false;
   double confidence = 0;  // that it varies: 1 - chance of the strongest harmonic
   std::string statement;  // the same in words
   std::vector<std::string> warnings;
 
-  /// Series with the corrected mean where known, else the separation's [rad].
+  /// Series with the corrected mean where known, else the separation's [rad]. The position is that of the
+  /// load with its turns: they say where the pinion is.
   double gap_at(double position) const;
 };
 
