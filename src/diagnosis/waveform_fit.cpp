@@ -159,7 +159,8 @@ WaveformFit::Part WaveformFit::linearise(std::size_t window) const {
 WaveformFit::Trial WaveformFit::trial(const std::vector<Part>& parts, double damping) const {
   const auto shared = static_cast<Eigen::Index>(moving_.size());
   MatrixXd normal = precision_(moving_, moving_);
-  VectorXd toward = -(precision_ * point.z)(moving_);
+  const VectorXd pull = precision_ * point.z;
+  VectorXd toward = -pull(moving_);
   for (std::size_t w = 0; w < parts.size(); ++w)
     if (used(w)) normal += parts[w].shared;
   normal.diagonal() *= 1 + damping;
