@@ -26,9 +26,13 @@ constexpr double kFarthest = 4;        // spreads, of one value: choice
 constexpr double kMostNoise = 1.3;     // residual per noise of the signal: choice
 // Of the swing, part of the residual that is no noise: simulation, see test_waveform.cpp.
 constexpr double kMostStructure[kWaveformChannels] = {0.01, 0.0006};
-constexpr double kFar = 1, kKnown = 0.5;  // spreads, of a value that the message tells: choices
-constexpr double kRivalCost = 9;          // chi^2 of three standard errors
-constexpr double kRivalApart = 0.1;       // of the gap: choice
+// What the message tells of the file: values beyond what it says of them, one spread, and surely so, as the
+// record tells them. A message that is wrong costs a commissioning; one that lacks hides a wrong file.
+// Choices.
+constexpr double kFar = 1;           // spreads
+constexpr double kErrorsFar = 3;     // standard errors
+constexpr double kRivalCost = 9;     // chi^2 of three standard errors
+constexpr double kRivalApart = 0.1;  // of the gap: choice
 
 void check(const WaveformSettings& s) {
   const auto require = [](const char* name, double value) {
@@ -102,14 +106,22 @@ void refuse_waveform(const WaveformSolution& s) {
 
 namespace {
 
+std::string contradiction(const WaveformSolution& s, std::size_t k) {
+  const WaveformQuantity& q = waveform_quantities()[k - 1];  // both start with the damping of the motor
+  const double error = s.told[k] * s.priors[k].spread * (q.factor ? s.values[k] : 1);
+  return fmt::format("declared {} {:.3g} {}, this record says {:.3g} +- {:.1g}",
+                     waveform_value_name(static_cast<int>(k)), s.priors[k].value, q.unit, s.values[k], error);
+}
+
 std::string message_of(const WaveformSolution& s, bool position) {
   std::string text = fmt::format("fitted to {} of {} reversals, {}", s.windows - s.left_out, s.windows,
                                  position ? "torque and position" : "torque alone");
   if (!position) text += ": limited by the declared stiffness of the sensor and by inertias";
   std::vector<std::string> found;
-  for (std::size_t k = kHalfGap + 1; k <= kContactLoss; ++k)
-    if (std::fabs(s.z[k]) > kFar && s.told[k] < kKnown) found.push_back(value_text(s, k));
-  return found.empty() ? text : text + "; the record shows " + joined(found);
+  for (std::size_t k = kHalfGap + 1; k <= kSensorGain; ++k)
+    if (deviations(s, k) > kFar && std::fabs(s.z[k]) > kErrorsFar * s.told[k])
+      found.push_back(contradiction(s, k));
+  return found.empty() ? text : text + "; " + joined(found) + ": run identify";
 }
 
 void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settings, bool position) {

@@ -60,8 +60,8 @@ std::optional<YamlReader> holder(const YamlReader& yaml, const std::vector<std::
 /// As a standard deviation of the logarithm, or in the unit of the value.
 double spread_of(const YamlReader& yaml, const std::string& key, const Uncertainty& u, double value,
                  bool factor) {
+  if (!(value > 0) && (factor || u.relative)) yaml.fail(key, "a value of 0 has no such uncertainty");
   if (factor == u.relative) return u.size;
-  if (!(value > 0)) yaml.fail(key, "a value of 0 has no relative uncertainty");
   return factor ? u.size / value : u.size * value;
 }
 
