@@ -88,7 +88,7 @@ const std::vector<WaveformQuantity>& waveform_quantities() {
       {"gear_inertia", kInertia, true, 1, &S::gear_inertia, &W::gear_inertia},
       {"output_stiffness", "N m/rad", true, 1, &S::output_stiffness, &W::output_stiffness},
       {"output_damping", kDamping, true, 1, &S::output_damping, &W::output_damping},
-      {"contact_stiffness", "N/m^1.5", true, 2.5, &S::contact_stiffness, &W::contact_stiffness},
+      {"contact_stiffness", "N/m^1.5", true, 1.5, &S::contact_stiffness, &W::contact_stiffness},
       {"contact_loss", "s/m", true, 1, &S::contact_loss, &W::contact_loss},
       {"sensor_gain", "-", true, 0, &S::sensor_gain, &W::sensor_gain},
       {"sensor_delay", "s", false, 0, &S::sensor_delay, &W::sensor_delay},

@@ -24,7 +24,7 @@ struct WaveformPrior {
 };
 using WaveformPriors = std::array<WaveformPrior, kGlobalValues>;
 /// Powers in the factor c of the symmetry of waveform.h. Theory.
-constexpr double kScalePower[kGlobalValues] = {-1, 1, 0, -1, 1, 1, 1, 1, 1, 1, 1, 2.5, 1};
+constexpr double kScalePower[kGlobalValues] = {-1, 1, 0, -1, 1, 1, 1, 1, 1, 1, 1, 1.5, 1};
 
 using WaveformStart = Eigen::Matrix<double, kStartValues, 1>;
 

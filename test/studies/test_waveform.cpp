@@ -97,7 +97,7 @@ TEST(Waveform, TorqueAloneScalesWithTheDeclaredMachine) {
                         &scaled.motor_damping, &scaled.sensor_stiffness, &scaled.sensor_damping,
                         &scaled.output_stiffness, &scaled.output_damping, &scaled.contact_loss})
     *value *= c;
-  scaled.contact_stiffness *= std::pow(c, 2.5);
+  scaled.contact_stiffness *= std::pow(c, 1.5);
   const Estimate one = diagnosis::estimate_waveform(record, declared());
   const Estimate other = diagnosis::estimate_waveform(record, scaled);
   ASSERT_EQ(one.status, Status::ok) << one.message;

@@ -11,7 +11,7 @@
 // its spread. What the spreads below are where the rig file does not say them is a choice: what data sheets
 // and drawings are good for.
 //
-// Symmetry of torque alone: with inertias, damping and stiffnesses times c, the contact's K times c^2.5 and
+// Symmetry of torque alone: with inertias, damping and stiffnesses times c, the contact's K times c^1.5 and
 // its alpha times c, and the backlash divided by c, the torque is the same. From torque alone the play is
 // known no better than one of these scales, mostly the stiffness of the torque sensor. An angle ends that.
 //
