@@ -97,6 +97,20 @@ std::string Range::text() const {
   return "must be " + from + " and " + to;
 }
 
+/// "30 %" or a number in the unit of the value.
+std::string uncertainty_problem(const YamlNode& node, Uncertainty& u) {
+  const char* const kExpected = "a number > 0, or one with % behind it";
+  std::string problem = scalar_problem(node, kExpected);
+  if (!problem.empty()) return problem;
+  std::string text = node.scalar;
+  u.relative = !text.empty() && text.back() == '%';
+  if (u.relative) text = std::string(trimmed(text.substr(0, text.size() - 1)));
+  const ParsedNumber number = parse_number(text);
+  if (!number || !(number.value > 0)) return std::string("must be ") + kExpected;
+  u.size = u.relative ? number.value / 100 : number.value;
+  return "";
+}
+
 // A map of the document with what was asked of it. A map that an alias shows in two places has two of these.
 struct YamlReader::Impl {
   std::shared_ptr<const YamlTree> tree;
@@ -104,6 +118,7 @@ struct YamlReader::Impl {
   std::string path;  // "gear_train.motor", empty at the top
   int line = 0;
   std::set<std::string> asked;
+  bool unused_uncertainty = false;  // it is a number with one that nobody asked for
   std::map<std::pair<std::string, std::size_t>, std::shared_ptr<Impl>>
       children;  // by key and index in a list
 
@@ -165,7 +180,15 @@ struct YamlReader::Impl {
     return child(key, 0, *entry.value, full(key), entry.line);
   }
 
+  // The map that is a number with what is known of it; nullptr: it is none.
+  std::shared_ptr<Impl> known_number(const std::string& key, const YamlEntry& entry) {
+    if (entry.value->kind != Kind::map || entry.value->entries.count("value") == 0) return nullptr;
+    return map_child(key, entry);
+  }
+
   void finish() const {
+    if (unused_uncertainty)
+      fail_at(line, path + ": nothing uses the uncertainty of this value, give a number");
     const std::pair<const std::string, YamlEntry>* unknown = nullptr;  // the first in the file
     for (const auto& entry : node->entries) {
       if (asked.count(entry.first) != 0) continue;
@@ -217,9 +240,34 @@ bool YamlReader::is_text(const std::string& key) const {
 
 double YamlReader::number(const std::string& key, const Range& range) const {
   const YamlEntry& entry = impl_->get(key, "a number");
+  if (const auto known = impl_->known_number(key, entry)) {
+    const YamlReader reader(known);
+    if (known->asked.empty()) known->unused_uncertainty = true;
+    Uncertainty u;
+    const YamlEntry& said = known->get("uncertainty", "one standard deviation");
+    known->require(said, "uncertainty", uncertainty_problem(*said.value, u));
+    reader.text_or("source", "");
+    return reader.number("value", range);
+  }
   double value = 0;
   impl_->require(entry, key, number_problem(*entry.value, range, value));
   return value;
+}
+
+std::optional<Uncertainty> YamlReader::uncertainty(const std::string& key) const {
+  const YamlEntry* const entry = impl_->find(key);
+  const auto known = entry == nullptr ? nullptr : impl_->known_number(key, *entry);
+  if (!known) return std::nullopt;
+  Uncertainty u;
+  const YamlEntry& said = known->get("uncertainty", "one standard deviation");
+  known->require(said, "uncertainty", uncertainty_problem(*said.value, u));
+  known->unused_uncertainty = false;
+  return u;
+}
+
+bool YamlReader::is_map(const std::string& key) const {
+  const YamlEntry* const entry = impl_->find(key);
+  return entry != nullptr && entry->value->kind == Kind::map && entry->value->entries.count("value") == 0;
 }
 
 long YamlReader::integer(const std::string& key, long lower, long upper) const {

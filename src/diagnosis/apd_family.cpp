@@ -53,7 +53,8 @@ Quantiles with_noise(const Quantiles& exact, double sigma) {
   const double range = exact.back() - exact.front();
   if (!(sigma > kLeastNoise * range)) return exact;
   const double cell = sigma / kCellsPerSigma, lower = exact.front() - (kReach + 1) * cell;
-  const auto cells = static_cast<Eigen::Index>(range / cell) + 2 * kReach + 4;
+  const auto cells =
+      static_cast<Eigen::Index>((exact.back() - lower) / cell) + kReach + 3;  // rounded as below
   Eigen::ArrayXd cumulative = Eigen::ArrayXd::Zero(cells), whole = Eigen::ArrayXd::Zero(cells);
   for (const double centre : exact) {
     const double place = (centre - lower) / cell;

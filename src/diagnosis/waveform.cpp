@@ -26,9 +26,13 @@ constexpr double kFarthest = 4;        // spreads, of one value: choice
 constexpr double kMostNoise = 1.3;     // residual per noise of the signal: choice
 // Of the swing, part of the residual that is no noise: simulation, see test_waveform.cpp.
 constexpr double kMostStructure[kWaveformChannels] = {0.01, 0.0006};
-constexpr double kFar = 1, kKnown = 0.5;  // spreads, of a value that the message tells: choices
-constexpr double kRivalCost = 9;          // chi^2 of three standard errors
-constexpr double kRivalApart = 0.1;       // of the gap: choice
+// What the message tells of the file: values beyond what it says of them, one spread, and surely so, as the
+// record tells them. A message that is wrong costs a commissioning; one that lacks hides a wrong file.
+// Choices.
+constexpr double kFar = 1;           // spreads
+constexpr double kErrorsFar = 3;     // standard errors
+constexpr double kRivalCost = 9;     // chi^2 of three standard errors
+constexpr double kRivalApart = 0.1;  // of the gap: choice
 
 void check(const WaveformSettings& s) {
   const auto require = [](const char* name, double value) {
@@ -46,12 +50,20 @@ void check(const WaveformSettings& s) {
   require("output_damping", s.output_damping);
   require("contact_stiffness", s.contact_stiffness);
   require("contact_loss", s.contact_loss);
+  require("friction_speed", s.friction_speed);
+  require("sensor_gain", s.sensor_gain);
   if (!(s.dry_friction >= 0)) throw InvalidParameter("waveform.dry_friction", s.dry_friction, "must be >= 0");
+}
+
+/// From what the file says, with the scale that its values have in common.
+double deviations(const WaveformSolution& s, std::size_t k) {
+  const double common = s.common_scale * kScalePower[k] / s.priors[k].spread;
+  return std::fabs(s.z[k]) / std::hypot(1, common);
 }
 
 std::string value_text(const WaveformSolution& s, std::size_t k) {
   return fmt::format("{} {:.3g}, {:.1f} standard deviations from what the file says",
-                     waveform_value_name(static_cast<int>(k)), s.values[k], std::fabs(s.z[k]));
+                     waveform_value_name(static_cast<int>(k)), s.values[k], deviations(s, k));
 }
 
 void refuse_misfit(const WaveformSolution& s) {
@@ -71,20 +83,19 @@ void refuse_misfit(const WaveformSolution& s) {
   }
 }
 
-void refuse(const WaveformSolution& s) {
+}  // namespace
+
+void refuse_waveform(const WaveformSolution& s) {
   if (s.left_out > kMostLeftOut * s.windows)
     throw Refusal{
         Status::out_of_domain,
         fmt::format("about {} of {} reversals the motion is not that of the machine of the rig file",
                     s.left_out, s.windows)};
   refuse_misfit(s);
-  double sum = 0;
   std::size_t worst = kHalfGap + 1;
-  for (std::size_t k = kHalfGap + 1; k < kGlobalValues; ++k) {
-    sum += s.z[k] * s.z[k];
-    if (std::fabs(s.z[k]) > std::fabs(s.z[worst])) worst = k;
-  }
-  if (sum > kMostPrior || std::fabs(s.z[worst]) > kFarthest)
+  for (std::size_t k = kHalfGap + 1; k < kGlobalValues; ++k)
+    if (deviations(s, k) > deviations(s, worst)) worst = k;
+  if (s.prior_cost > kMostPrior || deviations(s, worst) > kFarthest)
     throw Refusal{Status::out_of_domain,
                   "the record fits only a machine far from that of the rig file: " + value_text(s, worst)};
   if (s.rival_cost < kRivalCost &&
@@ -93,14 +104,24 @@ void refuse(const WaveformSolution& s) {
                                                  2 * s.half_gap, 2 * s.rival)};
 }
 
+namespace {
+
+std::string contradiction(const WaveformSolution& s, std::size_t k) {
+  const WaveformQuantity& q = waveform_quantities()[k - 1];  // both start with the damping of the motor
+  const double error = s.told[k] * s.priors[k].spread * (q.factor ? s.values[k] : 1);
+  return fmt::format("declared {} {:.3g} {}, this record says {:.3g} +- {:.1g}",
+                     waveform_value_name(static_cast<int>(k)), s.priors[k].value, q.unit, s.values[k], error);
+}
+
 std::string message_of(const WaveformSolution& s, bool position) {
   std::string text = fmt::format("fitted to {} of {} reversals, {}", s.windows - s.left_out, s.windows,
                                  position ? "torque and position" : "torque alone");
   if (!position) text += ": limited by the declared stiffness of the sensor and by inertias";
   std::vector<std::string> found;
-  for (std::size_t k = kHalfGap + 1; k <= kContactLoss; ++k)
-    if (std::fabs(s.z[k]) > kFar && s.told[k] < kKnown) found.push_back(value_text(s, k));
-  return found.empty() ? text : text + "; the record shows " + joined(found);
+  for (std::size_t k = kHalfGap + 1; k <= kSensorGain; ++k)
+    if (deviations(s, k) > kFar && std::fabs(s.z[k]) > kErrorsFar * s.told[k])
+      found.push_back(contradiction(s, k));
+  return found.empty() ? text : text + "; " + joined(found) + ": run identify";
 }
 
 void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settings, bool position) {
@@ -123,20 +144,25 @@ void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settin
 
 }  // namespace
 
+void check_waveform(const record::Record& record, const WaveformSettings& settings) {
+  using record::Channel;
+  check(settings);
+  for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
+    if (!record.has(channel))
+      throw Refusal{Status::insufficient_data, "needs " + record::channel_name(channel)};
+  for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque, Channel::motor_position})
+    for (const double value : record.column(channel))
+      if (!std::isfinite(value))
+        throw Refusal{Status::insufficient_data, record::channel_name(channel) + " has gaps"};
+}
+
 Estimate estimate_waveform(const record::Record& record, const WaveformSettings& settings) {
   check(settings);
   return estimate_or_refusal("waveform", [&](Estimate& estimate) {
-    using record::Channel;
-    for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque})
-      if (!record.has(channel))
-        throw Refusal{Status::insufficient_data, "needs " + record::channel_name(channel)};
-    for (const Channel channel : {Channel::motor_torque, Channel::sensor_torque, Channel::motor_position})
-      for (const double value : record.column(channel))
-        if (!std::isfinite(value))
-          throw Refusal{Status::insufficient_data, record::channel_name(channel) + " has gaps"};
+    check_waveform(record, settings);
     const WaveformSolution solution = solve_waveform(record, settings);
-    refuse(solution);
-    fill(estimate, solution, settings, record.has(Channel::motor_position));
+    refuse_waveform(solution);
+    fill(estimate, solution, settings, record.has(record::Channel::motor_position));
   });
 }
 

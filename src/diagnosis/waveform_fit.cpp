@@ -42,8 +42,11 @@ struct WaveformFit::Trial {
   double damping;
 };
 
-WaveformFit::WaveformFit(const WaveformData& data, const WaveformPriors& priors)
-    : data_(data), priors_(priors), steps_(VectorXd::Constant(kGlobalValues, kFirstStep)) {
+WaveformFit::WaveformFit(const WaveformData& data, const WaveformPriors& priors, double common)
+    : data_(data),
+      priors_(priors),
+      precision_(waveform_precision(priors, common)),
+      steps_(VectorXd::Constant(kGlobalValues, kFirstStep)) {
   for (int k = 0; k < kGlobalValues; ++k)
     if (priors_[static_cast<std::size_t>(k)].fitted) fitted_.push_back(k);
   point.z = VectorXd::Zero(kGlobalValues);
@@ -57,6 +60,19 @@ WaveformFit::WaveformFit(const WaveformData& data, const WaveformPriors& priors)
   }
   point.starts = guesses_;
   for (int k = 0; k < kStartValues; ++k) start_spread_[k] = kStartSpread[k] * data.level;
+}
+
+/// The inverse of 1 + common^2 w w^T, w the symmetry in spreads (Sherman and Morrison).
+MatrixXd waveform_precision(const WaveformPriors& priors, double common) {
+  VectorXd w = VectorXd::Zero(kGlobalValues);
+  for (int k = kHalfGap + 1; k < kGlobalValues; ++k)
+    w[k] = kScalePower[k] * common / priors[static_cast<std::size_t>(k)].spread;
+  const double share = 1 / (1 + w.squaredNorm());
+  return MatrixXd::Identity(kGlobalValues, kGlobalValues) - share * w * w.transpose();
+}
+
+double WaveformFit::prior_cost(const VectorXd& z) const {
+  return z.dot(precision_ * z);
 }
 
 double WaveformFit::value(int which, double z) const {
@@ -142,9 +158,9 @@ WaveformFit::Part WaveformFit::linearise(std::size_t window) const {
 /// The step of a damping; shared values first, then those of each window that follow from them.
 WaveformFit::Trial WaveformFit::trial(const std::vector<Part>& parts, double damping) const {
   const auto shared = static_cast<Eigen::Index>(moving_.size());
-  MatrixXd normal = MatrixXd::Identity(shared, shared);
-  VectorXd toward(shared);
-  for (Eigen::Index k = 0; k < shared; ++k) toward[k] = -point.z[moving_[static_cast<std::size_t>(k)]];
+  MatrixXd normal = precision_(moving_, moving_);
+  const VectorXd pull = precision_ * point.z;
+  VectorXd toward = -pull(moving_);
   for (std::size_t w = 0; w < parts.size(); ++w)
     if (used(w)) normal += parts[w].shared;
   normal.diagonal() *= 1 + damping;
@@ -230,7 +246,7 @@ std::vector<double> WaveformFit::costs(std::vector<Trial>& trials) const {
   });
   std::vector<double> sums;
   for (std::size_t i = 0; i < trials.size(); ++i) {
-    double sum = trials[i].point.z.squaredNorm();
+    double sum = prior_cost(trials[i].point.z);
     for (const std::vector<double>& each : of)
       if (!each.empty()) sum += each[i];
     sums.push_back(std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity());
@@ -247,8 +263,8 @@ bool WaveformFit::iterate() {
   });
   ++iterations_;
   const auto shared = static_cast<Eigen::Index>(moving_.size());
-  cost_ = point.z.squaredNorm();
-  information_ = MatrixXd::Identity(shared, shared);
+  cost_ = prior_cost(point.z);
+  information_ = precision_(moving_, moving_);
   VectorXd alone = VectorXd::Ones(shared);
   for (std::size_t w = 0; w < parts.size(); ++w) {
     if (!used(w)) continue;

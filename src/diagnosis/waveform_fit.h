@@ -23,6 +23,9 @@ struct WaveformPrior {
   bool fitted = true;
 };
 using WaveformPriors = std::array<WaveformPrior, kGlobalValues>;
+/// Powers in the factor c of the symmetry of waveform.h. Theory.
+constexpr double kScalePower[kGlobalValues] = {-1, 1, 0, -1, 1, 1, 1, 1, 1, 1, 1, 1.5, 1};
+
 using WaveformStart = Eigen::Matrix<double, kStartValues, 1>;
 
 enum WaveformChannel { kTorqueChannel, kPositionChannel, kWaveformChannels };
@@ -41,9 +44,12 @@ struct WaveformPoint {
   std::vector<WaveformStart> starts;
 };
 
+Eigen::MatrixXd waveform_precision(const WaveformPriors& priors, double common);
+
 class WaveformFit {
  public:
-  WaveformFit(const WaveformData& data, const WaveformPriors& priors);
+  /// `common`: standard deviation of a factor's logarithm, that value k has to the power kScalePower[k].
+  WaveformFit(const WaveformData& data, const WaveformPriors& priors, double common);
 
   /// How far the fit looks, and what it believes.
   struct Stage {
@@ -69,6 +75,8 @@ class WaveformFit {
   double value(int which) const { return value(which, point.z[which]); }
   double value(int which, double z) const;
   double cost() const { return cost_; }
+  /// How far the shared values are from what was known of them, chi^2.
+  double prior_cost(const Eigen::VectorXd& z) const;
   int iterations() const { return iterations_; }
 
   WaveformPoint point;
@@ -91,6 +99,7 @@ class WaveformFit {
 
   const WaveformData& data_;
   WaveformPriors priors_;
+  Eigen::MatrixXd precision_;  // of what was known, in spreads, all values
   std::vector<int> fitted_, moving_;
   std::vector<WaveformStart> guesses_;
   WaveformStart start_spread_;

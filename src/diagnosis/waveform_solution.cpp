@@ -58,22 +58,23 @@ WaveformPriors priors_of(const WaveformSettings& s, const WaveformData& data) {
   const double middle = data.position.empty() ? 0 : signal::median(data.position);
   WaveformPriors p;
   p[kHalfGap] = {twist_length(s, data.level), kWideGap, true};
-  p[kMotorDamping] = {s.motor_damping, Spread::kMotorDamping, true};
-  p[kDryFriction] = {s.dry_friction, Spread::kDryFriction * data.level};
-  p[kFrictionSpeed] = {Spread::kSlow, Spread::kFrictionSpeed, true};
-  p[kSensorStiffness] = {s.sensor_stiffness, Spread::kStiffness, true};
-  p[kSensorDamping] = {s.sensor_damping, Spread::kSensorDamping, true};
-  p[kMotorInertia] = {s.motor_inertia, Spread::kInertia, true};
-  p[kPinionInertia] = {s.pinion_inertia, Spread::kInertia, true};
-  p[kGearInertia] = {s.gear_inertia, Spread::kInertia, true};
-  p[kOutputStiffness] = {s.output_stiffness, Spread::kMesh, true};
-  p[kOutputDamping] = {s.output_damping, Spread::kMesh, true};
-  p[kContactStiffness] = {s.contact_stiffness, Spread::kMesh, true};
-  p[kContactLoss] = {s.contact_loss, Spread::kMesh, true};
-  p[kSensorGain] = {1, Spread::kGain, true};
+  p[kMotorDamping] = {s.motor_damping, s.spread.motor_damping, true};
+  p[kDryFriction] = {s.dry_friction, std::isnan(s.spread.dry_friction) ? Spread::kDryFriction * data.level
+                                                                       : s.spread.dry_friction};
+  p[kFrictionSpeed] = {s.friction_speed, s.spread.friction_speed, true};
+  p[kSensorStiffness] = {s.sensor_stiffness, s.spread.sensor_stiffness, true};
+  p[kSensorDamping] = {s.sensor_damping, s.spread.sensor_damping, true};
+  p[kMotorInertia] = {s.motor_inertia, s.spread.motor_inertia, true};
+  p[kPinionInertia] = {s.pinion_inertia, s.spread.pinion_inertia, true};
+  p[kGearInertia] = {s.gear_inertia, s.spread.gear_inertia, true};
+  p[kOutputStiffness] = {s.output_stiffness, s.spread.output_stiffness, true};
+  p[kOutputDamping] = {s.output_damping, s.spread.output_damping, true};
+  p[kContactStiffness] = {s.contact_stiffness, s.spread.contact_stiffness, true};
+  p[kContactLoss] = {s.contact_loss, s.spread.contact_loss, true};
+  p[kSensorGain] = {s.sensor_gain, s.spread.sensor_gain, true};
   p[kSensorBias] = {0, Spread::kBias * data.level};
-  p[kSensorLag] = {0, Spread::kLag};
-  p[kSensorTime] = {0, Spread::kLag};
+  p[kSensorLag] = {s.sensor_delay, s.spread.sensor_delay};
+  p[kSensorTime] = {s.sensor_time_constant, s.spread.sensor_time_constant};
   p[kSwitchDelay] = {0, data.grid.interval / 2};  // theory: it is seen a sample late at most
   p[kDriveOffset] = {0, Spread::kDrive * data.level};
   p[kDriveSlope] = {0, Spread::kDriveSlope * s.sensor_stiffness};
@@ -83,15 +84,10 @@ WaveformPriors priors_of(const WaveformSettings& s, const WaveformData& data) {
 
 /// Least standard error of the logarithm of the gap from torque alone: by the symmetry of waveform.h the
 /// torque says nothing of the factor c, so that the priors alone hold it. Theory.
-double symmetry_error(const WaveformPriors& priors) {
-  constexpr std::pair<int, double> kScaled[] = {
-      {kMotorDamping, 1},       {kSensorStiffness, 1}, {kSensorDamping, 1},   {kMotorInertia, 1},
-      {kPinionInertia, 1},      {kGearInertia, 1},     {kOutputStiffness, 1}, {kOutputDamping, 1},
-      {kContactStiffness, 2.5}, {kContactLoss, 1}};
-  double information = 0;
-  for (const auto& [value, power] : kScaled)
-    information += std::pow(power / priors[static_cast<std::size_t>(value)].spread, 2);
-  return 1 / std::sqrt(information);
+double symmetry_error(const WaveformPriors& priors, double common) {
+  Eigen::VectorXd w = Eigen::VectorXd::Zero(kGlobalValues);
+  for (int k = 0; k < kGlobalValues; ++k) w[k] = kScalePower[k] / priors[static_cast<std::size_t>(k)].spread;
+  return 1 / std::sqrt(w.dot(waveform_precision(priors, common) * w));
 }
 
 /// How far a stage looks, in cycles of the ring, and how much of the swing it takes as noise.
@@ -106,8 +102,8 @@ constexpr Look kLast = {12, 0, 15, true};
 
 class Solver {
  public:
-  Solver(const record::Record& record, const WaveformSettings& settings)
-      : settings_(settings), ring_(ring_of(settings)) {
+  Solver(const record::Record& record, const WaveformSettings& settings, double told, double told_error)
+      : settings_(settings), ring_(ring_of(settings)), told_gap_(told), told_error_(told_error) {
     data_.windows = waveform_windows(record, ring_, kMostWindows);
     data_.torque = record.column(record::Channel::sensor_torque);
     data_.position = record.column(record::Channel::motor_position);
@@ -122,7 +118,8 @@ class Solver {
   }
 
   WaveformSolution solve() {
-    const WaveformPriors priors = priors_of(settings_, data_);
+    WaveformPriors priors = priors_of(settings_, data_);
+    if (!std::isnan(told_gap_)) priors[kHalfGap] = {told_gap_, told_error_, true};
     WaveformFit fit = searched(priors);
     for (const Look& look : kMiddle) {
       fit.run(stage(look, search_set()));
@@ -174,12 +171,17 @@ class Solver {
     std::vector<WaveformFit> fits;
     std::vector<double> costs;
     for (const double guess : kGuesses) {
-      fits.emplace_back(data_, priors);
-      fits.back().point.z[kHalfGap] = std::log(guess) / kWideGap;
-      fits.back().point.z[kDryFriction] = fits.back().point.z[kSensorTime] = kFirstLoss;
+      fits.emplace_back(data_, priors, settings_.common_scale);
+      const WaveformPrior& gap = priors[kHalfGap];
+      const bool known = !std::isnan(told_gap_);
+      fits.back().point.z[kHalfGap] =
+          known ? 0 : std::log(guess * twist_length(settings_, data_.level) / gap.value) / gap.spread;
+      if (settings_.dry_friction == 0) fits.back().point.z[kDryFriction] = kFirstLoss;
+      if (settings_.sensor_time_constant == 0) fits.back().point.z[kSensorTime] = kFirstLoss;
       double cost = 0;
       for (const Look& look : kSearch) cost = fits.back().run(stage(look, search_set()));
       costs.push_back(cost);
+      if (known) break;
     }
     std::vector<std::size_t> order(costs.size());
     std::iota(order.begin(), order.end(), 0);
@@ -277,8 +279,15 @@ class Solver {
       s.told[static_cast<std::size_t>(fit.fitted()[i])] = std::sqrt(covariance(k, k));
     }
     for (int k = 0; k < kGlobalValues; ++k) s.values.push_back(fit.value(k));
-    s.log_error = kWideGap * s.told[kHalfGap];
-    if (data_.position.empty()) s.log_error = std::max(s.log_error, symmetry_error(priors));
+    s.log_error = priors[kHalfGap].spread * s.told[kHalfGap];
+    if (data_.position.empty())
+      s.log_error = std::max(s.log_error, symmetry_error(priors, settings_.common_scale));
+    Eigen::VectorXd machine = fit.point.z;
+    machine[kHalfGap] = 0;
+    s.prior_cost = fit.prior_cost(machine);
+    s.covariance = Eigen::MatrixXd::Zero(kGlobalValues, kGlobalValues);
+    s.covariance(fit.fitted(), fit.fitted()) = covariance;
+    s.priors = priors, s.common_scale = settings_.common_scale;
     for (int c = 0; c < channels(); ++c) s.misfit[c] = misfit(fit, static_cast<WaveformChannel>(c));
     s.windows = static_cast<int>(used_.size());
     s.left_out = static_cast<int>(std::count(used_.begin(), used_.end(), false));
@@ -291,6 +300,7 @@ class Solver {
   const WaveformSettings& settings_;
   double ring_;
   WaveformData data_;
+  double told_gap_, told_error_;
   double swing_[kWaveformChannels], noise_[kWaveformChannels];
   std::vector<bool> used_;
   double rival_ = kNaN, rival_cost_ = kNaN;
@@ -323,8 +333,9 @@ const char* waveform_value_name(int which) {
   return names[which];
 }
 
-WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings) {
-  return Solver(record, settings).solve();
+WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings, double told,
+                                double told_error) {
+  return Solver(record, settings, told, told_error).solve();
 }
 
 }  // namespace backlash::diagnosis

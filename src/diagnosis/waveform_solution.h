@@ -23,6 +23,10 @@ struct WaveformSolution {
   double log_error = kNaN;     // standard error of its logarithm
   std::vector<double> z;       // values in spreads from the declared ones
   std::vector<double> values;  // in their units
+  double prior_cost = 0;       // chi^2 of all values but the gap, against what was known
+  Eigen::MatrixXd covariance;  // of all values, in spreads; 0 where a value is not fitted
+  WaveformPriors priors;
+  double common_scale = 0;
   std::vector<double> told;  // share of the prior spread that the record leaves, per value; 1: tells nothing
   WaveformMisfit misfit[kWaveformChannels];
   int windows = 0, left_out = 0, iterations = 0;
@@ -32,7 +36,15 @@ struct WaveformSolution {
 };
 
 /// Throws Refusal where the record cannot be used.
-WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings);
+/// `told`: half gap, m, by itself, with the standard deviation of its logarithm; NaN: not told.
+WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings,
+                                double told = kNaN, double told_error = kNaN);
+
+/// Throws Refusal for a record without the channels, InvalidParameter for settings out of range.
+void check_waveform(const record::Record& record, const WaveformSettings& settings);
+
+/// Throws Refusal where the solution is not to be believed.
+void refuse_waveform(const WaveformSolution& solution);
 
 /// Name of a value for messages.
 const char* waveform_value_name(int which);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <ostream>
 
 #include "backlash_diagnosis/base/text.h"
@@ -194,6 +195,19 @@ std::string identification_json(const identification::Identification& found, con
     for (const auto& [name, factor] : f.combination) entry["combination"][name] = factor;
     entry.update(report::measured(f.measured));
     json["findings"].push_back(std::move(entry));
+  }
+  if (found.commissioning) {
+    json["common_scale"] = {{"uncertainty", found.commissioning->machine.common_scale}};
+    json["not_told"] = found.commissioning->untold;
+    for (std::size_t i = 0; i < found.commissioning->states.size(); ++i) {
+      const auto& state = found.commissioning->states[i];
+      const double half = 2 * state.log_error;
+      json["backlash"].push_back(
+          {{"record", found.procedures.front().records.at(i)},
+           {"backlash", state.backlash},
+           {"interval", {state.backlash * std::exp(-half), state.backlash * std::exp(half)}},
+           {"reversals", state.windows - state.left_out}});
+    }
   }
   json["details"] = details_json(found);
   json["rig"] = rig;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/fitted_rig.h"
 
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
+#include "backlash_diagnosis/rig_file/known_values.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 
@@ -20,6 +22,9 @@ std::map<std::string, Value> by_table(const std::map<std::string, Value>& one_in
 }  // namespace
 
 std::string fitted_rig_text(const rig_file::RigFile& declared, const Identification& found) {
+  if (found.commissioning)
+    return rig_file::commissioned_text(declared, *found.commissioning,
+                                       "identified from " + joined(found.procedures.front().records));
   rig_file::RigDocument document(declared);
   const double ratio = declared.rig.motor_axis_ratio();
   if (declared.rig.mesh.rigid)

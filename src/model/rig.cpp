@@ -9,7 +9,7 @@ constexpr double kLongestSkew = 0.1;  // s, choice: what is later is no delay of
 /// A number for both directions, or a map of `forward` and `backward`; as mean and half difference.
 void read_directional(const YamlReader& parent, const std::string& key, double& mean, double& asymmetry) {
   if (!parent.has(key)) return;
-  if (parent.is_text(key)) {
+  if (!parent.is_map(key)) {
     mean = parent.number(key, Range::not_negative());
     return;
   }

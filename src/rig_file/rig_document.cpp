@@ -61,6 +61,15 @@ bool replace_scalar(std::string& line, const std::string& key, const std::string
   return true;
 }
 
+/// The same for "key: {...}  # comment".
+bool replace_map(std::string& line, const std::string& key, const std::string& value,
+                 const std::string& comment) {
+  const std::size_t begin = column_of(line), open = line.find('{'), close = line.find('}');
+  if (begin == std::string::npos || line.compare(begin, key.size() + 1, key + ":") != 0) return false;
+  if (close == std::string::npos || line.find('{', open + 1) < close) return false;
+  return replace_scalar(line, key, line.substr(open, close + 1 - open), value, comment);
+}
+
 /// The lines of entries that are indented by two, at another column.
 std::vector<std::string> indented(const std::vector<std::string>& entries, std::size_t column) {
   std::vector<std::string> lines;
@@ -109,6 +118,9 @@ void RigDocument::set(const std::string& key, const std::string& value, const st
       if (entry.value->kind != YamlNode::Kind::map)
         throw BadData(name_, key + ": " + path[depth] + " is no map");
       map = entry.value;
+    } else if (entry.value->kind == YamlNode::Kind::map) {
+      if (!replace_map(lines_.at(entry.line - 1), path[depth], value, comment))
+        throw BadData(fmt::format("{}:{}", name_, entry.line), key + ": is no map on a line of its own");
     } else if (!replace_scalar(lines_.at(entry.line - 1), path[depth], entry.value->scalar, value, comment)) {
       throw BadData(fmt::format("{}:{}", name_, entry.line),
                     key + ": is no plain value on a line of its own");
@@ -118,6 +130,20 @@ void RigDocument::set(const std::string& key, const std::string& value, const st
 
 void RigDocument::set(const std::string& key, double value, const std::string& comment) {
   set(key, fmt::format("{:.6g}", value), comment);
+}
+
+void RigDocument::set_section(const std::string& key, const std::string& entries,
+                              const std::string& comment) {
+  const YamlTree read = tree();
+  const auto old = read.root->entries.find(key);
+  if (old != read.root->entries.end()) {
+    const auto begin = std::size_t(old->second.line) - 1;
+    std::size_t end = begin + 1;
+    while (end < lines_.size() && (lines_[end].empty() || lines_[end][0] == ' ')) ++end;
+    lines_.erase(lines_.begin() + std::ptrdiff_t(begin), lines_.begin() + std::ptrdiff_t(end));
+  }
+  lines_.insert(lines_.end(), {"", with_comment(key + ":", comment)});
+  for (const std::string& line : split(entries, '\n')) lines_.push_back(line);
 }
 
 void RigDocument::set_contact_law(const model::ContactSpec& contact) {

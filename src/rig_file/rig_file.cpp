@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/yaml_tree.h"
 #include "backlash_diagnosis/rig_file/declared_uncertainty.h"
+#include "backlash_diagnosis/rig_file/known_values.h"
 #include "default_rig.h"
 
 namespace backlash::rig_file {
@@ -120,13 +121,14 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   file.diagnosis = diagnosis::read_diagnosis_settings(yaml.map("diagnosis"));
   if (const auto drive = yaml.optional_map("drive"))
     file.drive = read_drive(*drive, file.rig.reduction_ratio);
-  yaml.finish();
   if (file.diagnosis.limits && !file.diagnosis.limits->angular && file.rig.mesh.angular())
     yaml.map("diagnosis").fail("limits", "a rig without base_radius needs limits of backlash_angle");
   if (file.simulation.sensors.of(record::Channel::motor_current).declared &&
       std::isnan(file.rig.torque_constant))
     yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
   fill_from_rig(file.rig, file.diagnosis);
+  read_known_values(yaml, file);
+  yaml.finish();
   if (file.diagnosis.position_difference)
     file.diagnosis.position_difference->output_torque_reversed =
         file.simulation.sensors.of(record::Channel::output_torque).reversed;

@@ -40,7 +40,10 @@ Command command() {
       "ways (friction, gap "
       "over position), sine about a speed (inertia), sweep with bias (frequency response), square wave "
       "(damping), load moved by "
-      "hand with the motor braked (clearance), the driver alone. All parameters are those of the load side "
+      "hand with the motor braked (clearance), the driver alone. A gear train with a torque sensor and a "
+      "locked output is fitted to square waves of torque, to sensor_torque and motor_position as far as they "
+      "are there; its records may be of several states of wear, the first of the one that the file declares. "
+      "All parameters are those of the load side "
       "of the reduction.";
   c.examples = {"identify run.csv --rig config/two_inertia_servo.yaml --out fitted.yaml --json fit.json",
                 "identify runs/*.csv --rig config/yumrukcal_2013.yaml --out fitted.yaml --json fit.json "
@@ -73,8 +76,11 @@ int identify_machine(const Arguments& arguments) {
   identification::Identification found;
   try {
     ProgressBar bar;
-    found = of_file(file.source,
-                    [&] { return identification::identify(file.rig, records, bar.progress(), file.drive); });
+    found = of_file(file.source, [&] {
+      return file.diagnosis.waveform
+                 ? identification::commission(file, records)
+                 : identification::identify(file.rig, records, bar.progress(), file.drive);
+    });
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     return kInconclusive;

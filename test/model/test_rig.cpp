@@ -291,7 +291,7 @@ const BadRig kWrongFriction[] = {
     {"viscous_damping: 0.004", "coulomb_friction: {forward: 3, backward: 1, sideways: 2}",
      "rig.yaml:6: gear_train.motor.coulomb_friction.sideways = 2: unknown key, known here: "},
     {"viscous_damping: 0.004", "coulomb_friction: [3, 4]",
-     "rig.yaml:6: gear_train.motor.coulomb_friction = [...]: must be a map"},
+     "rig.yaml:6: gear_train.motor.coulomb_friction = [...]: is a list, expected a number"},
     {"viscous_damping: 0.004", "viscous_damping: much",
      "rig.yaml:6: gear_train.motor.viscous_damping = much: not a number, must be >= 0"},
     {"viscous_damping: 0.001", "coulomb_friction: 3",

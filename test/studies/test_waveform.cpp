@@ -97,7 +97,7 @@ TEST(Waveform, TorqueAloneScalesWithTheDeclaredMachine) {
                         &scaled.motor_damping, &scaled.sensor_stiffness, &scaled.sensor_damping,
                         &scaled.output_stiffness, &scaled.output_damping, &scaled.contact_loss})
     *value *= c;
-  scaled.contact_stiffness *= std::pow(c, 2.5);
+  scaled.contact_stiffness *= std::pow(c, 1.5);
   const Estimate one = diagnosis::estimate_waveform(record, declared());
   const Estimate other = diagnosis::estimate_waveform(record, scaled);
   ASSERT_EQ(one.status, Status::ok) << one.message;
@@ -128,6 +128,39 @@ TEST(Waveform, OnlyRigsThatItsEquationsDescribe) {
   for (const char* rig :
        {"config/two_inertia_servo.yaml", "config/yumrukcal_2013.yaml", "config/ur5_joint.yaml"})
     EXPECT_FALSE(rig_file::load_rig_file(test::package_file(rig)).diagnosis.waveform) << rig;
+}
+
+/// The new machine is told by its record, then the worn one by the torque alone. By the symmetry the scale
+/// stays as uncertain as what was known of it, growth does not: 2 %, the goal, is several times the noise.
+TEST(Waveform, CommissionedWhenNewFromTorqueAlone) {
+  const double fresh = 25e-6, worn = 90e-6;
+  const auto first =
+      diagnosis::commission_waveform({without_position(record_of(drawn(31, fresh)))}, declared());
+  EXPECT_GT(first.machine.common_scale, 0.04);  // the sharpest prior, 9 % of the sensor, with the inertias'
+  const Estimate e =
+      diagnosis::estimate_waveform(without_position(record_of(drawn(31, worn))), first.machine);
+  expect_holds(e, worn);
+  EXPECT_NEAR(e.backlash / first.states[0].backlash, worn / fresh, 0.02 * worn / fresh);
+  EXPECT_GT(e.upper - e.lower, 0.15 * worn);  // never sure of the scale
+  const auto told = diagnosis::commission_waveform({without_position(record_of(drawn(31, fresh)))},
+                                                   declared(), fresh, 0.01);
+  const Estimate absolute =
+      diagnosis::estimate_waveform(without_position(record_of(drawn(31, worn))), told.machine);
+  expect_holds(absolute, worn);
+  EXPECT_NEAR(absolute.backlash, worn, 0.02 * worn);
+  EXPECT_LT(absolute.upper - absolute.lower, 0.08 * worn);
+}
+
+TEST(Waveform, CommissionedFromTwoStates) {
+  const auto found =
+      diagnosis::commission_waveform({record_of(drawn(32, 25e-6)), record_of(drawn(32, 90e-6))}, declared());
+  ASSERT_EQ(found.states.size(), 2U);
+  EXPECT_NEAR(found.states[0].backlash, 25e-6, 0.6e-6);  // what the interval promises at least
+  EXPECT_NEAR(found.states[1].backlash, 90e-6, 0.6e-6);
+  const double truth = drawn(32, 0).rig.input_coupling.stiffness;
+  const double error = std::hypot(found.machine.spread.sensor_stiffness, found.machine.common_scale);
+  EXPECT_NEAR(found.machine.sensor_stiffness, truth, 3 * error * truth);
+  EXPECT_LT(error, 0.01);
 }
 
 /// Records of a separate program; all values of the machine are off by as much as 12 % to a factor of 15.

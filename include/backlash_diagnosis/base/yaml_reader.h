@@ -26,6 +26,12 @@ struct Range {
   bool contains(double value) const;  ///< false for NaN and infinities
 };
 
+/// How well a number is known: one standard deviation.
+struct Uncertainty {
+  double size = 0;        // > 0
+  bool relative = false;  // of the value, else in its unit
+};
+
 /// One map of a YAML document. Copies refer to the same map and remember together which keys were read.
 class YamlReader {
  public:
@@ -44,7 +50,11 @@ class YamlReader {
   std::vector<std::string> keys() const;
 
   /// Readers of one value; BadData when it is absent, has another type or lies outside the range.
+  /// A number may say how well it is known: {value: 0.0048, uncertainty: 30 %, source: data sheet};
+  /// finish() refuses an uncertainty that nobody asked for.
   double number(const std::string& key, const Range& range) const;
+  std::optional<Uncertainty> uncertainty(const std::string& key) const;  ///< absent: not said
+  bool is_map(const std::string& key) const;  ///< and no number with its uncertainty
   long integer(const std::string& key, long lower, long upper) const;
   bool boolean(const std::string& key) const;
   std::string text(const std::string& key) const;

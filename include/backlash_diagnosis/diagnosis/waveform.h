@@ -8,9 +8,10 @@
 //   Jg qg'' = F rb - Ko qg - Co qg'              d = |rb (qp - qg)| - backlash / 2
 //
 // (Sarkar, Ellis and Moore 1997, Eqs. 1 to 12; the output is locked). No declared value has to be right, only
-// its spread. What the prior spreads below are is a choice: what data sheets and drawings are good for.
+// its spread. What the spreads below are where the rig file does not say them is a choice: what data sheets
+// and drawings are good for.
 //
-// Symmetry of torque alone: with inertias, damping and stiffnesses times c, the contact's K times c^2.5 and
+// Symmetry of torque alone: with inertias, damping and stiffnesses times c, the contact's K times c^1.5 and
 // its alpha times c, and the backlash divided by c, the torque is the same. From torque alone the play is
 // known no better than one of these scales, mostly the stiffness of the torque sensor. An angle ends that.
 //
@@ -21,10 +22,35 @@
 // what the residual has of structure, and not below what equations of rigid flanks can tell (kFinest).
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::diagnosis {
+
+/// How well the values of a machine are known: one standard deviation, of the logarithm where it says
+/// "factor". What stands here is for values whose uncertainty the rig file does not say. Choices.
+struct WaveformSpread {
+  double sensor_stiffness = 0.09;  ///< factor: 18 % at 95 %
+  double motor_inertia = 0.15, pinion_inertia = 0.15,
+         gear_inertia = 0.15;                               ///< factor: 30 % at 95 %, by a drawing
+  double motor_damping = 0.5;                               ///< factor: 2.7 at 95 %
+  double sensor_damping = 1.3;                              ///< factor: 13 at 95 %, no data sheet has it
+  double output_stiffness = 0.46, output_damping = 0.46;    ///< factor: 2.5 at 95 %
+  double contact_stiffness = 0.46, contact_loss = 0.46;     ///< factor: 2.5 at 95 %
+  double dry_friction = kNaN;                               ///< N m; NaN: kDryFriction of the torque's level
+  double friction_speed = 1.5;                              ///< factor
+  double sensor_gain = 0.04;                                ///< factor
+  double sensor_delay = 3e-4, sensor_time_constant = 3e-4;  ///< s
+
+  /// Of what is of a record more than of the machine.
+  static constexpr double kDryFriction = 0.1;   ///< of the torque's level
+  static constexpr double kBias = 0.1;          ///< of the torque's level, of the torque sensor
+  static constexpr double kDrive = 0.04;        ///< of the torque's level: cogging, gravity
+  static constexpr double kDriveSlope = 0.002;  ///< of Ki: cogging within the small travel
+};
 
 /// The declared machine. All at the motor_position axis, as the rig file gives them.
 struct WaveformSettings {
@@ -38,24 +64,13 @@ struct WaveformSettings {
   double contact_stiffness = kNaN;                        ///< K, N/m^1.5, > 0
   double contact_loss = kNaN;                             ///< alpha, s/m, > 0
   bool sensor_with_damper = false;                        ///< the sensor shows T and not Ki (qm - qp)
-};
-
-/// How well the values above are known: one standard deviation, of the logarithm where it says "factor".
-/// Choices.
-struct WaveformSpread {
-  static constexpr double kStiffness = 0.09;     ///< factor, of the torque sensor: 18 % at 95 %
-  static constexpr double kInertia = 0.15;       ///< factor: 30 % at 95 %, by a drawing
-  static constexpr double kMotorDamping = 0.5;   ///< factor: 2.7 at 95 %
-  static constexpr double kSensorDamping = 1.3;  ///< factor: 13 at 95 %, no data sheet has it
-  static constexpr double kMesh = 0.46;          ///< factor: 2.5 at 95 %, contact and output coupling
-  static constexpr double kDryFriction = 0.1;    ///< of the torque's level
-  static constexpr double kFrictionSpeed = 1.5;  ///< factor, about kSlow
-  static constexpr double kSlow = 0.02;          ///< rad/s, speed at which dry friction changes its sign
-  static constexpr double kGain = 0.04;          ///< factor, of the torque sensor
-  static constexpr double kBias = 0.1;           ///< of the torque's level, of the torque sensor
-  static constexpr double kLag = 3e-4;    ///< s, of the torque sensor: delay, and time constant of its filter
-  static constexpr double kDrive = 0.04;  ///< of the torque's level: cogging, gravity
-  static constexpr double kDriveSlope = 0.002;  ///< of Ki: cogging within the small travel
+  double friction_speed = 0.02;                       ///< rad/s, > 0, at which dry friction changes its sign
+  double sensor_gain = 1;                             ///< -, > 0, of the torque sensor
+  double sensor_delay = 0, sensor_time_constant = 0;  ///< s, >= 0, of the torque sensor
+  WaveformSpread spread;
+  /// Besides the spreads: standard deviation of the logarithm of a factor that all values of the symmetry
+  /// above have in common, of a machine commissioned from torque alone.
+  double common_scale = 0;
 };
 
 /// Throws InvalidParameter for settings outside the ranges above. Answers by status:
@@ -65,5 +80,41 @@ struct WaveformSpread {
 ///   ambiguous          two plays fit alike
 ///   below_range        the interval, which is given, holds 0
 Estimate estimate_waveform(const record::Record& record, const WaveformSettings& settings);
+
+/// A value of the machine that records can tell.
+struct WaveformQuantity {
+  const char *name, *unit;
+  bool factor;   ///< its spread is of the logarithm, else in its unit
+  double power;  ///< in the factor c of the symmetry
+  double WaveformSettings::*at;
+  double WaveformSpread::*spread;
+};
+const std::vector<WaveformQuantity>& waveform_quantities();
+
+/// A machine as records of it tell it.
+struct WaveformCommissioning {
+  WaveformSettings machine;  ///< values, their spreads, the scale that they have in common
+  struct State {
+    double backlash = kNaN;                                      ///< m
+    double log_error = kNaN;                                     ///< standard error of its logarithm
+    bool position = false;                                       ///< else torque alone
+    double residual[2] = {kNaN, kNaN}, noise[2] = {kNaN, kNaN};  ///< of the swing: torque, position
+    int windows = 0, left_out = 0;
+  };
+  std::vector<State> states;        ///< one per record
+  std::vector<std::string> untold;  ///< names of values of which the records tell nothing
+};
+
+/// Fits the machine to records of it in any states: all have the machine's values in common, each has its
+/// backlash, its sensor's bias and its drive's offset. The first record is of the state whose backlash is
+/// `told` (m; NaN: not told) with the standard deviation `told_error` of its logarithm.
+///
+/// The spreads are no sharper than the fit's covariance C of the logarithms, s^2 u u^T + R:
+///   s^2 = 1 / (u^T C^-1 u), the most that can be of the direction u of the symmetry
+///   the values' own: R's diagonal times the largest eigenvalue of R's correlation, so that it holds R
+/// Throws CannotIdentify where a record does not fit, with its name and the reason.
+WaveformCommissioning commission_waveform(const std::vector<record::Record>& records,
+                                          const WaveformSettings& settings, double told = kNaN,
+                                          double told_error = kNaN);
 
 }  // namespace backlash::diagnosis

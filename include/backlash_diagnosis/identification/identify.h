@@ -20,6 +20,7 @@
 #include "backlash_diagnosis/identification/procedures/one_inertia.h"
 #include "backlash_diagnosis/identification/procedures/sensor_calibration.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 
 namespace backlash::identification {
@@ -88,7 +89,12 @@ struct Identification {
   std::optional<signal::Measured> delay;  // s, of the torque, beyond the hold between samples
   std::optional<OneInertia> one_inertia;
   std::vector<ChannelTrace> torque, deflection;
+  std::optional<diagnosis::WaveformCommissioning> commissioning;  // of a gear train, else none
 };
+
+/// For a gear train with a torque sensor and a locked output (diagnosis/waveform.h). Throws CannotIdentify,
+/// BadData.
+Identification commission(const rig_file::RigFile& file, const std::vector<record::Record>& records);
 
 /// For a rig with two inertias or one (mesh: rigid). Starts from what the rig declares. Throws CannotIdentify
 /// where no procedure can use any record, with all reasons; BadData; Cancelled. `drive` tells the gap map

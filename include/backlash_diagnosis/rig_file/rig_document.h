@@ -36,9 +36,9 @@ class RigDocument {
   /// The machine that the text describes now. Throws as rig_file_from_text().
   RigFile read() const;
 
-  /// Replaces the scalar under `key` ("gear_train.motor.inertia"), and the comment of its line unless
-  /// `comment` is empty. A key that is absent becomes the first of its map, which must exist. Numbers get six
-  /// digits.
+  /// Replaces the scalar, or the map on one line, under `key` ("gear_train.motor.inertia"), and the comment
+  /// of its line unless `comment` is empty. A key that is absent becomes the first of its map, which must
+  /// exist. Numbers get six digits.
   void set(const std::string& key, const std::string& value, const std::string& comment = "");
   void set(const std::string& key, double value, const std::string& comment = "");
 
@@ -46,6 +46,9 @@ class RigDocument {
   /// with its standard error as comment. Friction becomes a map of both directions where they differ,
   /// backlash is said as the file says it: backlash, half_gap or backlash_angle.
   void set_fitted(const FittedValues& found);
+
+  /// A section at the end, in place of one of this name; `entries` are its lines.
+  void set_section(const std::string& key, const std::string& entries, const std::string& comment);
 
   /// Another law with all its values in place of the declared one.
   void set_contact_law(const model::ContactSpec& contact);

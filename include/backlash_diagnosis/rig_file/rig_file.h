@@ -19,6 +19,8 @@ struct RigFile {
   diagnosis::DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
   std::vector<TestRun> test_runs;
   std::optional<Drive> drive;
+  /// Standard deviation of the logarithm of the declared backlash, of the gear when new; absent: not said.
+  std::optional<double> backlash_error;
   std::string source;  // path, or "built-in sarkar_1997"
   std::string text;    // as read
   std::string digest;  // 64-bit FNV-1a of the text, hexadecimal

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/diagnosis/waveform.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
+#include "refusal.h"
+#include "waveform_solution.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+constexpr double kUntold = 0.9;  // of what was known, from which a record tells nothing: choice
+constexpr double kFinest =
+    0.002;  // of a value, choice: the equations are no better, see kModelError of the fit
+
+/// Of the fit, in the order of waveform_quantities().
+constexpr int kPlaces[] = {kMotorDamping,    kDryFriction,   kFrictionSpeed,    kSensorStiffness,
+                           kSensorDamping,   kMotorInertia,  kPinionInertia,    kGearInertia,
+                           kOutputStiffness, kOutputDamping, kContactStiffness, kContactLoss,
+                           kSensorGain,      kSensorLag,     kSensorTime};
+constexpr int kCount = sizeof(kPlaces) / sizeof(*kPlaces);
+
+/// What the record leaves of a machine, by the equations of waveform.h.
+WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s) {
+  Eigen::MatrixXd c(kCount, kCount);
+  Eigen::VectorXd u(kCount);
+  for (int i = 0; i < kCount; ++i) {
+    u[i] = kScalePower[kPlaces[i]];
+    for (int j = 0; j < kCount; ++j) {
+      const int a = kPlaces[i], b = kPlaces[j];
+      c(i, j) = s.covariance(a, b) * s.priors[static_cast<std::size_t>(a)].spread *
+                s.priors[static_cast<std::size_t>(b)].spread;
+    }
+  }
+  const Eigen::VectorXd unit = c.diagonal().cwiseSqrt();
+  const Eigen::MatrixXd scaled = unit.cwiseInverse().asDiagonal() * c * unit.cwiseInverse().asDiagonal();
+  const Eigen::VectorXd direction = u.cwiseQuotient(unit);
+  const double common = 1 / direction.dot(signal::solve_symmetric(scaled, direction).col(0));
+  Eigen::MatrixXd rest = scaled - common * direction * direction.transpose();
+  const Eigen::VectorXd own = rest.diagonal().cwiseMax(1e-6).cwiseSqrt();
+  rest = own.cwiseInverse().asDiagonal() * rest * own.cwiseInverse().asDiagonal();
+  const double widest = std::sqrt(std::max(1.0, signal::symmetric_eigenvalues(rest)[kCount - 1]));
+  WaveformSettings machine = before;
+  machine.common_scale = std::sqrt(common);
+  for (int i = 0; i < kCount; ++i) {
+    const auto k = static_cast<std::size_t>(kPlaces[i]);
+    const WaveformPrior& prior = s.priors[k];
+    const double finest = prior.factor ? kFinest : kFinest * s.values[k];
+    const double spread = std::min(prior.spread, std::max(finest, widest * own[i] * unit[i]));
+    const WaveformQuantity& q = waveform_quantities()[static_cast<std::size_t>(i)];
+    machine.*q.at = prior.factor ? s.values[k] : std::max(0.0, s.values[k]);
+    machine.spread.*q.spread = spread;
+  }
+  return machine;
+}
+
+WaveformCommissioning::State state_of(const WaveformSolution& s, bool position) {
+  WaveformCommissioning::State state;
+  state.backlash = 2 * s.half_gap, state.log_error = s.log_error;
+  state.position = position;
+  for (int c = 0; c < (position ? 2 : 1); ++c) {
+    state.residual[c] = s.misfit[c].rms / s.misfit[c].swing;
+    state.noise[c] = s.misfit[c].noise / s.misfit[c].swing;
+  }
+  state.windows = s.windows, state.left_out = s.left_out;
+  return state;
+}
+
+}  // namespace
+
+const std::vector<WaveformQuantity>& waveform_quantities() {
+  using S = WaveformSettings;
+  using W = WaveformSpread;
+  static const char* const kInertia = "kg m^2";
+  static const char* const kDamping = "N m s/rad";
+  static const std::vector<WaveformQuantity> table = {
+      {"motor_viscous", kDamping, true, 1, &S::motor_damping, &W::motor_damping},
+      {"motor_coulomb", "N m", false, 0, &S::dry_friction, &W::dry_friction},
+      {"friction_speed", "rad/s", true, -1, &S::friction_speed, &W::friction_speed},
+      {"sensor_stiffness", "N m/rad", true, 1, &S::sensor_stiffness, &W::sensor_stiffness},
+      {"sensor_damping", kDamping, true, 1, &S::sensor_damping, &W::sensor_damping},
+      {"motor_inertia", kInertia, true, 1, &S::motor_inertia, &W::motor_inertia},
+      {"pinion_inertia", kInertia, true, 1, &S::pinion_inertia, &W::pinion_inertia},
+      {"gear_inertia", kInertia, true, 1, &S::gear_inertia, &W::gear_inertia},
+      {"output_stiffness", "N m/rad", true, 1, &S::output_stiffness, &W::output_stiffness},
+      {"output_damping", kDamping, true, 1, &S::output_damping, &W::output_damping},
+      {"contact_stiffness", "N/m^1.5", true, 1.5, &S::contact_stiffness, &W::contact_stiffness},
+      {"contact_loss", "s/m", true, 1, &S::contact_loss, &W::contact_loss},
+      {"sensor_gain", "-", true, 0, &S::sensor_gain, &W::sensor_gain},
+      {"sensor_delay", "s", false, 0, &S::sensor_delay, &W::sensor_delay},
+      {"sensor_time_constant", "s", false, 0, &S::sensor_time_constant, &W::sensor_time_constant}};
+  return table;
+}
+
+WaveformCommissioning commission_waveform(const std::vector<record::Record>& records,
+                                          const WaveformSettings& settings, double told, double told_error) {
+  WaveformCommissioning result;
+  result.machine = settings;
+  std::vector<double> left(kCount, 1);  // of what was known before the first record
+  for (const record::Record& record : records) {
+    try {
+      check_waveform(record, result.machine);
+      const bool first = result.states.empty();
+      const WaveformSolution s =
+          solve_waveform(record, result.machine, first ? told / 2 : kNaN, first ? told_error : kNaN);
+      refuse_waveform(s);
+      for (int i = 0; i < kCount; ++i)
+        left[static_cast<std::size_t>(i)] *= s.told[static_cast<std::size_t>(kPlaces[i])];
+      result.machine = after(result.machine, s);
+      result.states.push_back(state_of(s, record.has(record::Channel::motor_position)));
+    } catch (const Refusal& refusal) {
+      throw CannotIdentify(record.name + ": " + refusal.reason);
+    }
+  }
+  for (int i = 0; i < kCount; ++i)
+    if (left[static_cast<std::size_t>(i)] > kUntold)
+      result.untold.emplace_back(waveform_quantities()[static_cast<std::size_t>(i)].name);
+  return result;
+}
+
+}  // namespace backlash::diagnosis
