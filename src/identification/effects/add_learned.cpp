@@ -66,13 +66,9 @@ Hypothesis add_learned(const Hypothesis& named, const SearchContext& context) {
       std::max(left.torque_share, left.deflection_share) < settings.acceptance.noise)
     return named;
   Hypothesis h = without_stand_ins(named, context);
-  bool helped = false;
-  while (h.effects.size() < settings.asked.most_effects) {
-    const std::size_t count = h.effects.size();
-    h = add_map(h, context);
-    if (h.effects.size() == count) break;
-    helped = true;
-  }
+  const std::size_t count = h.effects.size();
+  h = add_map(h, context);  // one: a machine that is told by several tables is not understood
+  const bool helped = h.effects.size() > count;
   if (helped) h = drop_superfluous(add_effects(h, context), context);
   if (helped && size(h) < (1 - settings.asked.least_gain_unclear) * size(named)) return h;
   Hypothesis rest = named;

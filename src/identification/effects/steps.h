@@ -43,7 +43,7 @@ Hypothesis try_equivalents(const Hypothesis& h, const SearchContext& context);
 
 /// One learned map, of those that explain most.
 Hypothesis add_map(const Hypothesis& h, const SearchContext& context);
-/// Learned maps where named effects leave much: tried without the effects that may be stand-ins, then with
+/// A learned map where named effects leave much: tried without the effects that may be stand-ins, then with
 /// named effects on top.
 Hypothesis add_learned(const Hypothesis& h, const SearchContext& context);
 

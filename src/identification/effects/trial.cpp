@@ -70,11 +70,13 @@ Trials tried_best(const Hypothesis& h, const std::vector<Candidate>& candidates,
                   const SearchContext& context) {
   const TrialSettings& settings = context.settings.trials;
   Trials all;
+  // Beside a map each fit takes long, and what is left of the map itself is no reason to try.
+  const double least = has_learned_map(h.effects) ? context.settings.asked.least_gain_unclear
+                                                  : least_gain_in_noise(h.fitted->records, context.settings);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate& c = candidates[i];
     const double worth =
-        std::max(settings.worth_trying * candidates.front().gain,
-                 settings.least_predicted * least_gain_in_noise(h.fitted->records, context.settings));
+        std::max(settings.worth_trying * candidates.front().gain, settings.least_predicted * least);
     if (i >= settings.most || c.gain < worth) {
       all.rejected.push_back(
           {c.id, fmt::format("not fitted: predicted to lessen the residual by {:.2g} %, {}", 100 * c.gain,
