@@ -37,7 +37,8 @@ NAMED = ["asymmetric_coulomb", "asymmetric_viscous", "stribeck", "quadratic_drag
          "load_dependent_friction", "position_dependent_friction", "friction_drift", "gravity", "cogging",
          "transmission_error", "varying_backlash", "mesh_hardening", "varying_reduction_ratio", "encoder_scale",
          "delay", "presliding", "local_fault"]
-OUTSIDE = ["torque_saturation", "slipping_coupling", "damaged_tooth", "thermal_growth", "speed_ripple", "creep"]
+OUTSIDE = ["torque_saturation", "slipping_coupling", "damaged_tooth", "thermal_growth", "speed_ripple", "creep",
+           "two_gaps"]
 PAIRS = ["gravity,cogging", "varying_backlash,stribeck", "transmission_error,load_dependent_friction",
          "friction_drift,varying_backlash", "delay,gravity", "quadratic_drag,encoder_scale",
          "position_dependent_friction,transmission_error", "cogging,mesh_hardening"]

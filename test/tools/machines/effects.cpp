@@ -203,6 +203,18 @@ Json creep(Random& random, const Circumstances&, Machine& machine) {
   return {{"load angle", "falls back by A*T*abs(w) dt, T = torque through the mesh"}, {"A", creep}};
 }
 
+Json two_gaps(Random& random, const Circumstances&, Machine& machine) {
+  SecondStage& second = machine.second;
+  second.backlash = machine.mesh.backlash * random.uniform(0.5, 1);
+  second.wheel.inertia = random.uniform(0.3, 0.8);
+  second.wheel.friction.coulomb = random.uniform(10, 40);
+  return {{"a wheel between two meshes",
+           "backlash_angle b and A, both twice as stiff and damped, inertia J, friction C"},
+          {"A", second.backlash},
+          {"J", second.wheel.inertia},
+          {"C", second.wheel.friction.coulomb}};
+}
+
 }  // namespace
 
 const std::vector<Effect>& all_effects() {
@@ -231,6 +243,7 @@ const std::vector<Effect>& all_effects() {
       {"thermal_growth", false, {}, thermal_growth},
       {"speed_ripple", false, {}, speed_ripple},
       {"creep", false, {}, creep},
+      {"two_gaps", false, {}, two_gaps},
   };
   return effects;
 }

@@ -68,6 +68,13 @@ struct Mesh {
   double damage_softening = 0;                                   // share of the stiffness lost in the middle
 };
 
+/// A second mesh in series with the first, and the wheel between them; both meshes then have twice the
+/// stiffness and damping.
+struct SecondStage {
+  double backlash = 0;  // rad; 0: there is none
+  Body wheel;
+};
+
 struct Drive {
   double saturation = 0;  // N m, the torque that the motor cannot exceed; 0: none
   Wave cogging;           // N m
@@ -90,6 +97,7 @@ struct Sensors {
 struct Machine {
   Body motor, load;
   Mesh mesh;
+  SecondStage second;
   Drive drive;
   Gravity gravity;
   Sensors sensors;

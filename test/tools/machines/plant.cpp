@@ -66,8 +66,25 @@ double Plant::flank(int side, double displacement, double rate, double* gap_slop
   return law(penetration, side * rate - *gap_slope * load_.speed, softening);
 }
 
+/// Linear teeth with nothing odd about them, twice as stiff as declared.
+double Plant::simple_mesh(double backlash, const State& driving, const State& driven) const {
+  const double displacement = driving.position - driven.position, rate = driving.speed - driven.speed;
+  const double penetration = std::abs(displacement) - backlash / 2;
+  if (penetration <= 0) return 0;
+  const int side = displacement > 0 ? 1 : -1;
+  const Mesh& mesh = machine_.mesh;
+  return side * std::max(0.0, 2 * (mesh.stiffness * penetration + mesh.damping * side * rate));
+}
+
+Plant::MeshTorques Plant::two_meshes() const {
+  const double first = simple_mesh(machine_.mesh.backlash, motor_, wheel_);
+  const double second = simple_mesh(machine_.second.backlash, wheel_, load_);
+  return {first, -first, first - second, second};
+}
+
 // Every flank acts on both bodies by virtual work: penetration = side * displacement - half gap.
 Plant::MeshTorques Plant::mesh() const {
+  if (machine_.second.backlash != 0) return two_meshes();
   const Mesh& mesh = machine_.mesh;
   const double ratio = 1 + mesh.ratio_per_torque * mesh_torque_;
   const double error_slope = mesh.transmission_error.slope(load_.position);
@@ -78,7 +95,7 @@ Plant::MeshTorques Plant::mesh() const {
   const double forward = flank(1, displacement, rate, &forward_slope);
   const double backward = flank(-1, displacement, rate, &backward_slope);
   const double torque = forward - backward;
-  return {torque, -torque * ratio,
+  return {torque, -torque * ratio, 0,
           torque * (1 - error_slope) + forward * forward_slope + backward * backward_slope};
 }
 
@@ -133,26 +150,30 @@ void Plant::push(double torque, const MeshTorques& teeth, double length) {
   const double weight = machine_.gravity.amplitude == 0
                             ? 0
                             : machine_.gravity.amplitude * std::sin(load_.position + machine_.gravity.phase);
+  if (machine_.second.backlash != 0) accelerate(machine_.second.wheel, teeth.wheel, length, &wheel_);
   accelerate(machine_.load, teeth.load - weight, length, &load_);
 }
 
+/// On at the speeds that the bodies have.
+void Plant::drift(double length) {
+  for (State* body : {&motor_, &wheel_, &load_}) body->position += length * body->speed;
+  time_ += length;
+}
+
 void Plant::step(double torque, double length) {
-  motor_.position += length / 2 * motor_.speed;
-  load_.position += length / 2 * load_.speed;
-  time_ += length / 2;
+  drift(length / 2);
   // The teeth act with the speeds of the middle of the step: with those of its start their damping b would
   // take b length / 2 from the inertia of the motor.
-  const State motor = motor_, load = load_;
+  const State motor = motor_, wheel = wheel_, load = load_;
   push(torque, mesh(), length / 2);
   const MeshTorques teeth = mesh();
   motor_ = motor;
+  wheel_ = wheel;
   load_ = load;
   mesh_torque_ = teeth.through;
   slip(length);
   push(torque, teeth, length);
-  motor_.position += length / 2 * motor_.speed;
-  load_.position += length / 2 * load_.speed;
-  time_ += length / 2;
+  drift(length / 2);
 }
 
 }  // namespace machines
