@@ -18,6 +18,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/record/sample_joiner.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "bag_structure.h"
@@ -116,6 +117,28 @@ class JointRun {
     if (record_.time.empty())
       throw BadData(path_, "no message of joint '" + printable(joint_) + "' on " + printable(topic_));
     drop_absent_channels();
+    return with_warnings();
+  }
+
+  /// Of a channel map: what this topic has of it.
+  record::Record finished(const record::ChannelMap& sources) {
+    for (const record::ChannelSource& source : sources.sources) {
+      std::vector<double>& column = record_.column(source.channel);
+      if (column.empty() || std::isnan(column.front()))
+        throw BadData(path_, fmt::format("channels.{}: no message on {} has the {} of '{}'",
+                                         record::channel_name(source.channel), printable(topic_),
+                                         record::field_name(source.field), printable(source.name)));
+    }
+    for (const record::Channel channel : record::kChannels)
+      if (!record_.column(channel).empty() && std::isnan(record_.column(channel).front()))
+        record_.column(channel).clear();
+    return with_warnings();
+  }
+
+  std::exception_ptr wrong;  // with a message of it
+
+ private:
+  record::Record with_warnings() {
     const std::string repeated = stamps_.describe("topic " + topic_);
     if (!repeated.empty()) record_.warnings.push_back(repeated);
     for (std::string& warning : record::describe_time_base(record_.time))
@@ -123,9 +146,6 @@ class JointRun {
     return std::move(record_);
   }
 
-  std::exception_ptr wrong;  // with a message of it
-
- private:
   [[noreturn]] void fail_at(std::size_t index, const std::string& reason) const {
     throw BadData(fmt::format("{}: {} message {}", path_, printable(topic_), index), reason);
   }
@@ -187,7 +207,7 @@ struct TopicRuns {
   std::set<std::string> names;
   std::vector<std::string> joints;
   std::vector<JointRun> runs;
-  JointStateReader reader{std::vector<std::string>()};
+  JointStateReader reader{std::vector<record::ChannelMap>()};
   std::size_t messages = 0;
 };
 
@@ -198,15 +218,38 @@ class Reader {
       : path_(path), joint_(joint), wanted_topic_(topic) {}
 
   record::Record read() {
+    return guarded([this] {
+      read_origin();
+      return with_own_names(joint_);
+    });
+  }
+
+  record::Record read(const record::ChannelMap& map) {
+    return guarded([&] {
+      read_origin();
+      if (origin_) return with_own_names(map.joint);
+      std::vector<std::string> topics;
+      for (const std::string& wanted : map.topics()) {
+        const std::vector<std::string> found = candidate_topics(wanted);
+        if (found.size() > 1)
+          fail("channels: several topics end in " + printable(wanted) + ", name one whole: " + joined(found));
+        topics.push_back(found.front());
+      }
+      if (topics.size() > 1) origin_ = first_stamp(topics);
+      for (std::size_t i = 0; i < topics.size(); ++i) meet(map.on(map.topics()[i]), topics[i]);
+      mapped_ = true;
+      read_messages(topics);
+      return joined_parts(map, topics);
+    });
+  }
+
+ private:
+  template <typename Action>
+  record::Record guarded(const Action& action) {
     check_bag_structure(path_);
     try {
       bag_.open(path_, rosbag::bagmode::Read);
-      const std::vector<std::string> topics = candidate_topics();
-      read_origin();
-      read_messages(topics);
-      JointRun& run = chosen(topics);
-      if (run.wrong) std::rethrow_exception(run.wrong);
-      return run.finished();
+      return action();
     } catch (const Error&) {
       throw;
     } catch (const std::exception& e) {
@@ -215,23 +258,31 @@ class Reader {
     }
   }
 
- private:
   [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
 
-  std::vector<std::string> candidate_topics() {
+  /// By the names of this package.
+  record::Record with_own_names(const std::string& joint) {
+    joint_ = joint;
+    const std::vector<std::string> topics = candidate_topics(wanted_topic_);
+    read_messages(topics);
+    JointRun& run = chosen(topics);
+    if (run.wrong) std::rethrow_exception(run.wrong);
+    return run.finished();
+  }
+
+  std::vector<std::string> candidate_topics(const std::string& wanted) {
     rosbag::View all(bag_);
     std::set<std::string> topics, present;
     for (const rosbag::ConnectionInfo* c : all.getConnections()) {
       present.insert(printable(c->topic) + " (" + type_of(*c) + ")");
-      if (!topic_matches(c->topic, wanted_topic_)) continue;
+      if (!topic_matches(c->topic, wanted)) continue;
       if (!is_type<sensor_msgs::JointState>(*c))
         fail("topic " + printable(c->topic) + " is of type " + type_of(*c) +
              ", expected sensor_msgs/JointState");
       topics.insert(c->topic);
     }
     if (topics.empty())
-      fail("no topic " + printable(wanted_topic_) +
-           "; there are: " + (present.empty() ? "none" : joined(present)));
+      fail("no topic " + printable(wanted) + "; there are: " + (present.empty() ? "none" : joined(present)));
     return {topics.begin(), topics.end()};
   }
 
@@ -273,11 +324,11 @@ class Reader {
   void take(const sensor_msgs::JointState& message, const std::string& topic) {
     TopicRuns& on = topics_[topic];
     for (const std::string& name : message.name)
-      if (on.names.insert(name).second) meet(name, topic, on);
+      if (on.names.insert(name).second && !mapped_) meet(name, topic, on);
     const std::size_t index = on.messages++;
     for (const std::size_t place : on.reader.read(message)) {
       JointRun& run = on.runs[place];
-      const bool wanted = joint_.empty() ? joints_.size() == 1 : on.joints[place] == joint_;
+      const bool wanted = mapped_ || (joint_.empty() ? joints_.size() == 1 : on.joints[place] == joint_);
       if (run.wrong || !wanted) continue;
       try {
         run.take(on.reader, place, message.header.stamp, index);
@@ -294,7 +345,49 @@ class Reader {
     joints_.insert(*joint);
     on.joints.push_back(*joint);
     on.runs.emplace_back(path_, topic, *joint, origin_);
-    on.reader = JointStateReader(on.joints);
+    std::vector<record::ChannelMap> maps;
+    for (const std::string& each : on.joints) maps.push_back(record::usual_channels(each));
+    on.reader = JointStateReader(maps);
+  }
+
+  void meet(const record::ChannelMap& sources, const std::string& topic) {
+    TopicRuns& on = topics_[topic];
+    on.joints = {sources.joint};
+    on.runs.emplace_back(path_, topic, sources.joint, origin_);
+    on.reader = JointStateReader({sources});
+  }
+
+  /// Time 0 of all topics.
+  ros::Time first_stamp(const std::vector<std::string>& topics) {
+    rosbag::View view(bag_, rosbag::TopicQuery(topics));
+    for (const rosbag::MessageInstance& instance : view)
+      if (const auto message = instance.instantiate<sensor_msgs::JointState>()) return message->header.stamp;
+    fail("no message on " + joined(topics));
+  }
+
+  /// Of one topic of a map.
+  record::Record part(const record::ChannelMap& sources, const std::string& topic) {
+    TopicRuns& on = topics_[topic];
+    JointRun& run = on.runs.front();
+    if (run.wrong) std::rethrow_exception(run.wrong);
+    std::vector<std::string> names;
+    for (const std::string& name : on.names) names.push_back(printable(name));
+    for (const record::ChannelSource& source : sources.sources)
+      if (on.names.count(source.name) == 0)
+        fail(fmt::format("channels.{}: no '{}' on {}; there are: {}", record::channel_name(source.channel),
+                         printable(source.name), printable(topic), names.empty() ? "none" : joined(names)));
+    return run.finished(sources);
+  }
+
+  record::Record joined_parts(const record::ChannelMap& map, const std::vector<std::string>& topics) {
+    std::vector<record::Record> parts;
+    for (std::size_t i = 0; i < topics.size(); ++i) parts.push_back(part(map.on(map.topics()[i]), topics[i]));
+    if (parts.size() == 1) return std::move(parts.front());
+    try {
+      return record::joined(parts);
+    } catch (const BadData& error) {
+      fail(std::string("channels: ") + error.what());
+    }
   }
 
   /// The joint that was asked for, or the only one; on its only topic.
@@ -329,6 +422,7 @@ class Reader {
   std::optional<ros::Time> origin_;
   std::set<std::string> joints_;
   std::map<std::string, TopicRuns> topics_;
+  bool mapped_ = false;  // by a channel map, not by names
 };
 
 }  // namespace
@@ -337,6 +431,10 @@ const ros::Time kBagTimeOrigin(1'000'000'000, 0);
 
 record::Record read_bag(const std::string& path, const std::string& joint, const std::string& topic) {
   return Reader(path, joint, topic).read();
+}
+
+record::Record read_bag(const std::string& path, const record::ChannelMap& channels) {
+  return channels.declared ? Reader(path, "", "joint_states").read(channels) : read_bag(path, channels.joint);
 }
 
 }  // namespace backlash::ros_bridge

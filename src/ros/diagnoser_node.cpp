@@ -19,11 +19,13 @@ namespace {
 
 constexpr int kTick = 100;  // ms: a change of level is published so soon
 constexpr int kTicks = 10;  // from one report on /diagnostics to the next without a change
-std::vector<std::string> names_of(const std::vector<MonitorSettings>& joints) {
-  std::vector<std::string> names;
-  names.reserve(joints.size());
-  for (const MonitorSettings& joint : joints) names.push_back(joint.joint);
-  return names;
+std::vector<record::ChannelMap> channels_of(const std::vector<MonitorSettings>& joints) {
+  std::vector<record::ChannelMap> maps;
+  for (const MonitorSettings& joint : joints) {
+    maps.push_back(joint.rig.channels.declared ? joint.rig.channels : record::usual_channels(joint.joint));
+    maps.back().joint = joint.joint;
+  }
+  return maps;
 }
 
 /// A joint's name may have parts, a file's name may not.
@@ -44,16 +46,19 @@ DiagnoserNode::DiagnoserNode(const ros::NodeHandle& handle, const ros::NodeHandl
       private_handle_(private_handle),
       folder_("~folder", settings.folder),
       job_memory_(settings.job_memory),
-      reader_(names_of(settings.joints)),
+      inputs_(channels_of(settings.joints)),
       updater_(handle, private_handle) {
-  topic_ = handle_.resolveName("joint_states");
+  for (const std::string& topic : inputs_.topics()) topics_.push_back(handle_.resolveName(topic));
   updater_.setHardwareID(settings.joints.front().rig.rig.name);
   serve_live(settings);
   advertise();
   ros::NodeHandle samples(handle_);
   samples.setCallbackQueue(&sample_queue_);
-  subscriber_ = samples.subscribe("joint_states", settings.queue, &DiagnoserNode::on_joint_state, this,
-                                  ros::TransportHints().tcpNoDelay());
+  for (std::size_t i = 0; i < inputs_.topics().size(); ++i)
+    subscribers_.push_back(samples.subscribe<sensor_msgs::JointState>(
+        inputs_.topics()[i], settings.queue,
+        [this, i](const sensor_msgs::JointState::ConstPtr& message) { on_joint_state(i, *message); },
+        ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
 DiagnoserNode::~DiagnoserNode() {
@@ -75,8 +80,8 @@ void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings&
       [this, place = joints_.size()](const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis) {
         publish(joints_[place], stamp, diagnosis);
       });
-  joint.diagnostics =
-      std::make_unique<JointDiagnostics>(*joint.monitor, joint.history.get(), topic_, common.diagnostics);
+  joint.diagnostics = std::make_unique<JointDiagnostics>(*joint.monitor, joint.history.get(), joined(topics_),
+                                                         common.diagnostics);
   joint.diagnostics->add_to(updater_);
   joints_.push_back(std::move(joint));
 }
@@ -180,12 +185,13 @@ void DiagnoserNode::write_histories() {
   }
 }
 
-void DiagnoserNode::on_joint_state(const sensor_msgs::JointState::ConstPtr& message) {
-  for (const std::size_t joint : reader_.read(*message)) {
-    const auto report = joints_[joint].monitor->take(message->header.stamp, reader_.values(joint),
-                                                     reader_.problem(joint), topic_);
-    if (report) publish(joints_[joint], *report);
-  }
+void DiagnoserNode::on_joint_state(std::size_t topic, const sensor_msgs::JointState& message) {
+  inputs_.take(topic, message,
+               [&](std::size_t joint, const ros::Time& stamp, const record::ChannelValues& values,
+                   const std::string& problem) {
+                 const auto report = joints_[joint].monitor->take(stamp, values, problem, topics_[topic]);
+                 if (report) publish(joints_[joint], *report);
+               });
 }
 
 void DiagnoserNode::publish(const Joint& joint, const PeriodReport& report) {

@@ -32,7 +32,11 @@ std::string size_problem(const sensor_msgs::JointState& m) {
   return problem;
 }
 
-enum Part { kMotor, kSensor, kLoad, kReference, kCurrent, kAccelerometer };
+const std::vector<double>& array_of(const sensor_msgs::JointState& m, record::Field field) {
+  return field == record::Field::position   ? m.position
+         : field == record::Field::velocity ? m.velocity
+                                            : m.effort;
+}
 
 /// Adds one joint; arrays stay parallel, they are emptied at the end where nobody has the quantity.
 void add(sensor_msgs::JointState& m, const std::string& name, double position, double velocity,
@@ -72,12 +76,18 @@ double StampClock::seconds(const ros::Time& stamp) {
   return std::fabs(nanoseconds) < kExactIntegers ? nanoseconds / 1e9 : whole + rest * 1e-9;
 }
 
-JointStateReader::JointStateReader(const std::vector<std::string>& joints) : readings_(joints.size()) {
+JointStateReader::JointStateReader(const std::vector<record::ChannelMap>& joints) : readings_(joints.size()) {
   for (std::size_t joint = 0; joint < joints.size(); ++joint) {
-    const JointNames n(joints[joint]);
-    const std::string* const parts[] = {&n.motor,     &n.sensor,  &n.load,
-                                        &n.reference, &n.current, &n.accelerometer};
-    for (int part = kMotor; part <= kAccelerometer; ++part) places_[*parts[part]] = {joint, part};
+    unsigned bit = 1;
+    for (const record::ChannelSource& source : joints[joint].sources) {
+      std::vector<Place>& places = places_[source.name];
+      if (places.empty() || places.back().joint != joint) {
+        places.push_back({joint, bit, true, {}});
+        bit <<= 1U;
+      }
+      places.back().sources.push_back(source);
+      if (source.channel != record::Channel::reference_position) places.back().set_point = false;
+    }
     readings_[joint].values.fill(kAbsent);
   }
   seen_.reserve(joints.size());
@@ -89,65 +99,47 @@ const std::vector<std::size_t>& JointStateReader::read(const sensor_msgs::JointS
     readings_[joint].values.fill(kAbsent);
     readings_[joint].problem.clear();
     readings_[joint].seen = 0;
+    readings_[joint].any = false;
   }
   seen_.clear();
   mentioned_.clear();
   const std::string wrong_size = size_problem(message);
   for (std::size_t i = 0; i < message.name.size(); ++i) {
-    const auto place = places_.find(message.name[i]);
-    if (place == places_.end()) continue;
-    const auto [joint, part] = place->second;
-    Reading& reading = readings_[joint];
-    if (reading.seen == 0) seen_.push_back(joint);
-    constexpr unsigned kReferenceOnly = 1U << kReference;  // a set-point alone says nothing of the joint
-    if ((reading.seen | kReferenceOnly) == kReferenceOnly && part != kReference) mentioned_.push_back(joint);
-    if (reading.problem.empty()) reading.problem = wrong_size;
-    if (reading.problem.empty() && (reading.seen & 1U << part))
-      reading.problem = "the name " + printable(message.name[i]) + " appears twice";
-    reading.seen |= 1U << part;
-    if (reading.problem.empty()) take(message, i, part, reading);
+    const auto places = places_.find(message.name[i]);
+    if (places == places_.end()) continue;
+    for (const Place& place : places->second) {
+      Reading& reading = readings_[place.joint];
+      if (reading.seen == 0) seen_.push_back(place.joint);
+      if (!reading.any && !place.set_point) {
+        reading.any = true;
+        mentioned_.push_back(place.joint);
+      }
+      if (reading.problem.empty()) reading.problem = wrong_size;
+      if (reading.problem.empty() && (reading.seen & place.bit) != 0)
+        reading.problem = "the name " + printable(message.name[i]) + " appears twice";
+      reading.seen |= place.bit;
+      if (reading.problem.empty()) take(message, i, place, reading);
+    }
   }
   return mentioned_;
 }
 
-void JointStateReader::take(const sensor_msgs::JointState& m, std::size_t i, int part, Reading& reading) {
-  const auto value = [&](const std::vector<double>& array, const char* what) {
-    if (array.empty()) return kAbsent;
-    if (std::isinf(array[i])) reading.problem = m.name[i] + " " + what + " is infinite";
-    return array[i];
-  };
-  const double position = value(m.position, "position"), velocity = value(m.velocity, "velocity"),
-               effort = value(m.effort, "effort");
-  record::ChannelValues& values = reading.values;
-  switch (part) {
-    case kMotor:
-      at(values, record::Channel::motor_position) = position;
-      at(values, record::Channel::motor_velocity) = velocity;
-      at(values, record::Channel::motor_torque) = effort;
-      break;
-    case kSensor:
-      at(values, record::Channel::sensor_torque) = effort;
-      break;
-    case kLoad:
-      at(values, record::Channel::load_position) = position;
-      at(values, record::Channel::load_velocity) = velocity;
-      at(values, record::Channel::output_torque) = effort;
-      break;
-    case kReference:
-      at(values, record::Channel::reference_position) = position;
-      break;
-    case kCurrent:
-      at(values, record::Channel::motor_current) = effort;
-      break;
-    case kAccelerometer:
-      at(values, record::Channel::acceleration) = effort;
-      break;
+void JointStateReader::take(const sensor_msgs::JointState& m, std::size_t i, const Place& place,
+                            Reading& reading) {
+  for (const record::ChannelSource& source : place.sources) {
+    const std::vector<double>& array = array_of(m, source.field);
+    if (array.empty()) continue;
+    if (std::isinf(array[i]))
+      reading.problem = m.name[i] + " " + record::field_name(source.field) + " is infinite";
+    double& value = at(reading.values, source.channel);
+    value = source.scale * array[i];
+    if (source.offset != 0) value += source.offset;  // else -0.0 stays what it is
   }
 }
 
 record::ChannelValues read_joint_state(const sensor_msgs::JointState& m, const std::string& joint,
                                        const std::string& topic) {
-  JointStateReader reader({joint});
+  JointStateReader reader({record::usual_channels(joint)});
   reader.read(m);
   if (!reader.problem(0).empty()) throw BadData(topic, reader.problem(0));
   return reader.values(0);

@@ -170,7 +170,7 @@ int compare(const Arguments& arguments) {
     files.push_back(rig_file::load_rig_file(arguments.positional(i)));
     rigs.push_back(files.back().rig);
   }
-  record::Record given = read_record(path, {rigs.front().joint});
+  record::Record given = read_record(path, place_of(files.front()));
   given.name = path;
   identification::ComparedRecord record;
   std::vector<identification::ModelComparison> models;

@@ -39,7 +39,8 @@ int convert(const Arguments& arguments) {
   check_record_path(in);
   check_record_path(out);
   BagPlace place;
-  if (arguments.has("rig")) place.joint = rig_file::load_rig_file(arguments.text("rig")).rig.joint;
+  if (arguments.has("rig")) place = place_of(rig_file::load_rig_file(arguments.text("rig")));
+  if (arguments.has("joint") || arguments.has("topic")) place.channels.declared = false;
   if (arguments.has("joint")) place.joint = arguments.text("joint");
   if (arguments.has("topic")) place.topic = arguments.text("topic");
   std::vector<std::string> inputs = {in};

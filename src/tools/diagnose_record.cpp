@@ -178,9 +178,12 @@ Inputs read_inputs(const Arguments& arguments) {
   if (arguments.has("rig")) {
     in.rig = rig_file::load_rig_file(arguments.text("rig"));
     in.settings = in.rig->diagnosis;
-    place.joint = in.rig->rig.joint;
+    place = place_of(*in.rig);
   }
-  if (arguments.has("joint")) place.joint = arguments.text("joint");
+  if (arguments.has("joint")) {
+    place.joint = arguments.text("joint");
+    place.channels.declared = false;
+  }
   if (arguments.has("curve")) {
     in.curve_source = arguments.text("curve");
     in.curve = diagnosis::read_curve(in.curve_source);

@@ -70,7 +70,7 @@ int identify_machine(const Arguments& arguments) {
   const rig_file::RigFile file = rig_file::load_rig_file(arguments.text("rig"));
   std::vector<record::Record> records;
   for (const std::string& path : arguments.positionals()) {
-    records.push_back(read_record(path, {file.rig.joint}));
+    records.push_back(read_record(path, place_of(file)));
     records.back().name = std::filesystem::path(path).filename();
   }
   identification::Identification found;

@@ -81,11 +81,10 @@ TraceJob job_of(const Arguments& arguments) {
   return job;
 }
 
-record::Record read(const std::string& path, const std::string& joint, std::vector<std::string>& warnings) {
-  const std::filesystem::path file(path);
-  record::Record record =
-      file.extension() == ".bag" ? ros_bridge::read_bag(path, joint, "joint_states") : record::read_csv(path);
-  record.name = file.filename();
+record::Record read(const std::string& path, const rig_file::RigFile& rig,
+                    std::vector<std::string>& warnings) {
+  record::Record record = read_record(path, place_of(rig));
+  record.name = std::filesystem::path(path).filename();
   for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
   return record;
 }
@@ -96,8 +95,8 @@ identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
   identification::check_traced_rig_text(job.rig);
   std::vector<std::string> inputs = job.train, warnings;
   std::vector<record::Record> train;
-  for (const std::string& path : job.train) train.push_back(read(path, job.rig.rig.joint, warnings));
-  const record::Record test = read(job.test, job.rig.rig.joint, warnings);
+  for (const std::string& path : job.train) train.push_back(read(path, job.rig, warnings));
+  const record::Record test = read(job.test, job.rig, warnings);
   inputs.push_back(job.test);
   inputs.push_back(job.rig.source);
   const findings::TraceFolder folder(job.folder, inputs);

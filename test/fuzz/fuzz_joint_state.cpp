@@ -61,7 +61,7 @@ void check_stream(const diagnosis::SampleStream& stream, long offered) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   FuzzedDataProvider in(data, size);
-  ros_bridge::JointStateReader reader({"joint", "elbow"});
+  ros_bridge::JointStateReader reader({record::usual_channels("joint"), record::usual_channels("elbow")});
   diagnosis::StreamSettings settings;
   settings.keep = 0.5;
   diagnosis::ApdSettings apd;

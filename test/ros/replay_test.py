@@ -10,9 +10,11 @@ import sys
 import tempfile
 import unittest
 
+import rosbag
 import rospy
 import rostest
 from diagnoser_support import Diagnoser, build_curve, rig_path, run_tool
+from sensor_msgs.msg import JointState
 from simulator_support import TIMEOUT, Simulator, package_folder
 from std_srvs.srv import SetBool
 
@@ -33,6 +35,30 @@ def play_command(bag, *options, topic="/joint_states"):
 def play(bag, *options, topic="/joint_states"):
     """Plays a bag to its end; the keyboard is not asked."""
     subprocess.run(play_command(bag, *options, topic=topic), check=True, stdin=subprocess.DEVNULL, timeout=300)
+
+
+ROBOT_CHANNELS = """
+channels:
+  motor_torque: {topic: /arm/joint_states, name: elbow, scale: 16}     # the effort is a current
+  motor_position: {topic: /arm/joint_states, name: elbow, scale: -1}
+  motor_velocity: {topic: /arm/joint_states, name: elbow, scale: -1}
+  load_position: {topic: /arm/joint_states, name: elbow_link}
+  sensor_torque: {topic: /arm/torques, name: elbow_flange}
+"""
+
+
+def as_a_robot_publishes(bag, path):
+    """The same run with the names, signs, units and topics of ROBOT_CHANNELS; powers of two keep every bit."""
+    with rosbag.Bag(bag) as recorded, rosbag.Bag(path, "w") as out:
+        for _, m, received in recorded.read_messages(topics=["/joint_states"]):
+            at = {name: i for i, name in enumerate(m.name)}
+            motor, sensor, load = at["joint_motor"], at["joint_sensor"], at["joint_load"]
+            arm = JointState(header=m.header, name=["elbow_link", "elbow"],
+                             position=[m.position[load], -m.position[motor]],
+                             velocity=[0, -m.velocity[motor]], effort=[0, m.effort[motor] / 16])
+            out.write("/arm/joint_states", arm, received)
+            out.write("/arm/torques", JointState(header=m.header, name=["elbow_flange"], effort=[m.effort[sensor]]),
+                      received)
 
 
 def numbers(answer):
@@ -97,6 +123,18 @@ class ReplayTest(unittest.TestCase):
         for answer in answers[1:]:
             self.assertEqual(numbers(answer), numbers(answers[0]))
         self.assert_like_offline(answers[0], offline(SMALL_BAG, self.folder, "--rig", rig_path(), "--curve", self.curve))
+
+    def test_a_robot_with_names_topics_and_units_of_its_own_needs_no_relay(self):
+        rig, bag = (os.path.join(self.folder, name) for name in ("robot.yaml", "robot.bag"))
+        with open(rig_path()) as stream, open(rig, "w") as out:
+            out.write(stream.read() + ROBOT_CHANNELS)
+        as_a_robot_publishes(SMALL_BAG, bag)
+        with Diagnoser({"rig": rig, "curve": self.curve}).ready() as diagnoser:
+            subprocess.run(play_command(bag, topic="/arm/joint_states") + ["/arm/torques"], check=True,
+                           stdin=subprocess.DEVNULL, timeout=300)
+            answer = diagnoser.diagnose(periods=SMALL_BAG_PERIODS, timeout=TIMEOUT)
+        self.assertEqual(numbers(answer), numbers(self.as_recorded()))
+        self.assert_like_offline(answer, offline(bag, self.folder, "--rig", rig, "--curve", self.curve))
 
     def test_pause_changes_nothing(self):
         with Diagnoser({"curve": self.curve}).ready() as diagnoser:

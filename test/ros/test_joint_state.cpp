@@ -20,7 +20,7 @@ TEST(JointState, CurrentAndAccelerationAreEffortsOfNamesOfTheirOwn) {
   sensor_msgs::JointState m;
   m.name = {"elbow_accelerometer", "wrist_current", "elbow_current", "elbow_motor"};
   m.effort = {-120, 9, 1.5, 0.05};
-  EXPECT_EQ(JointStateReader({"elbow"}).read(m).size(), 1u);
+  EXPECT_EQ(JointStateReader({record::usual_channels("elbow")}).read(m).size(), 1u);
   const record::ChannelValues values = read_joint_state(m, "elbow", "joint_states");
   EXPECT_EQ(of(values, record::Channel::acceleration), -120);
   EXPECT_EQ(of(values, record::Channel::motor_current), 1.5);
@@ -41,8 +41,8 @@ TEST(JointState, EitherNameAloneIsTheJoint) {
     sensor_msgs::JointState m;
     m.name = {"elbow" + suffix};
     m.effort = {2};
-    EXPECT_EQ(JointStateReader({"elbow"}).read(m).size(), 1u);
-    EXPECT_TRUE(JointStateReader({"wrist"}).read(m).empty());
+    EXPECT_EQ(JointStateReader({record::usual_channels("elbow")}).read(m).size(), 1u);
+    EXPECT_TRUE(JointStateReader({record::usual_channels("wrist")}).read(m).empty());
     m.effort.clear();
     m.position = {3};  // says nothing of these two
     const record::ChannelValues values = read_joint_state(m, "elbow", "joint_states");
@@ -96,7 +96,8 @@ TEST(JointState, TheSimulatorNamesOnlyWhatIsMeasured) {
 }
 
 TEST(JointStateReader, TellsTheJointsOfAMessageApart) {
-  JointStateReader reader({"elbow", "wrist", "knee"});
+  JointStateReader reader(
+      {record::usual_channels("elbow"), record::usual_channels("wrist"), record::usual_channels("knee")});
   sensor_msgs::JointState m;
   m.name = {"wrist_motor", "other_motor", "elbow_motor", "wrist_load", "knee_reference"};
   m.position = {1, 2, 3, 4, 5};
@@ -115,7 +116,7 @@ TEST(JointStateReader, TellsTheJointsOfAMessageApart) {
 }
 
 TEST(JointStateReader, AProblemOfOneJointIsNotTheOthers) {
-  JointStateReader reader({"elbow", "wrist"});
+  JointStateReader reader({record::usual_channels("elbow"), record::usual_channels("wrist")});
   sensor_msgs::JointState m;
   m.name = {"elbow_motor", "wrist_motor", "elbow_motor"};
   m.effort = {1, 2, 3};

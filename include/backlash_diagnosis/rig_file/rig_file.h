@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 #include "backlash_diagnosis/model/rig.h"
+#include "backlash_diagnosis/record/channel_map.h"
 #include "backlash_diagnosis/rig_file/drive.h"
 #include "backlash_diagnosis/rig_file/test_runs.h"
 #include "backlash_diagnosis/simulation/simulation.h"
@@ -19,6 +20,7 @@ struct RigFile {
   diagnosis::DiagnosisSettings diagnosis;  // with the rig's elastic deflection and base radius filled in
   std::vector<TestRun> test_runs;
   std::optional<Drive> drive;
+  record::ChannelMap channels;  // where a robot publishes them
   /// Standard deviation of the logarithm of the declared backlash, of the gear when new; absent: not said.
   std::optional<double> backlash_error;
   std::string source;  // path, or "built-in sarkar_1997"

@@ -11,6 +11,7 @@
 
 #include <string>
 
+#include "backlash_diagnosis/record/channel_map.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::ros_bridge {
@@ -32,6 +33,11 @@ extern const ros::Time kBagTimeOrigin;  ///< 1e9 s: stamp of time 0 in written b
 /// some messages only, an array has the wrong size or a value is infinite.
 record::Record read_bag(const std::string& path, const std::string& joint = "",
                         const std::string& topic = "joint_states");
+
+/// The same by a channel map; where a rig file has none, the joint with the names of this package. Topics
+/// after the first are read at its stamps, see sample_joiner.h. Throws BadData too where the bag has not what
+/// the map says, naming what it has.
+record::Record read_bag(const std::string& path, const record::ChannelMap& channels);
 
 /// Writes a record as messages of `joint` on /joint_states, stamped `origin` + time (rounded to 1 ns), whole
 /// or not at all. Throws CannotWrite when the file cannot be written, BadData when read_bag would not read it

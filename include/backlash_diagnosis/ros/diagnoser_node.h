@@ -20,6 +20,7 @@
 #include "backlash_diagnosis/DiagnoserLiveConfig.h"
 #include "backlash_diagnosis/base/file_folder.h"
 #include "backlash_diagnosis/ros/joint_diagnostics.h"
+#include "backlash_diagnosis/ros/joint_inputs.h"
 #include "backlash_diagnosis/ros/joint_monitor.h"
 #include "backlash_diagnosis/ros/live_server.h"
 #include "backlash_diagnosis/ros/trace_server.h"
@@ -65,7 +66,7 @@ class DiagnoserNode {
     std::unique_ptr<LiveServer<JointLive>> live;
   };
 
-  void on_joint_state(const sensor_msgs::JointState::ConstPtr& message);
+  void on_joint_state(std::size_t topic, const sensor_msgs::JointState& message);
   void publish(const Joint& joint, const PeriodReport& report);
   void publish(const Joint& joint, const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis);
   bool on_diagnose(backlash_diagnosis::Diagnose::Request& request,
@@ -94,12 +95,12 @@ class DiagnoserNode {
 
   ros::NodeHandle handle_, private_handle_;
   FileFolder folder_;
-  double job_memory_;          // GB
-  std::vector<Joint> joints_;  // as many as at the start, so that their addresses stay
-  JointStateReader reader_;    // of the same joints
-  std::string topic_;
+  double job_memory_;                // GB
+  std::vector<Joint> joints_;        // as many as at the start, so that their addresses stay
+  JointInputs inputs_;               // of the same joints
+  std::vector<std::string> topics_;  // of inputs_, resolved
   ros::CallbackQueue sample_queue_;  // samples have a thread of their own, services never hold them up
-  ros::Subscriber subscriber_;
+  std::vector<ros::Subscriber> subscribers_;  // of inputs_.topics()
   ros::Publisher distributions_, estimates_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<CurveServer> curve_server_;

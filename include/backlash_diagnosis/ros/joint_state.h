@@ -1,16 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A record as sensor_msgs/JointState and back: which joint name carries which channel, and how stamps become
-// seconds.
-//
-//   <joint>_motor       position = motor_position    velocity = motor_velocity   effort = motor_torque
-//   <joint>_sensor      position = twist of the input coupling (not recorded)    effort = sensor_torque
-//   <joint>_load        position = load_position     velocity = load_velocity   effort = output_torque
-//   <joint>_reference   position = reference_position
-//   <joint>_current         effort = motor_current [A]
-//   <joint>_accelerometer   effort = acceleration [rad/s^2]
-//
-// sensor_msgs/JointState has no field for a current or an acceleration; these two are put where a torque
-// would be.
+// A record as sensor_msgs/JointState and back, and how stamps become seconds. What is read is told by the
+// channel map of each joint (record/channel_map.h, which also has the names that are written).
 //
 // A joint whose name is absent has none of its channels; a NaN, or an empty position, velocity or effort
 // array, means "this joint does not have that quantity".
@@ -25,6 +15,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/record/channel_map.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::ros_bridge {
@@ -47,10 +38,11 @@ class StampClock {
   ros::Time origin_;
 };
 
-/// Reads the messages of some joints, each name looked up once; allocates only for what is wrong.
+/// Reads the messages of one topic, each name looked up once; allocates only for what is wrong.
 class JointStateReader {
  public:
-  explicit JointStateReader(const std::vector<std::string>& joints);
+  /// `joints`: of each joint its sources on this topic.
+  explicit JointStateReader(const std::vector<record::ChannelMap>& joints);
 
   /// The joints that a message speaks of, by their place in `joints` (the topic may carry others). This and
   /// what follows are valid until the next call.
@@ -61,24 +53,28 @@ class JointStateReader {
   const std::string& problem(std::size_t joint) const { return readings_[joint].problem; }
 
  private:
-  struct Place {
+  struct Place {  // of a name in a joint
     std::size_t joint;
-    int part;
+    unsigned bit;
+    bool set_point;  // says nothing of the joint by itself
+    std::vector<record::ChannelSource> sources;
   };
   struct Reading {
     record::ChannelValues values;
     std::string problem;
-    unsigned seen = 0;  // a bit for each part
+    unsigned seen = 0;  // a bit for each name
+    bool any = false;   // more than a set-point
   };
 
-  void take(const sensor_msgs::JointState& message, std::size_t i, int part, Reading& reading);
+  void take(const sensor_msgs::JointState& message, std::size_t i, const Place& place, Reading& reading);
 
-  std::unordered_map<std::string, Place> places_;
+  std::unordered_map<std::string, std::vector<Place>> places_;
   std::vector<Reading> readings_;
   std::vector<std::size_t> seen_, mentioned_;
 };
 
-/// Reads one message of one joint. Throws BadData naming `topic` where something is wrong with it.
+/// Reads one message of one joint by the names that this package gives. Throws BadData naming `topic` where
+/// something is wrong with it.
 record::ChannelValues read_joint_state(const sensor_msgs::JointState& message, const std::string& joint,
                                        const std::string& topic);
 

@@ -52,8 +52,17 @@ void check_record_path(const std::string& path) {
     throw UsageError("'" + printable(path, 4096) + "': a record must end in .csv or .bag");
 }
 
+BagPlace place_of(const rig_file::RigFile& file) {
+  BagPlace place;
+  place.joint = file.rig.joint;
+  place.channels = file.channels;
+  return place;
+}
+
 record::Record read_record(const std::string& path, const BagPlace& place) {
-  return is_bag(path) ? ros_bridge::read_bag(path, place.joint, place.topic) : record::read_csv(path);
+  if (!is_bag(path)) return record::read_csv(path);
+  return place.channels.declared ? ros_bridge::read_bag(path, place.channels)
+                                 : ros_bridge::read_bag(path, place.joint, place.topic);
 }
 
 void write_record(const record::Record& record, const std::string& path, const std::string& joint) {

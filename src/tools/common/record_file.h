@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/record/channel_map.h"
 #include "backlash_diagnosis/record/record.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace backlash::tools {
 
@@ -15,7 +17,11 @@ extern const std::string kDefaultJoint;  ///< "joint"
 struct BagPlace {
   std::string joint;  ///< empty: the only one there is
   std::string topic = "joint_states";
+  record::ChannelMap channels;  ///< where it is declared it says both
 };
+
+/// Where the joint of a rig file is.
+BagPlace place_of(const rig_file::RigFile& file);
 
 /// Throws UsageError for a path that ends in neither .csv nor .bag.
 void check_record_path(const std::string& path);

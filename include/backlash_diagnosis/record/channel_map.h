@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where the channels of one joint come from: which topic, which name in its messages, which of their fields,
+// and what must be done to the value. A robot publishes names and units of its own; this says what they are.
+//
+//   channel = scale * field + offset
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash::record {
+
+/// The arrays of sensor_msgs/JointState.
+enum class Field { position, velocity, effort };
+
+const char* field_name(Field field);
+
+/// The field that carries a channel where nothing else is said: sensor_msgs/JointState has none for a current
+/// or an acceleration, which are put where a torque would be.
+Field usual_field(Channel channel);
+
+struct ChannelSource {
+  Channel channel = Channel::motor_position;
+  std::string topic = "joint_states";
+  std::string name;  // in the messages
+  Field field = Field::position;
+  double scale = 1;   // unit of the channel over that of the field, != 0; < 0 turns the sign
+  double offset = 0;  // unit of the channel
+};
+
+struct ChannelMap {
+  std::string joint;  // what the joint is called in answers
+  std::vector<ChannelSource> sources;
+  bool declared = false;  // by the rig file or a parameter; else the names that this package gives
+
+  /// All topics, that of the motor's position (else of the first source) first: its stamps count.
+  std::vector<std::string> topics() const;
+  /// The sources on a topic.
+  ChannelMap on(const std::string& topic) const;
+};
+
+/// The names that this package gives, all on joint_states:
+///   <joint>_motor           position = motor_position   velocity = motor_velocity   effort = motor_torque
+///   <joint>_sensor                                                                  effort = sensor_torque
+///   <joint>_load            position = load_position    velocity = load_velocity    effort = output_torque
+///   <joint>_reference       position = reference_position
+///   <joint>_current                                                                 effort = motor_current
+///   <joint>_accelerometer                                                           effort = acceleration
+ChannelMap usual_channels(const std::string& joint);
+
+/// Throws InvalidParameter for a channel twice, no channel that shows backlash, an empty name or topic, a
+/// scale of 0, a scale or offset that is not finite.
+void check(const ChannelMap& map);
+
+}  // namespace backlash::record
