@@ -26,9 +26,9 @@ SMALL_BAG_PERIODS = 6  # 0.8 s at 10 Hz, less two to settle
 VERDICTS = (0, 1, 2, 3)  # exit codes of diagnose_record that are answers
 
 
-def play_command(bag, *options, topic="/joint_states"):
+def play_command(bag, *options, topic="/joint_states", delay=0):
     """Plays once the diagnoser listens."""
-    return ["rosbag", "play", "--clock", "--quiet", "--delay=0", "--wait-for-subscribers", *options, bag,
+    return ["rosbag", "play", "--clock", "--quiet", "--delay=%g" % delay, "--wait-for-subscribers", *options, bag,
             "--topics", topic]
 
 
@@ -130,7 +130,8 @@ class ReplayTest(unittest.TestCase):
             out.write(stream.read() + ROBOT_CHANNELS)
         as_a_robot_publishes(SMALL_BAG, bag)
         with Diagnoser({"rig": rig, "curve": self.curve}).ready() as diagnoser:
-            subprocess.run(play_command(bag, topic="/arm/joint_states") + ["/arm/torques"], check=True,
+            # A second of delay: a connection may still be under way when the topic has a subscriber.
+            subprocess.run(play_command(bag, topic="/arm/joint_states", delay=1) + ["/arm/torques"], check=True,
                            stdin=subprocess.DEVNULL, timeout=300)
             answer = diagnoser.diagnose(periods=SMALL_BAG_PERIODS, timeout=TIMEOUT)
         self.assertEqual(numbers(answer), numbers(self.as_recorded()))
