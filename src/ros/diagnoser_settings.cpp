@@ -80,7 +80,8 @@ parameters (private)
 
 subscribes
   joint_states             sensor_msgs/JointState: JOINT_motor, JOINT_sensor, JOINT_load,
-                           JOINT_current and JOINT_accelerometer (A and rad/s^2 as effort)
+                           JOINT_current and JOINT_accelerometer (A and rad/s^2 as effort);
+                           other topics and names where the rig file's `channels` say so
 publishes
   amplitude_distribution   backlash_diagnosis/AmplitudeDistribution, each whole period
   backlash_estimate        backlash_diagnosis/BacklashEstimate, one per method, each ~estimate_interval
