@@ -23,6 +23,13 @@ void yield_to_samples() {
 
 }  // namespace
 
+diagnosis::Diagnosis DiagnosisTask::compute() const {
+  diagnosis::Diagnosis diagnosis = diagnosis::diagnose(window, settings, curve.get(), baseline);
+  if (fitted && !window.record.time.empty())
+    diagnosis::recall_waveform(diagnosis, *fitted, window.record.time.back(), settings.limits, baseline);
+  return diagnosis;
+}
+
 DiagnosisWorker::DiagnosisWorker(Work work) : work_(std::move(work)), thread_(&DiagnosisWorker::run, this) {}
 
 DiagnosisWorker::~DiagnosisWorker() {

@@ -46,7 +46,8 @@ struct Estimate {
   bool from_record = false;   ///< what the value depends on was measured on the record, not declared
   bool fits_machine = false;  // of from_record: the values of the machine that other methods take from the
                               // rig file were fitted with it, so that they add nothing
-  std::string message;        ///< the reason of the status, or how the value came about
+  double age = 0;  ///< s, >= 0, by which the samples that it rests on ended before those of the diagnosis
+  std::string message;  ///< the reason of the status, or how the value came about
 };
 
 }  // namespace backlash::diagnosis
