@@ -79,7 +79,8 @@ bool BackgroundFits::one() {
       done = fit();
     } catch (const Cancelled&) {
     } catch (const std::exception& error) {
-      ROS_ERROR_THROTTLE(60, "a fit failed: %s", error.what());
+      if (problem_ != error.what()) ROS_ERROR("a fit failed: %s", error.what());
+      problem_ = error.what();
     }
     lock.lock();
     present_ = nullptr;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <list>
 #include <mutex>
+#include <string>
 #include <thread>
 
 namespace backlash::ros_bridge {
@@ -22,7 +23,7 @@ class BackgroundFits {
   BackgroundFits(const BackgroundFits&) = delete;
   BackgroundFits& operator=(const BackgroundFits&) = delete;
 
-  /// From now on `fit` has its turn among all. What it throws is logged.
+  /// From now on `fit` has its turn among all. What it throws is logged, and what comes again once.
   void add(const void* owner, Fit fit);
   void remove(const void* owner);  ///< cancels its present fit, and waits for its end
   void stop();                     ///< the same of all, for good
@@ -39,6 +40,7 @@ class BackgroundFits {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::list<Turn> turns_;          // the next one first
+  std::string problem_;            // that was logged last; of the thread
   const void* present_ = nullptr;  // whose fit runs
   bool cancel_ = false, stop_ = false;
   std::thread thread_;
