@@ -88,6 +88,50 @@ TEST(Waveform, MachinesWithAllValuesOff) {
   }
 }
 
+/// The file says 1.9 times the damping that was simulated, and 1.25 times the stiffness of the sensor.
+TEST(Waveform, NamesWhatTheRecordContradicts) {
+  rig_file::RigFile file = rig_file::default_rig_file();
+  file.rig.motor.viscous_damping /= 1.9;
+  file.rig.input_coupling.stiffness /= 1.25;
+  file.rig.mesh.backlash = 60e-6;
+  file.simulation.sensors = drawn(5, 0).simulation.sensors;
+  const Estimate e = diagnosis::estimate_waveform(record_of(file), declared());
+  expect_holds(e, 60e-6);
+  ASSERT_EQ(e.declared_wrong.size(), 2u) << e.message;
+  const double truth[] = {file.rig.motor.viscous_damping, file.rig.input_coupling.stiffness};
+  const double said[] = {declared().motor_damping, declared().sensor_stiffness};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const diagnosis::ContradictedValue& v = e.declared_wrong[i];
+    EXPECT_EQ(v.declared, said[i]) << v.name;
+    EXPECT_NEAR(v.found, truth[i], 0.01 * truth[i]) << v.name;  // at least: a tenth of the spread of the file
+    EXPECT_LT(v.standard_error, 0.01 * truth[i]) << v.name;
+    EXPECT_NE(e.message.find("declared " + v.name), std::string::npos) << e.message;
+  }
+}
+
+/// What people are shown is the record, and a waveform that leaves no more than its noise.
+TEST(Waveform, ShowsTheRecordAndTheFittedMachine) {
+  const record::Record record = record_of(drawn(101, 100e-6));
+  const Estimate e = diagnosis::estimate_waveform(record, declared());
+  ASSERT_TRUE(e.waveform);
+  const diagnosis::WaveformEvidence& evidence = *e.waveform;
+  ASSERT_EQ(evidence.values.size(), diagnosis::waveform_quantities().size());
+  ASSERT_GE(evidence.windows.size(), 4u);
+  for (const auto& window : evidence.windows) {
+    const auto first = static_cast<std::size_t>(std::lround((window.start - record.time[0]) * kRate));
+    double squares = 0;
+    for (std::size_t i = 0; i < window.torque.measured.size(); ++i) {
+      EXPECT_EQ(window.torque.measured[i], record.column(Channel::sensor_torque)[first + i]);
+      EXPECT_EQ(window.position.measured[i], record.column(Channel::motor_position)[first + i]);
+      squares += std::pow(window.torque.measured[i] - window.torque.model[i], 2);
+    }
+    // 0.002 N m of noise were added, and some hundred samples tell it to a tenth.
+    const double rms = std::sqrt(squares / static_cast<double>(window.torque.measured.size()));
+    EXPECT_NEAR(rms, 0.002, 0.0006);
+  }
+  EXPECT_FALSE(diagnosis::estimate_waveform(record.slice(0.2, 0.25), declared()).waveform);
+}
+
 /// The symmetry of waveform.h: the same torque is that of a machine with all of this times c and a gap 1 / c.
 TEST(Waveform, TorqueAloneScalesWithTheDeclaredMachine) {
   const record::Record record = without_position(record_of(drawn(7, 70e-6)));
