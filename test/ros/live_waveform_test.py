@@ -14,8 +14,8 @@ from simulator_support import TIMEOUT, Inbox, Simulator, default_rig, nanosecond
 
 RATE = 2000  # Hz
 BACKLASH = 8e-5  # m
-CHANGED = {"motor": {"viscous_damping": 0.6, "inertia": 1.15}, "pinion": {"inertia": 0.9},
-           "input_coupling": {"stiffness": 1.1}}  # of the simulated machine, times what the diagnoser's rig file says
+CHANGED = {"motor": {"viscous_damping": 0.5, "inertia": 1.15}, "pinion": {"inertia": 0.9},
+           "input_coupling": {"stiffness": 1.12}}  # of the simulated machine, times what the diagnoser's rig file says
 
 
 def machine():
@@ -81,7 +81,17 @@ class LiveWaveformTest(unittest.TestCase):
             self.assertEqual(message.samples, RATE // 10)
         self.assertGreater(sent, 2 * RATE)
 
-    def test_4_a_changed_machine_makes_the_answer_worthless_at_once(self):
+    def test_4_what_in_the_file_is_wrong_is_told(self):
+        self.fitted()
+        warn = 1
+        status, _ = Diagnostics().wait_for("joint: curve domain", lambda l, m, v: "run identify" in m, "a wrong value")
+        self.assertEqual(level(status.level), warn)
+        for value in (r"declared motor damping 0.0048 N m s/rad, this record says 0.002[34]\d* \+- ",
+                      r"declared sensor stiffness 28.7 N m/rad, this record says 32.\d* \+- "):
+            self.assertRegex(status.message, value)
+            self.assertRegex(self.diagnoser.diagnose(periods=5).message, value)
+
+    def test_5_a_changed_machine_makes_the_answer_worthless_at_once(self):
         self.fitted()
         service = self.simulator.topic("set_backlash")
         rospy.wait_for_service(service, TIMEOUT)
