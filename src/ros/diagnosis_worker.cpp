@@ -25,8 +25,7 @@ void yield_to_samples() {
 
 diagnosis::Diagnosis DiagnosisTask::compute() const {
   diagnosis::Diagnosis diagnosis = diagnosis::diagnose(window, settings, curve.get(), baseline);
-  if (fitted && !window.record.time.empty())
-    diagnosis::recall_waveform(diagnosis, *fitted, window.record.time.back(), settings.limits, baseline);
+  if (fitted) diagnosis::recall_waveform(diagnosis, *fitted, window, settings.limits, baseline);
   return diagnosis;
 }
 

@@ -34,12 +34,19 @@ EarlierWaveform earlier(const std::vector<Estimate>& others) {
   return found;
 }
 
+/// Samples that end then; of them nothing else is known.
+PeriodWindow ended(double when) {
+  PeriodWindow window;
+  window.record.time = {when};
+  return window;
+}
+
 /// What is told at 102.5 s, or when said.
 Diagnosis told(const EarlierWaveform& found, const std::vector<Estimate>& now, double when = 102.5) {
   Diagnosis diagnosis;
   diagnosis.estimates = now;
   diagnosis.estimates.push_back(made("waveform", 0, 0, Status::insufficient_data));
-  recall_waveform(diagnosis, found, when, std::nullopt, std::nullopt);
+  recall_waveform(diagnosis, found, ended(when), std::nullopt, std::nullopt);
   return diagnosis;
 }
 
@@ -90,7 +97,7 @@ TEST(EarlierWaveform, NeitherTooOldNorWithoutTheLock) {
   Diagnosis diagnosis;
   diagnosis.lock_contradicted = "the output turns";
   diagnosis.estimates = {made("waveform", 0, 0, Status::insufficient_data)};
-  recall_waveform(diagnosis, earlier({}), 101, std::nullopt, std::nullopt);
+  recall_waveform(diagnosis, earlier({}), ended(101), std::nullopt, std::nullopt);
   EXPECT_EQ(diagnosis.estimates.back().status, Status::out_of_domain);
   EXPECT_EQ(diagnosis.estimates.back().message, "the output turns");
 }

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
+#include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/diagnosis/waveform.h"
 #include "backlash_diagnosis/model/contact_law.h"
 #include "backlash_diagnosis/record/csv.h"
@@ -106,6 +108,36 @@ TEST(Waveform, NamesWhatTheRecordContradicts) {
     EXPECT_NEAR(v.found, truth[i], 0.01 * truth[i]) << v.name;  // at least: a tenth of the spread of the file
     EXPECT_LT(v.standard_error, 0.01 * truth[i]) << v.name;
     EXPECT_NE(e.message.find("declared " + v.name), std::string::npos) << e.message;
+  }
+}
+
+/// Without a curve and a position no other method speaks; the signal itself does.
+TEST(Waveform, AnEarlierAnswerEndsWithTheMachineItIsOf) {
+  diagnosis::DiagnosisSettings settings = rig_file::default_rig_file().diagnosis;
+  settings.apd->settling_periods = 0;
+  const auto window_of = [&](const record::Record& record) {
+    return diagnosis::cut_periods(record, settings.apd);
+  };
+  diagnosis::DiagnosisSettings quick = settings;
+  quick.leave_out_waveform();
+  rig_file::RigFile file = drawn(31, 60e-6);
+  const auto longer = [&](std::uint64_t seed) {
+    file.simulation.sensors.seed = seed;
+    return without_position(simulation::simulate_record(file.rig, file.simulation, 0.9).slice(0.2, 0.9));
+  };
+  const auto earlier = diagnosis::fit_waveform(window_of(longer(1)), settings, nullptr);
+  ASSERT_EQ(earlier.estimate.status, Status::ok) << earlier.estimate.message;
+  const auto told = [&](std::uint64_t seed) {
+    const diagnosis::PeriodWindow window = window_of(longer(seed));
+    diagnosis::Diagnosis now = diagnosis::diagnose(window, quick, nullptr);
+    diagnosis::recall_waveform(now, earlier, window, std::nullopt, std::nullopt);
+    return now.estimates.back();
+  };
+  for (std::uint64_t seed = 2; seed < 12; ++seed)
+    EXPECT_EQ(told(seed).status, Status::ok) << told(seed).message;
+  for (const double backlash : {30e-6, 45e-6, 80e-6, 120e-6}) {
+    file.rig.mesh.backlash = backlash;
+    EXPECT_EQ(told(2).status, Status::insufficient_data) << backlash;
   }
 }
 
