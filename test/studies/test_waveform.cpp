@@ -120,24 +120,30 @@ TEST(Waveform, AnEarlierAnswerEndsWithTheMachineItIsOf) {
   };
   diagnosis::DiagnosisSettings quick = settings;
   quick.leave_out_waveform();
-  rig_file::RigFile file = drawn(31, 60e-6);
-  const auto longer = [&](std::uint64_t seed) {
-    file.simulation.sensors.seed = seed;
-    return without_position(simulation::simulate_record(file.rig, file.simulation, 0.9).slice(0.2, 0.9));
-  };
-  const auto earlier = diagnosis::fit_waveform(window_of(longer(1)), settings, nullptr);
-  ASSERT_EQ(earlier.estimate.status, Status::ok) << earlier.estimate.message;
-  const auto told = [&](std::uint64_t seed) {
-    const diagnosis::PeriodWindow window = window_of(longer(seed));
-    diagnosis::Diagnosis now = diagnosis::diagnose(window, quick, nullptr);
-    diagnosis::recall_waveform(now, earlier, window, std::nullopt, std::nullopt);
-    return now.estimates.back();
-  };
-  for (std::uint64_t seed = 2; seed < 12; ++seed)
-    EXPECT_EQ(told(seed).status, Status::ok) << told(seed).message;
-  for (const double backlash : {30e-6, 45e-6, 80e-6, 120e-6}) {
-    file.rig.mesh.backlash = backlash;
-    EXPECT_EQ(told(2).status, Status::insufficient_data) << backlash;
+  // Above a half gap of 60 um no period is as the one before, and a tenth more play is not seen.
+  for (const double backlash : {60e-6, 160e-6}) {
+    rig_file::RigFile file = drawn(31, backlash);
+    const record::Record all = simulation::simulate_record(file.rig, file.simulation, 5.2);
+    const auto part = [&](double start) { return window_of(all.slice(start - 1e-6, start + 0.7 - 1e-6)); };
+    diagnosis::EarlierWaveform earlier;
+    earlier.end = 0.9;
+    earlier.estimate.status = Status::ok;
+    earlier.period = diagnosis::mean_period(part(0.2));
+    const auto told = [&](diagnosis::PeriodWindow window) {
+      window.record = without_position(window.record);
+      diagnosis::Diagnosis now = diagnosis::diagnose(window, quick, nullptr);
+      diagnosis::recall_waveform(now, earlier, window, std::nullopt, std::nullopt);
+      return now.estimates.back();
+    };
+    for (double start = 0.5; start < 4.5; start += 0.3)
+      EXPECT_EQ(told(part(start)).status, Status::ok) << told(part(start)).message;
+    for (const double factor : {0.5, 0.8, 0.9, 1.1, 1.3, 2.0}) {
+      if (backlash > 120e-6 && std::fabs(factor - 1) < 0.15) continue;
+      file.rig.mesh.backlash = factor * backlash;
+      const record::Record changed = simulation::simulate_record(file.rig, file.simulation, 5.2);
+      EXPECT_EQ(told(window_of(changed.slice(4.2 - 1e-6, 4.9 - 1e-6))).status, Status::insufficient_data)
+          << factor << " of " << backlash;
+    }
   }
 }
 
