@@ -22,7 +22,8 @@ using Clock = std::chrono::steady_clock;
 constexpr int kLowestPriority = 19;  // niceness: what nobody else wants of the processors
 constexpr int kRest = 3;             // times as long as the fit took: a quarter of the time is fits; a choice
 constexpr std::chrono::milliseconds kLeastRest{500};  // a choice: of fits that give up at once
-constexpr std::chrono::milliseconds kIdle{100};       // from one look for new samples to the next; a choice
+constexpr std::chrono::seconds kMostRest{5};     // a choice: so that answers of a slow machine are no older
+constexpr std::chrono::milliseconds kIdle{100};  // from one look for new samples to the next; a choice
 
 /// Of this thread, and of those that it starts: Linux keeps a niceness for each, and hands it on.
 void yield_to_all() {
@@ -95,7 +96,8 @@ void BackgroundFits::run() {
   for (;;) {
     const Clock::time_point start = Clock::now();
     const bool done = one();
-    const auto rest = done ? std::max<Clock::duration>(kLeastRest, kRest * (Clock::now() - start)) : kIdle;
+    const auto rest =
+        done ? std::clamp<Clock::duration>(kRest * (Clock::now() - start), kLeastRest, kMostRest) : kIdle;
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait_for(lock, rest, [this] { return stop_; });
     if (stop_) return;

@@ -14,7 +14,7 @@ namespace {
 
 /// Of a fit of the waveform: its twelve reversals, and the half period before the first.
 constexpr long kFittedPeriods = 7;
-constexpr const char* kNoFitYet = "takes seconds: being fitted, no answer yet";
+constexpr const char* kNoFitYet = "being fitted to seven periods, which takes seconds: no answer yet";
 
 diagnosis::StreamSettings stream_settings(const MonitorSettings& settings) {
   diagnosis::StreamSettings stream;
@@ -150,6 +150,8 @@ bool JointMonitor::fit() {
   }
   const std::vector<double>& time = newest.window.record.time;
   if (time.empty() || (newest.fitted && newest.fitted->end >= time.back())) return false;
+  const bool more_to_come = settings_.keep > (kFittedPeriods + 1) * newest.window.period;
+  if (newest.window.period > 0 && newest.window.count < kFittedPeriods && more_to_come) return false;
   newest.settings.waveform = waveform_;
   diagnosis::EarlierWaveform found =
       diagnosis::fit_waveform(newest.window, newest.settings, newest.curve.get());
