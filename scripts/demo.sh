@@ -58,8 +58,16 @@ wait_for_service() {
 wait_for_service /diagnoser/diagnose
 
 echo "Asking: rosservice call /diagnoser/diagnose \"{joint: '', periods: 10, timeout: 30.0}\""
-rosservice call /diagnoser/diagnose "{joint: '', periods: 10, timeout: 30.0}" >"${out}/answer.yaml" ||
-  fail "the service did not answer"
+ask() {
+  rosservice call /diagnoser/diagnose "{joint: '', periods: 10, timeout: 30.0}" >"${out}/answer.yaml" ||
+    fail "the service did not answer"
+}
+ask
+for ((i = 0; i < 20; ++i)); do # the estimator waveform takes some seconds
+  grep -q "being fitted" "${out}/answer.yaml" || break
+  sleep 1
+  ask
+done
 true_backlash=$(timeout 10 rostopic echo -n 1 -p /true_backlash | tail -n 1 | cut -d, -f2)
 rosbag record --quiet --duration=2 --output-name="${out}/record.bag" /joint_states >/dev/null 2>&1
 

@@ -24,6 +24,7 @@ LIMITS = {"watch": "#d9b200", "service": "#d98200", "stop": BAD}
 class Data:
     def __init__(self, series):
         self.report, self.curve, self.limits = series["report"], series["curve"], series["limits"]
+        self.waveform = series["waveform"]
         self.linear, self.locked, self.rigid = series["linear"], series["locked"], series["rigid"]
         record = series["record"]
         self.period = record["period"]
@@ -206,11 +207,53 @@ def intervals_picture(data):
     yield plotting.picture(figure, "Intervals of all methods; green: those that the verdict stands on")
 
 
+def traces(axes, rest, window, channel, data, scale):
+    """One window of the fit: what was measured, the machine's waveform over it, and below what is left."""
+    trace = window[channel]
+    measured, model = (np.array(trace[key], float) / scale for key in ("measured", "model"))
+    time = 1e3 * data.waveform["interval"] * np.arange(measured.size)
+    axes.plot(time, measured, ".", color=MEASURED, markersize=2.5, label="measured")
+    axes.plot(time, model, color=BAD, linewidth=0.9, label="fitted machine")
+    noise = data.waveform[channel + "_noise"] / scale
+    rest.axhspan(-2 * noise, 2 * noise, color=PALE, alpha=0.3, linewidth=0)
+    rest.plot(time, measured - model, color="#222222", linewidth=0.6)
+    rest.set_xlabel("ms from %.4g s" % window["start"], fontsize=8)
+
+
+def waveform_pictures(data):
+    """Why the estimate by waveform is believed, or is not."""
+    if not data.waveform:
+        return
+    windows = data.waveform["windows"]
+    for channel, scale, label in (("torque", 1, "sensor torque [N m]"), ("position", 1e-3, "motor position [mrad]")):
+        if windows[0][channel] is None:
+            continue
+        width, height = plotting.PAGE_FIGURE
+        figure, grid = plt.subplots(2, len(windows), figsize=(1.5 * width, 1.15 * height), layout="constrained",
+                                    sharex="col", sharey="row", squeeze=False, height_ratios=(3, 1))
+        for column, window in enumerate(windows):
+            traces(grid[0][column], grid[1][column], window, channel, data, scale)
+            names = [name for name, is_it in (("first", window is windows[0]),
+                                              ("worst", window["misfit"] == max(w["misfit"] for w in windows))) if is_it]
+            grid[0][column].set_title(" and ".join(names or ["median"]), fontsize=8)
+        grid[0][0].set_ylabel(label)
+        grid[1][0].set_ylabel("rest")
+        grid[0][0].legend(loc="best", fontsize=7, markerscale=2)
+        most = max(np.abs(line.get_ydata()).max() for rest in grid[1] for line in rest.get_lines())
+        grid[1][0].set_ylim(-1.2 * most, 1.2 * most)  # shared; the grey may fill it
+        yield plotting.picture(figure, "%s about reversals of the torque, %d fitted, %d left out: the first, that with "
+                               "the median and that with the largest rest; grey: twice what the fit takes as noise" %
+                               (label.partition(" [")[0].capitalize(), data.waveform["fitted"],
+                                data.waveform["left_out"]))
+
+
 def sections(series):
     data = Data(series)
     pictures = [p for draw in (intervals_picture, curve_picture, apd_picture, loop_picture, time_pictures)
                 for p in draw(data)]
-    return [plotting.section("", pictures)]
+    fitted = list(waveform_pictures(data))
+    return [plotting.section("", pictures)] + ([plotting.section("The fitted machine over the record", fitted)]
+                                               if fitted else [])
 
 
 def main():

@@ -168,8 +168,8 @@ Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings
   CurveMatch match;
   if (settings.apd) match = match_curve(record, *diagnosis.apd, *settings.apd, curve);
   diagnosis.mismatch = match.mismatch;
-  const DiagnosisInput input{record,        settings, curve,
-                             diagnosis.apd, match,    lock_contradicted(record, declared_lock(settings))};
+  diagnosis.lock_contradicted = lock_contradicted(record, declared_lock(settings));
+  const DiagnosisInput input{record, settings, curve, diagnosis.apd, match, diagnosis.lock_contradicted};
   for (const DiagnosisMethod& each : diagnosis_method_table()) {
     if (!method.empty() && method != each.name) continue;
     diagnosis.estimates.push_back(

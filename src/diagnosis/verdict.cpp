@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "backlash_diagnosis/base/text.h"
 
@@ -295,6 +296,22 @@ void put(Verdict& verdict, const Judge& judge) {
   verdict.growth_upper = closed(judge.growth.upper);
 }
 
+/// What is wrong in the rig file, beside the answer.
+Verdict with_declared_wrong(Verdict verdict, const Estimates& all) {
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Estimate& e = all[i];
+    const Set& against = verdict.dissenters;
+    const bool believed = e.status == Status::ok || e.status == Status::below_range;
+    if (!believed || std::find(against.begin(), against.end(), static_cast<int>(i)) != against.end())
+      continue;
+    verdict.declared_wrong.insert(verdict.declared_wrong.end(), e.declared_wrong.begin(),
+                                  e.declared_wrong.end());
+  }
+  const std::string text = contradiction_text(verdict.declared_wrong);
+  if (verdict.message.find(text) == std::string::npos) verdict.message += "; " + text;
+  return verdict;
+}
+
 Verdict nothing_sound(const Estimates& estimates) {
   Verdict verdict;
   verdict.agreement = "none";
@@ -328,7 +345,7 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
                 const std::optional<Baseline>& baseline) {
   Judge judge{estimates, limits, baseline, choose(estimates), false, {}, {}};
   const Set &members = judge.choice.members, &dissenters = judge.choice.dissenters;
-  if (members.empty() && dissenters.empty()) return nothing_sound(estimates);
+  if (members.empty() && dissenters.empty()) return with_declared_wrong(nothing_sound(estimates), estimates);
   const Set& shown_ones = members.empty() ? dissenters : members;
   judge.angular = limits ? limits->angular : std::isnan(level(combination(estimates, shown_ones, false)));
   Verdict verdict;
@@ -339,7 +356,7 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
                                                                           : "single";
   if (members.empty()) {
     verdict.message = "cannot tell" + judge.contradictions();
-    return verdict;
+    return with_declared_wrong(std::move(verdict), estimates);
   }
   verdict.estimate = members.front();
   judge.now = combination(estimates, members, judge.angular);
@@ -351,7 +368,7 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
       shown(judge.now, judge.unit()) + " by " + names(estimates, members) +
       (judge.choice.agree.empty() ? "" : " (" + names(estimates, judge.choice.agree) + " agree)") +
       judge.since_baseline() + judge.contradictions();
-  return verdict;
+  return with_declared_wrong(std::move(verdict), estimates);
 }
 
 }  // namespace backlash::diagnosis

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/base/text.h"
 #include "refusal.h"
 #include "waveform_solution.h"
 
@@ -106,22 +106,35 @@ void refuse_waveform(const WaveformSolution& s) {
 
 namespace {
 
-std::string contradiction(const WaveformSolution& s, std::size_t k) {
-  const WaveformQuantity& q = waveform_quantities()[k - 1];  // both start with the damping of the motor
-  const double error = s.told[k] * s.priors[k].spread * (q.factor ? s.values[k] : 1);
-  return fmt::format("declared {} {:.3g} {}, this record says {:.3g} +- {:.1g}",
-                     waveform_value_name(static_cast<int>(k)), s.priors[k].value, q.unit, s.values[k], error);
+double error_of(const WaveformSolution& s, std::size_t k) {
+  return s.told[k] * s.priors[k].spread * (s.priors[k].factor ? s.values[k] : 1);
+}
+
+std::vector<ContradictedValue> contradicted(const WaveformSolution& s) {
+  std::vector<ContradictedValue> found;
+  for (std::size_t k = kHalfGap + 1; k <= kSensorGain; ++k)
+    if (deviations(s, k) > kFar && std::fabs(s.z[k]) > kErrorsFar * s.told[k])
+      found.push_back({waveform_value_name(static_cast<int>(k)),
+                       waveform_quantities()[k - 1].unit,  // both start with the damping of the motor
+                       s.priors[k].value, s.values[k], error_of(s, k)});
+  return found;
 }
 
 std::string message_of(const WaveformSolution& s, bool position) {
   std::string text = fmt::format("fitted to {} of {} reversals, {}", s.windows - s.left_out, s.windows,
                                  position ? "torque and position" : "torque alone");
   if (!position) text += ": limited by the declared stiffness of the sensor and by inertias";
-  std::vector<std::string> found;
-  for (std::size_t k = kHalfGap + 1; k <= kSensorGain; ++k)
-    if (deviations(s, k) > kFar && std::fabs(s.z[k]) > kErrorsFar * s.told[k])
-      found.push_back(contradiction(s, k));
-  return found.empty() ? text : text + "; " + joined(found) + ": run identify";
+  const std::string wrong = contradiction_text(contradicted(s));
+  return wrong.empty() ? text : text + "; " + wrong;
+}
+
+std::shared_ptr<const WaveformEvidence> evidence_of(const WaveformSolution& s) {
+  auto evidence = std::make_shared<WaveformEvidence>(s.evidence);
+  for (const int place : kQuantityPlaces) {
+    const auto k = static_cast<std::size_t>(place);
+    evidence->values.push_back({s.priors[k].value, s.priors[k].spread, s.values[k], error_of(s, k)});
+  }
+  return evidence;
 }
 
 void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settings, bool position) {
@@ -136,6 +149,7 @@ void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settin
   if (!position) e.declared = below / per_angle;  // nearly all of it, by the symmetry
   e.from_record = e.fits_machine = true;
   e.message = message_of(s, position);
+  e.declared_wrong = contradicted(s);
   e.status = e.lower > 0 ? Status::ok : Status::below_range;
   if (e.lower > 0) return;
   e.message = "no more play than equations of rigid flanks can tell; " + e.message;
@@ -161,6 +175,7 @@ Estimate estimate_waveform(const record::Record& record, const WaveformSettings&
   return estimate_or_refusal("waveform", [&](Estimate& estimate) {
     check_waveform(record, settings);
     const WaveformSolution solution = solve_waveform(record, settings);
+    estimate.waveform = evidence_of(solution);
     refuse_waveform(solution);
     fill(estimate, solution, settings, record.has(record::Channel::motor_position));
   });

@@ -17,21 +17,16 @@ constexpr double kUntold = 0.9;  // of what was known, from which a record tells
 constexpr double kFinest =
     0.002;  // of a value, choice: the equations are no better, see kModelError of the fit
 
-/// Of the fit, in the order of waveform_quantities().
-constexpr int kPlaces[] = {kMotorDamping,    kDryFriction,   kFrictionSpeed,    kSensorStiffness,
-                           kSensorDamping,   kMotorInertia,  kPinionInertia,    kGearInertia,
-                           kOutputStiffness, kOutputDamping, kContactStiffness, kContactLoss,
-                           kSensorGain,      kSensorLag,     kSensorTime};
-constexpr int kCount = sizeof(kPlaces) / sizeof(*kPlaces);
+constexpr int kCount = sizeof(kQuantityPlaces) / sizeof(*kQuantityPlaces);
 
 /// What the record leaves of a machine, by the equations of waveform.h.
 WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s) {
   Eigen::MatrixXd c(kCount, kCount);
   Eigen::VectorXd u(kCount);
   for (int i = 0; i < kCount; ++i) {
-    u[i] = kScalePower[kPlaces[i]];
+    u[i] = kScalePower[kQuantityPlaces[i]];
     for (int j = 0; j < kCount; ++j) {
-      const int a = kPlaces[i], b = kPlaces[j];
+      const int a = kQuantityPlaces[i], b = kQuantityPlaces[j];
       c(i, j) = s.covariance(a, b) * s.priors[static_cast<std::size_t>(a)].spread *
                 s.priors[static_cast<std::size_t>(b)].spread;
     }
@@ -47,7 +42,7 @@ WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s
   WaveformSettings machine = before;
   machine.common_scale = std::sqrt(common);
   for (int i = 0; i < kCount; ++i) {
-    const auto k = static_cast<std::size_t>(kPlaces[i]);
+    const auto k = static_cast<std::size_t>(kQuantityPlaces[i]);
     const WaveformPrior& prior = s.priors[k];
     const double finest = prior.factor ? kFinest : kFinest * s.values[k];
     const double spread = std::min(prior.spread, std::max(finest, widest * own[i] * unit[i]));
@@ -109,7 +104,7 @@ WaveformCommissioning commission_waveform(const std::vector<record::Record>& rec
           solve_waveform(record, result.machine, first ? told / 2 : kNaN, first ? told_error : kNaN);
       refuse_waveform(s);
       for (int i = 0; i < kCount; ++i)
-        left[static_cast<std::size_t>(i)] *= s.told[static_cast<std::size_t>(kPlaces[i])];
+        left[static_cast<std::size_t>(i)] *= s.told[static_cast<std::size_t>(kQuantityPlaces[i])];
       result.machine = after(result.machine, s);
       result.states.push_back(state_of(s, record.has(record::Channel::motor_position)));
     } catch (const Refusal& refusal) {

@@ -26,6 +26,12 @@ using WaveformPriors = std::array<WaveformPrior, kGlobalValues>;
 /// Powers in the factor c of the symmetry of waveform.h. Theory.
 constexpr double kScalePower[kGlobalValues] = {-1, 1, 0, -1, 1, 1, 1, 1, 1, 1, 1, 1.5, 1};
 
+/// Of the fit, in the order of waveform_quantities().
+constexpr int kQuantityPlaces[] = {kMotorDamping,    kDryFriction,   kFrictionSpeed,    kSensorStiffness,
+                                   kSensorDamping,   kMotorInertia,  kPinionInertia,    kGearInertia,
+                                   kOutputStiffness, kOutputDamping, kContactStiffness, kContactLoss,
+                                   kSensorGain,      kSensorLag,     kSensorTime};
+
 using WaveformStart = Eigen::Matrix<double, kStartValues, 1>;
 
 enum WaveformChannel { kTorqueChannel, kPositionChannel, kWaveformChannels };

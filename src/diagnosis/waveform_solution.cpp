@@ -108,6 +108,7 @@ class Solver {
     data_.torque = record.column(record::Channel::sensor_torque);
     data_.position = record.column(record::Channel::motor_position);
     data_.grid = grid_of(settings, record.sampling_interval());
+    time_ = record.time;
     for (const WaveformWindow& w : data_.windows)
       data_.level +=
           (std::fabs(w.before) + std::fabs(w.after)) / 2 / static_cast<double>(data_.windows.size());
@@ -268,6 +269,41 @@ class Solver {
             swing_[channel]};
   }
 
+  WaveformEvidence::Trace trace(const WaveformFit& fit, std::size_t window, WaveformChannel channel) const {
+    const std::vector<double>& all = channel == kTorqueChannel ? data_.torque : data_.position;
+    const std::vector<double> r = fit.residual(window, channel);
+    WaveformEvidence::Trace trace;
+    for (std::size_t i = 0; i < r.size(); ++i) {
+      trace.measured.push_back(all[static_cast<std::size_t>(data_.windows[window].first) + i]);
+      trace.model.push_back(trace.measured.back() - r[i]);
+    }
+    return trace;
+  }
+
+  double fitted_noise(WaveformChannel channel) const {
+    return std::max(noise_[channel], kModelError * swing_[channel]);
+  }
+
+  WaveformEvidence evidence(const WaveformFit& fit) const {
+    WaveformEvidence e;
+    e.interval = data_.grid.interval;
+    e.torque_noise = fitted_noise(kTorqueChannel);
+    e.position_noise = channels() > 1 ? fitted_noise(kPositionChannel) : kNaN;
+    e.left_out = static_cast<int>(std::count(used_.begin(), used_.end(), false));
+    for (std::size_t w = 0; w < used_.size(); ++w) {
+      if (!used_[w]) continue;
+      WaveformEvidence::Window window;
+      window.start = time_[static_cast<std::size_t>(data_.windows[w].first)];
+      for (int c = 0; c < channels(); ++c) {
+        const auto channel = static_cast<WaveformChannel>(c);
+        window.misfit = std::max(window.misfit, window_rms(fit, w, channel) / fitted_noise(channel));
+        (c == kTorqueChannel ? window.torque : window.position) = trace(fit, w, channel);
+      }
+      e.windows.push_back(std::move(window));
+    }
+    return e;
+  }
+
   WaveformSolution told(const WaveformFit& fit, const WaveformPriors& priors) const {
     WaveformSolution s;
     s.half_gap = fit.value(kHalfGap);
@@ -294,11 +330,13 @@ class Solver {
     s.iterations = fit.iterations();
     s.cost = fit.cost();
     s.rival = rival_, s.rival_cost = rival_cost_;
+    s.evidence = evidence(fit);
     return s;
   }
 
   const WaveformSettings& settings_;
   double ring_;
+  std::vector<double> time_;
   WaveformData data_;
   double told_gap_, told_error_;
   double swing_[kWaveformChannels], noise_[kWaveformChannels];

@@ -31,6 +31,7 @@ struct WaveformSolution {
   WaveformMisfit misfit[kWaveformChannels];
   int windows = 0, left_out = 0, iterations = 0;
   double cost = 0;
+  WaveformEvidence evidence;
   double rival = kNaN;       // m, half gap of the next best guess
   double rival_cost = kNaN;  // its cost more than that of the best, at the same stage
 };

@@ -127,8 +127,12 @@ void warn_of_misfit(Identification& result) {
 void require_servo(const model::Rig& rig) {
   if (!rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.link_locked)
     throw CannotIdentify(
-        "identify knows machines of one inertia (mesh: rigid) and of two (rigid couplings, free link); "
-        "this rig is neither");
+        std::string("identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
+                    "link), and of a torque sensor with a locked output (elastic couplings, Hunt-Crossley "
+                    "mesh); this rig has ") +
+        (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
+        (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
+        (rig.link_locked ? "locked" : "free") + " link");
   for (const char* name : {"stiffness", "damping"})
     if (!rig.mesh.contact_spec().values.has(name))
       throw CannotIdentify("identify needs a contact law with stiffness and damping, not '" +

@@ -10,6 +10,9 @@ namespace backlash::report {
 /// The report as a value; keys in the order of the documentation.
 Json diagnosis_data(const DiagnosisReport& report);
 
+/// Of its machine fitted to the record; null where there is none.
+const diagnosis::WaveformEvidence* waveform_evidence(const diagnosis::Diagnosis& diagnosis);
+
 /// "79.98"; "?" for what is not finite.
 std::string four_digits(double value);
 

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/scratch_folder.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/report/diagnosis_series.h"
+#include "backlash_diagnosis/rig_file/declared_values.h"
 #include "diagnosis_data.h"
 #include "html_template.h"
 
@@ -19,6 +20,7 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 constexpr double kMicrometre = 1e-6;
+constexpr double kTold = 0.9;  // of what was known before, from which a record tells nothing: choice
 
 /// "80.0" and "[78.2, 81.9]"; an end that is not known is "?". Both empty where nothing is known.
 Json cell(double value, double lower, double upper, double unit) {
@@ -117,6 +119,33 @@ Json facts(const DiagnosisReport& report) {
   return rows;
 }
 
+/// What the record says of a value; empty where it was not asked.
+std::string found_text(const rig_file::DeclaredValue& v, const diagnosis::WaveformEvidence* evidence) {
+  if (!evidence || v.quantity < 0) return "";
+  const auto place = static_cast<std::size_t>(v.quantity);
+  const diagnosis::WaveformEvidence::Value& e = evidence->values[place];
+  const double before = e.spread * (diagnosis::waveform_quantities()[place].factor ? e.found : 1);
+  if (!(e.standard_error < kTold * before)) return "tells nothing of it";
+  return fmt::format("{} \u00b1 {:.1g}", four_digits(e.found - v.share), e.standard_error);
+}
+
+/// The machine as its rig file declares it, and beside it as a fit found it that is believed.
+Json machine(const DiagnosisReport& report, const rig_file::RigFile* rig) {
+  Json rows = Json::array();
+  if (!rig) return rows;
+  const diagnosis::WaveformEvidence* evidence = nullptr;
+  for (const diagnosis::Estimate& e : report.diagnosis.estimates)
+    if (e.status == diagnosis::Status::ok || e.status == diagnosis::Status::below_range)
+      if (e.waveform) evidence = e.waveform.get();
+  for (const rig_file::DeclaredValue& v : rig_file::declared_values(*rig))
+    rows.push_back({{"name", v.name},
+                    {"value", four_digits(v.value) + (v.unit.empty() || v.unit == "-" ? "" : " " + v.unit)},
+                    {"uncertainty", v.uncertainty},
+                    {"found", found_text(v, evidence)},
+                    {"source", v.source}});
+  return rows;
+}
+
 std::string plots_of(const DiagnosisReport& report, const rig_file::RigFile* rig) {
   try {
     const ScratchFolder scratch;
@@ -140,6 +169,8 @@ std::string diagnosis_page(const DiagnosisReport& report, const rig_file::RigFil
                      {"linear", linear},
                      {"estimates", estimates(report.diagnosis, linear)},
                      {"plots", plots_of(report, rig)},
+                     {"has_machine", rig != nullptr},
+                     {"machine", machine(report, rig)},
                      {"facts", facts(report)},
                      {"warnings", warnings_section(report.warnings)},
                      {"provenance", provenance_sections(provenance)}};

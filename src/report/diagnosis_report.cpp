@@ -72,6 +72,17 @@ Json verdict_json(const diagnosis::Verdict& verdict, const std::vector<diagnosis
   return json;
 }
 
+Json contradicted_json(const std::vector<diagnosis::ContradictedValue>& contradicted) {
+  Json list = Json::array();
+  for (const diagnosis::ContradictedValue& v : contradicted)
+    list.push_back({{"name", v.name},
+                    {"declared", json_number(v.declared)},
+                    {"found", json_number(v.found)},
+                    {"standard_error", json_number(v.standard_error)},
+                    {"unit", v.unit}});
+  return list;
+}
+
 Json apd_json(const diagnosis::ApdResult& apd, const diagnosis::ApdSettings& settings) {
   Json json;
   json["signal"] = record::channel_name(settings.signal);
@@ -152,6 +163,7 @@ Json diagnosis_data(const DiagnosisReport& report) {
   if (report.diagnosis.coherence)
     json["detectors"] = Json::array({coherence_json(*report.diagnosis.coherence)});
   json["verdict"] = verdict_json(report.diagnosis.verdict, report.diagnosis.estimates);
+  json["declared_wrong"] = contradicted_json(report.diagnosis.verdict.declared_wrong);
   const bool has_apd = report.diagnosis.apd && report.apd_settings;
   json["apd"] = has_apd ? apd_json(*report.diagnosis.apd, *report.apd_settings) : Json(nullptr);
   json["warnings"] = report.warnings;
@@ -163,6 +175,12 @@ Json diagnosis_data(const DiagnosisReport& report) {
 
 std::string diagnosis_json(const DiagnosisReport& report) {
   return dumped(diagnosis_data(report), 2);
+}
+
+const diagnosis::WaveformEvidence* waveform_evidence(const diagnosis::Diagnosis& diagnosis) {
+  for (const diagnosis::Estimate& e : diagnosis.estimates)
+    if (e.waveform) return e.waveform.get();
+  return nullptr;
 }
 
 std::string four_digits(double value) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "diagnosis_data.h"
@@ -63,6 +64,42 @@ Json limits_json(const DiagnosisReport& report) {
           {"stop", limits.stop}};
 }
 
+Json trace_json(const diagnosis::WaveformEvidence::Trace& trace) {
+  if (trace.measured.empty()) return nullptr;
+  return {{"measured", column(trace.measured, 1)}, {"model", column(trace.model, 1)}};
+}
+
+/// The first window of the fit, that with the median misfit and that with the largest; in order of time.
+std::vector<std::size_t> shown_windows(const diagnosis::WaveformEvidence& evidence) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < evidence.windows.size(); ++i) order.push_back(i);
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return evidence.windows[a].misfit < evidence.windows[b].misfit;
+  });
+  const std::set<std::size_t> chosen = {0, order[(order.size() - 1) / 2], order.back()};
+  return {chosen.begin(), chosen.end()};
+}
+
+/// Null where no machine was fitted.
+Json waveform_json(const DiagnosisReport& report) {
+  const diagnosis::WaveformEvidence* evidence = waveform_evidence(report.diagnosis);
+  if (!evidence || evidence->windows.empty()) return nullptr;
+  Json json = {{"interval", evidence->interval},
+               {"torque_noise", json_number(evidence->torque_noise)},
+               {"position_noise", json_number(evidence->position_noise)},
+               {"fitted", evidence->windows.size()},
+               {"left_out", evidence->left_out},
+               {"windows", Json::array()}};
+  for (const std::size_t i : shown_windows(*evidence)) {
+    const diagnosis::WaveformEvidence::Window& window = evidence->windows[i];
+    json["windows"].push_back({{"start", window.start},
+                               {"misfit", json_number(window.misfit)},
+                               {"torque", trace_json(window.torque)},
+                               {"position", trace_json(window.position)}});
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string diagnosis_series(const DiagnosisReport& report, const rig_file::RigFile* rig) {
@@ -75,7 +112,8 @@ std::string diagnosis_series(const DiagnosisReport& report, const rig_file::RigF
                      {"rigid", rig && rig->rig.mesh.rigid},
                      {"record", record_json(*report.record, period_of(report), linear)},
                      {"curve", report.curve ? curve_json(*report.curve) : Json(nullptr)},
-                     {"limits", limits_json(report)}};
+                     {"limits", limits_json(report)},
+                     {"waveform", waveform_json(report)}};
   return dumped(json, -1);
 }
 

@@ -10,42 +10,12 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/rig_file/rig_document.h"
+#include "known_places.h"
 
 namespace backlash::rig_file {
 namespace {
 
 constexpr const char* kGapKeys[] = {"backlash", "half_gap", "backlash_angle"};
-
-/// Where the file holds a value of waveform_quantities(), in their order; `half` is the coupling whose
-/// inertia is shared.
-struct Place {
-  std::vector<std::string> path;
-  model::Coupling model::Rig::*half = nullptr;
-};
-
-const std::vector<Place>& places() {
-  using model::Rig;
-  static const std::vector<Place> table = {{{"gear_train", "motor", "viscous_damping"}},
-                                           {{"gear_train", "motor", "coulomb_friction"}},
-                                           {{"commissioned", "friction_speed"}},
-                                           {{"gear_train", "input_coupling", "stiffness"}},
-                                           {{"gear_train", "input_coupling", "damping"}},
-                                           {{"gear_train", "motor", "inertia"}, &Rig::input_coupling},
-                                           {{"gear_train", "pinion", "inertia"}, &Rig::input_coupling},
-                                           {{"gear_train", "gear", "inertia"}, &Rig::output_coupling},
-                                           {{"gear_train", "output_coupling", "stiffness"}},
-                                           {{"gear_train", "output_coupling", "damping"}},
-                                           {{"gear_train", "mesh", "contact", "stiffness"}},
-                                           {{"gear_train", "mesh", "contact", "alpha"}},
-                                           {{"commissioned", "sensor_gain"}},
-                                           {{"commissioned", "sensor_delay"}},
-                                           {{"commissioned", "sensor_time_constant"}}};
-  return table;
-}
-
-double half_inertia(const Place& place, const model::Rig& rig) {
-  return place.half == nullptr ? 0 : 0.5 * (rig.*place.half).inertia;
-}
 
 /// The map that holds the last key of the path; nothing where the file has none.
 std::optional<YamlReader> holder(const YamlReader& yaml, const std::vector<std::string>& path) {
@@ -67,7 +37,7 @@ double spread_of(const YamlReader& yaml, const std::string& key, const Uncertain
 
 void read_value(const YamlReader& yaml, RigFile& file, std::size_t index) {
   const diagnosis::WaveformQuantity& q = diagnosis::waveform_quantities()[index];
-  const Place& place = places()[index];
+  const KnownPlace& place = known_places()[index];
   const std::string& key = place.path.back();
   const auto map = holder(yaml, place.path);
   if (!map || !map->has(key)) return;
@@ -107,8 +77,32 @@ void set_backlash_of(RigDocument& document, const RigFile& file, double backlash
 
 }  // namespace
 
+const std::vector<KnownPlace>& known_places() {
+  using model::Rig;
+  static const std::vector<KnownPlace> table = {{{"gear_train", "motor", "viscous_damping"}},
+                                                {{"gear_train", "motor", "coulomb_friction"}},
+                                                {{"commissioned", "friction_speed"}},
+                                                {{"gear_train", "input_coupling", "stiffness"}},
+                                                {{"gear_train", "input_coupling", "damping"}},
+                                                {{"gear_train", "motor", "inertia"}, &Rig::input_coupling},
+                                                {{"gear_train", "pinion", "inertia"}, &Rig::input_coupling},
+                                                {{"gear_train", "gear", "inertia"}, &Rig::output_coupling},
+                                                {{"gear_train", "output_coupling", "stiffness"}},
+                                                {{"gear_train", "output_coupling", "damping"}},
+                                                {{"gear_train", "mesh", "contact", "stiffness"}},
+                                                {{"gear_train", "mesh", "contact", "alpha"}},
+                                                {{"commissioned", "sensor_gain"}},
+                                                {{"commissioned", "sensor_delay"}},
+                                                {{"commissioned", "sensor_time_constant"}}};
+  return table;
+}
+
+double half_inertia(const KnownPlace& place, const model::Rig& rig) {
+  return place.half == nullptr ? 0 : 0.5 * (rig.*place.half).inertia;
+}
+
 void read_known_values(const YamlReader& yaml, RigFile& file) {
-  for (std::size_t i = 0; i < places().size(); ++i) read_value(yaml, file, i);
+  for (std::size_t i = 0; i < known_places().size(); ++i) read_value(yaml, file, i);
   if (const auto mesh = holder(yaml, {"gear_train", "mesh", "backlash"}))
     for (const char* key : kGapKeys)
       if (const auto u = mesh->uncertainty(key))
@@ -127,9 +121,9 @@ std::string commissioned_text(const RigFile& file, const diagnosis::WaveformComm
   RigDocument document(file);
   std::string section =
       fmt::format("  common_scale: {{value: 1, uncertainty: {:.3g} %}}\n", 100 * found.machine.common_scale);
-  for (std::size_t i = 0; i < places().size(); ++i) {
+  for (std::size_t i = 0; i < known_places().size(); ++i) {
     const diagnosis::WaveformQuantity& q = diagnosis::waveform_quantities()[i];
-    const Place& place = places()[i];
+    const KnownPlace& place = known_places()[i];
     if (std::count(found.untold.begin(), found.untold.end(), q.name) > 0) continue;
     const double whole = found.machine.*q.at, value = whole - half_inertia(place, file.rig);
     if (q.factor && !(value > 0))

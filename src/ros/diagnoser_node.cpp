@@ -79,7 +79,8 @@ void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings&
       std::move(settings),
       [this, place = joints_.size()](const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis) {
         publish(joints_[place], stamp, diagnosis);
-      });
+      },
+      common.waveform ? &fits_ : nullptr);
   joint.diagnostics = std::make_unique<JointDiagnostics>(*joint.monitor, joint.history.get(), joined(topics_),
                                                          common.diagnostics);
   joint.diagnostics->add_to(updater_);
@@ -169,6 +170,7 @@ void DiagnoserNode::run() {
     ros::WallDuration(1e-3 * kTick).sleep();
   }
   samples.stop();
+  fits_.stop();
   for (Joint& joint : joints_) joint.monitor->stop();
   write_histories();
 }
@@ -207,8 +209,7 @@ void DiagnoserNode::publish(const Joint& joint, const ros::Time& stamp,
                             const diagnosis::Diagnosis& diagnosis) {
   if (joint.history) joint.history->take(stamp.toSec(), diagnosis);
   for (const diagnosis::Estimate& estimate : diagnosis.estimates) {
-    auto m = to_message(estimate);
-    m.header.stamp = stamp;
+    auto m = to_message(estimate, stamp);
     m.joint = joint.monitor->joint();
     estimates_.publish(m);
   }
@@ -245,8 +246,7 @@ bool DiagnoserNode::on_diagnose(backlash_diagnosis::Diagnose::Request& request,
   const diagnosis::Diagnosis diagnosis = monitor->diagnose(request.periods, request.timeout, note, stamp);
   response.verdict = to_message(diagnosis.verdict, diagnosis.estimates);
   for (const diagnosis::Estimate& estimate : diagnosis.estimates) {
-    response.estimates.push_back(to_message(estimate));
-    response.estimates.back().header.stamp = stamp;
+    response.estimates.push_back(to_message(estimate, stamp));
     response.estimates.back().joint = monitor->joint();
   }
   if (diagnosis.apd) response.distribution = to_message(*diagnosis.apd, *monitor->rig().diagnosis.apd);

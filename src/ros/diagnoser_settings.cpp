@@ -75,6 +75,8 @@ parameters (private)
   history_interval   s at least from one entry to the next, by the stamps; default 60
   job_memory   GB that the process of an action may use, and that which builds a missing curve;
             default 4
+  waveform  whether the estimator waveform is fitted, in the background at the lowest priority; default
+            true
   folder    the only folder in which goals of actions may name files, relative to it or absolute;
             default: backlash_diagnosis in ROS_HOME (~/.ros)
 
@@ -114,6 +116,7 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   settings.history = read_history_folder(parameters);
   settings.history_interval = parameters.number("history_interval", 60, Range::not_negative());
   settings.job_memory = parameters.number("job_memory", kJobMemory, Range::positive());
+  settings.waveform = parameters.boolean("waveform", true);
   parameters.allow("live");
   parameters.allow("diagnostic_period");  // of diagnostic_updater
   const std::string limits = parameters.text("limits", "");

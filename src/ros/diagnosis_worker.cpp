@@ -23,6 +23,12 @@ void yield_to_samples() {
 
 }  // namespace
 
+diagnosis::Diagnosis DiagnosisTask::compute() const {
+  diagnosis::Diagnosis diagnosis = diagnosis::diagnose(window, settings, curve.get(), baseline);
+  if (fitted) diagnosis::recall_waveform(diagnosis, *fitted, window, settings.limits, baseline);
+  return diagnosis;
+}
+
 DiagnosisWorker::DiagnosisWorker(Work work) : work_(std::move(work)), thread_(&DiagnosisWorker::run, this) {}
 
 DiagnosisWorker::~DiagnosisWorker() {

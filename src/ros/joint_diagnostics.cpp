@@ -248,6 +248,9 @@ void JointDiagnostics::describe_curve(const MonitorState& state, Status& status)
   else
     status.summary(DiagnosticStatus::OK,
                    state.latest ? "the record is as the curve needs it" : "waiting for samples");
+  if (state.latest && !state.latest->verdict.declared_wrong.empty())
+    status.mergeSummary(DiagnosticStatus::WARN,
+                        diagnosis::contradiction_text(state.latest->verdict.declared_wrong));
   if (!state.latest || !curve) return;
   for (const diagnosis::Estimate& e : state.latest->estimates)
     if (e.status == backlash::diagnosis::Status::above_range && diagnosis::needs_curve(e.method))

@@ -12,6 +12,10 @@
 namespace backlash::ros_bridge {
 namespace {
 
+/// Of a fit of the waveform: its twelve reversals, and the half period before the first.
+constexpr long kFittedPeriods = 7;
+constexpr const char* kNoFitYet = "being fitted to seven periods, which takes seconds: no answer yet";
+
 diagnosis::StreamSettings stream_settings(const MonitorSettings& settings) {
   diagnosis::StreamSettings stream;
   stream.apd = settings.rig.diagnosis.apd;
@@ -28,13 +32,18 @@ std::vector<std::string> MonitorState::warnings() const {
   return all;
 }
 
-JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis)
+JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis, BackgroundFits* fits)
     : settings_(std::move(settings)),
       diagnosis_settings_(settings_.rig.diagnosis),
       stream_(stream_settings(settings_)),
       on_diagnosis_(std::move(on_diagnosis)),
+      fits_(fits),
+      waveform_(fits ? settings_.rig.diagnosis.waveform : std::nullopt),
       worker_([this](const DiagnosisTask& task) { work(task); }) {
-  diagnosis_settings_.leave_out_waveform();
+  if (waveform_)
+    diagnosis_settings_.leave_out_waveform(kNoFitYet);
+  else if (settings_.rig.diagnosis.waveform)
+    diagnosis_settings_.leave_out_waveform();
   if (settings_.baseline) set_baseline(settings_.baseline);
   if (settings_.curve) {
     curve_warning_ = settings_.curve_warning;
@@ -46,9 +55,11 @@ JointMonitor::JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis)
   } else {
     curve_state_ = "waiting for samples to know their rate";
   }
+  if (waveform_) fits_->add(this, [this] { return fit(); });
 }
 
 JointMonitor::~JointMonitor() {
+  if (waveform_) fits_->remove(this);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     stop_ = true;
@@ -74,6 +85,7 @@ std::optional<PeriodReport> JointMonitor::take(const ros::Time& stamp, const rec
   if (stream_.counters().restarts != restarts) {
     reported_periods_ = 0;
     estimated_.reset();
+    fitted_.reset();
   }
   if (!stream_.counters().last_problem.empty())
     last_problem_ = topic + ": " + stream_.counters().last_problem;
@@ -113,6 +125,7 @@ DiagnosisTask JointMonitor::task(long periods) const {
   task.settings = diagnosis_settings_;
   task.curve = curve_;
   task.baseline = baseline_;
+  task.fitted = fitted_;
   return task;
 }
 
@@ -124,6 +137,27 @@ void JointMonitor::work(const DiagnosisTask& task) {
     latest_ = diagnosis;
   }
   if (on_diagnosis_) on_diagnosis_(task.stamp, *diagnosis);
+}
+
+/// In the thread of the background fits.
+bool JointMonitor::fit() {
+  DiagnosisTask newest;
+  long restarts = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    newest = task(kFittedPeriods);
+    restarts = stream_.counters().restarts;
+  }
+  const std::vector<double>& time = newest.window.record.time;
+  if (time.empty() || (newest.fitted && newest.fitted->end >= time.back())) return false;
+  const bool more_to_come = settings_.keep > (kFittedPeriods + 1) * newest.window.period;
+  if (newest.window.period > 0 && newest.window.count < kFittedPeriods && more_to_come) return false;
+  newest.settings.waveform = waveform_;
+  diagnosis::EarlierWaveform found =
+      diagnosis::fit_waveform(newest.window, newest.settings, newest.curve.get());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (stream_.counters().restarts == restarts) fitted_ = std::move(found);
+  return true;
 }
 
 diagnosis::Diagnosis JointMonitor::diagnose(long periods, double timeout, std::string& note,

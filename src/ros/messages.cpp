@@ -71,8 +71,9 @@ backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::ApdResult&
   return m;
 }
 
-backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& e) {
+backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& e, const ros::Time& stamp) {
   EstimateMessage m;
+  if (!stamp.isZero()) m.header.stamp = stamp - ros::Duration(e.age);
   m.method = e.method;
   m.status = code(e.status);
   m.status_name = diagnosis::to_string(e.status);

@@ -70,6 +70,29 @@ TEST(Verdict, IntervalsThatJustMissEachOtherWidenTheAnswer) {
   EXPECT_EQ(combined({ok("a", 8e-5, 2e-6), ok("b", 8.9e-5, 2e-6)}).grade, Grade::cannot_tell);
 }
 
+// Told by who is believed, also where the play is too small to be told; not by who is contradicted.
+TEST(Verdict, SaysWhatInTheFileIsWrong) {
+  const ContradictedValue damping = {"motor damping", "N m s/rad", 0.0048, 0.0029, 2e-5};
+  const std::string text =
+      "; declared motor damping 0.0048 N m s/rad, this record says 0.0029 +- 2e-05: run identify";
+  Estimate fitted = ok("fitted", 8e-5, 1e-6);
+  fitted.from_record = fitted.fits_machine = true;
+  fitted.declared_wrong = {damping};
+  const Verdict v = combined({ok("a", 8.1e-5, 2e-6), fitted});
+  ASSERT_EQ(v.declared_wrong.size(), 1u);
+  EXPECT_EQ(v.declared_wrong[0].found, 0.0029);
+  EXPECT_TRUE(mentions(v, text));
+  Estimate none = unable("fitted", Status::below_range, "no play");
+  none.declared_wrong = {damping};
+  EXPECT_TRUE(mentions(combined({none}), text));
+  none.status = Status::out_of_domain;
+  EXPECT_TRUE(combined({none}).declared_wrong.empty());
+  fitted.fits_machine = fitted.from_record = false;
+  Estimate measured = ok("measured", 4e-5, 1e-6);
+  measured.from_record = true;
+  EXPECT_TRUE(combined({measured, fitted}).declared_wrong.empty());
+}
+
 TEST(Verdict, CombinesWhatAgreesSharpestFirst) {
   const Verdict v = combined({ok("wide", 9e-5, 3e-5), unable("off", Status::out_of_domain, "x"),
                               ok("narrow", 8e-5, 1e-6), ok("middle", 8e-5, 1e-5)});

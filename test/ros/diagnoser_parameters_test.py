@@ -69,7 +69,7 @@ class DiagnoserParametersTest(unittest.TestCase):
     def test_limits_and_baseline_are_kept_in_their_files(self):
         healthy = os.path.join(self.folder, "healthy.yaml")
         parameters = {"curve": build_curve(self.folder), "limits": self.write("limits.yaml", LIMITS),
-                      "baseline": healthy}
+                      "baseline": healthy, "waveform": False}
         run = simulated_messages(self.folder, 4e-5)
         first = self.fed(parameters, run)
         answer = first.diagnose(periods=10, timeout=TIMEOUT)

@@ -62,7 +62,7 @@ class DiagnoserTest(unittest.TestCase):
             answer = self.diagnoser.diagnose(periods=10, timeout=TIMEOUT)
             if answer.success:
                 told += 1
-                self.assertEqual(answer.estimates[answer.verdict.estimate].method, "lost_motion")
+                self.assertIn(answer.estimates[answer.verdict.estimate].method, ("lost_motion", "waveform"))
             else:  # the interval of one method missed those of the others: no value is better than a wrong one
                 self.assertIn("cannot tell; disagree", answer.message)
             best = next(e for e in answer.estimates if e.method == "lost_motion")
@@ -71,8 +71,7 @@ class DiagnoserTest(unittest.TestCase):
                 if estimate.method == "momentum_transfer":  # needs faster sampling
                     self.assertEqual(estimate.status_name, "out_of_domain", estimate.message)
                     continue
-                if estimate.method == "waveform":  # takes seconds, offline only
-                    self.assertEqual(estimate.status_name, "insufficient_data", estimate.message)
+                if estimate.method == "waveform" and estimate.status_name != "ok":  # not there yet, or of before
                     continue
                 self.assertIn(estimate.status_name, ("ok", "ambiguous", "above_range"), estimate.message)
                 open_end = math.isnan(estimate.upper)  # a lower bound only, which no sound estimate may be

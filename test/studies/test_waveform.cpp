@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
+#include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/diagnosis/waveform.h"
 #include "backlash_diagnosis/model/contact_law.h"
 #include "backlash_diagnosis/record/csv.h"
@@ -86,6 +88,86 @@ TEST(Waveform, MachinesWithAllValuesOff) {
     EXPECT_GT(alone.upper - alone.lower, 0.2 * alone.backlash);
     EXPECT_LT(alone.upper - alone.lower, 0.32 * alone.backlash);
   }
+}
+
+/// The file says 1.9 times the damping that was simulated, and 1.25 times the stiffness of the sensor.
+TEST(Waveform, NamesWhatTheRecordContradicts) {
+  rig_file::RigFile file = rig_file::default_rig_file();
+  file.rig.motor.viscous_damping /= 1.9;
+  file.rig.input_coupling.stiffness /= 1.25;
+  file.rig.mesh.backlash = 60e-6;
+  file.simulation.sensors = drawn(5, 0).simulation.sensors;
+  const Estimate e = diagnosis::estimate_waveform(record_of(file), declared());
+  expect_holds(e, 60e-6);
+  ASSERT_EQ(e.declared_wrong.size(), 2u) << e.message;
+  const double truth[] = {file.rig.motor.viscous_damping, file.rig.input_coupling.stiffness};
+  const double said[] = {declared().motor_damping, declared().sensor_stiffness};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const diagnosis::ContradictedValue& v = e.declared_wrong[i];
+    EXPECT_EQ(v.declared, said[i]) << v.name;
+    EXPECT_NEAR(v.found, truth[i], 0.01 * truth[i]) << v.name;  // at least: a tenth of the spread of the file
+    EXPECT_LT(v.standard_error, 0.01 * truth[i]) << v.name;
+    EXPECT_NE(e.message.find("declared " + v.name), std::string::npos) << e.message;
+  }
+}
+
+/// Without a curve and a position no other method speaks; the signal itself does.
+TEST(Waveform, AnEarlierAnswerEndsWithTheMachineItIsOf) {
+  diagnosis::DiagnosisSettings settings = rig_file::default_rig_file().diagnosis;
+  settings.apd->settling_periods = 0;
+  const auto window_of = [&](const record::Record& record) {
+    return diagnosis::cut_periods(record, settings.apd);
+  };
+  diagnosis::DiagnosisSettings quick = settings;
+  quick.leave_out_waveform();
+  // Above a half gap of 60 um no period is as the one before, and a tenth more play is not seen.
+  for (const double backlash : {60e-6, 160e-6}) {
+    rig_file::RigFile file = drawn(31, backlash);
+    const record::Record all = simulation::simulate_record(file.rig, file.simulation, 5.2);
+    const auto part = [&](double start) { return window_of(all.slice(start - 1e-6, start + 0.7 - 1e-6)); };
+    diagnosis::EarlierWaveform earlier;
+    earlier.end = 0.9;
+    earlier.estimate.status = Status::ok;
+    earlier.period = diagnosis::mean_period(part(0.2));
+    const auto told = [&](diagnosis::PeriodWindow window) {
+      window.record = without_position(window.record);
+      diagnosis::Diagnosis now = diagnosis::diagnose(window, quick, nullptr);
+      diagnosis::recall_waveform(now, earlier, window, std::nullopt, std::nullopt);
+      return now.estimates.back();
+    };
+    for (double start = 0.5; start < 4.5; start += 0.3)
+      EXPECT_EQ(told(part(start)).status, Status::ok) << told(part(start)).message;
+    for (const double factor : {0.5, 0.8, 0.9, 1.1, 1.3, 2.0}) {
+      if (backlash > 120e-6 && std::fabs(factor - 1) < 0.15) continue;
+      file.rig.mesh.backlash = factor * backlash;
+      const record::Record changed = simulation::simulate_record(file.rig, file.simulation, 5.2);
+      EXPECT_EQ(told(window_of(changed.slice(4.2 - 1e-6, 4.9 - 1e-6))).status, Status::insufficient_data)
+          << factor << " of " << backlash;
+    }
+  }
+}
+
+/// What people are shown is the record, and a waveform that leaves no more than its noise.
+TEST(Waveform, ShowsTheRecordAndTheFittedMachine) {
+  const record::Record record = record_of(drawn(101, 100e-6));
+  const Estimate e = diagnosis::estimate_waveform(record, declared());
+  ASSERT_TRUE(e.waveform);
+  const diagnosis::WaveformEvidence& evidence = *e.waveform;
+  ASSERT_EQ(evidence.values.size(), diagnosis::waveform_quantities().size());
+  ASSERT_GE(evidence.windows.size(), 4u);
+  for (const auto& window : evidence.windows) {
+    const auto first = static_cast<std::size_t>(std::lround((window.start - record.time[0]) * kRate));
+    double squares = 0;
+    for (std::size_t i = 0; i < window.torque.measured.size(); ++i) {
+      EXPECT_EQ(window.torque.measured[i], record.column(Channel::sensor_torque)[first + i]);
+      EXPECT_EQ(window.position.measured[i], record.column(Channel::motor_position)[first + i]);
+      squares += std::pow(window.torque.measured[i] - window.torque.model[i], 2);
+    }
+    // 0.002 N m of noise were added, and some hundred samples tell it to a tenth.
+    const double rms = std::sqrt(squares / static_cast<double>(window.torque.measured.size()));
+    EXPECT_NEAR(rms, 0.002, 0.0006);
+  }
+  EXPECT_FALSE(diagnosis::estimate_waveform(record.slice(0.2, 0.25), declared()).waveform);
 }
 
 /// The symmetry of waveform.h: the same torque is that of a machine with all of this times c and a gap 1 / c.

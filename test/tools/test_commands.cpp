@@ -280,8 +280,8 @@ TEST_F(Commands, ReportHasTheDocumentedShape) {
   const Json json = report("a.csv --rig rig.yaml --curve c.yaml", 0);
   std::vector<std::string> keys;
   for (const auto& item : json.items()) keys.push_back(item.key());
-  EXPECT_EQ(keys, (std::vector<std::string>{"schema_version", "record", "estimates", "verdict", "apd",
-                                            "warnings", "rig", "curve", "version"}));
+  EXPECT_EQ(keys, (std::vector<std::string>{"schema_version", "record", "estimates", "verdict",
+                                            "declared_wrong", "apd", "warnings", "rig", "curve", "version"}));
   EXPECT_EQ(json["schema_version"], 1);
   EXPECT_EQ(json["estimates"][0]["method"], "apd_skewness");
   std::vector<std::string> methods;

@@ -106,7 +106,7 @@ TEST_F(Pages, ADiagnosisInABrowser) {
   const Json& page = seen.at(0);
   const Json told = Json::parse(read("out.json"));
   expect_sound(page);
-  expect_drawn(page, 6);  // intervals, curve, APD, loop, torque, position
+  expect_drawn(page, 8);  // intervals, curve, APD, loop, torque, position; fitted torque and position
   const Json table = table_with(page, {"method", "status"});
   const Json& estimates = told.at("estimates");
   ASSERT_EQ(table.size(), estimates.size() + 2);  // heads, and all together
@@ -121,10 +121,16 @@ TEST_F(Pages, ADiagnosisInABrowser) {
   }
   const Json& verdict = told.at("verdict");
   expect_numbers(table.back()[2], verdict.at("backlash"), verdict.at("interval"), 1e-6);
+  const Json machine = table_with(page, {"value", "declared", "known within", "this record says"});
+  ASSERT_GT(machine.size(), 20u);
+  EXPECT_EQ(machine[3][0], "motor.viscous_damping");
+  EXPECT_EQ(machine[3][1], "0.0048 N m s/rad");
+  EXPECT_EQ(machine[3][2], "50 %, by default");
+  EXPECT_NEAR(numbers(machine[3][3]).at(0), 0.0048, 0.0001);  // what was simulated, to two per cent
   const std::string text = page.at("text");
-  for (const std::string& part :
-       std::vector<std::string>{verdict.at("message"), "2000 Hz", "# <script>alert(1)</script>", "SUNDIALS",
-                                told.at("version"), "run.csv", "matplotlib"})
+  for (const std::string& part : std::vector<std::string>{
+           verdict.at("message"), "2000 Hz", "The fitted machine over the record",
+           "# <script>alert(1)</script>", "SUNDIALS", told.at("version"), "run.csv", "matplotlib"})
     expect_contains(text, part);
 }
 

@@ -30,9 +30,9 @@ struct DiagnosisSettings {
       "the rig has no torque sensor before a Hunt-Crossley mesh with a locked output";
 
   /// Without the estimator that takes seconds.
-  void leave_out_waveform() {
+  void leave_out_waveform(const std::string& why = "takes seconds: not run here, but by diagnose_record") {
     waveform.reset();
-    no_waveform = "takes seconds: not run here, but by diagnose_record";
+    no_waveform = why;
   }
   std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
@@ -44,8 +44,9 @@ struct Diagnosis {
   std::vector<Estimate>
       estimates;  // one per method of diagnosis_methods(), in that order, or the one asked for
   std::optional<ApdResult> apd;
-  std::optional<Mismatch> mismatch;             // of the record and the conditions of the curve
-  std::optional<CoherenceDetection> coherence;  // where the settings ask for it
+  std::optional<Mismatch> mismatch;              // of the record and the conditions of the curve
+  std::optional<CoherenceDetection> coherence;   // where the settings ask for it
+  std::optional<std::string> lock_contradicted;  // why the output is not locked although the file says so
   Verdict verdict;
 };
 

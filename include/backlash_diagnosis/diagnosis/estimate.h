@@ -3,8 +3,10 @@
 // words.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "backlash_diagnosis/base/not_a_number.h"
 
@@ -30,6 +32,17 @@ struct PlayComponents {
   double at_torque = kNaN;   ///< N m, torque at which backlash_angle holds
 };
 
+/// A value of the rig file that the record contradicts.
+struct ContradictedValue {
+  std::string name, unit;
+  double declared = kNaN, found = kNaN;  ///< in the unit
+  double standard_error = kNaN;          ///< of what was found
+};
+/// "declared motor damping 0.0048 N m s/rad, this record says 0.0029 +- 2e-05: run identify"; empty for none.
+std::string contradiction_text(const std::vector<ContradictedValue>& contradicted);
+
+struct WaveformEvidence;  // diagnosis/waveform.h
+
 /// An estimate of backlash. NaN where not known: `backlash` for a rig without base radius, all where status
 /// says so.
 struct Estimate {
@@ -46,7 +59,10 @@ struct Estimate {
   bool from_record = false;   ///< what the value depends on was measured on the record, not declared
   bool fits_machine = false;  // of from_record: the values of the machine that other methods take from the
                               // rig file were fitted with it, so that they add nothing
-  std::string message;        ///< the reason of the status, or how the value came about
+  double age = 0;  ///< s, >= 0, by which the samples that it rests on ended before those of the diagnosis
+  std::vector<ContradictedValue> declared_wrong;
+  std::shared_ptr<const WaveformEvidence> waveform;  ///< null but of `waveform`
+  std::string message;  ///< the reason of the status, or how the value came about
 };
 
 }  // namespace backlash::diagnosis

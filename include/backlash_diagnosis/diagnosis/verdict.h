@@ -24,6 +24,7 @@ struct Verdict {
   double backlash = kNaN, lower = kNaN, upper = kNaN;                    // m, 95 % interval; NaN end: open
   double backlash_angle = kNaN, angle_lower = kNaN, angle_upper = kNaN;  // rad, axis of motor_position
   double growth = kNaN, growth_lower = kNaN, growth_upper = kNaN;  // since the baseline, unit of the limits
+  std::vector<ContradictedValue> declared_wrong;  // by sound estimates and those without play, not dissenters
   std::string message;
 };
 

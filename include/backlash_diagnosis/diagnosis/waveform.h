@@ -73,6 +73,28 @@ struct WaveformSettings {
   double common_scale = 0;
 };
 
+/// What a fit rests on, for people to see: what was measured about the reversals, what the fitted machine
+/// does there, and its values.
+struct WaveformEvidence {
+  struct Trace {
+    std::vector<double> measured, model;  ///< N m or rad; empty: not measured
+  };
+  struct Window {
+    double start = 0;        ///< s, on the clock of the record, of its first sample
+    double misfit = 0;       ///< -, largest rms of a channel's residual in noises of the fit
+    Trace torque, position;  ///< of the sensor, of the motor
+  };
+  struct Value {
+    double declared = kNaN, spread = kNaN;  ///< before the record; the spread is as in WaveformQuantity
+    double found = kNaN, standard_error = kNaN;
+  };
+  double interval = 0;                          ///< s, between samples
+  double torque_noise = 0, position_noise = 0;  ///< standard deviations that the fit takes, N m, rad
+  int left_out = 0;                             ///< windows that are not here, as the fit did not catch them
+  std::vector<Window> windows;
+  std::vector<Value> values;  ///< in the order of waveform_quantities()
+};
+
 /// Throws InvalidParameter for settings outside the ranges above. Answers by status:
 ///   insufficient_data  a channel is missing; too few reversals
 ///   out_of_domain      no square wave, uneven or too coarse samples; the equations do not fit the record, or

@@ -9,7 +9,8 @@
 
 namespace backlash::report {
 
-/// The report itself, the last periods of the record, the curve and the limits. `rig` may be null.
+/// The report itself, the last periods of the record, the curve, the limits and the waveform of the machine
+/// fitted to the record. `rig` may be null.
 std::string diagnosis_series(const DiagnosisReport& report, const rig_file::RigFile* rig);
 
 }  // namespace backlash::report

@@ -36,6 +36,7 @@ struct DiagnoserSettings {
   std::string history;             // folder with a file per joint; empty: none is kept
   double history_interval = 60;    // s
   double job_memory = kJobMemory;  // GB that the process of an action may hold
+  bool waveform = true;            // fitted in the background
 };
 
 /// Throws InvalidParameter, BadData, MissingInput.
@@ -96,6 +97,7 @@ class DiagnoserNode {
   ros::NodeHandle handle_, private_handle_;
   FileFolder folder_;
   double job_memory_;                // GB
+  BackgroundFits fits_;              // of all joints
   std::vector<Joint> joints_;        // as many as at the start, so that their addresses stay
   JointInputs inputs_;               // of the same joints
   std::vector<std::string> topics_;  // of inputs_, resolved

@@ -13,7 +13,7 @@
 #include <optional>
 #include <thread>
 
-#include "backlash_diagnosis/diagnosis/diagnose.h"
+#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
 
 namespace backlash::ros_bridge {
 
@@ -25,10 +25,9 @@ struct DiagnosisTask {
   diagnosis::DiagnosisSettings settings;
   std::shared_ptr<const diagnosis::MonitoringCurve> curve;  // null: none is there
   std::optional<diagnosis::Baseline> baseline;
+  std::optional<diagnosis::EarlierWaveform> fitted;  // latest
 
-  diagnosis::Diagnosis compute() const {
-    return diagnosis::diagnose(window, settings, curve.get(), baseline);
-  }
+  diagnosis::Diagnosis compute() const;
 };
 
 /// Works through tasks in their order. Some may wait, so that a moment without processor time loses none;

@@ -13,7 +13,9 @@
 #include <thread>
 #include <vector>
 
+#include "backlash_diagnosis/diagnosis/earlier_waveform.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
+#include "backlash_diagnosis/ros/background_fits.h"
 #include "backlash_diagnosis/ros/diagnosis_worker.h"
 #include "backlash_diagnosis/ros/job.h"
 #include "backlash_diagnosis/ros/joint_state.h"
@@ -68,7 +70,9 @@ class JointMonitor {
   /// `stamp` is that of their last sample.
   using OnDiagnosis = std::function<void(const ros::Time& stamp, const diagnosis::Diagnosis& diagnosis)>;
 
-  explicit JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis = nullptr);
+  /// `fits` outlives the monitor; null: the estimator `waveform` is not run.
+  explicit JointMonitor(MonitorSettings settings, OnDiagnosis on_diagnosis = nullptr,
+                        BackgroundFits* fits = nullptr);
   ~JointMonitor();
 
   const std::string& joint() const { return settings_.joint; }
@@ -82,7 +86,8 @@ class JointMonitor {
                                    const std::string& problem, const std::string& topic);
 
   /// Waits until `periods` whole periods are at hand (0: one) and the curve is there, at most `timeout` [s]
-  /// of wall time, then diagnoses the latest `periods` (0: all kept).
+  /// of wall time, then diagnoses the latest `periods` (0: all kept). `waveform` is what its latest fit
+  /// found; nobody waits for it.
   diagnosis::Diagnosis diagnose(long periods, double timeout, std::string& note, ros::Time& stamp);
 
   /// Ends the running estimates: the latest that waits is still told.
@@ -103,6 +108,7 @@ class JointMonitor {
   std::optional<DiagnosisTask> due(double time);
   DiagnosisTask task(long periods) const;
   void work(const DiagnosisTask& task);
+  bool fit();
   long wanted_periods(long periods) const { return periods > 0 ? periods : 1; }
 
   MonitorSettings settings_;
@@ -124,7 +130,10 @@ class JointMonitor {
   bool building_ = false, build_tried_ = false, stop_ = false;
   std::thread builder_;
   OnDiagnosis on_diagnosis_;
-  DiagnosisWorker worker_;  // last: it uses all of the others
+  BackgroundFits* const fits_;
+  const std::optional<diagnosis::WaveformSettings> waveform_;  // absent: not run
+  std::optional<diagnosis::EarlierWaveform> fitted_;           // of this run of the stream
+  DiagnosisWorker worker_;                                     // last: it uses all of the others
 };
 
 }  // namespace backlash::ros_bridge

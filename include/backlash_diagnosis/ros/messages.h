@@ -19,7 +19,9 @@ backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::PeriodResu
 /// All periods of an analysis together; skewness is the mean over the periods.
 backlash_diagnosis::AmplitudeDistribution to_message(const diagnosis::ApdResult& apd,
                                                      const diagnosis::ApdSettings& settings);
-backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& estimate);
+/// `stamp` is that of the last sample of the diagnosis; an estimate of earlier samples has theirs.
+backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& estimate,
+                                                const ros::Time& stamp = {});
 /// The estimates that the verdict is about give its members their names.
 backlash_diagnosis::Verdict to_message(const diagnosis::Verdict& verdict,
                                        const std::vector<diagnosis::Estimate>& estimates);

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// An answer of `waveform`, which takes seconds, beside a diagnosis of later samples of the same machine.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/diagnose.h"
+
+namespace backlash::diagnosis {
+
+/// The torque of the sensor over the phase of the excitation's period, in at most 200 bins; empty where there
+/// is no period.
+struct MeanPeriod {
+  std::vector<double> mean, squares, count;  ///< N m; (N m)^2, sum about the mean; samples
+  double swing = 0;                          ///< N m, half of the largest less the smallest
+};
+MeanPeriod mean_period(const PeriodWindow& window);
+
+/// What `waveform` found on samples that ended at `end`, and what the other methods found on the same.
+struct EarlierWaveform {
+  double end = 0;  ///< s, on the clock of the samples
+  Estimate estimate;
+  std::vector<Estimate> others;
+  MeanPeriod period;
+};
+
+/// Both on the same samples. Throws as diagnose() does.
+EarlierWaveform fit_waveform(const PeriodWindow& window, const DiagnosisSettings& settings,
+                             const MonitoringCurve* curve);
+
+/// Puts the earlier answer into a diagnosis of a window, without `waveform`, and combines anew. Its age is
+/// told, in Estimate::age and in the messages. It is not used, and the reason is told, where
+///   - it is older than 300 s: a choice, as play grows by months;
+///   - the machine has changed since: another method has moved by more than both its intervals (without what
+///     they have of declared values, which is the same in both, and not below a fiftieth of the value), or
+///     contradicts the answer now and did not then; or the mean period of the sensor's torque is another: by
+///     more than two standard errors, as a mean over the period, of which a hundredth of the swing is no
+///     change;
+///   - the samples of now contradict the declared lock.
+void recall_waveform(Diagnosis& diagnosis, const EarlierWaveform& earlier, const PeriodWindow& window,
+                     const std::optional<Limits>& limits, const std::optional<Baseline>& baseline);
+
+}  // namespace backlash::diagnosis
