@@ -107,6 +107,21 @@ double elastic_uncertainty(double coupling, double flank) {
   return all > 0 ? (Known::kCoupling * coupling + softest * flank) / all : 0;
 }
 
+model::Rig with_machine(model::Rig rig, const diagnosis::WaveformSettings& machine) {
+  model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
+  rig.motor.inertia = std::fmax(0, machine.motor_inertia - 0.5 * in.inertia);
+  rig.pinion.inertia = std::fmax(0, machine.pinion_inertia - 0.5 * in.inertia);
+  rig.gear.inertia = std::fmax(0, machine.gear_inertia - 0.5 * out.inertia);
+  rig.motor.viscous_damping = machine.motor_damping;
+  rig.motor.coulomb_friction = machine.dry_friction;
+  in.stiffness = machine.sensor_stiffness, in.damping = machine.sensor_damping;
+  out.stiffness = machine.output_stiffness, out.damping = machine.output_damping;
+  model::ContactSpec contact = rig.mesh.contact_spec();
+  contact.values["stiffness"] = machine.contact_stiffness, contact.values["alpha"] = machine.contact_loss;
+  rig.mesh.contact = model::make_contact_law(contact.law, contact.values);
+  return rig;
+}
+
 RigFile rig_file_from_text(const std::string& text, const std::string& source) {
   const YamlReader yaml = YamlReader::from_text(text, source);
   RigFile file;

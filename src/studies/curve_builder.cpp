@@ -125,16 +125,17 @@ int count_beyond(const CurvePlan& plan) {
 
 /// All machines that are run, by backlash: those of the points, those in the middle between two points, which
 /// are as far from the file as a real one may be, and those beyond the end of the curve.
-std::vector<model::Rig> machines_of(const CurvePlan& plan) {
+std::vector<Machine> machines_of(const CurvePlan& plan) {
   const int count = plan.request.points;
   const double step = plan.request.max_backlash / (count - 1);
-  std::vector<model::Rig> machines;
-  for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
+  const Machine declared = declared_machine(plan.file);
+  std::vector<Machine> machines;
+  for (int i = 0; i < count; ++i) machines.push_back(with_backlash(declared, i * step));
   for (int i = 0; i + 1 < count; ++i)
     machines.push_back(
-        with_backlash(draw_machine(plan.file, 2 * static_cast<std::uint64_t>(i) + 1), (i + 0.5) * step));
+        with_backlash(draw_stiffness(plan.file, 2 * static_cast<std::uint64_t>(i) + 1), (i + 0.5) * step));
   for (int i = 0; i < count_beyond(plan); ++i)
-    machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
+    machines.push_back(with_backlash(declared, (count + i) * step));
   return machines;
 }
 
@@ -185,14 +186,14 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   all.middle.means.resize(count - 1);
   all.middle.runs.resize(count - 1);
   all.beyond.resize(count_beyond(plan));
-  const std::vector<model::Rig> machines = machines_of(plan);
+  const std::vector<Machine> machines = machines_of(plan);
   PointsDone points(plan.request);
   const std::size_t chunks = (machines.size() + kTogether - 1) / kTogether;
   for_each_in_parallel(static_cast<int>(chunks), ticker, [&](int chunk) {
     const std::size_t begin = chunk * kTogether, end = std::min(begin + kTogether, machines.size());
     std::vector<FineRun> runs = run_fine(plan, {machines.begin() + begin, machines.begin() + end}, ticker);
     for (std::size_t i = begin; i < end; ++i) {
-      take(plan, i, machines[i].mesh.backlash, std::move(runs[i - begin]), all);
+      take(plan, i, machines[i].rig.mesh.backlash, std::move(runs[i - begin]), all);
       if (i < all.points.size()) points.add(all.points[i].point);
     }
   });

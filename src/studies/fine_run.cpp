@@ -103,8 +103,8 @@ double signal_scale(CurvePlan plan) {
   const Progress nobody;
   Ticker quiet(nobody, 1, "");
   double squares = 0;
-  const FineRun run =
-      std::move(run_fine(plan, {with_backlash(plan.file.rig, plan.request.max_backlash)}, quiet).front());
+  const FineRun run = std::move(
+      run_fine(plan, {with_backlash(declared_machine(plan.file), plan.request.max_backlash)}, quiet).front());
   for (const double value : run.signal) squares += value * value;
   return std::sqrt(squares / static_cast<double>(run.signal.size()));
 }
@@ -139,17 +139,18 @@ CurvePlan plan_curve(const rig_file::RigFile& file, CurveRequest request) {
   return plan;
 }
 
-model::Rig with_backlash(model::Rig rig, double backlash) {
-  rig.mesh.backlash = backlash;
-  return rig;
+Machine with_backlash(Machine machine, double backlash) {
+  machine.rig.mesh.backlash = backlash;
+  return machine;
 }
 
-std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<model::Rig>& machines,
-                              Ticker& ticker) {
+std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Machine>& machines, Ticker& ticker) {
   const simulation::SimulationSettings& how = plan.file.simulation;
   std::vector<FineRun> runs(machines.size());
-  if (simulation::Ensemble::takes(machines, how.excitation)) {
-    simulation::Ensemble ensemble(machines, how.excitation, how.solver);
+  std::vector<model::Rig> rigs;
+  for (const Machine& machine : machines) rigs.push_back(machine.rig);
+  if (simulation::Ensemble::takes(rigs, how.excitation)) {
+    simulation::Ensemble ensemble(rigs, how.excitation, how.solver);
     sample_finely(
         plan, ensemble,
         [&] {
@@ -158,13 +159,16 @@ std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<model::Ri
         [&] {
           for (std::size_t i = 0; i < runs.size(); ++i) ticker.tick();
         });
-    return runs;
+  } else {
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      simulation::Plant plant(rigs[i], how.excitation, how.solver);
+      sample_finely(
+          plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
+    }
   }
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    simulation::Plant plant(machines[i], how.excitation, how.solver);
-    sample_finely(
-        plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
-  }
+  if (plan.apd.signal == record::Channel::sensor_torque)
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      machines[i].sensor.apply(runs[i].signal, 1 / (plan.request.sampling_rate * plan.phases));
   return runs;
 }
 

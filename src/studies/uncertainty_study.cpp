@@ -14,7 +14,10 @@
 namespace backlash::studies {
 namespace {
 
-constexpr double kMisses = 2;  // widths of an interval beyond which a miss was confident
+// What makes a miss one that was wrong and sure. Choices.
+constexpr double kWidths = 2;        // of the interval, outside of it
+constexpr double kFar = 10e-6;       // m (angular mesh: rad), outside of it, and
+constexpr double kFarOfTruth = 0.2;  // this share of the backlash
 
 Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
   Random random(request.seed, static_cast<std::uint32_t>(index));
@@ -38,26 +41,13 @@ record::Record signal_alone(const record::Record& record, record::Channel signal
   return alone;
 }
 
-/// The verdict as one more estimate; where its members contradict each other nobody should rely on it.
-diagnosis::Estimate combined(const diagnosis::Verdict& verdict) {
-  diagnosis::Estimate estimate;
-  estimate.method = "combined";
-  estimate.backlash = verdict.backlash;
-  estimate.lower = verdict.lower;
-  estimate.upper = verdict.upper;
-  estimate.message = verdict.message;
-  const bool sound = verdict.grade != diagnosis::Grade::cannot_tell && std::isfinite(verdict.backlash);
-  estimate.status = sound ? diagnosis::Status::ok : diagnosis::Status::ambiguous;
-  return estimate;
-}
-
 std::vector<diagnosis::Estimate> estimates_of(const record::Record& record, const rig_file::RigFile& file,
                                               const diagnosis::MonitoringCurve& curve, bool waveform) {
   diagnosis::DiagnosisSettings settings = file.diagnosis;
   if (!waveform) settings.leave_out_waveform();
   const diagnosis::Diagnosis diagnosis = diagnosis::diagnose(record, settings, &curve);
   std::vector<diagnosis::Estimate> all = diagnosis.estimates;
-  all.push_back(combined(diagnosis.verdict));
+  all.push_back(estimate_of_verdict(diagnosis.verdict));
   return all;
 }
 
@@ -88,8 +78,9 @@ bool holds(const diagnosis::Estimate& e, double truth) {
   return truth >= e.lower && truth <= e.upper;
 }
 
-bool confident_miss(const diagnosis::Estimate& e, double truth) {
-  return std::fabs(e.backlash - truth) > kMisses * width(e);
+bool wrong_and_sure(const diagnosis::Estimate& e, double truth) {
+  const double outside = std::max(e.lower - truth, truth - e.upper);
+  return outside > kWidths * width(e) || (outside > kFar && outside > kFarOfTruth * truth);
 }
 
 struct Variant {
@@ -186,7 +177,7 @@ std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, boo
       errors.push_back(std::fabs(e.backlash - trial.backlash));
       widths.push_back(width(e));
       held += holds(e, trial.backlash);
-      row.confident_misses += confident_miss(e, trial.backlash);
+      row.wrong_and_sure += wrong_and_sure(e, trial.backlash);
     }
     row.told = static_cast<int>(errors.size());
     if (row.trials > 0) row.cannot_tell = 1 - static_cast<double>(row.told) / row.trials;

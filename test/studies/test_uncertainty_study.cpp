@@ -42,7 +42,7 @@ TEST(SummariseStudy, CountsByHand) {
   EXPECT_NEAR(rows[0].median_width, 3e-6, 1e-12);
   EXPECT_NEAR(rows[0].coverage, 1 / 3.0, 1e-12);
   EXPECT_NEAR(rows[0].cannot_tell, 0.25, 1e-12);
-  EXPECT_EQ(rows[0].confident_misses, 1);
+  EXPECT_EQ(rows[0].wrong_and_sure, 1);
   EXPECT_EQ(summarise_study(trials, true, 30e-6, 0.05)[0].trials, 0);
   EXPECT_EQ(summarise_study(trials, false, 30e-6)[0].trials, 0);
 }
@@ -78,7 +78,7 @@ TEST(UncertaintyStudy, IntervalsHoldWhatTheyPromise) {
   ASSERT_EQ(trials.size(), 96u);
   for (const bool position : {true, false})
     for (const StudyRow& row : summarise_study(trials, position, 70e-6)) {
-      EXPECT_EQ(row.confident_misses, 0) << row.method;
+      EXPECT_EQ(row.wrong_and_sure, 0) << row.method;
       // Of 30 to 48 intervals of 95 % more than 7 miss with a probability below 1 %.
       if (row.told > 0) {
         EXPECT_LE((1 - row.coverage) * row.told, 7.001) << row.method;

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the estimates are worth: many simulated records of known backlash, diagnosed and counted.
 //
-// Every record has its own backlash (uniform from 0 to the largest of the request), sensor noise (one of the
-// given levels), number of periods and start within an excitation period, all drawn from one seed. Each is
-// diagnosed twice: with all channels, and from the torque sensor alone.
+// Every record is of a machine of its own, drawn from what the rig file knows of its values: friction,
+// inertias, stiffnesses, damping, contact, gain and lag of the sensor, by the spreads of
+// diagnosis/waveform.h or those of the file (of a rig that waveform does not describe: the stiffness of the
+// couplings). It has its own backlash (uniform from 0 to the largest of the request), sensor noise (one of
+// the given levels), number of periods and start within an excitation period, all drawn from one seed. Each
+// is diagnosed twice: with all channels, and from the torque sensor alone.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +51,8 @@ struct StudyRow {
   double median_error = kNaN, p95_error = kNaN;  // m, of |estimate - truth|, where told
   double median_width = kNaN;                    // m, of the interval, where told
   double coverage = kNaN;                        // share of intervals that hold the truth, where told
-  int confident_misses = 0;   // told, and the truth more than two widths off the interval's value
+  int wrong_and_sure = 0;     // told, and the truth outside of the interval by more than twice its width, or
+                              // by more than 10 um and a fifth of the truth
   double cannot_tell = kNaN;  // share of trials without status ok
 };
 
