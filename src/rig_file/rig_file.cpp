@@ -15,6 +15,8 @@
 namespace backlash::rig_file {
 namespace {
 
+constexpr double kNormal95 = 1.96;  // standard deviations of 95 %, both ends: theory
+
 /// Where the file does not say how well it knows the elastic deflection that lost_motion subtracts. A mesh of
 /// angles is one spring with all that is merged into it, of the stated uncertainty.
 double default_uncertainty(const model::Rig& rig, const model::GearTrain& train,
@@ -98,6 +100,18 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
   difference.base_radius = momentum.base_radius = base_radius;
 }
 
+/// position_difference knows the deflection as well as the file knows the stiffness of sensor and contact.
+void use_spread(RigFile& file) {
+  const diagnosis::WaveformSpread& spread = file.diagnosis.waveform->spread;
+  diagnosis::PositionDifferenceSettings& difference = *file.diagnosis.position_difference;
+  const double torque = file.simulation.excitation.amplitude, all = difference.elastic_deflection(torque);
+  if (!(all > 0)) return;
+  const double coupling = torque / file.rig.input_coupling.stiffness, flank = std::fmax(0, all - coupling);
+  const double softest = std::expm1(kNormal95 * spread.contact_stiffness * 2 / 3);  // theory: Hertz
+  difference.elastic_uncertainty =
+      (std::expm1(kNormal95 * spread.sensor_stiffness) * coupling + softest * flank) / all;
+}
+
 }  // namespace
 
 double elastic_uncertainty(double coupling, double flank) {
@@ -143,6 +157,7 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
     yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
   fill_from_rig(file.rig, file.diagnosis);
   read_known_values(yaml, file);
+  if (file.diagnosis.waveform) use_spread(file);
   yaml.finish();
   if (file.diagnosis.position_difference)
     file.diagnosis.position_difference->output_torque_reversed =

@@ -16,6 +16,7 @@
 #include "drawn_machine.h"
 #include "family_builder.h"
 #include "fine_run.h"
+#include "spread_builder.h"
 
 namespace backlash::studies {
 namespace {
@@ -254,7 +255,8 @@ diagnosis::MonitoringCurve build_curve(const rig_file::RigFile& file, const Curv
   const CurvePlan plan = plan_curve(file, request);
   const long runs = 2L * plan.request.points - 1 + count_beyond(plan);
   const long calibration = (plan.request.points - 1L) * static_cast<long>(plan.noise_levels.size() + 1);
-  Ticker ticker(progress, runs * plan.run_periods() + calibration, "building the curve");
+  Ticker ticker(progress, (runs + spread_runs(plan)) * plan.run_periods() + calibration,
+                "building the curve");
   Cells all = make_cells(plan, ticker);
   diagnosis::MonitoringCurve curve;
   curve.conditions = conditions_of(plan);
@@ -273,6 +275,7 @@ diagnosis::MonitoringCurve build_curve(const rig_file::RigFile& file, const Curv
   curve.finish(all.middle.cells);
   curve.coverage_factor = calibrated_factor(curve, all.middle);
   calibrate_family(plan, all.middle.runs, ticker, *curve.family);
+  if (spread_runs(plan) > 0) curve.spread = learn_spread(plan, curve, ticker);
   return curve;
 }
 

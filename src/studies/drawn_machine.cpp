@@ -75,7 +75,11 @@ Machine draw_stiffness(const rig_file::RigFile& file, std::uint64_t seed) {
 
 Machine machine_off(const rig_file::RigFile& file, std::size_t quantity, double spreads) {
   diagnosis::WaveformSettings values = *file.diagnosis.waveform;
-  move(file, diagnosis::waveform_quantities()[quantity], spreads, 0, values);
+  const auto& all = diagnosis::waveform_quantities();
+  if (quantity < all.size())
+    move(file, all[quantity], spreads, 0, values);
+  else
+    for (const diagnosis::WaveformQuantity& q : all) move(file, q, 0, spreads * values.common_scale, values);
   return machine_of(file, values);
 }
 

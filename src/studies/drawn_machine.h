@@ -34,8 +34,8 @@ Machine draw_machine(const rig_file::RigFile& file, std::uint64_t seed);
 /// Drawn from diagnosis.stiffness_uncertainty alone.
 Machine draw_stiffness(const rig_file::RigFile& file, std::uint64_t seed);
 
-/// The declared machine with one of waveform_quantities() off by `spreads`. The rig needs
-/// diagnosis.waveform.
+/// The declared machine with one of waveform_quantities() off by `spreads`, or, beyond the last, with the
+/// factor that all have in common. The rig needs diagnosis.waveform.
 Machine machine_off(const rig_file::RigFile& file, std::size_t quantity, double spreads);
 
 }  // namespace backlash::studies

@@ -73,6 +73,7 @@ void check(const CurveRequest& request) {
   if (!(request.max_backlash > 0 && std::isfinite(request.max_backlash)))
     throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
   if (request.periods < 1) throw InvalidParameter("periods", request.periods, "must be >= 1");
+  if (request.machines < 0) throw InvalidParameter("machines", request.machines, "must be >= 0");
   if (request.seeds < 1) throw InvalidParameter("seeds", request.seeds, "must be >= 1");
   if (!(request.sampling_rate > 0 && std::isfinite(request.sampling_rate)))
     throw InvalidParameter("sample_rate", request.sampling_rate, "must be > 0 Hz and finite");
