@@ -108,7 +108,7 @@ void use_spread(RigFile& file) {
   if (!(all > 0)) return;
   const double coupling = torque / file.rig.input_coupling.stiffness, flank = std::fmax(0, all - coupling);
   const double softest = std::expm1(kNormal95 * spread.contact_stiffness * 2 / 3);  // theory: Hertz
-  difference.elastic_uncertainty =
+  difference.declared_uncertainty =
       (std::expm1(kNormal95 * spread.sensor_stiffness) * coupling + softest * flank) / all;
 }
 
