@@ -41,6 +41,13 @@ record::Record signal_alone(const record::Record& record, record::Channel signal
   return alone;
 }
 
+/// What a rig without encoders records.
+record::Record torques_alone(const record::Record& record, record::Channel signal) {
+  record::Record alone = signal_alone(record, signal);
+  alone.column(record::Channel::motor_torque) = record.column(record::Channel::motor_torque);
+  return alone;
+}
+
 std::vector<diagnosis::Estimate> estimates_of(const record::Record& record, const rig_file::RigFile& file,
                                               const diagnosis::MonitoringCurve& curve, bool waveform) {
   diagnosis::DiagnosisSettings settings = file.diagnosis;
@@ -139,6 +146,17 @@ record::Record simulate_variant(const rig_file::RigFile& file, const Variant& va
 
 }  // namespace
 
+rig_file::RigFile known_to(rig_file::RigFile file, double share) {
+  if (!(share > 0 && std::isfinite(share))) throw InvalidParameter("known", share, "must be > 0 and finite");
+  if (!file.diagnosis.waveform) throw InvalidParameter("known", share, file.diagnosis.no_waveform);
+  diagnosis::WaveformSpread& spread = file.diagnosis.waveform->spread;
+  if (std::isnan(spread.dry_friction))
+    spread.dry_friction = diagnosis::WaveformSpread::kDryFriction * file.simulation.excitation.amplitude;
+  for (const diagnosis::WaveformQuantity& q : diagnosis::waveform_quantities()) spread.*q.spread *= share;
+  file.diagnosis.waveform->common_scale *= share;
+  return file;
+}
+
 std::vector<StudyTrial> run_study(const rig_file::RigFile& rig_file, const diagnosis::MonitoringCurve& curve,
                                   const StudyRequest& request, const Progress& progress) {
   check(rig_file, request);
@@ -152,8 +170,9 @@ std::vector<StudyTrial> run_study(const rig_file::RigFile& rig_file, const diagn
     trials[2 * i] = {"",        d.backlash, d.noise,
                      d.periods, true,       estimates_of(record, file, curve, request.waveform)};
     trials[2 * i + 1] = {
-        "",        d.backlash, d.noise,
-        d.periods, false,      estimates_of(signal_alone(record, apd.signal), file, curve, request.waveform)};
+        "",      d.backlash,
+        d.noise, d.periods,
+        false,   estimates_of(torques_alone(record, apd.signal), file, curve, request.waveform)};
     ticker.tick();
   });
   return trials;

@@ -29,7 +29,7 @@ Command command() {
   c.name = "uncertainty_study";
   c.summary =
       "Simulates records with random backlash, sensor noise and length on machines whose values are drawn "
-      "from what the rig file knows of them, diagnoses each with all channels and from the signal alone, and "
+      "from what the rig file knows of them, diagnoses each with all channels and without positions, and "
       "counts: error, coverage of the 95 % interval, wrong and sure, share of 'cannot tell'. Then the same "
       "under wrong conditions.";
   c.positional = {"RIG.yaml"};
@@ -38,6 +38,7 @@ Command command() {
       {"curve", "CURVE.yaml", "monitoring curve; default: built first"},
       {"records", "N", "random records; default: 600"},
       {"variants", "N", "records of each wrong condition, 0: none; default: 40"},
+      {"known", "X", "every uncertainty of the rig file times X: of a machine known better; default: 1"},
       {"sample-rate", "HZ", "default: the rig file's"},
       {"seed", "N", "of all random numbers; default: 1"},
       {"waveform", "", "also run the estimator waveform: seconds a record"},
@@ -85,8 +86,8 @@ std::vector<Table> tables_of(const std::vector<studies::StudyTrial>& trials,
 }
 
 void print(const Table& table) {
-  std::cout << (table.position ? "\nall channels" : "\nthe signal alone") << ", half gaps to "
-            << 1e6 * table.half_gap << " um, ";
+  std::cout << (table.position ? "\nall channels" : "\nthe signal and motor_torque alone")
+            << ", half gaps to " << 1e6 * table.half_gap << " um, ";
   if (std::isnan(table.noise))
     std::cout << "all noise levels\n";
   else
@@ -164,7 +165,8 @@ int study(const Arguments& arguments) {
   request.waveform = arguments.has("waveform");
   request.sampling_rate = arguments.number("sample-rate", request.sampling_rate, Range::positive());
   const int variants = static_cast<int>(arguments.integer("variants", 40, 0, 1'000'000));
-  const rig_file::RigFile file = rig_file::load_rig_file(rig);
+  rig_file::RigFile file = rig_file::load_rig_file(rig);
+  if (arguments.has("known")) file = studies::known_to(file, arguments.number("known", 1, Range::positive()));
   check_output(out, {rig});
   if (!plot.empty()) {
     check_plot_path(plot);

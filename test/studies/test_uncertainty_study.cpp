@@ -7,7 +7,6 @@
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "backlash_diagnosis/studies/uncertainty_study.h"
 #include "support/estimates.h"
-#include "support/known_machine.h"
 
 namespace backlash::studies {
 namespace {
@@ -63,7 +62,7 @@ TEST(SummariseVariants, NearIsRightFarIsWrong) {
 
 /// Commissioned: known to a hundredth of what a file without a word knows.
 rig_file::RigFile rig() {
-  return test::known(rig_file::default_rig_file(), 0.01);
+  return known_to(rig_file::default_rig_file(), 0.01);
 }
 
 const diagnosis::MonitoringCurve& curve() {

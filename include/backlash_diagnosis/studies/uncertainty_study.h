@@ -6,7 +6,8 @@
 // diagnosis/waveform.h or those of the file (of a rig that waveform does not describe: the stiffness of the
 // couplings). It has its own backlash (uniform from 0 to the largest of the request), sensor noise (one of
 // the given levels), number of periods and start within an excitation period, all drawn from one seed. Each
-// is diagnosed twice: with all channels, and from the torque sensor alone.
+// is diagnosed twice: with all channels, and from the signal of the APD and
+// motor_torque alone; records under wrong conditions from that signal alone.
 #pragma once
 
 #include <cstdint>
@@ -29,13 +30,17 @@ struct StudyRequest {
   bool waveform = false;  // the estimator that takes seconds a record
 };
 
+/// The same file with each uncertainty of diagnosis.waveform times `share`, > 0: a machine that is known
+/// better. Throws InvalidParameter for another share and where the rig has none.
+rig_file::RigFile known_to(rig_file::RigFile file, double share);
+
 /// One record and what was said about it. The last estimate, "combined", is that of the verdict.
 struct StudyTrial {
   std::string variant;  // what was done to the conditions; empty in the study itself
   double backlash = 0;  // m, true
   double noise = 0;     // of the signal's rms
   int periods = 0;
-  bool position = true;  // false: the signal alone
+  bool position = true;  // false: without positions
   std::vector<diagnosis::Estimate> estimates;
 };
 
