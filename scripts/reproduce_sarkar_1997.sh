@@ -40,5 +40,5 @@ run figures plot_sarkar_1997.py --rig "${rig}" --out "${out}/figures"
 run figures_fitted plot_sarkar_1997.py --rig "${fitted}" --out "${out}/figures_fitted"
 run separability separability_map "${rig}" --json "${out}/separability.json" --plot "${out}/separability.png"
 run uncertainty uncertainty_study "${rig}" --json "${out}/uncertainty.json" --plot "${out}/uncertainty.png" ||
-  echo "There were confident misses, or wrong answers under wrong conditions: see the tables above." >&2
+  echo "Answers were wrong and sure, or wrong answers under wrong conditions: see the tables above." >&2
 echo "All figures and tables: ${out}"

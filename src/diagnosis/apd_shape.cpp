@@ -42,6 +42,7 @@ Estimate estimate_apd_shape(const ApdResult& apd, const CurveMatch& match, const
     estimate = answer(*match.family, *curve, apd.periods.size());
   else
     estimate.message = "the curve has no family of distributions; build it anew";
+  if (!match.refused) widen(*curve, &DeclaredSpread::shape, estimate);
   estimate.method = "apd_shape";
   estimate.skewness = apd.skewness;
   return estimate;

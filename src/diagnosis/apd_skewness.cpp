@@ -260,6 +260,7 @@ Estimate estimate_apd_skewness(const ApdResult& apd, const CurveMatch& match, co
     estimate.backlash = estimate.backlash_angle = kNaN;
     estimate.message += "; but the distribution also fits the end of the curve, backlash may be larger";
   }
+  if (!match.refused) widen(*curve, &DeclaredSpread::skewness, estimate);
   estimate.method = "apd_skewness";
   estimate.skewness = apd.skewness;
   return estimate;

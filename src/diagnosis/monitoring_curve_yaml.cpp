@@ -13,7 +13,7 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr long kSchema = 1;
+constexpr long kSchema = 2;  // 1 knew nothing of what the rig file leaves open
 
 void emit_conditions(YAML::Emitter& out, const CurveConditions& c) {
   out << YAML::Key << "conditions" << YAML::Value << YAML::BeginMap;
@@ -94,6 +94,30 @@ void emit_family(YAML::Emitter& out, const ApdFamily& family) {
   out << YAML::EndSeq << YAML::EndMap;
 }
 
+void emit_widening(YAML::Emitter& out, const char* key, const DeclaredSpread::Widening& w) {
+  out << YAML::Key << key << YAML::Value << YAML::BeginMap;
+  const auto row = [&out](const char* name, const std::vector<double>& values) {
+    out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    for (const double v : values) out << (std::isnan(v) ? std::string("-1") : to_text(v));
+    out << YAML::EndSeq;
+  };
+  row("below", w.below);
+  row("above", w.above);
+  out << YAML::Key << "bound" << YAML::Value << to_text(w.bound) << YAML::EndMap;
+}
+
+void emit_spread(YAML::Emitter& out, const DeclaredSpread& spread) {
+  out << YAML::Key << "spread" << YAML::Value
+      << YAML::Comment("of answers on machines that the rig file allows, unit of backlash; -1: not known")
+      << YAML::BeginMap;
+  out << YAML::Key << "machines" << YAML::Value << spread.machines;
+  out << YAML::Key << "resembling" << YAML::Value << to_text(spread.resembling);
+  out << YAML::Key << "limit" << YAML::Value << YAML::DoubleQuoted << spread.limit;
+  emit_widening(out, "apd_skewness", spread.skewness);
+  emit_widening(out, "apd_shape", spread.shape);
+  out << YAML::EndMap;
+}
+
 CurveConditions read_conditions(const YamlReader& yaml) {
   CurveConditions c;
   c.rig = yaml.text("rig");
@@ -171,6 +195,28 @@ ApdFamily read_family(const YamlReader& yaml, std::size_t points, std::size_t le
   return family;
 }
 
+DeclaredSpread::Widening read_widening(const YamlReader& yaml, std::size_t points) {
+  DeclaredSpread::Widening w;
+  for (const auto& [key, values] : {std::pair{"below", &w.below}, std::pair{"above", &w.above}}) {
+    *values = yaml.numbers(key, Range::any());
+    if (values->size() != points) yaml.fail(key, "needs one value per point of the curve");
+    for (double& v : *values)
+      if (v < 0) v = kNaN;
+  }
+  w.bound = yaml.number("bound", Range::not_negative());
+  return w;
+}
+
+DeclaredSpread read_spread(const YamlReader& yaml, std::size_t points) {
+  DeclaredSpread spread;
+  spread.machines = static_cast<int>(yaml.integer("machines", 1, 1'000'000));
+  spread.resembling = yaml.number("resembling", Range::between(0, 1));
+  spread.limit = yaml.text("limit");
+  spread.skewness = read_widening(yaml.map("apd_skewness"), points);
+  spread.shape = read_widening(yaml.map("apd_shape"), points);
+  return spread;
+}
+
 }  // namespace
 
 std::string MonitoringCurve::to_yaml() const {
@@ -188,6 +234,7 @@ std::string MonitoringCurve::to_yaml() const {
   out << YAML::Key << "points" << YAML::Value << YAML::BeginSeq;
   for (const CurvePoint& point : points) emit_point(out, *this, point);
   out << YAML::EndSeq;
+  if (spread) emit_spread(out, *spread);
   if (family) emit_family(out, *family);
   out << YAML::EndMap << YAML::Newline;
   return out.c_str();
@@ -214,6 +261,8 @@ MonitoringCurve MonitoringCurve::from_yaml(const YamlReader& yaml) {
       yaml.fail("points", "backlash must increase");
   if (const auto family = yaml.optional_map("family"))
     curve.family = read_family(*family, curve.points.size(), curve.noise_levels.size());
+  if (const auto spread = yaml.optional_map("spread"))
+    curve.spread = read_spread(*spread, curve.points.size());
   yaml.finish();
   return curve;
 }

@@ -234,6 +234,14 @@ std::string describe(const FlankFit& fit, bool moves) {
   return message;
 }
 
+/// What the machine's elastic deflection, both sides, may differ from the declared one by [rad].
+double declared_error(const TwoEncoders& motion, const PositionDifferenceSettings& settings) {
+  std::vector<double> magnitude;
+  for (const double torque : motion.torque) magnitude.push_back(std::abs(torque));
+  const double level = signal::median(std::move(magnitude));
+  return 2 * settings.declared_uncertainty * std::abs(settings.elastic_deflection(level));
+}
+
 void fill(const record::Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
   const TwoEncoders motion = without_skew(collect(record, settings), settings.encoder_skew);
   if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
@@ -258,8 +266,9 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
   const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
   const double bounce = model.moving ? 0 : kBounce * fit.gap;
-  const double half =
-      std::hypot(std::hypot(scatter, windows), std::hypot(unexplained, std::hypot(bounce, skewed)));
+  const double declared = model.moving ? 0 : declared_error(motion, settings);
+  const double half = std::hypot(std::hypot(scatter, windows),
+                                 std::hypot(unexplained, std::hypot(bounce, std::hypot(skewed, declared))));
   double lower = fit.gap - half, upper = fit.gap + half;
   if (fit.varies) {
     lower = std::min(lower, fit.least_gap - half);
@@ -276,6 +285,7 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   estimate.backlash = settings.base_radius * estimate.backlash_angle;
   estimate.lower = settings.base_radius * estimate.angle_lower;
   estimate.upper = settings.base_radius * estimate.angle_upper;
+  estimate.declared = declared;
   estimate.message = describe(fit, model.moving);
   if (skew.value != 0)
     estimate.message += fmt::format("; the load encoder is {:.3g} +- {:.2g} ms later than the rig file says",

@@ -73,21 +73,25 @@ const std::vector<WaveformQuantity>& waveform_quantities() {
   static const char* const kInertia = "kg m^2";
   static const char* const kDamping = "N m s/rad";
   static const std::vector<WaveformQuantity> table = {
-      {"motor_viscous", kDamping, true, 1, &S::motor_damping, &W::motor_damping},
-      {"motor_coulomb", "N m", false, 0, &S::dry_friction, &W::dry_friction},
-      {"friction_speed", "rad/s", true, -1, &S::friction_speed, &W::friction_speed},
-      {"sensor_stiffness", "N m/rad", true, 1, &S::sensor_stiffness, &W::sensor_stiffness},
-      {"sensor_damping", kDamping, true, 1, &S::sensor_damping, &W::sensor_damping},
-      {"motor_inertia", kInertia, true, 1, &S::motor_inertia, &W::motor_inertia},
-      {"pinion_inertia", kInertia, true, 1, &S::pinion_inertia, &W::pinion_inertia},
-      {"gear_inertia", kInertia, true, 1, &S::gear_inertia, &W::gear_inertia},
-      {"output_stiffness", "N m/rad", true, 1, &S::output_stiffness, &W::output_stiffness},
-      {"output_damping", kDamping, true, 1, &S::output_damping, &W::output_damping},
-      {"contact_stiffness", "N/m^1.5", true, 1.5, &S::contact_stiffness, &W::contact_stiffness},
-      {"contact_loss", "s/m", true, 1, &S::contact_loss, &W::contact_loss},
-      {"sensor_gain", "-", true, 0, &S::sensor_gain, &W::sensor_gain},
-      {"sensor_delay", "s", false, 0, &S::sensor_delay, &W::sensor_delay},
-      {"sensor_time_constant", "s", false, 0, &S::sensor_time_constant, &W::sensor_time_constant}};
+      {"motor_viscous", kDamping, "motor damping", true, 1, &S::motor_damping, &W::motor_damping},
+      {"motor_coulomb", "N m", "dry friction", false, 0, &S::dry_friction, &W::dry_friction},
+      {"friction_speed", "rad/s", "speed of dry friction", true, -1, &S::friction_speed, &W::friction_speed},
+      {"sensor_stiffness", "N m/rad", "sensor stiffness", true, 1, &S::sensor_stiffness,
+       &W::sensor_stiffness},
+      {"sensor_damping", kDamping, "sensor damping", true, 1, &S::sensor_damping, &W::sensor_damping},
+      {"motor_inertia", kInertia, "motor inertia", true, 1, &S::motor_inertia, &W::motor_inertia},
+      {"pinion_inertia", kInertia, "pinion inertia", true, 1, &S::pinion_inertia, &W::pinion_inertia},
+      {"gear_inertia", kInertia, "gear inertia", true, 1, &S::gear_inertia, &W::gear_inertia},
+      {"output_stiffness", "N m/rad", "output stiffness", true, 1, &S::output_stiffness,
+       &W::output_stiffness},
+      {"output_damping", kDamping, "output damping", true, 1, &S::output_damping, &W::output_damping},
+      {"contact_stiffness", "N/m^1.5", "contact stiffness", true, 1.5, &S::contact_stiffness,
+       &W::contact_stiffness},
+      {"contact_loss", "s/m", "contact loss", true, 1, &S::contact_loss, &W::contact_loss},
+      {"sensor_gain", "-", "sensor gain", true, 0, &S::sensor_gain, &W::sensor_gain},
+      {"sensor_delay", "s", "delay of the sensor", false, 0, &S::sensor_delay, &W::sensor_delay},
+      {"sensor_time_constant", "s", "time constant of the sensor", false, 0, &S::sensor_time_constant,
+       &W::sensor_time_constant}};
   return table;
 }
 

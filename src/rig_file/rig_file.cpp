@@ -16,6 +16,8 @@
 namespace backlash::rig_file {
 namespace {
 
+constexpr double kNormal95 = 1.96;  // standard deviations of 95 %, both ends: theory
+
 /// Where the file does not say how well it knows the elastic deflection that lost_motion subtracts. A mesh of
 /// angles is one spring with all that is merged into it, of the stated uncertainty.
 double default_uncertainty(const model::Rig& rig, const model::GearTrain& train,
@@ -99,6 +101,18 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
   difference.base_radius = momentum.base_radius = base_radius;
 }
 
+/// position_difference knows the deflection as well as the file knows the stiffness of sensor and contact.
+void use_spread(RigFile& file) {
+  const diagnosis::WaveformSpread& spread = file.diagnosis.waveform->spread;
+  diagnosis::PositionDifferenceSettings& difference = *file.diagnosis.position_difference;
+  const double torque = file.simulation.excitation.amplitude, all = difference.elastic_deflection(torque);
+  if (!(all > 0)) return;
+  const double coupling = torque / file.rig.input_coupling.stiffness, flank = std::fmax(0, all - coupling);
+  const double softest = std::expm1(kNormal95 * spread.contact_stiffness * 2 / 3);  // theory: Hertz
+  difference.declared_uncertainty =
+      (std::expm1(kNormal95 * spread.sensor_stiffness) * coupling + softest * flank) / all;
+}
+
 }  // namespace
 
 double elastic_uncertainty(double coupling, double flank) {
@@ -106,6 +120,21 @@ double elastic_uncertainty(double coupling, double flank) {
   const double softest = std::pow(Known::kContactFactor, 2.0 / 3) - 1;  // theory: Hertz
   const double all = coupling + flank;
   return all > 0 ? (Known::kCoupling * coupling + softest * flank) / all : 0;
+}
+
+model::Rig with_machine(model::Rig rig, const diagnosis::WaveformSettings& machine) {
+  model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
+  rig.motor.inertia = std::fmax(0, machine.motor_inertia - 0.5 * in.inertia);
+  rig.pinion.inertia = std::fmax(0, machine.pinion_inertia - 0.5 * in.inertia);
+  rig.gear.inertia = std::fmax(0, machine.gear_inertia - 0.5 * out.inertia);
+  rig.motor.viscous_damping = machine.motor_damping;
+  rig.motor.coulomb_friction = machine.dry_friction;
+  in.stiffness = machine.sensor_stiffness, in.damping = machine.sensor_damping;
+  out.stiffness = machine.output_stiffness, out.damping = machine.output_damping;
+  model::ContactSpec contact = rig.mesh.contact_spec();
+  contact.values["stiffness"] = machine.contact_stiffness, contact.values["alpha"] = machine.contact_loss;
+  rig.mesh.contact = model::make_contact_law(contact.law, contact.values);
+  return rig;
 }
 
 RigFile rig_file_from_text(const std::string& text, const std::string& source) {
@@ -130,6 +159,7 @@ RigFile rig_file_from_text(const std::string& text, const std::string& source) {
     yaml.map("sensors").fail("motor_current", "needs gear_train.motor.torque_constant (N m/A)");
   fill_from_rig(file.rig, file.diagnosis);
   read_known_values(yaml, file);
+  if (file.diagnosis.waveform) use_spread(file);
   yaml.finish();
   if (file.diagnosis.position_difference)
     file.diagnosis.position_difference->output_torque_reversed =

@@ -16,6 +16,7 @@
 #include "drawn_machine.h"
 #include "family_builder.h"
 #include "fine_run.h"
+#include "spread_builder.h"
 
 namespace backlash::studies {
 namespace {
@@ -125,16 +126,17 @@ int count_beyond(const CurvePlan& plan) {
 
 /// All machines that are run, by backlash: those of the points, those in the middle between two points, which
 /// are as far from the file as a real one may be, and those beyond the end of the curve.
-std::vector<model::Rig> machines_of(const CurvePlan& plan) {
+std::vector<Machine> machines_of(const CurvePlan& plan) {
   const int count = plan.request.points;
   const double step = plan.request.max_backlash / (count - 1);
-  std::vector<model::Rig> machines;
-  for (int i = 0; i < count; ++i) machines.push_back(with_backlash(plan.file.rig, i * step));
+  const Machine declared = declared_machine(plan.file);
+  std::vector<Machine> machines;
+  for (int i = 0; i < count; ++i) machines.push_back(with_backlash(declared, i * step));
   for (int i = 0; i + 1 < count; ++i)
     machines.push_back(
-        with_backlash(draw_machine(plan.file, 2 * static_cast<std::uint64_t>(i) + 1), (i + 0.5) * step));
+        with_backlash(draw_stiffness(plan.file, 2 * static_cast<std::uint64_t>(i) + 1), (i + 0.5) * step));
   for (int i = 0; i < count_beyond(plan); ++i)
-    machines.push_back(with_backlash(plan.file.rig, (count + i) * step));
+    machines.push_back(with_backlash(declared, (count + i) * step));
   return machines;
 }
 
@@ -185,14 +187,14 @@ Cells make_cells(const CurvePlan& plan, Ticker& ticker) {
   all.middle.means.resize(count - 1);
   all.middle.runs.resize(count - 1);
   all.beyond.resize(count_beyond(plan));
-  const std::vector<model::Rig> machines = machines_of(plan);
+  const std::vector<Machine> machines = machines_of(plan);
   PointsDone points(plan.request);
   const std::size_t chunks = (machines.size() + kTogether - 1) / kTogether;
   for_each_in_parallel(static_cast<int>(chunks), ticker, [&](int chunk) {
     const std::size_t begin = chunk * kTogether, end = std::min(begin + kTogether, machines.size());
     std::vector<FineRun> runs = run_fine(plan, {machines.begin() + begin, machines.begin() + end}, ticker);
     for (std::size_t i = begin; i < end; ++i) {
-      take(plan, i, machines[i].mesh.backlash, std::move(runs[i - begin]), all);
+      take(plan, i, machines[i].rig.mesh.backlash, std::move(runs[i - begin]), all);
       if (i < all.points.size()) points.add(all.points[i].point);
     }
   });
@@ -253,7 +255,8 @@ diagnosis::MonitoringCurve build_curve(const rig_file::RigFile& file, const Curv
   const CurvePlan plan = plan_curve(file, request);
   const long runs = 2L * plan.request.points - 1 + count_beyond(plan);
   const long calibration = (plan.request.points - 1L) * static_cast<long>(plan.noise_levels.size() + 1);
-  Ticker ticker(progress, runs * plan.run_periods() + calibration, "building the curve");
+  Ticker ticker(progress, (runs + spread_runs(plan)) * plan.run_periods() + calibration,
+                "building the curve");
   Cells all = make_cells(plan, ticker);
   diagnosis::MonitoringCurve curve;
   curve.conditions = conditions_of(plan);
@@ -272,6 +275,7 @@ diagnosis::MonitoringCurve build_curve(const rig_file::RigFile& file, const Curv
   curve.finish(all.middle.cells);
   curve.coverage_factor = calibrated_factor(curve, all.middle);
   calibrate_family(plan, all.middle.runs, ticker, *curve.family);
+  if (spread_runs(plan) > 0) curve.spread = learn_spread(plan, curve, ticker);
   return curve;
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/random.h"
-#include "drawn_machine.h"
 
 namespace backlash::studies {
 namespace {
@@ -45,9 +44,8 @@ double duration_of(const rig_file::RigFile& file, const Draw& d) {
 
 }  // namespace
 
-record::Record simulate_fine(rig_file::RigFile file, const Draw& d, double duration) {
-  model::Rig rig = draw_machine(file, d.seed);
-  rig.mesh.backlash = d.backlash;
+record::Record simulate_fine(rig_file::RigFile file, Machine machine, double backlash, double duration) {
+  machine.rig.mesh.backlash = backlash;
   simulation::SensorsSettings& sensors = file.simulation.sensors;
   sensors.sampling_rate *= kPhases;
   for (const record::Channel channel : {file.diagnosis.apd->signal, record::Channel::motor_torque}) {
@@ -55,7 +53,9 @@ record::Record simulate_fine(rig_file::RigFile file, const Draw& d, double durat
     sensors.of(channel) = {};
     sensors.of(channel).declared = declared;
   }
-  return simulation::simulate_record(rig, file.simulation, duration);
+  record::Record record = simulation::simulate_record(machine.rig, file.simulation, duration);
+  machine.sensor.apply(record.column(record::Channel::sensor_torque), 1 / sensors.sampling_rate);
+  return record;
 }
 
 record::Record recorded(const record::Record& fine, const rig_file::RigFile& file, const Draw& d) {
@@ -69,7 +69,20 @@ record::Record recorded(const record::Record& fine, const rig_file::RigFile& fil
 
 record::Record simulate_draw(const rig_file::RigFile& file, const Draw& d) {
   const double rate = file.simulation.sensors.sampling_rate;
-  return recorded(simulate_fine(file, d, duration_of(file, d) + d.start + 2 / rate), file, d);
+  const double duration = duration_of(file, d) + d.start + 2 / rate;
+  return recorded(simulate_fine(file, draw_machine(file, d.seed), d.backlash, duration), file, d);
+}
+
+diagnosis::Estimate estimate_of_verdict(const diagnosis::Verdict& verdict) {
+  diagnosis::Estimate estimate;
+  estimate.method = "combined";
+  estimate.backlash = verdict.backlash;
+  estimate.lower = verdict.lower;
+  estimate.upper = verdict.upper;
+  estimate.message = verdict.message;
+  const bool sound = verdict.grade != diagnosis::Grade::cannot_tell && std::isfinite(verdict.backlash);
+  estimate.status = sound ? diagnosis::Status::ok : diagnosis::Status::ambiguous;
+  return estimate;
 }
 
 }  // namespace backlash::studies

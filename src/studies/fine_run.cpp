@@ -73,6 +73,7 @@ void check(const CurveRequest& request) {
   if (!(request.max_backlash > 0 && std::isfinite(request.max_backlash)))
     throw InvalidParameter("max_backlash", request.max_backlash, "must be > 0 and finite");
   if (request.periods < 1) throw InvalidParameter("periods", request.periods, "must be >= 1");
+  if (request.machines < 0) throw InvalidParameter("machines", request.machines, "must be >= 0");
   if (request.seeds < 1) throw InvalidParameter("seeds", request.seeds, "must be >= 1");
   if (!(request.sampling_rate > 0 && std::isfinite(request.sampling_rate)))
     throw InvalidParameter("sample_rate", request.sampling_rate, "must be > 0 Hz and finite");
@@ -103,8 +104,8 @@ double signal_scale(CurvePlan plan) {
   const Progress nobody;
   Ticker quiet(nobody, 1, "");
   double squares = 0;
-  const FineRun run =
-      std::move(run_fine(plan, {with_backlash(plan.file.rig, plan.request.max_backlash)}, quiet).front());
+  const FineRun run = std::move(
+      run_fine(plan, {with_backlash(declared_machine(plan.file), plan.request.max_backlash)}, quiet).front());
   for (const double value : run.signal) squares += value * value;
   return std::sqrt(squares / static_cast<double>(run.signal.size()));
 }
@@ -139,17 +140,18 @@ CurvePlan plan_curve(const rig_file::RigFile& file, CurveRequest request) {
   return plan;
 }
 
-model::Rig with_backlash(model::Rig rig, double backlash) {
-  rig.mesh.backlash = backlash;
-  return rig;
+Machine with_backlash(Machine machine, double backlash) {
+  machine.rig.mesh.backlash = backlash;
+  return machine;
 }
 
-std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<model::Rig>& machines,
-                              Ticker& ticker) {
+std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Machine>& machines, Ticker& ticker) {
   const simulation::SimulationSettings& how = plan.file.simulation;
   std::vector<FineRun> runs(machines.size());
-  if (simulation::Ensemble::takes(machines, how.excitation)) {
-    simulation::Ensemble ensemble(machines, how.excitation, how.solver);
+  std::vector<model::Rig> rigs;
+  for (const Machine& machine : machines) rigs.push_back(machine.rig);
+  if (simulation::Ensemble::takes(rigs, how.excitation)) {
+    simulation::Ensemble ensemble(rigs, how.excitation, how.solver);
     sample_finely(
         plan, ensemble,
         [&] {
@@ -158,13 +160,16 @@ std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<model::Ri
         [&] {
           for (std::size_t i = 0; i < runs.size(); ++i) ticker.tick();
         });
-    return runs;
+  } else {
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      simulation::Plant plant(rigs[i], how.excitation, how.solver);
+      sample_finely(
+          plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
+    }
   }
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    simulation::Plant plant(machines[i], how.excitation, how.solver);
-    sample_finely(
-        plan, plant, [&] { append(plan, plant.observe(), runs[i]); }, [&] { ticker.tick(); });
-  }
+  if (plan.apd.signal == record::Channel::sensor_torque)
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      machines[i].sensor.apply(runs[i].signal, 1 / (plan.request.sampling_rate * plan.phases));
   return runs;
 }
 

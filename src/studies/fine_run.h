@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
+#include "drawn_machine.h"
 
 namespace backlash::studies {
 
@@ -30,11 +31,11 @@ struct FineRun {
   std::vector<double> signal, torque, position;
 };
 /// One for each machine; at once where they differ in numbers only. A tick for every period of each.
-std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<model::Rig>& machines, Ticker& ticker);
+std::vector<FineRun> run_fine(const CurvePlan& plan, const std::vector<Machine>& machines, Ticker& ticker);
 /// Machines that are worth moving at once.
 constexpr std::size_t kTogether = 8;
 
-model::Rig with_backlash(model::Rig rig, double backlash);
+Machine with_backlash(Machine machine, double backlash);
 
 /// What the sensor reads of a fine run at one phase; `seed` is that of its noise (standard deviation, unit of
 /// the signal).

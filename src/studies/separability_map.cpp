@@ -48,13 +48,12 @@ Draw draw(const SeparabilityRequest& request, double period, int record) {
 record::Record simulate_disturbed(DisturbedMachine machine, double amplitude, double backlash, int periods) {
   const diagnosis::ApdSettings& apd = *machine.file.diagnosis.apd;
   const double rate = machine.file.simulation.sensors.sampling_rate;
-  machine.file.diagnosis.stiffness_uncertainty = 0;  // nothing is unknown but the disturbance
   const double load = machine.load * amplitude;
   machine.file.simulation.excitation.bias += load;
-  Draw d{};
-  d.backlash = backlash;
+  // Nothing is unknown but the disturbance.
   record::Record fine =
-      simulate_fine(machine.file, d, (apd.settling_periods + periods + 1) * apd.period + 2 / rate);
+      simulate_fine(machine.file, {machine.file.rig, {machine.sensor_gain, machine.sensor_delay, 0}},
+                    backlash, (apd.settling_periods + periods + 1) * apd.period + 2 / rate);
   for (double& torque : fine.column(record::Channel::motor_torque)) torque -= load;
   for (double& current : fine.column(record::Channel::motor_current))
     current -= load / machine.file.rig.torque_constant;
@@ -101,7 +100,9 @@ SeparabilityCell make_cell(const DisturbedMachine& machine, const diagnosis::Dia
     d.noise = machine.noise;
     const diagnosis::Diagnosis diagnosis =
         diagnosis::diagnose(recorded(fine, machine.file, d), believed, &curve);
-    for (const diagnosis::Estimate& e : diagnosis.estimates)
+    std::vector<diagnosis::Estimate> all = diagnosis.estimates;
+    all.push_back(estimate_of_verdict(diagnosis.verdict));
+    for (const diagnosis::Estimate& e : all)
       for (std::size_t m = 0; m < methods.size(); ++m)
         if (e.method == methods[m]) estimates[m].push_back(e);
     cell.skewness += (diagnosis.apd ? diagnosis.apd->skewness : kNaN) / request.records;
@@ -130,6 +131,62 @@ void add_equivalents(SeparabilityMap& map, double slope) {
       row[b].equivalent = (row[b].skewness - map.cells[none][b].skewness) / slope;
 }
 
+void add_of_machine(const rig_file::RigFile& file, std::vector<Disturbance>& all) {
+  const double amplitude = file.simulation.excitation.amplitude;
+  all.push_back({"motor_dry_friction",
+                 "dry friction of the motor more than declared / excitation amplitude",
+                 0,
+                 {0, 0.02, 0.05, 0.1, 0.15, 0.2},
+                 [amplitude](DisturbedMachine& m, double level) {
+                   m.file.rig.motor.coulomb_friction += level * amplitude;
+                 }});
+  all.push_back({"motor_inertia",
+                 "inertia of the motor / declared",
+                 1,
+                 {0.7, 0.85, 0.95, 1, 1.05, 1.15, 1.3},
+                 [](DisturbedMachine& m, double level) { m.file.rig.motor.inertia *= level; }});
+  if (!file.rig.input_coupling.rigid || !file.rig.output_coupling.rigid)
+    all.push_back({"coupling_stiffness",
+                   "change of the couplings' stiffness / declared",
+                   0,
+                   {-0.2, -0.15, -0.1, -0.05, 0, 0.05, 0.1, 0.15, 0.2},
+                   [](DisturbedMachine& m, double level) {
+                     for (model::Coupling* c : {&m.file.rig.input_coupling, &m.file.rig.output_coupling})
+                       c->stiffness *= 1 + level;
+                   }});
+  if (!file.rig.mesh.rigid && file.rig.mesh.contact_spec().values.has("stiffness"))
+    all.push_back({"contact_stiffness",
+                   "stiffness of the contact / declared",
+                   1,
+                   {0.4, 0.63, 1, 1.6, 2.5},
+                   [](DisturbedMachine& m, double level) {
+                     model::ContactSpec contact = m.file.rig.mesh.contact_spec();
+                     contact.values["stiffness"] *= level;
+                     m.file.rig.mesh.contact = model::make_contact_law(contact.law, contact.values);
+                   }});
+}
+
+void add_of_sensors(const rig_file::RigFile& file, std::vector<Disturbance>& all) {
+  if (!file.rig.input_coupling.rigid) {
+    all.push_back({"sensor_gain",
+                   "gain of the torque sensor / declared",
+                   1,
+                   {0.9, 0.95, 0.98, 1, 1.02, 1.05, 1.1},
+                   [](DisturbedMachine& m, double level) { m.sensor_gain = level; }});
+    all.push_back({"sensor_delay",
+                   "delay of the torque sensor [s]",
+                   0,
+                   {0, 1e-4, 3e-4, 6e-4, 1e-3},
+                   [](DisturbedMachine& m, double level) { m.sensor_delay = level; }});
+  }
+  if (!file.rig.link_locked)
+    all.push_back({"encoder_skew",
+                   "load encoder later than declared [s]",
+                   0,
+                   {0, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2},
+                   [](DisturbedMachine& m, double level) { m.file.rig.encoder_skew += level; }});
+}
+
 }  // namespace
 
 std::vector<Disturbance> disturbances_of(const rig_file::RigFile& file) {
@@ -150,15 +207,8 @@ std::vector<Disturbance> disturbances_of(const rig_file::RigFile& file) {
                  0,
                  {0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6},
                  [](DisturbedMachine& m, double level) { m.load = level; }});
-  if (!file.rig.input_coupling.rigid || !file.rig.output_coupling.rigid)
-    all.push_back({"coupling_stiffness",
-                   "change of the couplings' stiffness / declared",
-                   0,
-                   {-0.2, -0.15, -0.1, -0.05, 0, 0.05, 0.1, 0.15, 0.2},
-                   [](DisturbedMachine& m, double level) {
-                     for (model::Coupling* c : {&m.file.rig.input_coupling, &m.file.rig.output_coupling})
-                       c->stiffness *= 1 + level;
-                   }});
+  add_of_machine(file, all);
+  add_of_sensors(file, all);
   return all;
 }
 
@@ -167,8 +217,7 @@ Separability map_separability(const rig_file::RigFile& file, const diagnosis::Mo
                               const SeparabilityRequest& request, const Progress& progress) {
   check(file, curve, disturbances, request);
   diagnosis::DiagnosisSettings believed = file.diagnosis;
-  believed.lost_motion = std::nullopt;
-  believed.leave_out_waveform();
+  if (!request.waveform) believed.leave_out_waveform();
   Separability all;
   all.slope = slope_of(curve);
   const double first = curve.points.front().backlash, last = curve.points.back().backlash;

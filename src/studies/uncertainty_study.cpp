@@ -14,7 +14,10 @@
 namespace backlash::studies {
 namespace {
 
-constexpr double kMisses = 2;  // widths of an interval beyond which a miss was confident
+// What makes a miss one that was wrong and sure. Choices.
+constexpr double kWidths = 2;        // of the interval, outside of it
+constexpr double kFar = 10e-6;       // m (angular mesh: rad), outside of it, and
+constexpr double kFarOfTruth = 0.2;  // this share of the backlash
 
 Draw draw(const StudyRequest& request, double period, std::uint64_t index) {
   Random random(request.seed, static_cast<std::uint32_t>(index));
@@ -38,17 +41,11 @@ record::Record signal_alone(const record::Record& record, record::Channel signal
   return alone;
 }
 
-/// The verdict as one more estimate; where its members contradict each other nobody should rely on it.
-diagnosis::Estimate combined(const diagnosis::Verdict& verdict) {
-  diagnosis::Estimate estimate;
-  estimate.method = "combined";
-  estimate.backlash = verdict.backlash;
-  estimate.lower = verdict.lower;
-  estimate.upper = verdict.upper;
-  estimate.message = verdict.message;
-  const bool sound = verdict.grade != diagnosis::Grade::cannot_tell && std::isfinite(verdict.backlash);
-  estimate.status = sound ? diagnosis::Status::ok : diagnosis::Status::ambiguous;
-  return estimate;
+/// What a rig without encoders records.
+record::Record torques_alone(const record::Record& record, record::Channel signal) {
+  record::Record alone = signal_alone(record, signal);
+  alone.column(record::Channel::motor_torque) = record.column(record::Channel::motor_torque);
+  return alone;
 }
 
 std::vector<diagnosis::Estimate> estimates_of(const record::Record& record, const rig_file::RigFile& file,
@@ -57,7 +54,7 @@ std::vector<diagnosis::Estimate> estimates_of(const record::Record& record, cons
   if (!waveform) settings.leave_out_waveform();
   const diagnosis::Diagnosis diagnosis = diagnosis::diagnose(record, settings, &curve);
   std::vector<diagnosis::Estimate> all = diagnosis.estimates;
-  all.push_back(combined(diagnosis.verdict));
+  all.push_back(estimate_of_verdict(diagnosis.verdict));
   return all;
 }
 
@@ -88,8 +85,9 @@ bool holds(const diagnosis::Estimate& e, double truth) {
   return truth >= e.lower && truth <= e.upper;
 }
 
-bool confident_miss(const diagnosis::Estimate& e, double truth) {
-  return std::fabs(e.backlash - truth) > kMisses * width(e);
+bool wrong_and_sure(const diagnosis::Estimate& e, double truth) {
+  const double outside = std::max(e.lower - truth, truth - e.upper);
+  return outside > kWidths * width(e) || (outside > kFar && outside > kFarOfTruth * truth);
 }
 
 struct Variant {
@@ -148,6 +146,17 @@ record::Record simulate_variant(const rig_file::RigFile& file, const Variant& va
 
 }  // namespace
 
+rig_file::RigFile known_to(rig_file::RigFile file, double share) {
+  if (!(share > 0 && std::isfinite(share))) throw InvalidParameter("known", share, "must be > 0 and finite");
+  if (!file.diagnosis.waveform) throw InvalidParameter("known", share, file.diagnosis.no_waveform);
+  diagnosis::WaveformSpread& spread = file.diagnosis.waveform->spread;
+  if (std::isnan(spread.dry_friction))
+    spread.dry_friction = diagnosis::WaveformSpread::kDryFriction * file.simulation.excitation.amplitude;
+  for (const diagnosis::WaveformQuantity& q : diagnosis::waveform_quantities()) spread.*q.spread *= share;
+  file.diagnosis.waveform->common_scale *= share;
+  return file;
+}
+
 std::vector<StudyTrial> run_study(const rig_file::RigFile& rig_file, const diagnosis::MonitoringCurve& curve,
                                   const StudyRequest& request, const Progress& progress) {
   check(rig_file, request);
@@ -161,8 +170,9 @@ std::vector<StudyTrial> run_study(const rig_file::RigFile& rig_file, const diagn
     trials[2 * i] = {"",        d.backlash, d.noise,
                      d.periods, true,       estimates_of(record, file, curve, request.waveform)};
     trials[2 * i + 1] = {
-        "",        d.backlash, d.noise,
-        d.periods, false,      estimates_of(signal_alone(record, apd.signal), file, curve, request.waveform)};
+        "",      d.backlash,
+        d.noise, d.periods,
+        false,   estimates_of(torques_alone(record, apd.signal), file, curve, request.waveform)};
     ticker.tick();
   });
   return trials;
@@ -186,7 +196,7 @@ std::vector<StudyRow> summarise_study(const std::vector<StudyTrial>& trials, boo
       errors.push_back(std::fabs(e.backlash - trial.backlash));
       widths.push_back(width(e));
       held += holds(e, trial.backlash);
-      row.confident_misses += confident_miss(e, trial.backlash);
+      row.wrong_and_sure += wrong_and_sure(e, trial.backlash);
     }
     row.told = static_cast<int>(errors.size());
     if (row.trials > 0) row.cannot_tell = 1 - static_cast<double>(row.told) / row.trials;

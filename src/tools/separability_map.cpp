@@ -34,9 +34,10 @@ Command command() {
   Command c;
   c.name = "separability_map";
   c.summary =
-      "Maps where backlash can be told from sensor noise, viscous friction of the motor, a constant load "
-      "torque and the stiffness of the couplings, of which the monitoring curve knows nothing: by the bare "
-      "skewness, by apd_skewness and by apd_shape.";
+      "Maps where backlash can be told from sensor noise, viscous and dry friction and inertia of the motor, "
+      "a "
+      "constant load torque, stiffness of couplings and contact, gain and delay of the torque sensor and a "
+      "late load encoder: by the bare skewness, by apd_skewness, apd_shape, waveform and the verdict.";
   c.positional = {"RIG.yaml"};
   c.options = {
       {"json", "OUT.json", "all cells of the maps", true},
@@ -48,6 +49,7 @@ Command command() {
       {"noise", "X",
        "on the signal and on motor_torque where noise is not what the map is about, of the signal's rms" +
            fallback(defaults.noise)},
+      {"waveform", "", "also run the estimator waveform: seconds a record"},
       {"seed", "N", "of noise and starts of the records" + fallback(defaults.seed)},
   };
   c.notes =
@@ -164,6 +166,7 @@ studies::SeparabilityRequest read_request(const Arguments& a) {
   r.backlash_values = static_cast<int>(a.integer("points", r.backlash_values, 2, kMost));
   r.records = static_cast<int>(a.integer("records", r.records, 1, kMost));
   r.periods = static_cast<int>(a.integer("periods", r.periods, 1, kMost));
+  r.waveform = a.has("waveform");
   r.noise = a.number("noise", r.noise, Range::not_negative());
   r.seed = a.integer("seed", r.seed, 0, std::numeric_limits<std::uint64_t>::max());
   return r;

@@ -28,27 +28,28 @@ Command command() {
   Command c;
   c.name = "uncertainty_study";
   c.summary =
-      "Simulates records with random backlash, sensor noise and length on machines whose stiffness is not "
-      "exactly the rig file's, diagnoses each with all channels and from the signal alone, and counts: "
-      "error, "
-      "coverage of the 95 % interval, share of 'cannot tell'. Then the same under wrong conditions.";
+      "Simulates records with random backlash, sensor noise and length on machines whose values are drawn "
+      "from what the rig file knows of them, diagnoses each with all channels and without positions, and "
+      "counts: error, coverage of the 95 % interval, wrong and sure, share of 'cannot tell'. Then the same "
+      "under wrong conditions.";
   c.positional = {"RIG.yaml"};
   c.options = {
       {"json", "OUT.json", "all tables and every single record", true},
       {"curve", "CURVE.yaml", "monitoring curve; default: built first"},
       {"records", "N", "random records; default: 600"},
-      {"variants", "N", "records of each wrong condition; default: 40"},
+      {"variants", "N", "records of each wrong condition, 0: none; default: 40"},
+      {"known", "X", "every uncertainty of the rig file times X: of a machine known better; default: 1"},
       {"sample-rate", "HZ", "default: the rig file's"},
       {"seed", "N", "of all random numbers; default: 1"},
       {"waveform", "", "also run the estimator waveform: seconds a record"},
       {"plot", "OUT.png", "also draw errors and coverage"},
   };
   c.notes =
-      "'combined' is the verdict. A confident miss is an answer that is more than two of its interval's "
-      "widths "
-      "from the truth. Under wrong conditions an answer within one width counts as right.";
+      "'combined' is the verdict. An answer is wrong and sure where the truth is outside of its interval by "
+      "more than twice its width, or by more than 10 um and a fifth of the truth. Under wrong conditions an "
+      "answer within one width counts as right.";
   c.examples = {"uncertainty_study config/sarkar_1997.yaml --json study.json --plot study.png"};
-  c.exit_codes = "  0   done\n  1   there were confident misses, or wrong answers under wrong conditions\n";
+  c.exit_codes = "  0   done\n  1   answers were wrong and sure, or wrong answers under wrong conditions\n";
   return c;
 }
 
@@ -61,7 +62,7 @@ Json row_json(const studies::StudyRow& row) {
           {"median_width", report::json_number(row.median_width)},
           {"coverage", report::json_number(row.coverage)},
           {"cannot_tell", report::json_number(row.cannot_tell)},
-          {"confident_misses", row.confident_misses}};
+          {"wrong_and_sure", row.wrong_and_sure}};
 }
 
 struct Table {
@@ -85,14 +86,14 @@ std::vector<Table> tables_of(const std::vector<studies::StudyTrial>& trials,
 }
 
 void print(const Table& table) {
-  std::cout << (table.position ? "\nall channels" : "\nthe signal alone") << ", half gaps to "
-            << 1e6 * table.half_gap << " um, ";
+  std::cout << (table.position ? "\nall channels" : "\nthe signal and motor_torque alone")
+            << ", half gaps to " << 1e6 * table.half_gap << " um, ";
   if (std::isnan(table.noise))
     std::cout << "all noise levels\n";
   else
     std::cout << "noise " << 100 * table.noise << " % of rms\n";
-  std::cout
-      << "  method               records  error [um] median   95 %   width   coverage  cannot tell  misses\n";
+  std::cout << "  method               records  error [um] median   95 %   width   coverage  cannot tell  "
+               "wrong and sure\n";
   for (const studies::StudyRow& row : table.rows) {
     std::cout << "  " << std::left << std::setw(22) << row.method << std::right << std::setw(6) << row.trials;
     if (row.told == 0) {
@@ -102,7 +103,7 @@ void print(const Table& table) {
     std::cout << std::fixed << std::setprecision(2) << std::setw(19) << 1e6 * row.median_error << std::setw(7)
               << 1e6 * row.p95_error << std::setw(8) << 1e6 * row.median_width << std::setprecision(1)
               << std::setw(9) << 100 * row.coverage << " %" << std::setw(10) << 100 * row.cannot_tell << " %"
-              << std::setw(8) << row.confident_misses << '\n'
+              << std::setw(8) << row.wrong_and_sure << '\n'
               << std::defaultfloat << std::setprecision(6);
   }
 }
@@ -141,7 +142,7 @@ Json trials_json(const std::vector<studies::StudyTrial>& trials) {
 int misses(const std::vector<Table>& tables, const std::vector<studies::VariantRow>& variants) {
   int count = 0;
   for (const Table& table : tables)
-    for (const studies::StudyRow& row : table.rows) count += row.confident_misses;
+    for (const studies::StudyRow& row : table.rows) count += row.wrong_and_sure;
   for (const studies::VariantRow& row : variants) count += row.wrong;
   return count;
 }
@@ -163,8 +164,9 @@ int study(const Arguments& arguments) {
   request.seed = arguments.integer("seed", request.seed, 0, std::uint64_t{1} << 53);
   request.waveform = arguments.has("waveform");
   request.sampling_rate = arguments.number("sample-rate", request.sampling_rate, Range::positive());
-  const int variants = static_cast<int>(arguments.integer("variants", 40, 1, 1'000'000));
-  const rig_file::RigFile file = rig_file::load_rig_file(rig);
+  const int variants = static_cast<int>(arguments.integer("variants", 40, 0, 1'000'000));
+  rig_file::RigFile file = rig_file::load_rig_file(rig);
+  if (arguments.has("known")) file = studies::known_to(file, arguments.number("known", 1, Range::positive()));
   check_output(out, {rig});
   if (!plot.empty()) {
     check_plot_path(plot);

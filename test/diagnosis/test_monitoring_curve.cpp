@@ -365,8 +365,8 @@ TEST(MonitoringCurve, MalformedFilesAreRefusedWithTheirKey) {
     const char *from, *to, *key;
   };
   const std::vector<Case> cases = {
-      {"schema_version: 1", "schema_version: 2", "schema_version"},
-      {"schema_version: 1\n", "", "schema_version"},
+      {"schema_version: 2", "schema_version: 1", "schema_version"},
+      {"schema_version: 2\n", "", "schema_version"},
       {"  rig: \"linear\"\n", "", "conditions.rig"},
       {"\"sensor_torque\"", "\"torque\"", "conditions.signal"},
       {"amplitude: 0.05", "amplitude: -1", "conditions.amplitude"},

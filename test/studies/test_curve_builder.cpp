@@ -23,6 +23,7 @@ CurveRequest quick(int points = 3) {
   request.points = points;
   request.periods = 2;
   request.seeds = 3;
+  request.machines = 0;
   return request;
 }
 
@@ -31,6 +32,7 @@ TEST(BuildCurve, MeetsThePublishedParametersOfTheSarkarRig) {
   request.points = 5;  // half gaps 0, 25, 50, 75 and 100 um
   request.sampling_rate = 10000;
   request.periods = 1;
+  request.machines = 0;
   const diagnosis::MonitoringCurve curve =
       build_curve(rig_file::load_rig_file(test::package_file("config/sarkar_1997.yaml")), request);
   ASSERT_EQ(curve.points.size(), 5u);
@@ -96,6 +98,20 @@ TEST(BuildCurve, IsReadBackAsWritten) {
   const diagnosis::MonitoringCurve curve = build_curve(rig_file::default_rig_file(), quick());
   const std::string text = curve.to_yaml();
   EXPECT_EQ(diagnosis::MonitoringCurve::from_yaml(YamlReader::from_text(text, "curve")).to_yaml(), text);
+}
+
+TEST(BuildCurve, WhatTheFileLeavesOpenIsReadBackAndLeavesTheCurveAsItIs) {
+  CurveRequest request = quick();
+  const std::string known = build_curve(rig_file::default_rig_file(), request).to_yaml();
+  request.machines = 4;
+  diagnosis::MonitoringCurve curve = build_curve(rig_file::default_rig_file(), request);
+  ASSERT_TRUE(curve.spread);
+  EXPECT_EQ(curve.spread->machines, 4);
+  EXPECT_FALSE(curve.spread->limit.empty());
+  const std::string text = curve.to_yaml();
+  EXPECT_EQ(diagnosis::MonitoringCurve::from_yaml(YamlReader::from_text(text, "curve")).to_yaml(), text);
+  curve.spread.reset();
+  EXPECT_EQ(curve.to_yaml(), known);
 }
 
 TEST(BuildCurve, IsDeterministicOnAnyNumberOfProcessors) {

@@ -42,6 +42,7 @@ CurveRequest coarse() {
   request.points = 11;
   request.periods = 5;
   request.seeds = 4;
+  request.machines = 0;
   return request;
 }
 

@@ -33,6 +33,7 @@ const diagnosis::MonitoringCurve& curve() {
     request.points = 11;
     request.periods = 5;
     request.seeds = 4;
+    request.machines = 0;
     return build_curve(rig(), request);
   }();
   return built;

@@ -16,6 +16,7 @@
 
 #include "backlash_diagnosis/diagnosis/amplitude_distribution.h"
 #include "backlash_diagnosis/diagnosis/apd_family.h"
+#include "backlash_diagnosis/diagnosis/declared_spread.h"
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/signal/noise.h"
 
@@ -59,6 +60,8 @@ class MonitoringCurve {
   std::optional<ApdFamily> family;   // at the same backlash values; for apd_shape
   /// Standard deviations within which 95 % of simulated records lie about the curve; normal by default.
   double coverage_factor = 1.959964;
+  /// What the rig file leaves open of the machine; none of a rig whose machine the file takes as known.
+  std::optional<DeclaredSpread> spread;
   double backlash_to_angle = kNaN;  // rad (at the axis of motor_position) per unit of backlash
 
   /// Marks points that rise, and widens the scatter of all points by what runs in the middle between two

@@ -15,7 +15,8 @@
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t times the standard error, stays on a flank counted as independent,
-// - the declared elastic deflection, where used: its uncertainty,
+// - the declared elastic deflection, where used: its uncertainty; with a locked output also that of the whole
+//   declared machine,
 // - windows: the difference to the same fit with windows twice as long,
 // - what the model does not hold: twice the rms residual with a locked output, where all windows lie at
 //   nearly one torque and a pinion that keeps bouncing shifts all of them alike; 0.15 times it where the load
@@ -42,6 +43,11 @@ struct PositionDifferenceSettings {
 
   /// Relative 95 % uncertainty of elastic_deflection, > 0.
   double elastic_uncertainty = 0.02;
+
+  /// Relative 95 % uncertainty of elastic_deflection, >= 0, by which the whole machine may differ from the
+  /// declared one. Where the load is locked the interval is wider by twice this share of the deflection under
+  /// the median torque; the fit does not use it, as a record of nearly one torque cannot tell it from play.
+  double declared_uncertainty = 0;
 
   /// kg m^2, >= 0: what motor_torque accelerates before it reaches the flank, at the motor_position axis. A
   /// value to start from, taken as certain to +-50 % (one standard deviation).

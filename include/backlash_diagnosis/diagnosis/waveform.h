@@ -105,9 +105,9 @@ Estimate estimate_waveform(const record::Record& record, const WaveformSettings&
 
 /// A value of the machine that records can tell.
 struct WaveformQuantity {
-  const char *name, *unit;
-  bool factor;   ///< its spread is of the logarithm, else in its unit
-  double power;  ///< in the factor c of the symmetry
+  const char *name, *unit, *words;  ///< key in reports, unit, name in messages
+  bool factor;                      ///< its spread is of the logarithm, else in its unit
+  double power;                     ///< in the factor c of the symmetry
   double WaveformSettings::*at;
   double WaveformSpread::*spread;
 };

@@ -34,6 +34,11 @@ RigFile load_rig_file(const std::string& path);
 /// The same from text; `source` stands for the path in messages.
 RigFile rig_file_from_text(const std::string& text, const std::string& source);
 
+/// The rig with the machine's values of a waveform fit in place of its own: the inverse of what
+/// RigFile::diagnosis.waveform was made by. Not below what half a coupling's inertia leaves; what the rig has
+/// no place for (friction_speed, the sensor's gain and lag) is left out.
+model::Rig with_machine(model::Rig rig, const diagnosis::WaveformSettings& machine);
+
 /// config/sarkar_1997.yaml as it was when the library was built: what nodes use without a rig file.
 RigFile default_rig_file();
 

@@ -20,6 +20,9 @@ struct CurveRequest {
   double sampling_rate = 0;    // Hz; 0: the rig file's
   int periods = 10;            // per seed, after settling
   int seeds = 8;
+  /// Drawn from what the rig file does not know, to learn how far answers may be off; 0: the machine is known
+  /// to be the declared one.
+  int machines = 64;
   BestSoFar best_so_far;  // points that are there; may be empty
 };
 

@@ -25,9 +25,10 @@ namespace backlash::studies {
 /// The machine that is recorded, other than the curve believes.
 struct DisturbedMachine {
   rig_file::RigFile file;
-  double noise = 0;  // standard deviation, of the signal's rms
-  double load = 0;   // constant torque on the motor from outside, which motor_torque does not show; of the
-                     // largest motor torque of the curve
+  double noise = 0;                          // standard deviation, of the signal's rms
+  double sensor_gain = 1, sensor_delay = 0;  // of the torque sensor: -, s
+  double load = 0;  // constant torque on the motor from outside, which motor_torque does not show; of the
+                    // largest motor torque of the curve
 };
 
 struct Disturbance {
@@ -38,8 +39,9 @@ struct Disturbance {
   std::function<void(DisturbedMachine&, double level)> apply;
 };
 
-/// sensor_noise, motor_viscous_damping, load_torque, coupling_stiffness: those that the rig can have, with
-/// the levels of the map.
+/// sensor_noise, motor_viscous_damping, motor_dry_friction, load_torque, coupling_stiffness, motor_inertia,
+/// contact_stiffness, sensor_gain, sensor_delay, encoder_skew: those that the rig can have, with the levels
+/// of the map.
 std::vector<Disturbance> disturbances_of(const rig_file::RigFile& file);
 
 struct SeparabilityRequest {
@@ -48,6 +50,7 @@ struct SeparabilityRequest {
   int periods = 10;          // >= 1, per record, after settling
   double noise = 0.02;       // of the signal's rms, >= 0: of the maps of all other disturbances
   std::uint64_t seed = 1;
+  bool waveform = false;  // the estimator that takes seconds a record
 };
 
 /// What a method said about the records of a cell.
@@ -72,7 +75,7 @@ struct SeparabilityMap {
 };
 
 struct Separability {
-  std::vector<std::string> methods = {"apd_skewness", "apd_shape"};
+  std::vector<std::string> methods = {"apd_skewness", "apd_shape", "waveform", "combined"};  // the verdict
   double slope = kNaN;           // 1/m, of the curve; NaN where it does not fall
   std::vector<double> backlash;  // m (angular mesh: rad), total free play
   std::vector<double>

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the estimates are worth: many simulated records of known backlash, diagnosed and counted.
 //
-// Every record has its own backlash (uniform from 0 to the largest of the request), sensor noise (one of the
-// given levels), number of periods and start within an excitation period, all drawn from one seed. Each is
-// diagnosed twice: with all channels, and from the torque sensor alone.
+// Every record is of a machine of its own, drawn from what the rig file knows of its values: friction,
+// inertias, stiffnesses, damping, contact, gain and lag of the sensor, by the spreads of
+// diagnosis/waveform.h or those of the file (of a rig that waveform does not describe: the stiffness of the
+// couplings). It has its own backlash (uniform from 0 to the largest of the request), sensor noise (one of
+// the given levels), number of periods and start within an excitation period, all drawn from one seed. Each
+// is diagnosed twice: with all channels, and from the signal of the APD and
+// motor_torque alone; records under wrong conditions from that signal alone.
 #pragma once
 
 #include <cstdint>
@@ -26,13 +30,17 @@ struct StudyRequest {
   bool waveform = false;  // the estimator that takes seconds a record
 };
 
+/// The same file with each uncertainty of diagnosis.waveform times `share`, > 0: a machine that is known
+/// better. Throws InvalidParameter for another share and where the rig has none.
+rig_file::RigFile known_to(rig_file::RigFile file, double share);
+
 /// One record and what was said about it. The last estimate, "combined", is that of the verdict.
 struct StudyTrial {
   std::string variant;  // what was done to the conditions; empty in the study itself
   double backlash = 0;  // m, true
   double noise = 0;     // of the signal's rms
   int periods = 0;
-  bool position = true;  // false: the signal alone
+  bool position = true;  // false: without positions
   std::vector<diagnosis::Estimate> estimates;
 };
 
@@ -48,7 +56,8 @@ struct StudyRow {
   double median_error = kNaN, p95_error = kNaN;  // m, of |estimate - truth|, where told
   double median_width = kNaN;                    // m, of the interval, where told
   double coverage = kNaN;                        // share of intervals that hold the truth, where told
-  int confident_misses = 0;   // told, and the truth more than two widths off the interval's value
+  int wrong_and_sure = 0;     // told, and the truth outside of the interval by more than twice its width, or
+                              // by more than 10 um and a fifth of the truth
   double cannot_tell = kNaN;  // share of trials without status ok
 };
 

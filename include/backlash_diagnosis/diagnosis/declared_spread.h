@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How far the answers of a monitoring curve may be off on machines that the rig file allows.
+//
+// A curve is that of one machine, the declared one. What the file does not know exactly (WaveformSpread) is
+// drawn many times, each such machine is recorded with known backlash and diagnosed with the curve. Beyond
+// the interval of an answer b lies the truth by at most
+//   below(b) = max (lower - truth),  above(b) = max (truth - upper)     over answers near b, not below 0
+// by which the interval is widened. By order statistics the next of k machines is farther off with a
+// probability of 1 / (k + 1): with fewer than kFewest answers at all nothing is told.
+//
+// Most machines that the file allows may look like no machine of the curve. Then one that does may do so by
+// chance, with another backlash, and an answer is refused.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/not_a_number.h"
+
+namespace backlash::diagnosis {
+
+class MonitoringCurve;
+struct Estimate;
+
+struct DeclaredSpread {
+  /// Of an estimator.
+  struct Widening {
+    std::vector<double> below, above;  ///< m, >= 0, one per point of the curve; NaN: too few answers
+    double bound = kNaN;               ///< m, >= 0: by which a lower bound was above the truth
+  };
+  int machines = 0;          ///< drawn, > 0
+  double resembling = kNaN;  ///< share of their records that look like the curve
+  std::string limit;         ///< what changes skewness most, in words
+  Widening skewness, shape;
+
+  static constexpr int kFewest = 19;               ///< answers. Theory: 1 / 20, the rest of 95 %
+  static constexpr double kLeastResembling = 0.5;  ///< choice, tried on drawn machines
+};
+
+/// Widens the interval of an answer or a lower bound that an estimator took from the curve; or makes it
+/// "cannot tell" where the curve is too short for it. Nothing without a spread.
+void widen(const MonitoringCurve& curve, DeclaredSpread::Widening DeclaredSpread::*method,
+           Estimate& estimate);
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/diagnosis/declared_spread.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/diagnosis/monitoring_curve.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+constexpr double kMostOfCurve = 0.5;  // choice: as of an interval without what the file leaves open
+
+/// Linear between the points of the curve.
+double at(const MonitoringCurve& curve, const std::vector<double>& values, double backlash) {
+  std::size_t i = 0;
+  while (i + 2 < curve.points.size() && curve.points[i + 1].backlash < backlash) ++i;
+  const double from = curve.points[i].backlash, to = curve.points[i + 1].backlash;
+  const double share = std::clamp((backlash - from) / (to - from), 0.0, 1.0);
+  return values[i] + share * (values[i + 1] - values[i]);
+}
+
+void refuse(Status status, const std::string& why, const DeclaredSpread& spread, Estimate& e) {
+  e.status = status;
+  e.backlash = e.backlash_angle = kNaN;
+  e.message += fmt::format("; {}: limited by the declared {}", why, spread.limit);
+}
+
+void widen_answer(const MonitoringCurve& curve, const DeclaredSpread::Widening& by, Estimate& e) {
+  const double below = at(curve, by.below, e.backlash), above = at(curve, by.above, e.backlash);
+  const double end = curve.points.back().backlash, span = end - curve.points.front().backlash;
+  if (std::isnan(below + above)) {
+    e.lower = e.upper = kNaN;
+    refuse(Status::ambiguous,
+           "too few machines that the rig file allows give such an answer to say how far off it is",
+           *curve.spread, e);
+    return;
+  }
+  e.lower = std::max(0.0, e.lower - below);
+  e.upper += above;
+  if (e.upper - e.lower > kMostOfCurve * span) {
+    refuse(Status::ambiguous, "with what the rig file leaves open more than half of the curve fits",
+           *curve.spread, e);
+  } else if (e.upper >= end) {
+    refuse(Status::above_range,
+           "with what the rig file leaves open backlash may be larger than the curve covers", *curve.spread,
+           e);
+  } else {
+    return;
+  }
+  if (e.upper >= end) e.upper = kNaN;
+}
+
+void widen_bound(const MonitoringCurve& curve, const DeclaredSpread::Widening& by, Estimate& e) {
+  if (e.lower > by.bound) {
+    e.lower -= by.bound;
+    return;
+  }
+  e.lower = kNaN;
+  refuse(Status::ambiguous, "with what the rig file leaves open any backlash fits", *curve.spread, e);
+}
+
+}  // namespace
+
+void widen(const MonitoringCurve& curve, DeclaredSpread::Widening DeclaredSpread::*method, Estimate& e) {
+  if (!curve.spread || (e.status != Status::ok && e.status != Status::above_range)) return;
+  const DeclaredSpread& spread = *curve.spread;
+  if (spread.resembling < DeclaredSpread::kLeastResembling) {
+    e.lower = e.upper = kNaN;
+    refuse(
+        Status::ambiguous,
+        fmt::format(
+            "of machines that the rig file allows only {:.0f} % look like the curve, so that one may do so "
+            "by chance",
+            100 * spread.resembling),
+        spread, e);
+  } else if (e.status == Status::ok) {
+    widen_answer(curve, spread.*method, e);
+  } else {
+    widen_bound(curve, spread.*method, e);
+  }
+  e.backlash_angle = e.backlash * curve.backlash_to_angle;
+  e.angle_lower = e.lower * curve.backlash_to_angle;
+  e.angle_upper = e.upper * curve.backlash_to_angle;
+}
+
+}  // namespace backlash::diagnosis
