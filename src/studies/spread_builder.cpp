@@ -12,7 +12,7 @@ namespace {
 
 using diagnosis::DeclaredSpread;
 
-constexpr int kPlaces = 9;           // backlash values of each: choice
+constexpr int kPlaces = 9;            // backlash values of each: choice
 constexpr double kReach = 1.5;        // of the curve's length, largest backlash: as its family
 constexpr int kMostPeriods = 5;       // of a record: choice
 constexpr int kMostPhases = 4;        // of a sample: choice
