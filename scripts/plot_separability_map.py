@@ -6,6 +6,7 @@ Exit codes: 0 done, 64 usage, 65 not a map, 66 map missing, 70 matplotlib missin
 """
 import os
 import sys
+import textwrap
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import plotting  # noqa: E402
@@ -69,7 +70,7 @@ def draw(data, plt, numpy):
     figure, grid = plt.subplots(len(rows), len(maps), figsize=(3.9 * len(maps) + 1.2, 3.2 * len(rows) + 1),
                                 squeeze=False, constrained_layout=True)
     for column, one_map in enumerate(maps):
-        grid[0][column].set_title(one_map["axis"], fontsize=9.5)
+        grid[0][column].set_title(textwrap.fill(one_map["axis"], 36), fontsize=9.5)
         for row, name in enumerate(rows):
             axes = grid[row][column]
             error = one_map["equivalent"] if row == 0 else one_map["methods"][name]["error"]

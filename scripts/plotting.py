@@ -49,8 +49,8 @@ def load_yaml(path, what):
     try:
         with open(path) as stream:
             data = yaml.load(stream, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-        if data["schema_version"] != 1:
-            raise ValueError("schema_version is not 1")
+        if data["schema_version"] != 2:
+            raise ValueError("schema_version is not 2")
         return data
     except OSError as error:
         fail(66, error)

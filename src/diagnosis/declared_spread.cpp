@@ -11,7 +11,7 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr double kMostOfCurve = 0.5;  // choice: as of an interval without what the file leaves open
+constexpr double kMuchWider = 2;  // choice: times the interval without what the file leaves open
 
 /// Linear between the points of the curve.
 double at(const MonitoringCurve& curve, const std::vector<double>& values, double backlash) {
@@ -30,7 +30,6 @@ void refuse(Status status, const std::string& why, const DeclaredSpread& spread,
 
 void widen_answer(const MonitoringCurve& curve, const DeclaredSpread::Widening& by, Estimate& e) {
   const double below = at(curve, by.below, e.backlash), above = at(curve, by.above, e.backlash);
-  const double end = curve.points.back().backlash, span = end - curve.points.front().backlash;
   if (std::isnan(below + above)) {
     e.lower = e.upper = kNaN;
     refuse(Status::ambiguous,
@@ -38,19 +37,11 @@ void widen_answer(const MonitoringCurve& curve, const DeclaredSpread::Widening& 
            *curve.spread, e);
     return;
   }
+  const double width = e.upper - e.lower;
   e.lower = std::max(0.0, e.lower - below);
   e.upper += above;
-  if (e.upper - e.lower > kMostOfCurve * span) {
-    refuse(Status::ambiguous, "with what the rig file leaves open more than half of the curve fits",
-           *curve.spread, e);
-  } else if (e.upper >= end) {
-    refuse(Status::above_range,
-           "with what the rig file leaves open backlash may be larger than the curve covers", *curve.spread,
-           e);
-  } else {
-    return;
-  }
-  if (e.upper >= end) e.upper = kNaN;
+  if (e.upper - e.lower > kMuchWider * width)
+    e.message += "; interval limited by the declared " + curve.spread->limit;
 }
 
 void widen_bound(const MonitoringCurve& curve, const DeclaredSpread::Widening& by, Estimate& e) {
@@ -67,16 +58,7 @@ void widen_bound(const MonitoringCurve& curve, const DeclaredSpread::Widening& b
 void widen(const MonitoringCurve& curve, DeclaredSpread::Widening DeclaredSpread::*method, Estimate& e) {
   if (!curve.spread || (e.status != Status::ok && e.status != Status::above_range)) return;
   const DeclaredSpread& spread = *curve.spread;
-  if (spread.resembling < DeclaredSpread::kLeastResembling) {
-    e.lower = e.upper = kNaN;
-    refuse(
-        Status::ambiguous,
-        fmt::format(
-            "of machines that the rig file allows only {:.0f} % look like the curve, so that one may do so "
-            "by chance",
-            100 * spread.resembling),
-        spread, e);
-  } else if (e.status == Status::ok) {
+  if (e.status == Status::ok) {
     widen_answer(curve, spread.*method, e);
   } else {
     widen_bound(curve, spread.*method, e);

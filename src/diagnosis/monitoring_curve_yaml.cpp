@@ -111,7 +111,6 @@ void emit_spread(YAML::Emitter& out, const DeclaredSpread& spread) {
       << YAML::Comment("of answers on machines that the rig file allows, unit of backlash; -1: not known")
       << YAML::BeginMap;
   out << YAML::Key << "machines" << YAML::Value << spread.machines;
-  out << YAML::Key << "resembling" << YAML::Value << to_text(spread.resembling);
   out << YAML::Key << "limit" << YAML::Value << YAML::DoubleQuoted << spread.limit;
   emit_widening(out, "apd_skewness", spread.skewness);
   emit_widening(out, "apd_shape", spread.shape);
@@ -210,7 +209,6 @@ DeclaredSpread::Widening read_widening(const YamlReader& yaml, std::size_t point
 DeclaredSpread read_spread(const YamlReader& yaml, std::size_t points) {
   DeclaredSpread spread;
   spread.machines = static_cast<int>(yaml.integer("machines", 1, 1'000'000));
-  spread.resembling = yaml.number("resembling", Range::between(0, 1));
   spread.limit = yaml.text("limit");
   spread.skewness = read_widening(yaml.map("apd_skewness"), points);
   spread.shape = read_widening(yaml.map("apd_shape"), points);

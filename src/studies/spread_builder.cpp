@@ -12,7 +12,7 @@ namespace {
 
 using diagnosis::DeclaredSpread;
 
-constexpr int kPlaces = 9;           // backlash values of each: choice
+constexpr int kPlaces = 9;            // backlash values of each: choice
 constexpr double kReach = 1.5;        // of the curve's length, largest backlash: as its family
 constexpr int kMostPeriods = 5;       // of a record: choice
 constexpr int kMostPhases = 4;        // of a sample: choice
@@ -21,7 +21,6 @@ constexpr std::uint64_t kSeed = 640;  // of the drawn machines
 
 struct Trial {
   double truth = 0;
-  bool resembles = false;
   diagnosis::Estimate skewness, shape;
 };
 
@@ -69,7 +68,6 @@ Trial try_out(const CurvePlan& plan, const diagnosis::MonitoringCurve& curve, do
     if (e.method == "apd_skewness") trial.skewness = e;
     if (e.method == "apd_shape") trial.shape = e;
   }
-  trial.resembles = trial.shape.status != diagnosis::Status::out_of_domain;
   return trial;
 }
 
@@ -183,9 +181,6 @@ DeclaredSpread learn_spread(const CurvePlan& plan, const diagnosis::MonitoringCu
   const std::vector<Trial> trials = run_trials(brief, curve, ticker);
   DeclaredSpread spread;
   spread.machines = plan.request.machines;
-  spread.resembling = static_cast<double>(std::count_if(trials.begin(), trials.end(),
-                                                        [](const Trial& t) { return t.resembles; })) /
-                      static_cast<double>(trials.size());
   spread.limit = limit_of(brief, ticker);
   spread.skewness = widening(trials, &Trial::skewness, curve);
   spread.shape = widening(trials, &Trial::shape, curve);

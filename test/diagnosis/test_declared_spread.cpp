@@ -15,7 +15,6 @@ MonitoringCurve curve() {
   MonitoringCurve c = test::linear_curve(21);
   DeclaredSpread& spread = c.spread.emplace();
   spread.machines = 64;
-  spread.resembling = 0.9;
   spread.limit = "motor damping";
   for (int i = 0; i < 21; ++i) {
     spread.shape.below.push_back(5e-6);
@@ -46,21 +45,26 @@ TEST(DeclaredSpread, WidensByWhatIsLearntNearTheAnswer) {
   EXPECT_EQ(small.lower, 0);
 }
 
-TEST(DeclaredSpread, CannotTellNamesWhatLimits) {
-  Estimate wide = answer(60e-6, 120e-6, 150e-6);  // 119 um with it, more than half of the curve
+TEST(DeclaredSpread, AWideIntervalNamesWhatLimitsIt) {
+  Estimate narrow = answer(60e-6, 75e-6, 90e-6);  // hardly wider
+  widen(curve(), &DeclaredSpread::shape, narrow);
+  EXPECT_EQ(narrow.message.find("limited"), std::string::npos) << narrow.message;
+  Estimate wide = answer(160e-6, 165e-6, 170e-6);  // with it beyond the end of the curve, as are the machines
   widen(curve(), &DeclaredSpread::shape, wide);
-  EXPECT_EQ(wide.status, Status::ambiguous);
-  EXPECT_TRUE(std::isnan(wide.backlash));
+  EXPECT_EQ(wide.status, Status::ok);
+  EXPECT_NEAR(wide.lower, 155e-6, 1e-12);
+  EXPECT_NEAR(wide.upper, 203e-6, 1e-12);
   EXPECT_NE(wide.message.find("limited by the declared motor damping"), std::string::npos) << wide.message;
-  Estimate end = answer(160e-6, 165e-6, 170e-6);  // 203 um with it
-  widen(curve(), &DeclaredSpread::shape, end);
-  EXPECT_EQ(end.status, Status::above_range);
-  EXPECT_NEAR(end.lower, 155e-6, 1e-12);
-  EXPECT_TRUE(std::isnan(end.upper));
+}
+
+TEST(DeclaredSpread, WhereTooFewMachinesGiveAnAnswerNothingIsTold) {
   Estimate untold = answer(70e-6, 75e-6, 80e-6);
   widen(curve(), &DeclaredSpread::skewness, untold);
   EXPECT_EQ(untold.status, Status::ambiguous);
+  EXPECT_TRUE(std::isnan(untold.backlash));
   EXPECT_TRUE(std::isnan(untold.lower));
+  EXPECT_NE(untold.message.find("limited by the declared motor damping"), std::string::npos)
+      << untold.message;
 }
 
 TEST(DeclaredSpread, BoundsGoDown) {
@@ -73,17 +77,13 @@ TEST(DeclaredSpread, BoundsGoDown) {
   EXPECT_EQ(low.status, Status::ambiguous);
 }
 
-TEST(DeclaredSpread, WhereFewMachinesLookLikeTheCurveNothingIsTold) {
+TEST(DeclaredSpread, TouchesNoRefusalAndNothingWithoutASpread) {
   MonitoringCurve c = curve();
-  c.spread->resembling = 0.2;
-  Estimate e = answer(70e-6, 75e-6, 80e-6), refused = answer(kNaN, kNaN, kNaN, Status::out_of_domain);
-  widen(c, &DeclaredSpread::shape, e);
-  EXPECT_EQ(e.status, Status::ambiguous);
-  EXPECT_TRUE(std::isnan(e.upper));
+  Estimate refused = answer(kNaN, kNaN, kNaN, Status::out_of_domain);
   widen(c, &DeclaredSpread::shape, refused);
   EXPECT_EQ(refused.status, Status::out_of_domain);
   c.spread.reset();
-  e = answer(70e-6, 75e-6, 80e-6);
+  Estimate e = answer(70e-6, 75e-6, 80e-6);
   widen(c, &DeclaredSpread::shape, e);
   EXPECT_EQ(e.upper, 80e-6);
 }

@@ -5,11 +5,13 @@
 // drawn many times, each such machine is recorded with known backlash and diagnosed with the curve. Beyond
 // the interval of an answer b lies the truth by at most
 //   below(b) = max (lower - truth),  above(b) = max (truth - upper)     over answers near b, not below 0
-// by which the interval is widened. By order statistics the next of k machines is farther off with a
-// probability of 1 / (k + 1): with fewer than kFewest answers at all nothing is told.
+// by which the interval is widened, also beyond the curve's end: the drawn machines have up to 1.5 times its
+// backlash. By order statistics the next of k machines is farther off with a probability of 1 / (k + 1): with
+// fewer than kFewest answers at all nothing is told.
 //
-// Most machines that the file allows may look like no machine of the curve. Then one that does may do so by
-// chance, with another backlash, and an answer is refused.
+// Counted are those drawn machines that look like one of the curve, as all others are refused
+// (out_of_domain). Where most of them do not, one that does may do so by chance, with another backlash: that
+// makes the interval wide.
 #pragma once
 
 #include <string>
@@ -28,17 +30,16 @@ struct DeclaredSpread {
     std::vector<double> below, above;  ///< m, >= 0, one per point of the curve; NaN: too few answers
     double bound = kNaN;               ///< m, >= 0: by which a lower bound was above the truth
   };
-  int machines = 0;          ///< drawn, > 0
-  double resembling = kNaN;  ///< share of their records that look like the curve
-  std::string limit;         ///< what changes skewness most, in words
+  int machines = 0;   ///< drawn, > 0
+  std::string limit;  ///< what changes skewness most, in words
   Widening skewness, shape;
 
-  static constexpr int kFewest = 19;               ///< answers. Theory: 1 / 20, the rest of 95 %
-  static constexpr double kLeastResembling = 0.5;  ///< choice, tried on drawn machines
+  static constexpr int kFewest = 19;  ///< answers. Theory: 1 / 20, the rest of 95 %
 };
 
-/// Widens the interval of an answer or a lower bound that an estimator took from the curve; or makes it
-/// "cannot tell" where the curve is too short for it. Nothing without a spread.
+/// Widens the interval of an answer or a lower bound that an estimator took from the curve, and says what
+/// limits it where it becomes more than twice as wide; or makes it "cannot tell" where the drawn machines
+/// cannot say by how much. Nothing without a spread.
 void widen(const MonitoringCurve& curve, DeclaredSpread::Widening DeclaredSpread::*method,
            Estimate& estimate);
 
