@@ -30,13 +30,6 @@ void refuse(Status status, const std::string& why, const DeclaredSpread& spread,
 
 void widen_answer(const MonitoringCurve& curve, const DeclaredSpread::Widening& by, Estimate& e) {
   const double below = at(curve, by.below, e.backlash), above = at(curve, by.above, e.backlash);
-  if (std::isnan(below + above)) {
-    e.lower = e.upper = kNaN;
-    refuse(Status::ambiguous,
-           "too few machines that the rig file allows give such an answer to say how far off it is",
-           *curve.spread, e);
-    return;
-  }
   const double width = e.upper - e.lower;
   e.lower = std::max(0.0, e.lower - below);
   e.upper += above;

@@ -98,7 +98,7 @@ void emit_widening(YAML::Emitter& out, const char* key, const DeclaredSpread::Wi
   out << YAML::Key << key << YAML::Value << YAML::BeginMap;
   const auto row = [&out](const char* name, const std::vector<double>& values) {
     out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginSeq;
-    for (const double v : values) out << (std::isnan(v) ? std::string("-1") : to_text(v));
+    for (const double v : values) out << to_text(v);
     out << YAML::EndSeq;
   };
   row("below", w.below);
@@ -108,8 +108,7 @@ void emit_widening(YAML::Emitter& out, const char* key, const DeclaredSpread::Wi
 
 void emit_spread(YAML::Emitter& out, const DeclaredSpread& spread) {
   out << YAML::Key << "spread" << YAML::Value
-      << YAML::Comment("of answers on machines that the rig file allows, unit of backlash; -1: not known")
-      << YAML::BeginMap;
+      << YAML::Comment("of answers on machines that the rig file allows, unit of backlash") << YAML::BeginMap;
   out << YAML::Key << "machines" << YAML::Value << spread.machines;
   out << YAML::Key << "limit" << YAML::Value << YAML::DoubleQuoted << spread.limit;
   emit_widening(out, "apd_skewness", spread.skewness);
@@ -197,10 +196,8 @@ ApdFamily read_family(const YamlReader& yaml, std::size_t points, std::size_t le
 DeclaredSpread::Widening read_widening(const YamlReader& yaml, std::size_t points) {
   DeclaredSpread::Widening w;
   for (const auto& [key, values] : {std::pair{"below", &w.below}, std::pair{"above", &w.above}}) {
-    *values = yaml.numbers(key, Range::any());
+    *values = yaml.numbers(key, Range::not_negative());
     if (values->size() != points) yaml.fail(key, "needs one value per point of the curve");
-    for (double& v : *values)
-      if (v < 0) v = kNaN;
   }
   w.bound = yaml.number("bound", Range::not_negative());
   return w;

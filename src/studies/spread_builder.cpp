@@ -14,9 +14,10 @@ using diagnosis::DeclaredSpread;
 
 constexpr int kPlaces = 9;            // backlash values of each: choice
 constexpr double kReach = 1.5;        // of the curve's length, largest backlash: as its family
+constexpr double kDenser = 1.5;       // exponent: a tenth of them below 3 % of the reach. Choice
 constexpr int kMostPeriods = 5;       // of a record: choice
 constexpr int kMostPhases = 4;        // of a sample: choice
-constexpr double kNear = 0.125;       // of the curve's length: answers whose errors are alike. Choice
+constexpr double kNear = 0.25;        // of the curve's length: answers whose errors are alike. Choice
 constexpr std::uint64_t kSeed = 640;  // of the drawn machines
 
 struct Trial {
@@ -71,15 +72,18 @@ Trial try_out(const CurvePlan& plan, const diagnosis::MonitoringCurve& curve, do
   return trial;
 }
 
-/// Each drawn machine at backlash values spread evenly over the curve and beyond, other values each.
+/// Each drawn machine at backlash values spread over the curve and beyond, other values each; denser where it
+/// is small, as a lower bound above the truth is told by those alone.
 std::vector<Machine> machines_of(const CurvePlan& plan) {
   std::vector<Machine> machines;
   for (int m = 0; m < plan.request.machines; ++m) {
     Random random(kSeed, static_cast<std::uint32_t>(m));
     const Machine machine = draw_machine(plan.file, random.bits());
     const double offset = random.uniform();
-    for (int k = 0; k < kPlaces; ++k)
-      machines.push_back(with_backlash(machine, kReach * plan.request.max_backlash * (k + offset) / kPlaces));
+    for (int k = 0; k < kPlaces; ++k) {
+      const double place = std::pow((k + offset) / kPlaces, kDenser);
+      machines.push_back(with_backlash(machine, kReach * plan.request.max_backlash * place));
+    }
   }
   // What sticks cannot be moved together with others.
   std::stable_partition(machines.begin(), machines.end(),
@@ -108,13 +112,14 @@ std::vector<Trial> run_trials(const CurvePlan& plan, const diagnosis::Monitoring
   return trials;
 }
 
-/// How far answers near a backlash are off: of all within kNear, and of the kFewest nearest.
+/// How far answers near a backlash are off: of all within `near`, and of the kFewest nearest; `all` that was
+/// drawn where there are too few.
 void add_point(std::vector<const Trial*> told, diagnosis::Estimate Trial::*method, double backlash,
-               double near, DeclaredSpread::Widening& w) {
+               double near, double all, DeclaredSpread::Widening& w) {
   const auto distance = [&](const Trial* t) { return std::fabs((t->*method).backlash - backlash); };
   if (told.size() < DeclaredSpread::kFewest) {
-    w.below.push_back(kNaN);
-    w.above.push_back(kNaN);
+    w.below.push_back(all);
+    w.above.push_back(all);
     return;
   }
   std::sort(told.begin(), told.end(),
@@ -139,7 +144,8 @@ DeclaredSpread::Widening widening(const std::vector<Trial>& trials, diagnosis::E
     if (e.status == diagnosis::Status::above_range) w.bound = std::fmax(w.bound, e.lower - trial.truth);
   }
   for (const diagnosis::CurvePoint& point : curve.points)
-    add_point(told, method, point.backlash, kNear * length_of(curve), w);
+    add_point(told, method, point.backlash, kNear * length_of(curve), kReach * curve.points.back().backlash,
+              w);
   return w;
 }
 

@@ -29,7 +29,7 @@ TEST_F(SeparabilityMapCommand, WritesTableJsonAndPicture) {
   const Json map = Json::parse(read("map.json"));
   EXPECT_EQ(map["schema_version"], 1);
   EXPECT_EQ(map["backlash"].size(), 2u);
-  ASSERT_EQ(map["maps"].size(), 4u);
+  ASSERT_EQ(map["maps"].size(), 9u);
   for (const Json& one : map["maps"])
     for (const char* method : {"apd_skewness", "apd_shape"}) {
       const Json& cells = one["methods"][method];

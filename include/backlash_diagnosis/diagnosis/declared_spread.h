@@ -7,7 +7,7 @@
 //   below(b) = max (lower - truth),  above(b) = max (truth - upper)     over answers near b, not below 0
 // by which the interval is widened, also beyond the curve's end: the drawn machines have up to 1.5 times its
 // backlash. By order statistics the next of k machines is farther off with a probability of 1 / (k + 1): with
-// fewer than kFewest answers at all nothing is told.
+// fewer than kFewest answers at all the interval becomes all that was drawn.
 //
 // Counted are those drawn machines that look like one of the curve, as all others are refused
 // (out_of_domain). Where most of them do not, one that does may do so by chance, with another backlash: that
@@ -27,14 +27,14 @@ struct Estimate;
 struct DeclaredSpread {
   /// Of an estimator.
   struct Widening {
-    std::vector<double> below, above;  ///< m, >= 0, one per point of the curve; NaN: too few answers
+    std::vector<double> below, above;  ///< m, >= 0, one per point of the curve
     double bound = kNaN;               ///< m, >= 0: by which a lower bound was above the truth
   };
   int machines = 0;   ///< drawn, > 0
   std::string limit;  ///< what changes skewness most, in words
   Widening skewness, shape;
 
-  static constexpr int kFewest = 19;  ///< answers. Theory: 1 / 20, the rest of 95 %
+  static constexpr int kFewest = 39;  ///< answers. Theory: 1 / 40 on either side, the rest of 95 %
 };
 
 /// Widens the interval of an answer or a lower bound that an estimator took from the curve, and says what

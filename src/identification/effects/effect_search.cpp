@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
 #include "effect_roles.h"
 #include "found_effects.h"
 #include "search.h"
@@ -185,7 +186,10 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
         "the teeth are Hertzian (force with the power 1.5 of the penetration), not linear as declared; so "
         "they are in "
         "the model, but nothing is called missing for it");
-  note_shape_of_friction(found, settings.shape_of_friction, trace);
+  note_shape_of_friction(
+      found,
+      simulation::load_moves_freely(declared) ? settings.shape_of_friction : settings.shape_of_all_torque,
+      trace);
   judge_remainder(remainders(result, on_test.back(), records, settings, trace), settings.explainable, trace);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;

@@ -125,6 +125,8 @@ struct SearchSettings {
   MapSettings maps;
   BeliefSettings belief;
   double shape_of_friction = 0.01;  // choice: of the signal: less is how friction begins, not an effect
+  double shape_of_all_torque =
+      0.03;  // choice: the same of one inertia, whose torque is friction for the most part
   ExplainableSettings explainable;
 };
 
