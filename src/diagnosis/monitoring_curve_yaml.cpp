@@ -237,8 +237,9 @@ std::string MonitoringCurve::to_yaml() const {
 
 MonitoringCurve MonitoringCurve::from_yaml(const YamlReader& yaml) {
   MonitoringCurve curve;
-  yaml.integer("schema_version", kSchema, kSchema);
-  curve.conditions = read_conditions(yaml.map("conditions"));
+  curve.conditions = read_conditions(yaml.map("conditions"));  // first: a rig file says that it is no curve
+  if (yaml.integer("schema_version", 1, kSchema) < kSchema)
+    yaml.fail("schema_version", "is that of an earlier version's curve; build_curve draws it anew");
   curve.backlash_to_angle = yaml.number("backlash_to_angle", Range::positive());
   curve.coverage_factor = yaml.number("coverage_factor", Range::positive());
   curve.noise_levels = yaml.numbers("noise_levels", Range::not_negative());

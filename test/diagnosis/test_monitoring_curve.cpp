@@ -366,6 +366,7 @@ TEST(MonitoringCurve, MalformedFilesAreRefusedWithTheirKey) {
   };
   const std::vector<Case> cases = {
       {"schema_version: 2", "schema_version: 1", "schema_version"},
+      {"schema_version: 2", "schema_version: 1", "build_curve draws it anew"},
       {"schema_version: 2\n", "", "schema_version"},
       {"  rig: \"linear\"\n", "", "conditions.rig"},
       {"\"sensor_torque\"", "\"torque\"", "conditions.signal"},
