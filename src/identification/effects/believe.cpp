@@ -45,7 +45,7 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   const double price = (other_is.total() - other_was.total()) / other_was.noise;
   const bool at_noise = other_is.total() < settings.at_noise * settings.at_noise * other_is.noise;
   const bool dear = !at_noise || price > settings.price * decrease / was.noise;
-  if (other.upper < 0 && other.value < -settings.worse && dear)
+  if (other.upper < 0 && (other.value < -settings.much_worse || (other.value < -settings.worse && dear)))
     return fmt::format("on the unseen record it makes the error of {} worse, by {}", names[!deflection],
                        interval({-other.value, -other.upper, -other.lower}));
   return "";

@@ -44,6 +44,17 @@ class SearchProgress {
   std::string phase_;
 };
 
+/// Friction that comes out negative is held at zero, which fits all else anew: the unseen record is asked
+/// again.
+Hypothesis believe_physical(const Hypothesis& before, const ServoData& unseen, const SearchContext& context) {
+  Hypothesis h = believe(before, unseen, context);
+  for (;;) {
+    const Hypothesis held = hold_friction(h, context);
+    if (held.fitted == h.fitted) return h;
+    h = believe(held, unseen, context);
+  }
+}
+
 }  // namespace
 
 SearchResult search_effects(const model::Rig& declared, const std::vector<ServoData>& data,
@@ -65,8 +76,7 @@ SearchResult search_effects(const model::Rig& declared, const std::vector<ServoD
   h = try_equivalents(h, context);
   h = add_learned(h, context);
   h = drop_stand_ins(h, context);
-  h = believe(h, unseen, context);
-  result.found = hold_friction(h, context);
+  result.found = believe_physical(h, unseen, context);
   return result;
 }
 

@@ -82,6 +82,7 @@ struct BeliefSettings {
   // noise: the fit weighs both.
   double at_noise = 1.3;     // simulation: times the noise
   double price = 0.1;        // choice
+  double much_worse = 0.15;  // choice: of the other channel's error, at no price
   double least_z = 4;        // choice: of a strength, standard errors
   double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
   double local_error = 0.1;  // choice: of a strength; where it is told worse the rest of the record counts
