@@ -13,6 +13,12 @@ const char* field_name(Field field) {
   return kNames[static_cast<int>(field)];
 }
 
+std::optional<Field> field_from_name(const std::string& name) {
+  for (const Field field : {Field::position, Field::velocity, Field::effort})
+    if (name == field_name(field)) return field;
+  return std::nullopt;
+}
+
 Field usual_field(Channel channel) {
   switch (channel) {
     case Channel::motor_position:

@@ -12,11 +12,8 @@ record::ChannelSource read_source(const YamlReader& yaml, record::Channel channe
   source.topic = yaml.text_or("topic", source.topic);
   source.name = yaml.text("name");
   source.field = record::usual_field(channel);
-  if (yaml.has("field")) {
-    const std::string field = yaml.choice("field", {"position", "velocity", "effort"});
-    for (const record::Field f : {record::Field::position, record::Field::velocity, record::Field::effort})
-      if (field == record::field_name(f)) source.field = f;
-  }
+  if (yaml.has("field"))
+    source.field = *record::field_from_name(yaml.choice("field", {"position", "velocity", "effort"}));
   source.scale = yaml.number_or("scale", source.scale, Range::any());
   source.offset = yaml.number_or("offset", source.offset, Range::any());
   return source;

@@ -5,33 +5,10 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/ros/diagnoser_node.h"
-#include "backlash_diagnosis/ros/parameters.h"
+#include "backlash_diagnosis/ros/monitor_settings.h"
 
 namespace backlash::ros_bridge {
 namespace {
-
-rig_file::RigFile rig_from(const std::string& path) {
-  return path.empty() ? rig_file::default_rig_file() : rig_file::load_rig_file(path);
-}
-
-void use_limits(MonitorSettings& monitor, const std::string& path) {
-  if (path.empty()) return;
-  const diagnosis::Limits limits = diagnosis::read_limits_file(path);
-  diagnosis::check_limits(limits, monitor.rig.rig.mesh.angular(), path);
-  monitor.rig.diagnosis.limits = limits;
-}
-
-/// A file that is not there yet is one to be written.
-void use_baseline(MonitorSettings& monitor, const std::string& path) {
-  monitor.baseline_path = path;
-  if (path.empty()) return;
-  const auto folder = std::filesystem::path(path).parent_path();
-  if (!folder.empty() && !std::filesystem::is_directory(folder))
-    throw InvalidParameter("~baseline", path, "is in a folder that does not exist");
-  if (!std::filesystem::exists(path)) return;
-  monitor.baseline = diagnosis::read_baseline(path);
-  diagnosis::check_baseline(*monitor.baseline, monitor.rig.rig.name, monitor.rig.digest, path);
-}
 
 std::string read_history_folder(Parameters& parameters) {
   const std::string folder = parameters.text("history", "");
@@ -55,13 +32,17 @@ usage: rosrun backlash_diagnosis diagnoser [_PARAMETER:=VALUE ...] [NAME:=REMAPP
 
 parameters (private)
   rig       path of the rig file; default: the built-in rig of Sarkar et al. (1997)
+  rig_folder  folder with a rig file for each joint of a robot, instead of rig: all are watched
   curve     path of a monitoring curve; default: built from the rig at the rate of the messages
-  joints    list of joint names; default: the joint of the rig file
+  joints    list of joint names; default: the joint of the rig file, or all of rig_folder
+  channels/CHANNEL/...   topic, name, field, scale, offset: where the robot publishes that channel, as
+            `channels` of the rig file, and instead of them
   limits    path of a file with limits to grade by (schema_version and the map of diagnosis.limits in a
             rig file); default: the rig file's
   baseline  path of the baseline of the healthy machine: read at the start where it exists, written by
             ~set_baseline, removed where that clears it; default: a baseline lasts as long as the node
-  JOINT/rig, JOINT/curve, JOINT/limits, JOINT/baseline   the same for one of several joints
+  JOINT/rig, JOINT/channels, JOINT/curve, JOINT/limits, JOINT/baseline   the same for one of several
+            joints
   window    whole periods that the published estimates look back; default 5
   estimate_interval   s at least from one published estimate to the next, by their stamps; default 0.25;
             0: each period
@@ -101,9 +82,6 @@ actions
 DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle) {
   Parameters parameters(private_handle);
   DiagnoserSettings settings;
-  const std::string rig = parameters.text("rig", "");
-  const std::string curve = parameters.text("curve", "");
-  const rig_file::RigFile common = rig_from(rig);
   MonitorSettings defaults;
   defaults.window = static_cast<int>(parameters.integer("window", 5, 1, 1'000'000));
   defaults.estimate_interval = parameters.number("estimate_interval", 0.25, Range::not_negative());
@@ -119,29 +97,7 @@ DiagnoserSettings load_diagnoser_settings(const ros::NodeHandle& private_handle)
   settings.waveform = parameters.boolean("waveform", true);
   parameters.allow("live");
   parameters.allow("diagnostic_period");  // of diagnostic_updater
-  const std::string limits = parameters.text("limits", "");
-  const std::string baseline = parameters.text("baseline", "");
-  const auto joints = parameters.texts("joints", {common.rig.joint});
-  if (joints.size() > 1 && !baseline.empty())
-    throw InvalidParameter("~baseline", baseline,
-                           "is one file for several joints; give each its JOINT/baseline");
-  for (const std::string& joint : joints) {
-    for (const MonitorSettings& other : settings.joints)
-      if (other.joint == joint) throw InvalidParameter("~joints", joint, "is named twice");
-    MonitorSettings monitor = defaults;
-    monitor.joint = joint;
-    parameters.allow(joint + "/live");
-    const std::string own_rig = parameters.text(joint + "/rig", "");
-    const std::string own_curve = parameters.text(joint + "/curve", curve);
-    monitor.rig = own_rig.empty() ? common : rig_file::load_rig_file(own_rig);
-    if (!own_curve.empty()) {
-      monitor.curve = diagnosis::read_curve(own_curve);
-      monitor.curve_warning = studies::check_curve(*monitor.curve, monitor.rig, own_curve);
-    }
-    use_limits(monitor, parameters.text(joint + "/limits", limits));
-    use_baseline(monitor, parameters.text(joint + "/baseline", baseline));
-    settings.joints.push_back(std::move(monitor));
-  }
+  settings.joints = load_monitors(parameters, defaults);
   parameters.finish();
   return settings;
 }

@@ -66,6 +66,37 @@ class DiagnoserParametersTest(unittest.TestCase):
                            "backlash_angle: 1.0e-3\nangle_interval: [0.9e-3, 1.1e-3]\n")
         self.assert_refused({"baseline": other}, "other.yaml", "'elbow', not of 'sarkar_1997'")
 
+    def test_a_robot_whose_joints_are_not_told_apart_is_refused(self):
+        def folder(**rigs):
+            path = tempfile.mkdtemp(dir=self.folder)
+            for name, text in rigs.items():
+                with open(os.path.join(path, name + ".yaml"), "w") as out:
+                    out.write(text)
+            return path
+
+        with open(rig_path()) as stream:
+            rig = stream.read()
+        channels = "\nchannels: {motor_position: {name: elbow}, motor_torque: {name: elbow}}\n"
+        self.assert_refused({"rig_folder": "/nowhere"}, "~rig_folder", "/nowhere")
+        self.assert_refused({"rig_folder": folder()}, "~rig_folder", "no rig file")
+        self.assert_refused({"rig_folder": folder(a=rig, b=rig)}, "b.yaml", "second rig file", "'joint'")
+        self.assert_refused({"rig_folder": folder(a="schema_version: [")}, "a.yaml")
+        self.assert_refused({"rig_folder": folder(a=rig), "rig": rig_path()}, "~rig_folder", "beside ~rig")
+        self.assert_refused({"rig_folder": folder(a=rig), "joints": ["elbow"]}, "elbow", "no rig file in ~rig_folder")
+        self.assert_refused({"rig": self.write("mapped.yaml", rig + channels), "joints": ["a", "b"]}, "~joints", "a",
+                            "channels are of one joint")
+
+    def test_wrong_channels_are_refused_by_name(self):
+        good = {"motor_position": {"name": "elbow"}, "motor_torque": {"name": "elbow"}}
+        for wrong, *shown in (({"motor_position": {"topic": "x"}}, "channels.motor_position.name", "empty"),
+                              ({"motor_position": {"name": "x", "field": "angle"}}, "field", "angle"),
+                              ({"motor_position": {"name": "x", "scale": 0.0}}, "channels.motor_position.scale"),
+                              ({"motor_position": {"name": "x", "scale": "two"}}, "scale", "number"),
+                              ({"motor_position": {"name": "x", "unit": "deg"}}, "unit", "not a parameter"),
+                              ({"motor_angle": {"name": "x"}}, "motor_angle", "not a parameter")):
+            self.assert_refused({"channels": {**good, **wrong}}, "~", *shown)
+            self.assert_refused({"joints": ["a", "b"], "b/channels": {**good, **wrong}}, "~", *shown)
+
     def test_limits_and_baseline_are_kept_in_their_files(self):
         healthy = os.path.join(self.folder, "healthy.yaml")
         parameters = {"curve": build_curve(self.folder), "limits": self.write("limits.yaml", LIMITS),

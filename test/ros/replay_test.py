@@ -4,6 +4,7 @@
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -37,14 +38,21 @@ def play(bag, *options, topic="/joint_states"):
     subprocess.run(play_command(bag, *options, topic=topic), check=True, stdin=subprocess.DEVNULL, timeout=300)
 
 
-ROBOT_CHANNELS = """
-channels:
-  motor_torque: {topic: /arm/joint_states, name: elbow, scale: 16}     # the effort is a current
-  motor_position: {topic: /arm/joint_states, name: elbow, scale: -1}
-  motor_velocity: {topic: /arm/joint_states, name: elbow, scale: -1}
-  load_position: {topic: /arm/joint_states, name: elbow_link}
-  sensor_torque: {topic: /arm/torques, name: elbow_flange}
-"""
+ROBOT_CHANNELS = {
+    "motor_torque": {"topic": "/arm/joint_states", "name": "elbow", "scale": 16},  # the effort is a current
+    "motor_position": {"topic": "/arm/joint_states", "name": "elbow", "scale": -1},
+    "motor_velocity": {"topic": "/arm/joint_states", "name": "elbow", "scale": -1},
+    "load_position": {"topic": "/arm/joint_states", "name": "elbow_link"},
+    "sensor_torque": {"topic": "/arm/torques", "name": "elbow_flange"},
+}
+
+
+def rig_of(joint, folder, more=""):
+    """The reference rig under a joint's name."""
+    path = os.path.join(folder, joint + ".yaml")
+    with open(rig_path()) as stream, open(path, "w") as out:
+        out.write(re.sub(r"(?m)^joint: \w+", "joint: " + joint, stream.read(), count=1) + more)
+    return path
 
 
 def as_a_robot_publishes(bag, path):
@@ -125,16 +133,20 @@ class ReplayTest(unittest.TestCase):
         self.assert_like_offline(answers[0], offline(SMALL_BAG, self.folder, "--rig", rig_path(), "--curve", self.curve))
 
     def test_a_robot_with_names_topics_and_units_of_its_own_needs_no_relay(self):
-        rig, bag = (os.path.join(self.folder, name) for name in ("robot.yaml", "robot.bag"))
-        with open(rig_path()) as stream, open(rig, "w") as out:
-            out.write(stream.read() + ROBOT_CHANNELS)
+        rigs, bag = os.path.join(self.folder, "robot"), os.path.join(self.folder, "robot.bag")
+        os.mkdir(rigs)
+        # The channels of one joint are in its rig file, those of the other are parameters.
+        rig = rig_of("elbow", rigs, "\nchannels: " + json.dumps(ROBOT_CHANNELS) + "\n")
+        rig_of("wrist", rigs)
         as_a_robot_publishes(SMALL_BAG, bag)
-        with Diagnoser({"rig": rig, "curve": self.curve}).ready() as diagnoser:
+        parameters = {"rig_folder": rigs, "curve": self.curve, "waveform": False, "wrist/channels": ROBOT_CHANNELS}
+        with Diagnoser(parameters).ready() as diagnoser:
             # A second of delay: a connection may still be under way when the topic has a subscriber.
             subprocess.run(play_command(bag, topic="/arm/joint_states", delay=1) + ["/arm/torques"], check=True,
                            stdin=subprocess.DEVNULL, timeout=300)
-            answer = diagnoser.diagnose(periods=SMALL_BAG_PERIODS, timeout=TIMEOUT)
-        self.assertEqual(numbers(answer), numbers(self.as_recorded()))
+            for joint in ("elbow", "wrist"):
+                answer = diagnoser.diagnose(joint=joint, periods=SMALL_BAG_PERIODS, timeout=TIMEOUT)
+                self.assertEqual(numbers(answer), numbers(self.as_recorded()), joint)
         self.assert_like_offline(answer, offline(bag, self.folder, "--rig", rig, "--curve", self.curve))
 
     def test_pause_changes_nothing(self):

@@ -17,6 +17,7 @@ namespace backlash::record {
 enum class Field { position, velocity, effort };
 
 const char* field_name(Field field);
+std::optional<Field> field_from_name(const std::string& name);
 
 /// The field that carries a channel where nothing else is said: sensor_msgs/JointState has none for a current
 /// or an acceleration, which are put where a torque would be.
