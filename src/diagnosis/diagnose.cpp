@@ -88,6 +88,11 @@ Estimate by_waveform(const DiagnosisInput& in) {
   return estimate_waveform(in.record, *in.settings.waveform);
 }
 
+Estimate by_gap_traverse(const DiagnosisInput& in) {
+  if (!in.settings.gap_traverse) return not_served(in.settings.no_gap_traverse);
+  return estimate_gap_traverse(in.record, *in.settings.gap_traverse);
+}
+
 CoherenceSettings read_coherence(const YamlReader& yaml) {
   CoherenceSettings coherence;
   coherence.segment = yaml.number("segment", Range::positive());
@@ -127,6 +132,8 @@ const std::vector<DiagnosisMethod>& diagnosis_method_table() {
        by_position_difference},
       {"momentum_transfer", "motor_velocity or motor_position; motor_torque, unless that is a square wave",
        false, by_momentum_transfer},
+      {"gap_traverse", "motor_torque and motor_position; load free, moves that reverse under load", false,
+       by_gap_traverse},
       {"waveform", "motor_torque (square wave) and sensor_torque; motor_position sharpens it", false,
        by_waveform},
   };

@@ -30,6 +30,12 @@ constexpr double kBounce = 0.03;
 constexpr double kLockedTravel = 0.05;  // of the motor's travel
 // Share of the rms residual in the interval, of a locked rig and of a moving load.
 constexpr double kLockedResidual = 2, kMovingResidual = 0.15;
+// Of the play, of a moving load: what windows over touches and coarse encoders shift. Simulation.
+constexpr double kMovingModel = 0.003;
+// Powers of the torque that a deflection may follow: Hertz's contact, a spring. Theory.
+constexpr double kPowers[] = {2.0 / 3, 1};
+constexpr double kOtherPower = 0.1;  // from the declared one, beyond which it is another: choice
+constexpr double kShapeErrors = 3;   // standard errors by which the record tells two shapes apart: choice
 constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
 // wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
@@ -216,6 +222,56 @@ void require_sound(const FlankFit& fit) {
                               100 * fit.scale_error)};
 }
 
+double typical_torque(const TwoEncoders& motion) {
+  std::vector<double> size;
+  for (const double torque : motion.torque) size.push_back(std::abs(torque));
+  return signal::median(std::move(size));
+}
+
+/// The models whose deflection follows another power of the torque, the same at a typical torque.
+std::vector<FlankModel> bent_otherwise(const FlankModel& model, const TwoEncoders& motion) {
+  const double torque = typical_torque(motion), typical = std::abs(model.elastic(torque));
+  std::vector<FlankModel> others;
+  if (!model.moving || !(typical > 0)) return others;
+  const double declared = std::log2(std::abs(model.elastic(2 * torque)) / typical);
+  for (const double power : kPowers) {
+    if (std::abs(power - declared) < kOtherPower) continue;
+    others.push_back(model);
+    others.back().elastic = [elastic = model.elastic, typical, bend = power / declared](double t) {
+      const double e = elastic(t);
+      return std::copysign(typical * std::pow(std::abs(e) / typical, bend), e);
+    };
+  }
+  return others;
+}
+
+/// The flanks by the declared shape of the deflection, or another where that is told to fit better.
+struct Shaped {
+  Fits fits;
+  bool declared = true;
+  double least = 0, largest = 0;  // rad, play by any shape that the record does not rule out
+};
+
+Shaped fit_shapes(const TwoEncoders& motion, const FlankModel& model) {
+  Shaped best{fit_record(motion, model), true, 0, 0};
+  require_sound(best.fits.fit);
+  std::vector<FlankFit> all = {best.fits.fit};
+  const double told = 1 + kShapeErrors * kShapeErrors / double(best.fits.fit.stays);
+  const auto squares = [](const FlankFit& fit) { return fit.residual * fit.residual; };
+  for (const FlankModel& shape : bent_otherwise(model, motion)) {
+    const Fits other = fit_record(motion, shape);
+    if (!other.fit.found || !(other.fit.gap > 0)) continue;
+    all.push_back(other.fit);
+    if (told * squares(other.fit) < squares(best.fits.fit)) best.fits = other, best.declared = false;
+  }
+  best.least = best.largest = best.fits.fit.gap;
+  for (const FlankFit& fit : all) {
+    if (squares(fit) > told * squares(best.fits.fit)) continue;
+    best.least = std::min(best.least, fit.gap), best.largest = std::max(best.largest, fit.gap);
+  }
+  return best;
+}
+
 std::string describe(const FlankFit& fit, bool moves) {
   std::string message = std::to_string(fit.used[0]) + " and " + std::to_string(fit.used[1]) +
                         " windows on the two flanks, " + std::to_string(fit.stays) + " stays; ";
@@ -236,9 +292,7 @@ std::string describe(const FlankFit& fit, bool moves) {
 
 /// What the machine's elastic deflection, both sides, may differ from the declared one by [rad].
 double declared_error(const TwoEncoders& motion, const PositionDifferenceSettings& settings) {
-  std::vector<double> magnitude;
-  for (const double torque : motion.torque) magnitude.push_back(std::abs(torque));
-  const double level = signal::median(std::move(magnitude));
+  const double level = typical_torque(motion);
   return 2 * settings.declared_uncertainty * std::abs(settings.elastic_deflection(level));
 }
 
@@ -256,8 +310,8 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   model.elastic_deviation = settings.elastic_uncertainty / 1.96;
   model.moving = load_moves(motion);
   const signal::Measured skew = model.moving ? clear_skew(motion, inertia) : signal::Measured{0, 0};
-  const auto [fit, longer] = fit_record(without_skew(motion, skew.value), model);
-  require_sound(fit);
+  const Shaped shaped = fit_shapes(without_skew(motion, skew.value), model);
+  const FlankFit &fit = shaped.fits.fit, &longer = shaped.fits.longer;
   const double skewed = gap_change(motion, model, skew, fit.gap);
 
   const double scatter =
@@ -265,11 +319,11 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
       fit.standard_error;
   const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
   const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
-  const double bounce = model.moving ? 0 : kBounce * fit.gap;
+  const double bounce = (model.moving ? kMovingModel : kBounce) * fit.gap;
   const double declared = model.moving ? 0 : declared_error(motion, settings);
   const double half = std::hypot(std::hypot(scatter, windows),
                                  std::hypot(unexplained, std::hypot(bounce, std::hypot(skewed, declared))));
-  double lower = fit.gap - half, upper = fit.gap + half;
+  double lower = shaped.least - half, upper = shaped.largest + half;
   if (fit.varies) {
     lower = std::min(lower, fit.least_gap - half);
     upper = std::max(upper, fit.largest_gap + half);
@@ -287,6 +341,7 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   estimate.upper = settings.base_radius * estimate.angle_upper;
   estimate.declared = declared;
   estimate.message = describe(fit, model.moving);
+  if (!shaped.declared) estimate.message += "; the deflection bends over the torque otherwise than declared";
   if (skew.value != 0)
     estimate.message += fmt::format("; the load encoder is {:.3g} +- {:.2g} ms later than the rig file says",
                                     1e3 * skew.value, 1e3 * skew.standard_error);

@@ -60,6 +60,28 @@ std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   return s;
 }
 
+/// The same. Its values at the axis of motor_position.
+std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(const model::Rig& rig) {
+  if (rig.link_locked || !rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.linear ||
+      rig.coupled || !rig.terms.empty() || rig.mesh.variation || rig.mesh.pairs ||
+      rig.mesh.contact_spec().law != "linear")
+    return std::nullopt;
+  const double ratio = rig.motor_axis_ratio(), lever = rig.mesh.lever() / ratio;
+  diagnosis::GapTraverseSettings s;
+  s.motor_inertia = rig.motor.inertia + rig.pinion.inertia;
+  s.load_inertia = (rig.gear.inertia + rig.link.inertia) / (ratio * ratio);
+  s.motor_damping = rig.motor.viscous_damping + rig.pinion.viscous_damping;
+  s.motor_friction = rig.motor.coulomb_friction;
+  s.load_friction = rig.link.coulomb_friction / ratio;
+  s.stiffness = rig.mesh.contact_spec().values.at("stiffness") * lever * lever;
+  s.damping = rig.mesh.contact_spec().values.at("damping") * lever * lever;
+  s.gap = rig.backlash_angle(rig.mesh.backlash);
+  if (!rig.mesh.angular()) s.base_radius = 1 / rig.backlash_angle(1);
+  for (const double value : {s.motor_inertia, s.load_inertia, s.stiffness, s.damping})
+    if (!(value > 0)) return std::nullopt;
+  return s;
+}
+
 /// What the estimators need to know of the rig.
 void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings) {
   const auto train = std::make_shared<model::GearTrain>(rig);  // refuses what cannot move
@@ -76,6 +98,7 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
       settings.lost_motion->elastic_uncertainty = default_uncertainty(rig, *train, settings);
   }
   settings.waveform = waveform_of(rig);
+  settings.gap_traverse = gap_traverse_of(rig);
   const model::Coupling& coupling = rig.input_coupling;
   const double motor = rig.motor.inertia + 0.5 * coupling.inertia;
   const double pinion = rig.pinion.inertia + 0.5 * coupling.inertia;

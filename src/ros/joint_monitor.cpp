@@ -114,6 +114,11 @@ std::optional<DiagnosisTask> JointMonitor::due(double time) {
   DiagnosisTask next = task(settings_.window);
   if (next.window.record.time.empty()) return std::nullopt;
   estimated_ = time;
+  if (next.settings.gap_traverse) {
+    next.settings.gap_traverse.reset();
+    next.settings.no_gap_traverse =
+        "takes a second: not in the running estimates, but in answers of ~diagnose";
+  }
   return next;
 }
 

@@ -97,7 +97,7 @@ TEST(PositionDifference, FreePlayOfAServoWhoseLoadMoves) {
     EXPECT_NEAR(e.backlash_angle, gap, kNear);
     EXPECT_LE(e.angle_lower, gap);
     EXPECT_GE(e.angle_upper, gap);
-    EXPECT_LT(e.angle_upper - e.angle_lower, 10 * kNear);
+    EXPECT_LT(e.angle_upper - e.angle_lower, 10 * kNear + 0.008 * gap);  // 0.3 % to either side is declared
     EXPECT_TRUE(std::isnan(e.backlash));
     EXPECT_EQ(e.method, "position_difference");
   }

@@ -8,6 +8,7 @@
 
 #include "backlash_diagnosis/diagnosis/apd_skewness.h"
 #include "backlash_diagnosis/diagnosis/coherence.h"
+#include "backlash_diagnosis/diagnosis/gap_traverse.h"
 #include "backlash_diagnosis/diagnosis/lost_motion.h"
 #include "backlash_diagnosis/diagnosis/momentum_transfer.h"
 #include "backlash_diagnosis/diagnosis/position_difference.h"
@@ -34,6 +35,9 @@ struct DiagnosisSettings {
     waveform.reset();
     no_waveform = why;
   }
+  std::optional<GapTraverseSettings> gap_traverse;
+  std::string no_gap_traverse =  // the same
+      "the rig has no free load behind rigid couplings and a linear mesh, or has terms";
   std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
 };

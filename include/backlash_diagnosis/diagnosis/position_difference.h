@@ -22,7 +22,11 @@
 //   nearly one torque and a pinion that keeps bouncing shifts all of them alike; 0.15 times it where the load
 //   moves,
 // - the skew of the encoders, where it was taken out: the change of the play over its interval,
-// - with a locked output 3 % of the play, for the bouncing that the residual does not show.
+// - with a locked output 3 % of the play, for the bouncing that the residual does not show; where the load
+//   moves 0.3 %.
+// Where the load moves the deflection is also fitted as the other of a spring's and Hertz's power of the
+// torque: the better counts, and the interval holds the play by either where the record does not tell them
+// apart.
 // The shares are set by simulation, see test_rig_estimators.cpp.
 //
 // Where the play depends on the position of the load, the interval is widened to the least and the largest

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Play from the motor's side alone, on a joint whose load is free, in ordinary motion: while the gap is
+// crossed the motor carries its own inertia only, so what it moves against the coasting load, from break-away
+// to touch, is the play (Nordin and Gutman 2002; Villwock and Pacas 2009). About each crossing the load is
+// moved by the recorded motor, and the torque that this needs is fitted to the recorded one:
+//
+//   Jm qm'' = tau - bm qm' - cm sign(qm') - F       F = k d + c d' > 0, d = |qm - ql| - gap / 2
+//   Jl ql'' = F - cl sign(ql')                      F has the sign of qm - ql
+//
+// with gap, k, c, Jl, Jm, bm, cm and cl of all crossings together, free within what is known of them, and two
+// start values of each. All at the motor_position axis; the teeth count as one linear spring.
+//
+// Needs motor_torque and motor_position, evenly sampled, at least eight samples in a cycle of the motor
+// against the load, and 20 crossings that begin in contact. No period.
+//
+// Interval, 95 %: Student's t with the larger of two standard errors of the logarithm (crossings as clusters;
+// the fit's own), and kModel besides for what these equations do not hold: set by simulated machines with
+// cogging, gravity, Stribeck friction, varying play and transmission errors that are not told to the fit.
+#pragma once
+
+#include "backlash_diagnosis/diagnosis/estimate.h"
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash::diagnosis {
+
+/// The declared machine, at the motor_position axis.
+struct GapTraverseSettings {
+  double motor_inertia = kNaN, load_inertia = kNaN;  ///< kg m^2, > 0
+  double motor_damping = 0;                          ///< N m s/rad, >= 0
+  double motor_friction = 0, load_friction = 0;      ///< N m, >= 0, dry
+  double stiffness = kNaN, damping = kNaN;           ///< N m/rad, N m s/rad, > 0, of the flanks
+  double gap = 0;                                    ///< rad, >= 0: where the fit begins, with any error
+  double base_radius = kNaN;                         ///< m, > 0; NaN: Estimate::backlash is NaN
+};
+
+/// Throws InvalidParameter for settings outside the ranges above. Answers by status:
+///   insufficient_data  a channel is missing; too few crossings, and which motion would give them; the
+///                      crossings do not tell the play
+///   out_of_domain      uneven or too coarse samples; the equations do not fit the record, or only with
+///                      values far from the declared ones
+///   ambiguous          two plays fit alike
+///   below_range        the play is less than what the torque's noise hides
+Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSettings& settings);
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/diagnosis/gap_traverse.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/signal/distributions.h"
+#include "refusal.h"
+#include "traverse_fit.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+// All choices, tried on simulated machines, but where another origin is given.
+constexpr double kModel = 0.1;                 // of the play, see gap_traverse.h: simulation
+constexpr int kFewest = 20;                    // crossings
+constexpr int kMost = 60;                      // beyond them the errors do not shrink: the equations limit
+constexpr int kSearched = 16;                  // for the first guesses
+constexpr double kGuesses[] = {-0.5, 0, 0.5};  // spreads of the gap: 0.2, 1, 4.5 times the declared one
+constexpr int kSearch = 12, kFit = 30;         // steps
+constexpr double kMisfit = 2;                  // noises, of the median crossing
+constexpr double kFar = 4;                     // spreads of a declared value
+constexpr double kMostLeftOut = 0.34;          // of the crossings
+constexpr double kVague = 0.7;                 // half width of the interval of the logarithm: a factor of two
+constexpr double kRivalCost = 9;               // theory: three standard errors
+constexpr double kHidden = 1;                  // deflections under the noise, that a play must exceed
+
+void require(bool valid, const char* name, double value, const char* limit) {
+  if (!valid || !std::isfinite(value)) throw InvalidParameter(name, value, limit);
+}
+
+void check(const GapTraverseSettings& s) {
+  require(s.motor_inertia > 0, "motor_inertia", s.motor_inertia, "must be > 0");
+  require(s.load_inertia > 0, "load_inertia", s.load_inertia, "must be > 0");
+  require(s.stiffness > 0, "stiffness", s.stiffness, "must be > 0");
+  require(s.damping > 0, "damping", s.damping, "must be > 0");
+  require(s.motor_damping >= 0, "motor_damping", s.motor_damping, "must be >= 0");
+  require(s.motor_friction >= 0, "motor_friction", s.motor_friction, "must be >= 0");
+  require(s.load_friction >= 0, "load_friction", s.load_friction, "must be >= 0");
+  require(s.gap >= 0, "gap", s.gap, "must be >= 0");
+}
+
+void check_channels(const record::Record& record) {
+  for (const auto channel : {record::Channel::motor_torque, record::Channel::motor_position}) {
+    if (!record.has(channel))
+      throw Refusal{Status::insufficient_data, "needs " + record::channel_name(channel)};
+    for (const double value : record.column(channel))
+      if (!std::isfinite(value))
+        throw Refusal{Status::insufficient_data, record::channel_name(channel) + " has gaps"};
+  }
+}
+
+/// Spread evenly over the record.
+std::vector<TraverseWindow> some(const std::vector<TraverseWindow>& all, int most) {
+  if (int(all.size()) <= most) return all;
+  std::vector<TraverseWindow> chosen;
+  for (int i = 0; i < most; ++i)
+    chosen.push_back(all[static_cast<std::size_t>(i) * all.size() / static_cast<std::size_t>(most)]);
+  return chosen;
+}
+
+struct Solution {
+  TraverseFit fit;
+  double rival_gap, rival_cost;  // rad; more than the best's
+};
+
+Solution solve(const TraverseData& data, const GapTraverseSettings& settings) {
+  const TraversePriors priors = traverse_priors(data, settings);
+  std::vector<TraverseFit> guesses;
+  for (const double guess : kGuesses) {
+    guesses.emplace_back(data, priors, some(data.windows, kSearched), guess);
+    guesses.back().run(kSearch);
+  }
+  // Each leaves out other crossings: all are compared on all.
+  std::vector<TraverseFit> fits;
+  for (const TraverseFit& guess : guesses) {
+    fits.emplace_back(guess, some(data.windows, kMost));
+    fits.back().run(kFit);
+  }
+  const auto cost = [](const TraverseFit& f) {
+    return f.cost() + f.left_out() * kFar * kFar * 64;  // left out is no way to be better
+  };
+  const auto best = std::min_element(fits.begin(), fits.end(),
+                                     [&](const auto& a, const auto& b) { return cost(a) < cost(b); });
+  const double gap = best->value(kTraverseGap);
+  Solution solution{*best, gap, std::numeric_limits<double>::infinity()};
+  for (const TraverseFit& other : fits)
+    if (std::fabs(std::log(other.value(kTraverseGap) / gap)) > 2 * kModel &&
+        cost(other) - cost(*best) < solution.rival_cost)
+      solution.rival_gap = other.value(kTraverseGap), solution.rival_cost = cost(other) - cost(*best);
+  return solution;
+}
+
+void refuse(const TraverseFit& fit, const TraverseData& data) {
+  if (!(fit.misfit() < kMisfit) || fit.left_out() > kMostLeftOut * fit.windows())
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("the machine of the rig file, whatever its values, does not explain the torque: "
+                    "{:.2g} times the noise are left, {} of {} crossings left out",
+                    fit.misfit(), fit.left_out(), fit.windows())};
+  static const char* const names[] = {"gap",
+                                      "stiffness of the mesh",
+                                      "damping of the mesh",
+                                      "inertia of the load",
+                                      "inertia of the motor",
+                                      "damping of the motor",
+                                      "dry friction of the motor",
+                                      "dry friction of the load"};
+  for (int k = kTraverseStiffness; k < kTraverseEarlier; ++k)
+    if (std::fabs(fit.deviation(k)) > kFar)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("the record fits only a machine far from that of the rig file: {} {:.3g}",
+                                names[k], fit.value(k))};
+  const double hidden = kHidden * data.noise / fit.value(kTraverseStiffness);
+  if (fit.value(kTraverseGap) < hidden)
+    throw Refusal{Status::below_range,
+                  fmt::format("less than {:.2g} rad, which the noise of the torque hides", hidden)};
+}
+
+void fill(Estimate& e, const Solution& solution, const TraverseData& data, const GapTraverseSettings& s) {
+  const TraverseFit& fit = solution.fit;
+  refuse(fit, data);
+  const double gap = fit.value(kTraverseGap);
+  if (solution.rival_cost < kRivalCost)
+    throw Refusal{Status::ambiguous,
+                  fmt::format("{:.4g} and {:.4g} rad fit the record alike", gap, solution.rival_gap)};
+  const int used = fit.windows() - fit.left_out();
+  const double error = std::max(fit.standard_error() * std::max(1.0, fit.misfit()), fit.clustered_error());
+  const double half = std::hypot(signal::student_t_quantile(0.975, used - 1) * error, kModel);
+  if (!(half < kVague))
+    throw Refusal{Status::insufficient_data,
+                  fmt::format("{} crossings of the gap tell it only from {:.2g} to {:.2g} rad", used,
+                              gap * std::exp(-half), gap * std::exp(half))};
+  e.status = Status::ok;
+  e.backlash_angle = gap, e.angle_lower = gap * std::exp(-half), e.angle_upper = gap * std::exp(half);
+  e.backlash = gap * s.base_radius, e.lower = e.angle_lower * s.base_radius;
+  e.upper = e.angle_upper * s.base_radius;
+  e.message =
+      fmt::format("motor's side alone, {} of {} crossings of the gap; {:.2g} times the noise are left", used,
+                  data.crossings, fit.misfit());
+}
+
+}  // namespace
+
+Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSettings& settings) {
+  check(settings);
+  return estimate_or_refusal("gap_traverse", [&](Estimate& estimate) {
+    check_channels(record);
+    const TraverseData data = traverse_data(record, settings);
+    if (int(data.windows.size()) < kFewest)
+      throw Refusal{
+          Status::insufficient_data,
+          fmt::format("the gap was crossed {} times, {} of them from a clear press on a flank, which "
+                      "{} are needed of; moves that reverse with more than {:.2g} N m would do",
+                      data.crossings, data.windows.size(), kFewest, 10 * data.noise)};
+    fill(estimate, solve(data, settings), data, settings);
+  });
+}
+
+}  // namespace backlash::diagnosis

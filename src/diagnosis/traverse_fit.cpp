@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "traverse_fit.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/base/parallel.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// What is known of the values: choices, two of them are the 95 % of servos declared within 40 % and more.
+constexpr double kKnownGap = 3, kKnownStiffness = 0.35, kKnownDamping = 0.7, kKnownInertia = 0.3,
+                 kKnownFriction = 0.5;
+constexpr double kNoFriction = 0.1;              // of the level, where none is declared
+constexpr double kHeld = 0.5, kKnownHeld = 0.3;  // shares of the sample before: theory, choice
+constexpr double kStartSpread[] = {0.5, 5e-2};   // of the deflection, of the rms speed's scale: choice
+constexpr double kSlopeOfNoise = 0.5;            // theory: 0.32 for white noise, of a slope over five samples
+constexpr double kUntold = 0.1;                  // of the level: a torque that nothing else tells
+constexpr double kDifference = 1e-4;             // spreads, step of a difference
+constexpr double kStartDifference = 1e-2;        // the same of a start value
+constexpr double kFirstDamping = 1e-2, kLeastDamping = 1e-6, kHarder = 4, kEasier = 5;
+constexpr double kLongestMove = 1.5;  // spreads, of a value in one step
+constexpr double kEnough = 1e-5;      // gain of the cost below which it ends, relative
+constexpr double kFarOff = 3;         // times the median rms: a crossing is left out
+constexpr int kLook = 6;              // steps between two looks for such crossings
+constexpr int kTries = 8;
+
+}  // namespace
+
+TraversePriors traverse_priors(const TraverseData& data, const GapTraverseSettings& s) {
+  const auto friction = [&](double declared, double scale) {
+    return declared > 0 ? TraversePrior{declared, kKnownFriction, true}
+                        : TraversePrior{0, kNoFriction * data.level / scale, false};
+  };
+  const double speed = data.slow * 100;  // rms
+  TraversePriors p;
+  p[kTraverseGap] = {std::max(s.gap, data.level / s.stiffness), kKnownGap, true};
+  p[kTraverseStiffness] = {s.stiffness, kKnownStiffness, true};
+  p[kTraverseDamping] = {s.damping, kKnownDamping, true};
+  p[kTraverseLoadInertia] = {s.load_inertia, kKnownInertia, true};
+  p[kTraverseMotorInertia] = {s.motor_inertia, kKnownInertia, true};
+  p[kTraverseMotorDamping] = friction(s.motor_damping, speed);
+  p[kTraverseMotorFriction] = friction(s.motor_friction, 1);
+  p[kTraverseLoadFriction] = friction(s.load_friction, 1);
+  p[kTraverseEarlier] = {kHeld, kKnownHeld, false};
+  return p;
+}
+
+TraverseFit::TraverseFit(const TraverseData& data, const TraversePriors& priors,
+                         std::vector<TraverseWindow> windows, double first_gap)
+    : data_(data),
+      priors_(priors),
+      windows_(std::move(windows)),
+      used_(windows_.size(), 1),
+      own_(windows_.size(), TraverseOwn::Zero()),
+      z_(VectorXd::Zero(kTraverseValues)) {
+  z_[kTraverseGap] = first_gap;
+  // What a window knows of its start comes from the torque there, with its noise.
+  const double per_torque = 1 / priors_[kTraverseStiffness].value;
+  own_spread_ << std::hypot(kStartSpread[0] * data.level, data.noise) * per_torque,
+      std::hypot(kStartSpread[1] * data.slow * 100, kSlopeOfNoise * data.noise * per_torque / data.interval),
+      kUntold * data.level, kUntold * data.level;
+}
+
+TraverseFit::TraverseFit(const TraverseFit& other, std::vector<TraverseWindow> windows)
+    : TraverseFit(other.data_, other.priors_, std::move(windows), 0) {
+  z_ = other.z_;
+}
+
+double TraverseFit::value(int which, double z) const {
+  const TraversePrior& p = priors_[static_cast<std::size_t>(which)];
+  return p.factor ? p.value * std::exp(p.spread * z) : std::max(0.0, p.value + p.spread * z);
+}
+
+TraverseMachine TraverseFit::machine(const VectorXd& z) const {
+  TraverseMachine m{};
+  for (int k = 0; k < kTraverseValues; ++k) m[static_cast<std::size_t>(k)] = value(k, z[k]);
+  return m;
+}
+
+/// In noises.
+VectorXd TraverseFit::residual(std::size_t window, const VectorXd& z, const TraverseOwn& own) const {
+  const TraverseOwn scaled = own.cwiseProduct(own_spread_);
+  VectorXd r(static_cast<Eigen::Index>(data_.samples));
+  traverse_residual(data_, windows_[window], machine(z), scaled, r.data());
+  return r / data_.noise;
+}
+
+TraverseFit::Part TraverseFit::linearise(std::size_t window) const {
+  const VectorXd r = residual(window, z_, own_[window]);
+  MatrixXd slopes(r.size(), kTraverseValues + kTraverseOwn);
+  for (int k = 0; k < kTraverseValues + kTraverseOwn; ++k) {
+    VectorXd up = z_, down = z_;
+    TraverseOwn above = own_[window], below = above;
+    const double step = k < kTraverseValues ? kDifference : kStartDifference;
+    if (k < kTraverseValues)
+      up[k] += step, down[k] -= step;
+    else
+      above[k - kTraverseValues] += step, below[k - kTraverseValues] -= step;
+    slopes.col(k) = (residual(window, up, above) - residual(window, down, below)) / (2 * step);
+  }
+  const MatrixXd normal = signal::gram(slopes);
+  const VectorXd toward = -signal::transposed_product(slopes, r);
+  Part part{normal.topLeftCorner(kTraverseValues, kTraverseValues),
+            normal.topRightCorner(kTraverseValues, kTraverseOwn),
+            normal.bottomRightCorner(kTraverseOwn, kTraverseOwn), toward.head(kTraverseValues),
+            toward.tail(kTraverseOwn)};
+  part.own += TraverseMatrix::Identity();
+  part.own_toward -= own_[window];
+  return part;
+}
+
+double TraverseFit::cost_of(const VectorXd& z, const std::vector<TraverseOwn>& own,
+                            std::vector<double>* rms) const {
+  std::vector<double> of(windows_.size(), 0.0);
+  for_each_in_parallel(int(of.size()), [&](int index) {
+    const auto w = static_cast<std::size_t>(index);
+    if (!used_[w] && rms == nullptr) return;
+    const double squares = residual(w, z, own[w]).squaredNorm();
+    if (rms != nullptr) (*rms)[w] = std::sqrt(squares / static_cast<double>(data_.samples));
+    of[w] = used_[w] ? squares + own[w].squaredNorm() : 0;
+  });
+  double sum = z.squaredNorm();
+  for (const double each : of) sum += each;
+  return std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
+}
+
+/// One linearisation, and harder damping until a step improves. False where none does.
+bool TraverseFit::iterate() {
+  parts_.resize(windows_.size());
+  for_each_in_parallel(int(windows_.size()), [&](int w) {
+    parts_[static_cast<std::size_t>(w)] = linearise(static_cast<std::size_t>(w));
+  });
+  for (int attempt = 0; attempt < kTries; ++attempt, damping_ *= kHarder) {
+    MatrixXd normal = MatrixXd::Identity(kTraverseValues, kTraverseValues);
+    VectorXd toward = -z_;
+    std::vector<TraverseMatrix> own(windows_.size());
+    for (std::size_t w = 0; w < windows_.size(); ++w) {
+      if (!used_[w]) continue;
+      own[w] = parts_[w].own;
+      own[w].diagonal() *= 1 + damping_;
+      const TraverseMatrix inverse = own[w].inverse();
+      MatrixXd shared = parts_[w].shared;
+      shared.diagonal() *= 1 + damping_;
+      normal += shared - parts_[w].mixed * inverse * parts_[w].mixed.transpose();
+      toward += parts_[w].toward - parts_[w].mixed * (inverse * parts_[w].own_toward);
+    }
+    const VectorXd move =
+        VectorXd(signal::solve_symmetric(normal, toward)).cwiseMax(-kLongestMove).cwiseMin(kLongestMove);
+    std::vector<TraverseOwn> moved = own_;
+    for (std::size_t w = 0; w < windows_.size(); ++w)
+      if (used_[w])
+        moved[w] += own[w].inverse() * (parts_[w].own_toward - parts_[w].mixed.transpose() * move);
+    const double cost = cost_of(z_ + move, moved, nullptr);
+    gain_ = cost_ - cost;
+    if (!(gain_ > 0)) continue;
+    z_ += move, own_ = std::move(moved), cost_ = cost;
+    damping_ = std::max(kLeastDamping, damping_ / kEasier);
+    return true;
+  }
+  return false;
+}
+
+void TraverseFit::leave_out() {
+  std::vector<double> rms(windows_.size());
+  cost_of(z_, own_, &rms);
+  const double most = kFarOff * std::max(1.0, signal::median(rms));
+  for (std::size_t w = 0; w < windows_.size(); ++w) used_[w] = rms[w] <= most;
+  cost_ = cost_of(z_, own_, nullptr);
+}
+
+void TraverseFit::run(int iterations) {
+  damping_ = kFirstDamping;
+  cost_ = cost_of(z_, own_, nullptr);
+  for (int i = 1; i <= iterations; ++i) {
+    const bool better = iterate();
+    if (i % kLook == 0) leave_out();
+    if ((!better || gain_ < kEnough * cost_) && i > 2 * kLook) break;
+  }
+  leave_out();
+}
+
+int TraverseFit::left_out() const {
+  return int(std::count(used_.begin(), used_.end(), 0));
+}
+
+double TraverseFit::misfit() const {
+  std::vector<double> rms(windows_.size());
+  cost_of(z_, own_, &rms);
+  return signal::median(rms);
+}
+
+namespace {
+
+MatrixXd eliminated(const MatrixXd& shared, const MatrixXd& mixed, const TraverseMatrix& own) {
+  return shared - mixed * own.inverse() * mixed.transpose();
+}
+
+}  // namespace
+
+double TraverseFit::standard_error() const {
+  MatrixXd information = MatrixXd::Identity(kTraverseValues, kTraverseValues);
+  for (std::size_t w = 0; w < windows_.size(); ++w)
+    if (used_[w]) information += eliminated(parts_[w].shared, parts_[w].mixed, parts_[w].own);
+  return priors_[kTraverseGap].spread *
+         std::sqrt(signal::symmetric_inverse(information)(kTraverseGap, kTraverseGap));
+}
+
+double TraverseFit::clustered_error() const {
+  MatrixXd information = MatrixXd::Identity(kTraverseValues, kTraverseValues), scatter = information;
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    if (!used_[w]) continue;
+    information += eliminated(parts_[w].shared, parts_[w].mixed, parts_[w].own);
+    const VectorXd score =
+        parts_[w].toward - parts_[w].mixed * (parts_[w].own.inverse() * parts_[w].own_toward);
+    scatter += score * score.transpose();
+  }
+  const MatrixXd inverse = signal::symmetric_inverse(information);
+  return priors_[kTraverseGap].spread * std::sqrt((inverse * scatter * inverse)(kTraverseGap, kTraverseGap));
+}
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Fits a machine to all crossings of the gap: least squares with priors by Levenberg and Marquardt's method,
+// the own values of each crossing eliminated (Schur complement).
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "traverse_motion.h"
+
+namespace backlash::diagnosis {
+
+/// What is known of a value: normal about `value`, or its logarithm is (`factor`).
+struct TraversePrior {
+  double value = 0, spread = 1;
+  bool factor = true;
+};
+using TraverseMatrix = Eigen::Matrix<double, kTraverseOwn, kTraverseOwn>;
+using TraversePriors = std::array<TraversePrior, kTraverseValues>;
+
+TraversePriors traverse_priors(const TraverseData& data, const GapTraverseSettings& settings);
+
+class TraverseFit {
+ public:
+  /// Uses `windows` of the data's, and begins with a gap of `first_gap` spreads.
+  TraverseFit(const TraverseData& data, const TraversePriors& priors, std::vector<TraverseWindow> windows,
+              double first_gap);
+  /// Another fit's machine on these windows.
+  TraverseFit(const TraverseFit& other, std::vector<TraverseWindow> windows);
+
+  /// At most so many steps; crossings that the machine does not follow are left out on the way.
+  void run(int iterations);
+
+  double value(int which) const { return value(which, z_[which]); }
+  /// In spreads from what was known.
+  double deviation(int which) const { return z_[which]; }
+  double cost() const { return cost_; }
+  int windows() const { return int(windows_.size()); }
+  int left_out() const;
+  /// Median over the crossings of the rms residual, in noises.
+  double misfit() const;
+  /// Of the logarithm of the gap: the fit's, and by crossings as clusters (sandwich).
+  double standard_error() const;
+  double clustered_error() const;
+
+ private:
+  /// Normal equations of one crossing.
+  struct Part {
+    Eigen::MatrixXd shared, mixed;
+    TraverseMatrix own;
+    Eigen::VectorXd toward;
+    TraverseOwn own_toward;
+  };
+
+  double value(int which, double z) const;
+  TraverseMachine machine(const Eigen::VectorXd& z) const;
+  Eigen::VectorXd residual(std::size_t window, const Eigen::VectorXd& z, const TraverseOwn& own) const;
+  Part linearise(std::size_t window) const;
+  double cost_of(const Eigen::VectorXd& z, const std::vector<TraverseOwn>& own,
+                 std::vector<double>* rms) const;
+  bool iterate();
+  void leave_out();
+
+  const TraverseData& data_;
+  TraversePriors priors_;
+  std::vector<TraverseWindow> windows_;
+  std::vector<char> used_;
+  std::vector<TraverseOwn> own_;  // in spreads
+  TraverseOwn own_spread_;
+  std::vector<Part> parts_;  // at the last step
+  Eigen::VectorXd z_;
+  double cost_ = 0, gain_ = 0, damping_ = 0;
+};
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "traverse_motion.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/signal/noise.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "refusal.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+// All choices, tried on simulated machines, but where another origin is given.
+constexpr double kCycleSamples = 8;  // fewest samples in a cycle of the motor against the load
+constexpr double kStep = 0.06;       // of the integration times the fastest frequency, rad
+constexpr double kBefore = 0.8;      // cycles of a window before a crossing: tell the start
+constexpr double kAfter = 1.7;       // and from its begin on: the first touches
+constexpr double kUneven = 0.25;     // of an interval, from one sample to the next
+constexpr double kClear = 3.1;       // noises of the averaged torque, above which it presses a flank
+constexpr double kSlow = 0.02;       // of the rms speed: there dry friction takes any value
+constexpr double kFade = 0.01;       // of it: the load's friction turns its sign within
+constexpr std::size_t kFewestSamples = 256;
+// Quadratic over five samples (Savitzky and Golay 1964): value, slope per sample, and what it leaves of
+// noise.
+constexpr double kValue[] = {-3 / 35.0, 12 / 35.0, 17 / 35.0, 12 / 35.0, -3 / 35.0};
+constexpr double kSlope[] = {-0.2, -0.1, 0, 0.1, 0.2};
+
+double cycle_of(const GapTraverseSettings& s) {
+  return 2 * M_PI / std::sqrt(s.stiffness * (1 / s.motor_inertia + 1 / s.load_inertia));
+}
+
+void check_samples(const record::Record& record, double interval, double cycle) {
+  if (record.size() < kFewestSamples) throw Refusal{Status::insufficient_data, "fewer than 256 samples"};
+  if (!(interval * kCycleSamples < cycle))
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("a sample each {:.3g} s does not resolve the cycle of {:.3g} s of the motor "
+                              "against the load",
+                              interval, cycle)};
+  for (std::size_t i = 1; i < record.size(); ++i) {
+    const double step = record.time[i] - record.time[i - 1];
+    if (std::fabs(step - interval) > kUneven * interval)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("the samples are not evenly spaced in time at {:.6g} s", record.time[i])};
+  }
+}
+
+double filtered(const std::vector<double>& x, std::size_t i, const double* weights) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 5; ++k) sum += weights[k] * x[i + k - 2];
+  return sum;
+}
+
+/// What the declared motor leaves for the teeth.
+std::vector<double> torque_of_teeth(const TraverseData& d, const GapTraverseSettings& s) {
+  std::vector<double> teeth(d.torque.size(), 0.0);
+  for (std::size_t i = 1; i + 1 < teeth.size(); ++i)
+    teeth[i] = 0.5 * (d.torque[i] + d.torque[i - 1]) - s.motor_inertia * d.acceleration[i] -
+               s.motor_damping * d.rate[i] - std::copysign(s.motor_friction, d.rate[i]);
+  return teeth;
+}
+
+/// Neighbours share a sample of the torque: every second one is taken.
+double noise_of(const std::vector<double>& teeth) {
+  std::vector<double> half[2];
+  for (std::size_t i = 2; i + 2 < teeth.size(); ++i) half[i % 2].push_back(teeth[i]);
+  return 0.5 * (signal::noise_from_differences(half[0], 2) + signal::noise_from_differences(half[1], 2));
+}
+
+void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle) {
+  const std::size_t n = teeth.size();
+  std::vector<double> smooth(n, 0.0), pressed;
+  std::vector<int> flank(n, 0);
+  const double clear = kClear * d.noise;
+  for (std::size_t i = 2; i + 2 < n; ++i) {
+    smooth[i] = filtered(teeth, i, kValue);
+    if (std::fabs(smooth[i]) < clear) continue;
+    flank[i] = smooth[i] > 0 ? 1 : -1;
+    pressed.push_back(std::fabs(smooth[i]));
+  }
+  if (!pressed.empty()) d.level = signal::median(pressed);
+  const auto before = static_cast<std::size_t>(std::lround(kBefore * cycle / d.interval));
+  d.samples = before + static_cast<std::size_t>(std::lround(kAfter * cycle / d.interval));
+  std::size_t last = 0, free_from = 3;  // last sample on a flank; where the next window may begin
+  for (std::size_t i = 3; i < n; ++i) {
+    if (flank[i] == 0) continue;
+    const std::size_t left = last;
+    last = i;
+    if (left == 0 || flank[left] == flank[i]) continue;
+    ++d.crossings;
+    std::size_t first = left > before ? left - before : 0;
+    while (first < left && (first < 3 || flank[first] != flank[left])) ++first;
+    if (first < free_from || first + d.samples + 3 >= n || i + d.samples / 8 > first + d.samples) continue;
+    d.windows.push_back(
+        {first, double(flank[first]), smooth[first], filtered(teeth, first, kSlope) / d.interval});
+    free_from = first + d.samples / 2;
+  }
+}
+
+/// Motor between two samples: a cubic through positions and rates.
+struct Motor {
+  double position, rate;
+};
+
+class Cubic {
+ public:
+  Cubic(const TraverseData& d, std::size_t i)
+      : q0_(d.position[i]),
+        q1_(d.position[i + 1]),
+        v0_(d.rate[i] * d.interval),
+        v1_(d.rate[i + 1] * d.interval),
+        interval_(d.interval) {}
+
+  Motor at(double u) const {
+    const double u2 = u * u, u3 = u2 * u;
+    return {
+        (2 * u3 - 3 * u2 + 1) * q0_ + (u3 - 2 * u2 + u) * v0_ + (3 * u2 - 2 * u3) * q1_ + (u3 - u2) * v1_,
+        ((6 * u2 - 6 * u) * (q0_ - q1_) + (3 * u2 - 4 * u + 1) * v0_ + (3 * u2 - 2 * u) * v1_) / interval_};
+  }
+
+ private:
+  double q0_, q1_, v0_, v1_, interval_;
+};
+
+struct Load {
+  double position, rate;
+};
+
+/// Torque through the teeth: never tensile.
+double teeth_torque(const TraverseMachine& m, const Motor& motor, const Load& load) {
+  const double x = motor.position - load.position, in = std::fabs(x) - 0.5 * m[kTraverseGap];
+  if (in <= 0) return 0;
+  const double side = x > 0 ? 1 : -1;
+  const double force = m[kTraverseStiffness] * in + m[kTraverseDamping] * side * (motor.rate - load.rate);
+  return force > 0 ? side * force : 0;
+}
+
+}  // namespace
+
+TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings) {
+  TraverseData d;
+  d.interval = record.sampling_interval();
+  const double cycle = cycle_of(settings);
+  check_samples(record, d.interval, cycle);
+  d.steps = std::max(1, static_cast<int>(std::ceil(2 * M_PI * d.interval / (cycle * kStep))));
+  d.torque = record.column(record::Channel::motor_torque);
+  d.position = record.column(record::Channel::motor_position);
+  const std::size_t n = d.position.size();
+  d.rate.assign(n, 0), d.acceleration.assign(n, 0), d.counts.assign(n, 0);
+  double squares = 0;
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    d.rate[i] = (d.position[i + 1] - d.position[i - 1]) / (2 * d.interval);
+    d.acceleration[i] =
+        (d.position[i + 1] - 2 * d.position[i] + d.position[i - 1]) / (d.interval * d.interval);
+    squares += d.rate[i] * d.rate[i] / static_cast<double>(n);
+  }
+  if (!(squares > 0)) throw Refusal{Status::insufficient_data, "the motor does not move"};
+  d.slow = kFade * std::sqrt(squares);
+  for (std::size_t i = 0; i < n; ++i) d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares);
+  const std::vector<double> teeth = torque_of_teeth(d, settings);
+  d.noise = noise_of(teeth);
+  find_windows(d, teeth, cycle);
+  return d;
+}
+
+void traverse_residual(const TraverseData& d, const TraverseWindow& window, const TraverseMachine& m,
+                       const TraverseOwn& own, double* to) {
+  const double dt = d.interval / d.steps, inertia = m[kTraverseLoadInertia];
+  const double first_in = window.side * 0.5 * m[kTraverseGap] + window.torque / m[kTraverseStiffness];
+  Load load{d.position[window.first] - first_in + own[0],
+            d.rate[window.first] - window.torque_rate / m[kTraverseStiffness] + own[1]};
+  const auto acceleration = [&](double torque, double rate) {
+    return (torque - own[3] - m[kTraverseLoadFriction] * std::clamp(rate / d.slow, -1.0, 1.0)) / inertia;
+  };
+  // Weighted 1 - |t| / interval about each sample, which is what a second difference of the position sees.
+  double mean = 0, next = 0;
+  for (std::size_t k = 0; k + 1 < d.samples; ++k) {
+    const std::size_t i = window.first + k;
+    const Cubic motor(d, i);
+    mean = next, next = 0;
+    for (int s = 0; s < d.steps; ++s) {
+      const double u = double(s) / d.steps, half = u + 0.5 / d.steps, end = u + 1.0 / d.steps;
+      const double f = teeth_torque(m, motor.at(u), load);
+      mean += (1 - u) * f / d.steps, next += u * f / d.steps;
+      const double a1 = acceleration(f, load.rate);
+      const Load l2{load.position + 0.5 * dt * load.rate, load.rate + 0.5 * dt * a1};
+      const double a2 = acceleration(teeth_torque(m, motor.at(half), l2), l2.rate);
+      const Load l3{load.position + 0.5 * dt * l2.rate, load.rate + 0.5 * dt * a2};
+      const double a3 = acceleration(teeth_torque(m, motor.at(half), l3), l3.rate);
+      const Load l4{load.position + dt * l3.rate, load.rate + dt * a3};
+      const double a4 = acceleration(teeth_torque(m, motor.at(end), l4), l4.rate);
+      load.position += dt * (load.rate + 2 * l2.rate + 2 * l3.rate + l4.rate) / 6;
+      load.rate += dt * (a1 + 2 * a2 + 2 * a3 + a4) / 6;
+    }
+    const double drive = (1 - m[kTraverseEarlier]) * d.torque[i] + m[kTraverseEarlier] * d.torque[i - 1];
+    const double need = mean + own[2] + m[kTraverseMotorInertia] * d.acceleration[i] +
+                        m[kTraverseMotorDamping] * d.rate[i] +
+                        std::copysign(m[kTraverseMotorFriction], d.rate[i]);
+    to[k] = k > 0 && d.counts[i] ? drive - need : 0;
+  }
+  to[d.samples - 1] = 0;
+}
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Crossings of the gap in a record of the motor's side, and the torque that a machine needs for the recorded
+// motion about one of them. Equations: gap_traverse.h.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/gap_traverse.h"
+
+namespace backlash::diagnosis {
+
+enum TraverseValue {
+  kTraverseGap,
+  kTraverseStiffness,
+  kTraverseDamping,
+  kTraverseLoadInertia,
+  kTraverseMotorInertia,
+  kTraverseMotorDamping,
+  kTraverseMotorFriction,
+  kTraverseLoadFriction,
+  kTraverseEarlier,  // -, share of the torque of the sample before: 0.5 where it is held between samples
+  kTraverseValues
+};
+using TraverseMachine = std::array<double, kTraverseValues>;
+/// Of one crossing: position and rate of the load at the first sample beyond what the torque there tells,
+/// rad, rad/s, and torques on motor and load that nothing else tells (gravity, cogging, friction that
+/// drifts), N m.
+constexpr int kTraverseOwn = 4;
+using TraverseOwn = Eigen::Matrix<double, kTraverseOwn, 1>;
+
+/// Stretch of the record that begins in contact and holds one change of flank or more.
+struct TraverseWindow {
+  std::size_t first = 0;
+  double side = 1;                     // flank at the first sample
+  double torque = 0, torque_rate = 0;  // N m, N m/s through the teeth there
+};
+
+/// The motor's side of a record.
+struct TraverseData {
+  double interval = 0;                 // s
+  int steps = 1;                       // of the integration per sample
+  std::size_t samples = 0;             // of a window
+  std::vector<double> torque;          // N m, of the motor
+  std::vector<double> position, rate;  // rad, rad/s
+  std::vector<double> acceleration;    // rad/s^2, second difference
+  std::vector<char> counts;            // whether dry friction is told: not about a standstill
+  double noise = 0;                    // N m, of the torque through the teeth
+  double level = 0;                    // N m, of it, median where it presses a flank
+  double slow = 0;                     // rad/s, below which dry friction fades
+  std::size_t crossings = 0;           // changes of flank, of which windows may hold several
+  std::vector<TraverseWindow> windows;
+};
+
+/// Throws Refusal.
+TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings);
+
+/// Recorded torque less what the machine needs, N m, at each sample of the window; 0 where it does not count.
+void traverse_residual(const TraverseData& data, const TraverseWindow& window, const TraverseMachine& machine,
+                       const TraverseOwn& own, double* to);
+
+}  // namespace backlash::diagnosis
