@@ -140,6 +140,9 @@ void ExciterNode::refuse_if_not_alone() const {
     throw InvalidParameter("torque_command", command_.getTopic(), "has another publisher: " + other);
   if (command_.getNumSubscribers() == 0)
     throw InvalidParameter("torque_command", command_.getTopic(), "has no subscriber: no controller listens");
+  for (const ros::Subscriber& states : subscribers_)
+    if (states.getNumPublishers() == 0)
+      throw InvalidParameter("joint_states", states.getTopic(), "has no publisher: no state comes");
 }
 
 void ExciterNode::command(double torque, Result& result) {

@@ -170,9 +170,8 @@ void SafeDrive::check_work(const State& state) {
   const double floor = kWorkFloor * plan_.largest_torque * std::max(noise_, resolution_);
   if (moved_work_ > floor && work_ < -kGivenBack * moved_work_)
     stop(
-        "the joint moves against the commanded torque: the sign of torque or position is reversed, or "
-        "something else "
-        "drives the joint (gravity, another controller)");
+        "the joint moves against the commanded torque: the sign of torque or position is reversed, its state "
+        "comes late, or something else drives the joint (gravity, another controller)");
 }
 
 void SafeDrive::end_of_rest() {

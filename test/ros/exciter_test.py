@@ -108,14 +108,22 @@ class ExciterTest(unittest.TestCase):
         self.start_exciter()
         client = self.client()
         until(lambda: os.path.exists(self.commands_file), "robot")
-        # The exciter refuses while it has no subscriber: the robot may connect a little later.
-        deadline = time.monotonic() + TIMEOUT
-        while True:
+        return client, self.result_of_a_goal(client)
+
+    def result_of_a_goal(self, client):
+        """Asks again while nobody listens or no state comes: the robot may connect a little later."""
+        results = []
+
+        def taken():
             client.send_goal(ExciteGoal(bag=self.bag))
             self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)), self.output())
-            result = client.get_result()
-            if "no subscriber" not in result.message or time.monotonic() > deadline:
-                return client, result
+            results.append(client.get_result())
+            if "has no " in results[-1].message:
+                time.sleep(0.1)  # between two askings
+                return False
+            return True
+        until(taken, "robot that is connected")
+        return results[-1]
 
     def test_a_run_is_driven_and_recorded(self):
         client, result = self.result_with("none")
@@ -174,13 +182,19 @@ class ExciterTest(unittest.TestCase):
         self.assertIn("another publisher", client.get_result().message)
         other.unregister()
 
-    def test_cancel(self):
+    def test_cancel_at_any_moment(self):
         _, client = self.start_run()
-        client.cancel_goal()
-        self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)))
-        self.assertEqual(client.get_state(), GoalStatus.PREEMPTED)
-        self.assertIn("cancelled", client.get_result().message)
-        self.check_end()
+        for wait in (None, 0.0, 0.1, 0.4):  # in the midst of the run; before, at and after the start
+            if wait is not None:
+                client.send_goal(ExciteGoal(bag=self.bag))
+                time.sleep(wait)
+            client.cancel_goal()
+            self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)))
+            self.assertIn(client.get_state(), (GoalStatus.PREEMPTED, GoalStatus.RECALLED))
+            until(lambda: self.commands()[-5:] == [0.0] * 5, "five zeros at the end")
+            if wait is None:
+                self.assertIn("cancelled", client.get_result().message)
+                self.check_end()
 
     def test_signals(self):
         for which in (signal.SIGINT, signal.SIGTERM):
@@ -241,12 +255,7 @@ class ExciterTest(unittest.TestCase):
                                remap=["joint_states:=" + simulator.topic("joint_states"),
                                       "torque_command:=" + simulator.topic("torque_command")])
             client = self.client()
-            deadline = time.monotonic() + TIMEOUT
-            while True:
-                client.send_goal(ExciteGoal(bag=self.bag))
-                self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)), self.output())
-                if "no subscriber" not in client.get_result().message or time.monotonic() > deadline:
-                    break
+            self.result_of_a_goal(client)
         self.assertTrue(client.get_result().success, client.get_result().message)
         with rosbag.Bag(self.bag) as bag:
             self.assertEqual(bag.get_message_count(simulator.topic("joint_states")), client.get_result().states)

@@ -141,6 +141,21 @@ TEST(SafeDrive, EachFaultStopsIt) {
   drive_and_expect("not at rest", 0.6, [](double, double) { return 1.0; });
 }
 
+// Noise is no jump, no speed and no wrong sign; nor is a coarse encoder.
+TEST(SafeDrive, ANoisyJointIsDrivenToItsEnd) {
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, 1e-3);
+    const double count = seed % 2 ? 2e-3 : 0;
+    SafeDrive drive(sine(), 4, limits());
+    Joint joint;
+    run(drive, joint, nullptr, [&](double, double position) {
+      return count > 0 ? count * std::round(position / count) : position + noise(random);
+    });
+    EXPECT_TRUE(drive.done()) << seed << " " << drive.reason();
+  }
+}
+
 TEST(SafeDrive, AStopIsForEver) {
   SafeDrive drive(sine(), 4, limits());
   drive.stop("cancelled");
