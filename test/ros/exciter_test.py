@@ -19,7 +19,8 @@ import rostest
 import yaml
 from actionlib_msgs.msg import GoalStatus
 from backlash_diagnosis.msg import ExciteAction, ExciteGoal
-from simulator_support import PACKAGE, TIMEOUT, Simulator, default_rig
+from sensor_msgs.msg import JointState
+from simulator_support import PACKAGE, TIMEOUT, Inbox, Simulator, default_rig
 from std_msgs.msg import Float64
 
 LIMITS = {"torque_limit": 2.0, "speed_limit": 3.0, "position_lower": -1.0, "position_upper": 1.0,
@@ -246,11 +247,24 @@ class ExciterTest(unittest.TestCase):
         self.assertIn("dry run", client.get_result().message)
         self.assertEqual(client.get_result().commands, 0)
 
+    def test_the_simulator_lets_go_of_an_old_torque(self):
+        path = self.write_rig({"channels": None, "test_runs": None, "excitation": {"type": "topic"}})
+        with Simulator({"rig": path, "torque_timeout": 0.2}) as simulator:
+            states = Inbox(simulator.topic("joint_states"), JointState)
+            command = rospy.Publisher(simulator.topic("torque_command"), Float64, queue_size=1, latch=True)
+            command.publish(0.04)  # N m
+
+            def efforts(messages):  # the motor's torque as its sensor shows it
+                return [m.effort[0] for m in messages]
+            states.wait_for(lambda m: m and max(efforts(m[-50:])) > 0.03, "torque")
+            states.wait_for(lambda m: max(efforts(m[-50:])) < 0.02, "end of the torque")
+            command.unregister()
+
     def test_the_simulator_is_the_robot(self):
         rig = default_rig()
         run = {"shake": {"duration": 2.0, "excitation": dict(rig["excitation"])}}
         path = self.write_rig({"channels": None, "test_runs": run, "excitation": {"type": "topic"}})
-        with Simulator({"rig": path}) as simulator:
+        with Simulator({"rig": path, "torque_timeout": 0.1}) as simulator:
             self.start_exciter({"torque_limit": 0.06, "speed_limit": 20.0}, path,
                                remap=["joint_states:=" + simulator.topic("joint_states"),
                                       "torque_command:=" + simulator.topic("torque_command")])
