@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/ros/bag_record.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -200,8 +201,10 @@ void ExciterNode::drive(const backlash_diagnosis::ExciteGoal& goal, Result& resu
   const std::string plan = fmt::format("{}: {} s, up to {:.4g} N m, ramps of {} s", run.name, run.duration,
                                        drive->plan().largest_torque, settings_.drive.ramp);
   if (settings_.dry_run) {
-    result.success = true;
     result.message = "dry run, nothing was commanded. " + plan;
+    if (!bag.empty()) write_plan(drive->plan(), bag);
+    result.bag = bag;
+    result.success = true;
     return;
   }
   refuse_if_not_alone();
@@ -226,6 +229,16 @@ void ExciterNode::drive(const backlash_diagnosis::ExciteGoal& goal, Result& resu
   send_zeros(result);
   write_bag(bag, result);
   result.message = result.success ? plan : result.message;
+}
+
+/// As commands from the time that written records begin at.
+void ExciterNode::write_plan(const simulation::DrivePlan& plan, const std::string& path) const {
+  RunRecording planned;
+  planned.command_topic = recording_.command_topic;
+  planned.outcome = "dry run: nothing was commanded";
+  for (std::size_t i = 0; i < plan.time.size(); ++i)
+    planned.commands.emplace_back(kBagTimeOrigin + ros::Duration(plan.time[i]), plan.torque[i]);
+  write_run_bag(planned, path);
 }
 
 void ExciterNode::write_bag(const std::string& path, Result& result) {

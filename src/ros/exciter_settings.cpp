@@ -23,7 +23,8 @@ Private parameters; unknown ones are refused. Those without a default must be gi
   state_age       0.1 s, a run stops where no state has come for longer
   still           2 s, a run stops where nothing moved for so long at half of its largest torque or more
   rate            200 Hz, of the commands
-  dry_run         false; true: goals are checked and told, nothing is commanded
+  dry_run         false; true: goals are checked and told, nothing is commanded; a goal's
+                  bag then holds the plan (plot_excitation.py draws both)
   folder          folder of the bags; without it no goal may ask for one
 
 Publishes

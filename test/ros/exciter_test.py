@@ -241,11 +241,19 @@ class ExciterTest(unittest.TestCase):
     def test_dry_run_commands_nothing(self):
         self.start_exciter({"dry_run": "true"})
         client = self.client()
-        client.send_goal(ExciteGoal())
+        client.send_goal(ExciteGoal(bag=self.bag))
         self.assertTrue(client.wait_for_result(rospy.Duration(TIMEOUT)))
         self.assertTrue(client.get_result().success)
         self.assertIn("dry run", client.get_result().message)
         self.assertEqual(client.get_result().commands, 0)
+        with rosbag.Bag(self.bag) as bag:
+            plan = [m.data for _, m, _ in bag.read_messages("/torque_command")]
+        self.assertEqual(len(plan), 2001)  # 2 s, each millisecond
+        self.assertEqual((plan[0], plan[-1]), (0, 0))
+        picture = os.path.join(self.folder, "plan.png")
+        script = os.path.join(os.path.dirname(os.path.realpath(__file__)), "../../scripts/plot_excitation.py")
+        subprocess.run([sys.executable, script, self.bag, "--out", picture], check=True)
+        self.assertGreater(os.path.getsize(picture), 10000)
 
     def test_the_simulator_lets_go_of_an_old_torque(self):
         path = self.write_rig({"channels": None, "test_runs": None, "excitation": {"type": "topic"}})

@@ -61,6 +61,7 @@ class ExciterNode {
   void command(double torque, Result& result);
   void send_zeros(Result& result);
   void refuse_if_not_alone() const;
+  void write_plan(const simulation::DrivePlan& plan, const std::string& path) const;
   void write_bag(const std::string& path, Result& result);
   void stop(const std::string& reason);
   std::string other_publisher() const;
