@@ -40,6 +40,8 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
       angular_(settings.file.rig.mesh.angular()),
       names_(name_),
       simulation_(settings.file.rig, settings.file.simulation),
+      torque_samples_(static_cast<long>(
+          std::ceil(settings.torque_timeout * settings.file.simulation.sensors.sampling_rate))),
       next_torque_warning_(std::chrono::steady_clock::now()),
       handle_(handle) {
   rig_description_ = handle_.advertise<std_msgs::String>("rig_description", 1, true);
@@ -53,6 +55,11 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
   ros::NodeHandle services(private_handle);
   set_backlash_ = services.advertiseService("set_backlash", &SimulatedJoint::set_backlash, this);
   live_ = std::make_unique<LiveServer<Live>>(services, live(), [this](const Live& wanted) { apply(wanted); });
+}
+
+void SimulatedJoint::step(sensor_msgs::JointState& message) {
+  if (torque_samples_ > 0 && torque_age_++ == torque_samples_) simulation_.plant().set_torque(0);
+  add_joint_state(simulation_.step(), names_, message);
 }
 
 void SimulatedJoint::reset() {
@@ -113,6 +120,7 @@ void SimulatedJoint::apply(const Live& wanted) {
 void SimulatedJoint::set_torque(const std_msgs::Float64& message) {
   if (std::isfinite(message.data)) {
     simulation_.plant().set_torque(message.data);
+    torque_age_ = 0;
     return;
   }
   const auto now = std::chrono::steady_clock::now();

@@ -23,6 +23,7 @@ Private parameters; unknown ones are refused. In brackets: units of values that 
   seed                  [-] of the sensor noise, >= 0
   excitation_amplitude  [N m] >= 0, square and sine only
   excitation_frequency  [Hz] > 0, square and sine only
+  torque_timeout        0 s; simulated time without a torque_command after which the torque is zero, 0 is never
   real_time_factor      1; 2: twice as fast as wall time, 0: as fast as possible (slow subscribers lose some)
   duration              0 s; simulated time after which the node ends, 0 is endless
   publish_clock         true if real_time_factor is not 1, else false; others follow with /use_sim_time true
@@ -38,7 +39,7 @@ Publishes
   /diagnostics          diagnostic_msgs/DiagnosticArray: lag, samples, real time factor, integrator
 
 Subscribes
-  torque_command        std_msgs/Float64, N m, held until the next; for rigs with excitation type topic
+  torque_command        std_msgs/Float64, N m, held until the next or ~torque_timeout; for rigs with excitation type topic
 
 Services
   ~set_backlash         backlash_diagnosis/SetBacklash; acts from the last sample on

@@ -18,7 +18,8 @@ namespace {
 
 constexpr double kSlowest = 1e-3;  // real time factor
 constexpr double kFastest = 1e3;
-constexpr double kLongest = 1e9;  // s, keeps sample numbers and nanoseconds far within 64 bits
+constexpr double kLongestHold = 1e3;  // s, of a torque_command
+constexpr double kLongest = 1e9;      // s, keeps sample numbers and nanoseconds far within 64 bits
 
 /// Reads the parameters that override the rig file and remembers which were given: those below a scope ("" or
 /// "JOINT/") of one joint.
@@ -202,6 +203,8 @@ SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle)
     settings.joints = read_joints(parameters, common);
   else
     settings.joints = {read_joint(parameters, common)};
+  const double timeout = parameters.number("torque_timeout", 0, Range::between(0, kLongestHold));
+  for (JointSettings& joint : settings.joints) joint.torque_timeout = timeout;
   settings.real_time_factor = read_real_time_factor(parameters);
   settings.samples = read_samples(parameters, settings.joints.front().file.simulation.sensors.sampling_rate);
   settings.publish_clock = parameters.boolean("publish_clock", settings.real_time_factor != 1);

@@ -31,7 +31,7 @@ class SimulatedJoint {
   SimulatedJoint& operator=(const SimulatedJoint&) = delete;
 
   /// The next sample, added to a message.
-  void step(sensor_msgs::JointState& message) { add_joint_state(simulation_.step(), names_, message); }
+  void step(sensor_msgs::JointState& message);
   /// At rest in the middle of the gap, backlash as at the start.
   void reset();
   std::string true_backlash() const;  // with its unit, for people
@@ -53,6 +53,8 @@ class SimulatedJoint {
   bool angular_;
   JointNames names_;
   simulation::Simulation simulation_;
+  long torque_samples_;  // that a torque_command is held for; 0: for ever
+  long torque_age_ = 0;  // samples since the last one
   std::chrono::steady_clock::time_point next_torque_warning_;
   ros::NodeHandle handle_;
   ros::Publisher rig_description_, true_backlash_;

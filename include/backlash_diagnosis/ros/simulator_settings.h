@@ -13,8 +13,9 @@ namespace backlash::ros_bridge {
 
 /// One simulated joint.
 struct JointSettings {
-  rig_file::RigFile file;   // with the parameters that override it applied to `rig` and `simulation`
-  std::string description;  // the rig file's text after a comment line: its source and what overrides it
+  rig_file::RigFile file;     // with the parameters that override it applied to `rig` and `simulation`
+  std::string description;    // the rig file's text after a comment line: its source and what overrides it
+  double torque_timeout = 0;  // s, simulated, after which a torque_command is zero again; 0: held for ever
 };
 
 struct SimulatorSettings {
