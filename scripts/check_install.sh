@@ -52,7 +52,9 @@ for name in ${programs} ${plots}; do
   quietly help rosrun "${PACKAGE}" "${name}" --help || fail "${name} --help"
 done
 for launch in "${share}"/launch/*.launch; do
-  quietly launch roslaunch --nodes "${PACKAGE}" "${launch##*/}" || fail "${launch}"
+  # Anything will do for an argument that has no default: nothing starts.
+  mapfile -t required < <(sed -nE '/default=|value=/!s/.*<arg name="([a-z_]+)".*/\1:=given/p' "${launch}")
+  quietly launch roslaunch --nodes "${PACKAGE}" "${launch##*/}" "${required[@]}" || fail "${launch}"
 done
 python3 -c "
 from backlash_diagnosis.msg import BacklashEstimate, BuildCurveAction

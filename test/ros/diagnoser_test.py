@@ -71,6 +71,9 @@ class DiagnoserTest(unittest.TestCase):
                 if estimate.method == "momentum_transfer":  # needs faster sampling
                     self.assertEqual(estimate.status_name, "out_of_domain", estimate.message)
                     continue
+                if estimate.method == "gap_traverse":  # needs a free load
+                    self.assertEqual(estimate.status_name, "insufficient_data", estimate.message)
+                    continue
                 if estimate.method == "waveform" and estimate.status_name != "ok":  # not there yet, or of before
                     continue
                 self.assertIn(estimate.status_name, ("ok", "ambiguous", "above_range"), estimate.message)
