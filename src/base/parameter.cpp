@@ -10,6 +10,8 @@ ParameterValues read_parameters(const YamlReader& yaml, const std::vector<Parame
       values.set_choice(spec.name, yaml.choice(spec.name, spec.choices));
     else if (spec.list)
       values.set_list(spec.name, yaml.numbers(spec.name, spec.range));
+    else if (spec.absent)
+      values[spec.name] = yaml.number_or(spec.name, *spec.absent, spec.range);
     else
       values[spec.name] = yaml.number(spec.name, spec.range);
   }

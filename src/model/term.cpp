@@ -74,8 +74,11 @@ void check_choice(const ParameterSpec& spec, const std::string& value) {
 
 }  // namespace
 
-std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& values) {
+std::shared_ptr<const Term> make_term(const std::string& id, const ParameterValues& given) {
   const TermType& type = term_type(id);
+  ParameterValues values = given;
+  for (const ParameterSpec& spec : type.parameters)
+    if (spec.absent && !values.has(spec.name)) values[spec.name] = *spec.absent;
   for (const ParameterSpec& spec : type.parameters) {
     if (!spec.choices.empty()) {
       check_choice(spec, values.choice(spec.name));

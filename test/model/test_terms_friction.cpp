@@ -69,6 +69,24 @@ TEST(EndTerms, FrictionByHand) {
               6 * (1 - std::exp(-2.0)) / (1 - std::exp(-5.0)));
 }
 
+// Oracle: the mean over evenly spread torques, as the law is written.
+TEST(EndTerms, LossOfATorqueThatFluctuatesIsTheMeanOfItsSize) {
+  for (const double fluctuation : {0.0, 5.0, 20.0, 60.0}) {
+    const auto loaded = term(
+        "id: load_dependent_friction, coefficient: 0.1, body: motor, fluctuation_speed: 0.5, fluctuation: " +
+        std::to_string(fluctuation));
+    EndFriction sum{};
+    loaded->add_friction(kMotion, sum);
+    const double a = fluctuation * (std::fabs(kMotion.motor_velocity) - 0.5);
+    double mean = 0;
+    constexpr int kCount = 20'000;
+    for (int i = 0; i < kCount; ++i)
+      mean += std::fabs(kMotion.mesh_torque + a * ((2 * i + 1.0) / kCount - 1)) / kCount;
+    EXPECT_NEAR(sum.motor.forward, 0.1 * mean, 1e-6 * mean);  // midpoint rule: 1 / count^2
+    EXPECT_EQ(sum.motor.backward, sum.motor.forward);
+  }
+}
+
 TEST(EndTerms, AsymmetricCoulombByHand) {
   for (const bool load : {false, true}) {
     const auto t = term(std::string("id: asymmetric_coulomb, torque: 3, body: ") + (load ? "load" : "motor"));

@@ -5,6 +5,7 @@
 
 #include <initializer_list>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,8 +20,9 @@ struct ParameterSpec {
   std::string unit;
   Range range;
   std::string meaning;
-  bool list = false;                      // of numbers, each in the range
-  std::vector<std::string> choices = {};  // not empty: one of these words instead of a number
+  bool list = false;                            // of numbers, each in the range
+  std::vector<std::string> choices = {};        // not empty: one of these words instead of a number
+  std::optional<double> absent = std::nullopt;  // of a number that need not be given
 };
 
 /// Values by name: a number, a list of numbers or a word.

@@ -147,6 +147,8 @@ struct TermShape {
   bool refined;  // the best is then fitted with all others; else it is one of the values
   // An order, which any number > 0 may be: those that a spectrum of the residual shows are tried as well.
   std::optional<WaveOver> wave = std::nullopt;
+  // 0, and not fitted, until the effect is found; then these values, which are > 0, are tried as starts.
+  bool later = false;
 };
 
 /// 1/rad: orders that differ by less are hard to tell apart over the travel; infinite where nothing moves.

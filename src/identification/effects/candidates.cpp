@@ -36,6 +36,7 @@ double held_order(double order, const model::MotionRange& range) {
 std::vector<double> values_of(const model::TermShape& shape, const ParameterValues& choices,
                               const model::MotionRange& range, const ResidualOrders& orders,
                               std::size_t peaks) {
+  if (shape.later) return {0};
   std::vector<double> all = shape.values(range);
   if (!shape.wave) return all;
   const double lowest = kResolved * model::order_resolution(range);
@@ -242,7 +243,8 @@ std::vector<const model::TermShape*> fitted_shapes(const Candidate& candidate, s
   std::vector<const model::TermShape*> all;
   const bool held = term < candidate.held_orders.size() && candidate.held_orders[term] > 0;
   for (const model::TermShape& shape : model::term_type(candidate.id).search->shapes)
-    if (shape.refined && !(shape.wave && held)) all.push_back(&shape);
+    if (shape.refined && !(shape.wave && held) && !(shape.later && candidate.terms[term].at(shape.name) == 0))
+      all.push_back(&shape);
   return all;
 }
 
