@@ -180,7 +180,6 @@ class Reader {
   [[noreturn]] void fail_unknown_column(const std::string& name) const {
     std::string known = kTimeColumn;
     for (const Channel channel : kChannels) known += ", " + channel_name(channel);
-    known += ", with JOINT/ before them where there are several joints";
     lines_.fail("column = " + in_quotes(name) + ": unknown, known are " + known);
   }
 

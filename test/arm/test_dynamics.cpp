@@ -91,8 +91,8 @@ TEST(Dynamics, ForwardDynamicsIsKdlsAndTheInverseOfInverseDynamics) {
     const Joints a = forward_dynamics(chain, q, v, torque, rotor);
     const Joints back = inverse_dynamics(chain, q, v, a) + rotor.cwiseProduct(a);
     EXPECT_LT((back - torque).norm(), 1e-9 * (1 + torque.norm() + a.norm())) << trial;
-    KDL::ChainDynParam parameters(to_kdl(chain),
-                                  KDL::Vector(chain.gravity.x(), chain.gravity.y(), chain.gravity.z()));
+    const KDL::Chain kdl = to_kdl(chain);  // is referred to
+    KDL::ChainDynParam parameters(kdl, KDL::Vector(chain.gravity.x(), chain.gravity.y(), chain.gravity.z()));
     KDL::JntSpaceInertiaMatrix mass{unsigned(n)};
     KDL::JntArray coriolis{unsigned(n)}, gravity{unsigned(n)};
     parameters.JntToMass(to_kdl(q), mass);

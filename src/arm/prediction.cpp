@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The part of fit.h that looks at motions with a fit that is done.
+#include <cmath>
+
+#include "backlash_diagnosis/arm/fit.h"
+#include "backlash_diagnosis/base/not_a_number.h"
+#include "fit_model.h"
+
+namespace backlash::arm {
+
+Prediction predict(const ArmFit& fit, const FitFreedom& freedom, const FittedMotion& motion) {
+  const FitModel model(fit.rig, freedom);
+  State state = model.start();
+  state.payload = freedom.payload_sign * fit.payload;
+  if (freedom.tilt) state.tilt = {fit.tilt[0].value, fit.tilt[1].value};
+  if (freedom.friction) state.friction = std::log(fit.friction_factor.value);
+  const std::vector<Linearised> all = model.linearised(state, motion);
+  const auto rows = Eigen::Index(motion.motion->rows.size());
+  Prediction out{Eigen::MatrixXd(rows, Eigen::Index(all.size())),
+                 Eigen::MatrixXd(rows, Eigen::Index(all.size()))};
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    out.measured.col(Eigen::Index(j)) = all[j].measured;
+    out.predicted.col(Eigen::Index(j)) = all[j].predicted;
+  }
+  return out;
+}
+
+std::vector<double> relative_errors(const ArmFit& fit, const FitFreedom& freedom,
+                                    const std::vector<FittedMotion>& motions, double least_seconds) {
+  const std::size_t joints = fit.rig.joints.size();
+  std::vector<double> count(joints, 0), sum(joints, 0), squares(joints, 0), residual(joints, 0),
+      seconds(joints, 0);
+  for (const FittedMotion& m : motions) {
+    const Prediction p = predict(fit, freedom, m);
+    for (std::size_t j = 0; j < joints; ++j) {
+      seconds[j] += moving_seconds(*m.motion, j);
+      const auto c = Eigen::Index(j);
+      for (Eigen::Index k = 0; k < p.measured.rows(); ++k) {
+        if (!m.motion->counts(k, c)) continue;
+        const double s = p.measured(k, c), r = s - p.predicted(k, c);
+        count[j] += 1, sum[j] += s, squares[j] += s * s, residual[j] += r * r;
+      }
+    }
+  }
+  std::vector<double> errors;
+  for (std::size_t j = 0; j < joints; ++j)
+    errors.push_back(seconds[j] >= least_seconds
+                         ? std::sqrt(residual[j] / (squares[j] - sum[j] * sum[j] / count[j]))
+                         : kNaN);
+  return errors;
+}
+
+}  // namespace backlash::arm

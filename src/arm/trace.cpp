@@ -1,0 +1,436 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/arm/trace.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/not_a_number.h"
+#include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "fit_model.h"
+
+namespace backlash::arm {
+namespace {
+
+using Motions = std::vector<ArmMotion>;
+
+std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked) {
+  std::vector<FittedMotion> all;
+  for (const ArmMotion& m : motions) all.push_back({&m, marked});
+  return all;
+}
+
+Motions parts(const Motions& motions, double from, double to) {
+  Motions out;
+  for (const ArmMotion& m : motions)
+    if (ArmMotion part = part_of(m, from, to); !part.rows.empty()) out.push_back(std::move(part));
+  return out;
+}
+
+/// Where one half of the samples lies before.
+double middle(const Motions& motions) {
+  std::size_t all = 0, seen = 0;
+  for (const ArmMotion& m : motions) all += m.rows.size();
+  for (const ArmMotion& m : motions) {
+    if (2 * (seen + m.rows.size()) >= all) return m.time[m.rows[std::min(all / 2 - seen, m.rows.size() - 1)]];
+    seen += m.rows.size();
+  }
+  return 0;
+}
+
+/// Squared residuals of each joint in blocks of time, of two models.
+struct Squares {
+  std::vector<std::vector<double>> before, after;  // block, joint
+};
+
+struct Candidate {
+  std::string effect;
+  FitFreedom freedom;
+  ArmFit fit;
+  std::vector<double> before, after;
+  double gain = 0, lower = 0, upper = 0;  // of the joint that it helps most
+  std::size_t joint = 0;
+  double all_lower = 0;  // of the mean of all joints' logarithms, lower end
+  double all = 0;
+  std::string reason;  // why not; empty: believed
+};
+
+class Tracer {
+ public:
+  Tracer(const ArmRig& rig, const ArmTraceSettings& settings, const Progress& progress)
+      : rig_(rig), settings_(settings), progress_(progress) {}
+
+  ArmTrace run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record);
+
+ private:
+  void tell(double fraction, const char* phase) const {
+    if (progress_ && !progress_(fraction, phase)) throw Cancelled();
+  }
+  void set_base();
+  void look_for_pushes(const ArmRecord& test);
+  void set_held_series(const ArmRecord& test);
+  bool search(const Motions& fitted, const Motions& judged, const std::string& words);
+  std::vector<Candidate> candidates(const FitFreedom& accepted) const;
+  void try_out(Candidate& c, const Motions& fitted, const Motions& judged) const;
+  Squares squares(const Candidate& c, const Motions& judged) const;
+  void bootstrap(Candidate& c, const Squares& squares) const;
+  std::string refusal(const Candidate& c) const;
+  ArmStep step_of(const Candidate& c) const;
+  void finish(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit);
+  void set_unexplained();
+  void set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit);
+
+  const ArmRig& rig_;
+  const ArmTraceSettings& settings_;
+  const Progress& progress_;
+  Motions train_, test_;
+  ArmFit base_;
+  ArmTrace trace_;
+};
+
+void Tracer::set_base() {
+  if (rig_.fitted) {
+    base_.rig = rig_;
+    return;
+  }
+  base_ = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
+  for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
+}
+
+Squares Tracer::squares(const Candidate& c, const Motions& judged) const {
+  Squares all;
+  for (const ArmMotion& m : judged) {
+    const FittedMotion plain{&m, false}, marked{&m, true};
+    const Prediction before = predict(base_, {}, plain), after = predict(c.fit, c.freedom, marked);
+    double begin = -1e300;
+    for (std::size_t k = 0; k < m.rows.size(); ++k) {
+      if (m.time[m.rows[k]] >= begin + settings_.block) {
+        begin = m.time[m.rows[k]];
+        all.before.emplace_back(rig_.joints.size(), 0.0);
+        all.after.emplace_back(rig_.joints.size(), 0.0);
+      }
+      for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+        const auto r = Eigen::Index(k), col = Eigen::Index(j);
+        if (!m.counts(r, col)) continue;
+        all.before.back()[j] += std::pow(before.measured(r, col) - before.predicted(r, col), 2);
+        all.after.back()[j] += std::pow(after.measured(r, col) - after.predicted(r, col), 2);
+      }
+    }
+  }
+  return all;
+}
+
+void Tracer::bootstrap(Candidate& c, const Squares& s) const {
+  const std::size_t joints = rig_.joints.size(), blocks = s.before.size();
+  std::vector<std::size_t> places(blocks);
+  const auto gains = [&](const std::vector<std::size_t>& chosen) {
+    std::vector<double> out(joints + 1, 0);
+    double count = 0;
+    for (std::size_t j = 0; j < joints; ++j) {
+      double before = 0, after = 0;
+      for (const std::size_t b : chosen) before += s.before[b][j], after += s.after[b][j];
+      if (!(before > 0)) continue;
+      out[j] = 1 - after / before;
+      out[joints] -= std::log(after / before);
+      count += 1;
+    }
+    if (count > 0) out[joints] /= count;
+    return out;
+  };
+  for (std::size_t b = 0; b < blocks; ++b) places[b] = b;
+  const std::vector<double> all = gains(places);
+  c.joint = std::size_t(std::max_element(all.begin(), all.end() - 1) - all.begin());
+  c.gain = all[c.joint];
+  c.all = all[joints];
+  Random random(settings_.seed);
+  std::vector<double> one, together;
+  for (int d = 0; d < settings_.draws; ++d) {
+    for (std::size_t& place : places) place = random.below(blocks);
+    const std::vector<double> drawn = gains(places);
+    one.push_back(drawn[c.joint]);
+    together.push_back(drawn[joints]);
+  }
+  c.lower = signal::quantile(one, 0.025);
+  c.upper = signal::quantile(one, 0.975);
+  c.all_lower = signal::quantile(together, 0.025);
+}
+
+void Tracer::try_out(Candidate& c, const Motions& fitted, const Motions& judged) const {
+  std::vector<FittedMotion> motions = as_fitted(fitted, true);
+  c.freedom.links = c.freedom.drives = !rig_.fitted;
+  if (!rig_.fitted)
+    for (const FittedMotion& m : as_fitted(train_, false)) motions.push_back(m);
+  c.fit = fit_arm(rig_, motions, c.freedom, settings_.fit);
+  if (rig_.fitted) c.fit.rig.common_error = rig_.common_error;
+  c.before = relative_errors(base_, {}, as_fitted(judged, false), settings_.fit.least_seconds);
+  c.after = relative_errors(c.fit, c.freedom, as_fitted(judged, true), settings_.fit.least_seconds);
+  bootstrap(c, squares(c, judged));
+  c.reason = refusal(c);
+}
+
+std::string Tracer::refusal(const Candidate& c) const {
+  if (c.gain < settings_.least_gain)
+    return fmt::format(
+        "takes {:.0f} % of the squared error of {} away in the part that was not fitted, {:.0f} % are needed",
+        100 * c.gain, rig_.joints[c.joint].name, 100 * settings_.least_gain);
+  if (!(c.lower > 0) || !(c.all_lower > 0))
+    return "the part that was not fitted does not confirm it in all blocks of time";
+  if (c.effect == "payload" && !(std::fabs(c.fit.mass.value) > settings_.sure * c.fit.mass.standard_error))
+    return fmt::format("its mass is not told apart from none: {:.2g} +- {:.1g} kg", c.fit.mass.value,
+                       c.fit.mass.standard_error);
+  if (c.effect == "gravity_direction") {
+    const double tilt = std::hypot(c.fit.tilt[0].value, c.fit.tilt[1].value),
+                 error = std::hypot(c.fit.tilt[0].standard_error, c.fit.tilt[1].standard_error);
+    if (tilt < settings_.least_tilt || tilt < settings_.sure * error)
+      return fmt::format("the tilt is {:.2g} +- {:.1g} rad, no more than a level base has", tilt, error);
+  }
+  if (c.effect == "friction_drift") {
+    const signal::Measured& f = c.fit.friction_factor;
+    if (std::fabs(f.value - 1) < settings_.least_friction ||
+        std::fabs(f.value - 1) < settings_.sure * f.standard_error)
+      return fmt::format(
+          "friction is {:.2f} +- {:.2f} times that of the training, as warming up makes it too", f.value,
+          f.standard_error);
+  }
+  return "";
+}
+
+std::vector<Candidate> Tracer::candidates(const FitFreedom& accepted) const {
+  std::vector<Candidate> all;
+  const auto add = [&](const char* effect, const FitFreedom& freedom) {
+    Candidate c;
+    c.effect = effect;
+    c.freedom = freedom;
+    all.push_back(c);
+  };
+  if (!accepted.payload) {
+    for (std::size_t i = rig_.chain.size(); i-- > 0;)
+      for (const double sign : {1.0, -1.0}) {
+        FitFreedom freedom = accepted;
+        freedom.payload = i;
+        freedom.payload_sign = sign;
+        add("payload", freedom);
+      }
+  }
+  if (!accepted.tilt) {
+    FitFreedom freedom = accepted;
+    freedom.tilt = true;
+    add("gravity_direction", freedom);
+  }
+  if (!accepted.friction) {
+    for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+      FitFreedom freedom = accepted;
+      freedom.friction = j;
+      add("friction_drift", freedom);
+    }
+  }
+  return all;
+}
+
+ArmStep Tracer::step_of(const Candidate& c) const {
+  ArmStep step;
+  step.effect = c.effect;
+  step.before = c.before;
+  step.after = c.after;
+  step.channel = rig_.joints[c.joint].name + "/torque";
+  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
+  if (c.effect == "payload") {
+    step.link = rig_.chain.joints[*c.freedom.payload].link;
+    const double mass = c.fit.mass.value;
+    const double error = rig_.fitted ? std::hypot(c.fit.mass.standard_error, mass * rig_.common_error)
+                                     : c.fit.mass.standard_error;
+    step.parameters.push_back({"mass", "kg", {mass, error}});
+    static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
+    for (int i = 0; i < 3; ++i) step.parameters.push_back({names[i], "m", c.fit.centre[i]});
+  } else if (c.effect == "gravity_direction") {
+    step.parameters = {{"about_x", "rad", c.fit.tilt[0]}, {"about_y", "rad", c.fit.tilt[1]}};
+  } else {
+    step.joint = rig_.joints[*c.freedom.friction].name;
+    step.parameters = {{"factor", "-", c.fit.friction_factor}};
+  }
+  return step;
+}
+
+/// True where something was found.
+bool Tracer::search(const Motions& fitted, const Motions& judged, const std::string& words) {
+  FitFreedom accepted;
+  ArmFit fit = base_;
+  for (int round = 0; round < 3; ++round) {
+    std::vector<Candidate> all = candidates(accepted);
+    std::size_t best = all.size(), last = all.size();
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
+      try_out(all[i], fitted, judged);
+      if (!all[i].reason.empty()) continue;
+      if (best == all.size() || all[i].all > all[best].all) best = i;
+      if (all[i].effect == "payload" && all[i].freedom.payload == rig_.chain.size() - 1 &&
+          (last == all.size() || all[i].all > all[last].all))
+        last = i;
+    }
+    if (best < all.size() && last < all.size() && all[best].effect == "payload" &&
+        all[best].all - all[last].all < -std::log(1 - settings_.same_link))
+      best = last;
+    if (round == 0 || best == all.size())
+      for (const Candidate& c : all)
+        if (!c.reason.empty() && (c.effect != "payload" || c.freedom.payload == rig_.chain.size() - 1))
+          trace_.rejected.push_back(
+              {c.effect + (c.freedom.friction ? " of " + rig_.joints[*c.freedom.friction].name : "") +
+                   (c.effect == "payload" && c.freedom.payload_sign < 0 ? " (taken away)" : ""),
+               c.reason});
+    if (best == all.size()) break;
+    if (round > 0) break;  // a second effect is not searched yet: see below
+    trace_.steps.push_back(step_of(all[best]));
+    accepted = all[best].freedom;
+    fit = all[best].fit;
+    break;
+  }
+  if (trace_.steps.empty()) return false;
+  trace_.judged = words;
+  finish(judged, accepted, fit);
+  return true;
+}
+
+void Tracer::finish(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit) {
+  const double least = settings_.fit.least_seconds;
+  const bool changed = freedom.payload || freedom.tilt || freedom.friction;
+  trace_.before = relative_errors(base_, {}, as_fitted(judged, false), least);
+  trace_.after = changed ? relative_errors(fit, freedom, as_fitted(judged, true), least) : trace_.before;
+  trace_.train = relative_errors(base_, {}, as_fitted(train_, false), least);
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    double noise = 0, count = 0, sum = 0, squares = 0;
+    for (const ArmMotion& m : judged)
+      for (std::size_t k = 0; k < m.rows.size(); ++k) {
+        if (!m.counts(Eigen::Index(k), Eigen::Index(j))) continue;
+        const double s = m.signal(Eigen::Index(m.rows[k]), Eigen::Index(j));
+        count += 1, sum += s, squares += s * s;
+        noise += m.noise[Eigen::Index(j)] * m.noise[Eigen::Index(j)];
+      }
+    trace_.floor.push_back(std::isnan(trace_.before[j]) ? kNaN
+                                                        : std::sqrt(noise / (squares - sum * sum / count)));
+  }
+  trace_.augmented = fit.rig;
+  if (freedom.payload)
+    trace_.augmented.payloads.push_back({rig_.chain.joints[*freedom.payload].link, freedom.payload_sign,
+                                         BodyParameters(freedom.payload_sign * fit.payload)});
+  if (freedom.tilt)
+    trace_.augmented.chain.gravity = tilted(fit.rig.chain.gravity, {fit.tilt[0].value, fit.tilt[1].value});
+  if (freedom.friction)
+    for (const DriveTerm t :
+         {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
+      trace_.augmented.joints[*freedom.friction].terms[std::size_t(t)] *= fit.friction_factor.value;
+  set_series(judged, freedom, fit);
+  set_unexplained();
+}
+
+void Tracer::set_unexplained() {
+  double worst = settings_.foretold;
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    const double ratio = trace_.after[j] / trace_.train[j];
+    if (!(ratio > worst)) continue;
+    worst = ratio;
+    trace_.unexplained = {{rig_.joints[j].name + "/torque",
+                           fmt::format("the error is {:.3g} times that of the training records", ratio)}};
+  }
+}
+
+void Tracer::set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit) {
+  const std::size_t joints = rig_.joints.size();
+  trace_.series.measured.resize(joints), trace_.series.before.resize(joints),
+      trace_.series.after.resize(joints);
+  for (const ArmMotion& m : judged) {
+    const Prediction before = predict(base_, {}, {&m, false}), after = predict(fit, freedom, {&m, true});
+    for (std::size_t k = 0; k < m.rows.size(); ++k) {
+      trace_.series.time.push_back(m.time[m.rows[k]]);
+      for (std::size_t j = 0; j < joints; ++j) {
+        const auto r = Eigen::Index(k), c = Eigen::Index(j);
+        const bool counts = m.counts(r, c);
+        trace_.series.measured[j].push_back(before.measured(r, c));
+        trace_.series.before[j].push_back(counts ? before.predicted(r, c) : kNaN);
+        trace_.series.after[j].push_back(counts ? after.predicted(r, c) : kNaN);
+      }
+    }
+  }
+}
+
+/// The record as it is: nothing foretells a joint at rest.
+void Tracer::set_held_series(const ArmRecord& test) {
+  trace_.series.time = test.joints.front().time;
+  for (const record::Record& joint : test.joints) {
+    trace_.series.measured.push_back(joint.column(rig_.channel));
+    trace_.series.before.emplace_back(joint.size(), kNaN);
+  }
+  trace_.series.after = trace_.series.before;
+}
+
+void Tracer::look_for_pushes(const ArmRecord& test) {
+  for (const PushEvent& e : pushes(test, base_.rig, settings_.push)) {
+    ArmStep step;
+    step.effect = "external_torque";
+    step.joint = rig_.joints[e.joint].name;
+    step.channel = step.joint + "/torque";
+    step.parameters = {{"torque", "N m", {e.torque, e.torque_error}}};
+    step.push = e;
+    trace_.steps.push_back(step);
+  }
+}
+
+ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record) {
+  trace_.joints = rig_.joint_names();
+  tell(0, "reading the motion");
+  for (const ArmRecord& record : train)
+    for (ArmMotion& m : motions_of(record, rig_, trace_.warnings)) train_.push_back(std::move(m));
+  test_ = motions_of(test, rig_, trace_.warnings);
+  tell(0.1, "fitting the base machine");
+  set_base();
+  trace_.augmented = base_.rig;
+  const std::size_t joints = rig_.joints.size();
+  if (holds_pose(test, settings_.push)) {
+    look_for_pushes(test);
+    set_held_series(test);
+    for (auto* list : {&trace_.before, &trace_.after, &trace_.floor, &trace_.train})
+      list->assign(joints, kNaN);
+    trace_.judged =
+        "The test record holds its pose: friction at rest hides what the drives carry, so no error is given; "
+        "pushes are looked for.";
+    return std::move(trace_);
+  }
+  const double least = settings_.fit.least_seconds;
+  const Motions first = parts(test_, -1e300, middle(test_)), second = parts(test_, middle(test_), 1e300);
+  double moving = 0;
+  for (std::size_t j = 0; j < joints; ++j) {
+    double seconds = 0;
+    for (const ArmMotion& m : second) seconds += moving_seconds(m, j);
+    moving = std::max(moving, seconds);
+  }
+  if (moving < least) {
+    trace_.cannot_tell = true;
+    for (auto* list : {&trace_.before, &trace_.after, &trace_.floor, &trace_.train})
+      list->assign(joints, kNaN);
+    trace_.judged =
+        fmt::format("No joint moves for {} s in a half of the test record: nothing can be judged.", least);
+    return std::move(trace_);
+  }
+  if (rig_.fitted && !same_record &&
+      search(train_, test_, "Effects are fitted to the training records and judged on the test record."))
+    return std::move(trace_);
+  trace_.rejected.clear();
+  if (search(first, second,
+             "The test record is of a machine that has changed: effects are fitted to its first half and "
+             "judged on its second half."))
+    return std::move(trace_);
+  trace_.judged = "Errors are those of the whole test record.";
+  finish(test_, {}, base_);
+  return std::move(trace_);
+}
+
+}  // namespace
+
+ArmTrace trace_arm(const ArmRig& rig, const std::vector<ArmRecord>& train, const ArmRecord& test,
+                   bool same_record, const ArmTraceSettings& settings, const Progress& progress) {
+  return Tracer(rig, settings, progress).run(train, test, same_record);
+}
+
+}  // namespace backlash::arm
