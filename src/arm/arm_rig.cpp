@@ -67,7 +67,8 @@ JointDrive read_joint(const YamlReader& yaml) {
   for (std::size_t i = 0; i < kDriveTerms; ++i) {
     const DriveTermSpec& spec = kDriveTermSpecs[i];
     joint.terms[i] = yaml.number_or(spec.name, 0, spec.dissipates ? Range::not_negative() : Range::any());
-    yaml.uncertainty(spec.name);
+    if (const auto error = yaml.uncertainty(spec.name); error && DriveTerm(i) == DriveTerm::load)
+      joint.load_error = error->relative ? error->size * joint.terms[i] : error->size;
   }
   joint.delay = yaml.number_or("delay", 0, Range::between(-kLongestDelay, kLongestDelay));
   yaml.uncertainty("delay");
@@ -200,7 +201,11 @@ std::string joint_text(const ArmRig& rig, const JointDrive& joint) {
   }
   for (const DriveTerm term : rig.terms) {
     const DriveTermSpec& spec = kDriveTermSpecs[std::size_t(term)];
-    text += fmt::format("    {}: {:.8g}  # {}\n", spec.name, joint.terms[std::size_t(term)], spec.unit);
+    const double value = joint.terms[std::size_t(term)];
+    text += term == DriveTerm::load && joint.load_error > 0
+                ? fmt::format("    {}: {{value: {:.8g}, uncertainty: {:.3g}}}  # {}\n", spec.name, value,
+                              joint.load_error, spec.unit)
+                : fmt::format("    {}: {:.8g}  # {}\n", spec.name, value, spec.unit);
   }
   return text + fmt::format("    delay: {:.6g}  # s\n", joint.delay);
 }

@@ -182,6 +182,8 @@ std::vector<char> Fit::free_unknowns(bool first) const {
     if (!moves_[std::size_t(j)]) continue;
     if (freedom_.drives)
       for (const DriveTerm t : rig_.terms) set(layout_.drive(j) + Eigen::Index(t), 1);
+    if (freedom_.load && rig_.joints[std::size_t(j)].load_error > 0)
+      set(layout_.drive(j) + Eigen::Index(DriveTerm::load), 1);
     if (freedom_.constants && !first && rig_.joints[std::size_t(j)].constant_error > 0)
       set(layout_.kappa(j), 1);
     if (freedom_.drives && !first) set(layout_.delay(j), 1);
@@ -276,6 +278,7 @@ void Fit::set_drives(ArmFit& fit, const Eigen::MatrixXd& covariance) const {
     }
     for (std::size_t t = 0; t < kDriveTerms; ++t) drive.terms[t] = values[t].value;
     drive.delay = values.back().value;
+    if (freedom_.drives) drive.load_error = values[std::size_t(DriveTerm::load)].standard_error;
     signal::Measured& constant = values[kDriveTerms];
     constant.value = drive.constant * std::exp(constant.value);
     const double own =
@@ -328,6 +331,7 @@ ArmFit Fit::result(const Eigen::MatrixXd& covariance, const std::vector<std::vec
   fit.rig.chain.links = state_.links;
   fit.rig.fitted = rig_.fitted || freedom_.links;
   fit.deviation = deviation_;
+  fit.covariance = covariance;
   set_drives(fit, covariance);
   if (freedom_.payload) set_payload(fit, covariance);
   for (Eigen::Index i = 0; i < 2; ++i)

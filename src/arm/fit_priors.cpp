@@ -55,10 +55,15 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
         const double otherwise = t == DriveTerm::rotor_inertia ? settings.rotor_inertia
                                  : t == DriveTerm::load        ? settings.load_friction
                                                         : drive.constant;  // that of 1 A: a size, it follows
-        positive_.push_back({layout_.drive(c) + Eigen::Index(t), declared > 0 ? declared : otherwise,
-                             t != DriveTerm::rotor_inertia});
+        positive_.push_back({layout_.drive(c) + Eigen::Index(t), declared > 0 ? declared : otherwise});
       }
       normal_.push_back({layout_.delay(c), drive.delay, 1 / (kDelayError * kDelayError)});
+    }
+    if (freedom.load && !freedom.drives && drive.load_error > 0) {
+      const Eigen::Index place = layout_.drive(c) + Eigen::Index(DriveTerm::load);
+      normal_.push_back(
+          {place, drive.terms[std::size_t(DriveTerm::load)], 1 / (drive.load_error * drive.load_error)});
+      positive_.push_back({place, drive.terms[std::size_t(DriveTerm::load)]});
     }
     if (freedom.constants && drive.constant_error > 0)
       normal_.push_back({layout_.kappa(c), 0, 1 / (drive.constant_error * drive.constant_error)});
@@ -137,12 +142,21 @@ Eigen::MatrixXd Priors::curvature(const State& state) const {
   return curvature;
 }
 
+void Priors::follow(const Eigen::VectorXd& x) {
+  for (Divergence& d : bodies_) {
+    const Eigen::Matrix4d p = pseudo_inertia(x.segment<10>(d.place));
+    if (payload_ && d.place == layout_.payload())
+      d.inverse = inverse(p);
+    else
+      d.inverse *= 4 / (d.inverse * p).trace();
+  }
+  for (Positive& p : positive_) p.reference = x[p.place];
+}
+
 Eigen::VectorXd Priors::step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g, const State& state,
                              const std::vector<char>& free) {
   const Eigen::VectorXd start = vector_of(state);
-  if (payload_) bodies_.back().inverse = inverse(pseudo_inertia(state.payload));
-  for (Positive& p : positive_)
-    if (p.follows) p.reference = start[p.place];
+  follow(start);
   std::vector<Eigen::Index> places;
   for (std::size_t i = 0; i < free.size(); ++i)
     if (free[i]) places.push_back(Eigen::Index(i));

@@ -18,9 +18,9 @@ class Priors {
   /// Puts values that a fit can start from where the rig declares none.
   void begin(State& state);
 
-  /// The step that minimises 1/2 x^T H x - g^T x plus the priors at state + x, where `free` is set. The
-  /// payload and what friction has no declared value for are only kept physical: their reference is the state
-  /// itself.
+  /// The step that minimises 1/2 x^T H x - g^T x plus the priors at state + x, where `free` is set.
+  /// References follow the state in all but the shape of the links, so that declared masses say nothing of
+  /// the torque constants.
   Eigen::VectorXd step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g, const State& state,
                        const std::vector<char>& free);
 
@@ -35,7 +35,6 @@ class Priors {
   struct Positive {
     Eigen::Index place;
     double reference;
-    bool follows;  // the state
   };
   struct Normal {
     Eigen::Index place;
@@ -45,6 +44,7 @@ class Priors {
   double value(const Eigen::VectorXd& x) const;
   void add_derivatives(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& curvature) const;
   Eigen::VectorXd vector_of(const State& state) const;
+  void follow(const Eigen::VectorXd& x);
 
   Layout layout_;
   double weight_ = 1;

@@ -153,7 +153,7 @@ std::vector<ArmMotion> motions_of(const ArmRecord& record, const ArmRig& rig,
     const double to = k < time.size() ? time[k] : time.back() + most + 1;
     if (time[k - 1] - time[begin] >= kShortestStretch)
       all.push_back(motion_of(record, rig, time[begin], to));
-    else
+    else if (k - begin > 1)
       warnings.push_back(fmt::format("{}: {:.3g} s from t = {:.4g} s are too short for a fit and left out",
                                      record.name, time[k - 1] - time[begin], time[begin]));
     begin = k;

@@ -80,7 +80,7 @@ class Tracer {
   std::string refusal(const Candidate& c) const;
   ArmStep step_of(const Candidate& c) const;
   void finish(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit);
-  void set_unexplained();
+  void set_unexplained(const std::vector<double>& foretold);
   void set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit);
 
   const ArmRig& rig_;
@@ -161,6 +161,7 @@ void Tracer::bootstrap(Candidate& c, const Squares& s) const {
 void Tracer::try_out(Candidate& c, const Motions& fitted, const Motions& judged) const {
   std::vector<FittedMotion> motions = as_fitted(fitted, true);
   c.freedom.links = c.freedom.drives = !rig_.fitted;
+  c.freedom.load = rig_.fitted && c.freedom.payload;
   if (!rig_.fitted)
     for (const FittedMotion& m : as_fitted(train_, false)) motions.push_back(m);
   c.fit = fit_arm(rig_, motions, c.freedom, settings_.fit);
@@ -263,6 +264,12 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
     std::size_t best = all.size(), last = all.size();
     for (std::size_t i = 0; i < all.size(); ++i) {
       tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
+      // The last link, tried first with both signs, tells whether something has come or gone.
+      if (all[i].effect == "payload" && i > 1 &&
+          (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0)) {
+        all[i].reason = "not tried";
+        continue;
+      }
       try_out(all[i], fitted, judged);
       if (!all[i].reason.empty()) continue;
       if (best == all.size() || all[i].all > all[best].all) best = i;
@@ -322,17 +329,20 @@ void Tracer::finish(const Motions& judged, const FitFreedom& freedom, const ArmF
          {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
       trace_.augmented.joints[*freedom.friction].terms[std::size_t(t)] *= fit.friction_factor.value;
   set_series(judged, freedom, fit);
-  set_unexplained();
+  set_unexplained(fit.covariance.size() > 0 && !rig_.fitted
+                      ? foretold_errors(fit, freedom, as_fitted(judged, changed), least)
+                      : trace_.train);
 }
 
-void Tracer::set_unexplained() {
+void Tracer::set_unexplained(const std::vector<double>& foretold) {
   double worst = settings_.foretold;
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-    const double ratio = trace_.after[j] / trace_.train[j];
+    const double ratio = trace_.after[j] / foretold[j];
     if (!(ratio > worst)) continue;
     worst = ratio;
-    trace_.unexplained = {{rig_.joints[j].name + "/torque",
-                           fmt::format("the error is {:.3g} times that of the training records", ratio)}};
+    trace_.unexplained = {
+        {rig_.joints[j].name + "/torque",
+         fmt::format("the error is {:.3g} times what the training records let expect", ratio)}};
   }
 }
 
@@ -371,7 +381,7 @@ void Tracer::look_for_pushes(const ArmRecord& test) {
     step.effect = "external_torque";
     step.joint = rig_.joints[e.joint].name;
     step.channel = step.joint + "/torque";
-    step.parameters = {{"torque", "N m", {e.torque, e.torque_error}}};
+    step.parameters = {{"torque", "N m", {-e.torque, e.torque_error}}};
     step.push = e;
     trace_.steps.push_back(step);
   }

@@ -163,7 +163,7 @@ std::string arm_verdict_sentence(const arm::ArmTrace& trace) {
     if (step.push)
       text += fmt::format(" from {:.2f} s, {} {:.2f} s, {:.3g} N m.", step.push->begin,
                           step.push->released ? "released at" : "not released by the end,", step.push->end,
-                          step.push->torque);
+                          step.parameters.front().measured.value);
     else
       text += fmt::format(": {} = {} {}.", step.parameters.front().name,
                           with_error(step.parameters.front().measured),

@@ -2,8 +2,6 @@
 // Oracles: KDL's solvers, energy, finite differences.
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
-#include <kdl/chain.hpp>
 #include <kdl/chaindynparam.hpp>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
@@ -13,38 +11,7 @@
 namespace backlash::arm {
 namespace {
 
-KDL::Frame frame(const Eigen::Matrix3d& r, const Eigen::Vector3d& p) {
-  return {KDL::Rotation(r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0), r(2, 1), r(2, 2)),
-          KDL::Vector(p.x(), p.y(), p.z())};
-}
-
-/// KDL's segment is a joint and then a fixed frame; the body is said in the frame behind both.
-KDL::Chain to_kdl(const Chain& chain) {
-  KDL::Chain kdl;
-  kdl.addSegment(
-      KDL::Segment(KDL::Joint(KDL::Joint::None), frame(chain.joints[0].rotation, chain.joints[0].position)));
-  for (std::size_t i = 0; i < chain.size(); ++i) {
-    const Body b = body_of(chain.links[i]);
-    const Eigen::Vector3d a = chain.joints[i].axis;
-    const KDL::Frame to_next = i + 1 < chain.size()
-                                   ? frame(chain.joints[i + 1].rotation, chain.joints[i + 1].position)
-                                   : KDL::Frame::Identity();
-    const KDL::RigidBodyInertia inertia(
-        b.mass, KDL::Vector(b.centre.x(), b.centre.y(), b.centre.z()),
-        KDL::RotationalInertia(b.inertia(0, 0), b.inertia(1, 1), b.inertia(2, 2), b.inertia(0, 1),
-                               b.inertia(0, 2), b.inertia(1, 2)));
-    kdl.addSegment(
-        KDL::Segment(KDL::Joint(KDL::Vector::Zero(), KDL::Vector(a.x(), a.y(), a.z()), KDL::Joint::RotAxis),
-                     to_next, to_next.Inverse() * inertia));
-  }
-  return kdl;
-}
-
-KDL::JntArray to_kdl(const Joints& values) {
-  KDL::JntArray array(unsigned(values.size()));
-  array.data = values;
-  return array;
-}
+using test::to_kdl;
 
 TEST(Dynamics, InverseDynamicsIsKdls) {
   Random random(1);

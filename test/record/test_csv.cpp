@@ -392,11 +392,11 @@ TEST(Csv, ColumnsOfSeveralJointsAreOneRecordEach) {
   EXPECT_EQ(message_of([&] { parse("time,a/motor_position,motor_torque\n0,1,2\n"); }),
             "run.csv:1: some columns name their joint and some do not: all or none must (JOINT/channel)");
   EXPECT_EQ(message_of([&] { parse("time,a/motor_position,b/reference_position\n0,1,2\n"); }).substr(0, 26),
-            "run.csv:1: joint 'b': no to");
+            "run.csv:1: joint 'b': no t");
   EXPECT_EQ(message_of([&] { parse("time,a/motor_position,a/motor_position\n0,1,2\n"); }),
             "run.csv:1: column = 'a/motor_position': there twice");
   EXPECT_EQ(message_of([&] { parse("time,/motor_position\n0,1\n"); }).substr(0, 40),
-            "run.csv:1: column = '/motor_position': un");
+            "run.csv:1: column = '/motor_position': u");
 }
 
 TEST(Csv, MeasuredRecordsAreReadWhole) {

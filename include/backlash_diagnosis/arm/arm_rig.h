@@ -37,7 +37,8 @@ struct JointDrive {
   double constant = 1;        // k: N m per unit of the channel, > 0
   double constant_error = 0;  // of it, relative, one standard deviation; 0: exact
   std::array<double, kDriveTerms> terms = {};
-  double delay = 0;  // d [s]
+  double load_error = 0;  // of the term `load`, one standard deviation; 0: not said
+  double delay = 0;       // d [s]
 };
 
 struct ArmIdentification {

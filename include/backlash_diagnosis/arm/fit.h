@@ -5,10 +5,12 @@
 //   p_j = (tau_j + friction_j) exp(-kappa_j) / k_j,   D(P, P_0) = -log|P P_0^-1| + tr(P P_0^-1) - 4
 //
 // sigma_j is the residual's own deviation, c_j how many samples say the same once. D keeps every body
-// physical: it is infinite where no mass distribution has the parameters. At its weight of one a declared
-// body counts as known to a factor of e or so, which matters only where the records say nothing (Lee, Wensing
-// and Park 2020, IEEE T-RO 36:168). What must be positive in a drive has the same divergence in one
-// dimension. Standard errors are those of blocks left out, plus what declared constants leave open.
+// physical: it is infinite where no mass distribution has the parameters. P_0 is the declared body, of
+// whatever mass fits best, so that only its shape counts: at a weight of one as known to a factor of e or so,
+// which matters only where the records say nothing (Lee, Wensing and Park 2020, IEEE T-RO 36:168). What must
+// be positive in a drive has the same divergence in one dimension. All masses together are only as well known
+// as the declared constants. Standard errors are those of blocks left out, plus what the declared values
+// leave open.
 #pragma once
 
 #include <optional>
@@ -38,6 +40,7 @@ struct FitFreedom {
   std::optional<std::size_t> payload;  // at this link, in the motions that are marked
   double payload_sign = 1;
   bool tilt = false;                    // of gravity, in the motions that are marked
+  bool load = false;                    // friction that follows the load, about what is known of it
   std::optional<std::size_t> friction;  // of this joint, in the motions that are marked: factors of its drive
 };
 
@@ -63,6 +66,7 @@ struct ArmFit {
   std::vector<BaseParameter> base;
   std::vector<double> deviation;     // sigma_j, unit of the channel; NaN for a joint that does not move
   std::vector<double> train, floor;  // per joint: norm(r) / norm(s - mean(s)); what white noise would leave
+  Eigen::MatrixXd covariance;        // of all unknowns, in the order of the fit; empty: nothing was fitted
   std::vector<std::string> warnings;
 };
 
@@ -80,6 +84,11 @@ Prediction predict(const ArmFit& fit, const FitFreedom& freedom, const FittedMot
 /// norm(r) / norm(s - mean(s)) of each joint where it moves, over all motions; NaN where it moves less than
 /// `least_seconds`.
 std::vector<double> relative_errors(const ArmFit& fit, const FitFreedom& freedom,
+                                    const std::vector<FittedMotion>& motions, double least_seconds);
+
+/// What relative_errors() should be by the fit's own account: its residuals where it was fitted, and how well
+/// it knows what each sample depends on. Needs `covariance`.
+std::vector<double> foretold_errors(const ArmFit& fit, const FitFreedom& freedom,
                                     const std::vector<FittedMotion>& motions, double least_seconds);
 
 }  // namespace backlash::arm

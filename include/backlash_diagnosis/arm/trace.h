@@ -27,7 +27,7 @@ struct ArmTraceSettings {
   double least_friction =
       0.25;  // of a factor from one; choice: warm-up (Bittencourt and Axelsson 2013) moves as much
   double same_link = 0.03;  // share of the error by which another link must do better than the last; choice
-  double foretold = 4;      // times the training error: a joint above it is unexplained; choice: days differ by 2.3
+  double foretold = 3;      // times what the fit expects of itself: a joint above it is unexplained; choice
   double block = 2;         // s, of the bootstrap; as FitSettings::block
   int draws = 400;          // choice (time)
   std::uint64_t seed = 1;   // choice
@@ -47,7 +47,7 @@ struct ArmStep {
   std::vector<double> before, after;                // relative error per joint on the judged part
   double gain = 0, gain_lower = 0, gain_upper = 0;  // share of the squared error taken away there, 95 %
   std::vector<std::string> equivalent_to;
-  std::optional<PushEvent> push;
+  std::optional<PushEvent> push;  // whose `torque` parameter is that on the joint: minus the drive's
 };
 
 struct ArmTrace {
