@@ -177,9 +177,9 @@ std::vector<char> Fit::free_unknowns(bool first) const {
   if (freedom_.links) set(0, layout_.payload());
   if (freedom_.payload) set(layout_.payload(), 10);
   if (freedom_.tilt) set(layout_.tilt(), 2);
-  if (freedom_.friction) set(layout_.friction(), 1);
   for (Eigen::Index j = 0; j < layout_.joints; ++j) {
     if (!moves_[std::size_t(j)]) continue;
+    if (freedom_.friction) set(layout_.friction(j), 1), set(layout_.shift(j), 1);
     if (freedom_.drives)
       for (const DriveTerm t : rig_.terms) set(layout_.drive(j) + Eigen::Index(t), 1);
     if (freedom_.load && rig_.joints[std::size_t(j)].load_error > 0)
@@ -196,7 +196,8 @@ void Fit::apply(const Eigen::VectorXd& step) {
     state_.links[std::size_t(i)] += step.segment<10>(layout_.link(i));
   state_.payload += step.segment<10>(layout_.payload());
   state_.tilt += step.segment<2>(layout_.tilt());
-  state_.friction += step[layout_.friction()];
+  state_.friction += step.segment(layout_.friction(0), layout_.joints);
+  state_.shift += step.segment(layout_.shift(0), layout_.joints);
   for (Eigen::Index j = 0; j < layout_.joints; ++j)
     state_.drives.row(j) += step.segment(layout_.drive(j), kDriveUnknowns).transpose();
 }
@@ -336,8 +337,12 @@ ArmFit Fit::result(const Eigen::MatrixXd& covariance, const std::vector<std::vec
   if (freedom_.payload) set_payload(fit, covariance);
   for (Eigen::Index i = 0; i < 2; ++i)
     fit.tilt[i] = {state_.tilt[i], std::sqrt(covariance(layout_.tilt() + i, layout_.tilt() + i))};
-  const double factor = std::exp(state_.friction);
-  fit.friction_factor = {factor, factor * std::sqrt(covariance(layout_.friction(), layout_.friction()))};
+  for (Eigen::Index j = 0; j < layout_.joints; ++j) {
+    const double factor = std::exp(state_.friction[j]);
+    const Eigen::Index place = layout_.friction(j);
+    fit.shifts.push_back(state_.shift[j]);
+    fit.friction_factors.push_back({factor, factor * std::sqrt(std::max(0.0, covariance(place, place)))});
+  }
   set_errors(fit, all);
   if (freedom_.links) fit.base = base_parameters(rig_, motions_, state_, covariance);
   return fit;

@@ -44,6 +44,7 @@ Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& ti
 State FitModel::start() const {
   State state;
   state.links = rig_.chain.links;
+  state.friction = state.shift = Eigen::VectorXd::Zero(Eigen::Index(rig_.joints.size()));
   state.drives = Eigen::MatrixXd::Zero(Eigen::Index(rig_.joints.size()), kDriveUnknowns);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     for (std::size_t t = 0; t < kDriveTerms; ++t)
@@ -101,11 +102,11 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
   const ArmMotion& m = *motion.motion;
   const auto c = Eigen::Index(j);
   const Layout at{Eigen::Index(rig_.joints.size())};
-  const bool carries = freedom_.payload && motion.marked, rubs = freedom_.friction == j && motion.marked;
+  const bool carries = freedom_.payload && motion.marked, rubs = freedom_.friction && motion.marked;
   const double factor = std::exp(-state.drives(c, kDriveTerms)) / rig_.joints[j].constant;
   Linearised out;
   const Eigen::Index links = 10 * at.joints, rows = Eigen::Index(m.rows.size());
-  out.sensitivity.resize(rows, links + kDriveUnknowns + (carries ? 10 : 0) + tilt.cols() + (rubs ? 1 : 0));
+  out.sensitivity.resize(rows, links + kDriveUnknowns + (carries ? 10 : 0) + tilt.cols() + (rubs ? 2 : 0));
   for (Eigen::Index i = 0; i < links; ++i) out.unknowns.push_back(i);
   out.sensitivity.leftCols(links) = factor * m.chain[j];
   Eigen::MatrixXd drive = m.drive[j];
@@ -115,9 +116,10 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
   if (rubs)
     for (const DriveTerm t :
          {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
-      kept[int(t)] *= std::exp(state.friction);
+      kept[int(t)] *= std::exp(state.friction[c]);
   const Chain chain = this->chain(state, motion.marked);
   out.predicted = drive * kept;
+  if (rubs) out.predicted.array() += state.shift[c];
   for (Eigen::Index i = 0; i < at.joints; ++i)
     out.predicted += m.chain[j].middleCols(10 * i, 10) * chain.links[std::size_t(i)];
   if (tilt.cols() > 0)
@@ -144,7 +146,9 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
     Eigen::VectorXd part = kept;
     part[int(DriveTerm::rotor_inertia)] = part[int(DriveTerm::offset)] = 0;
     out.sensitivity.col(next) = factor * (drive * part);
-    out.unknowns.push_back(at.friction());
+    out.unknowns.push_back(at.friction(c));
+    out.sensitivity.col(next + 1).setConstant(factor);
+    out.unknowns.push_back(at.shift(c));
   }
   return out;
 }

@@ -17,7 +17,8 @@ struct State {
   std::vector<BodyParameters> links;
   BodyParameters payload = BodyParameters::Zero();  // of the body, without the sign
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   // rad
-  double friction = 0;                              // logarithm of the factor
+  Eigen::VectorXd friction;                         // logarithms of the factors, one per joint
+  Eigen::VectorXd shift;                            // N m, of the offsets
   Eigen::MatrixXd drives;                           // joints x kDriveUnknowns
 };
 
@@ -27,8 +28,9 @@ struct Layout {
   Eigen::Index link(Eigen::Index i) const { return 10 * i; }
   Eigen::Index payload() const { return 10 * joints; }
   Eigen::Index tilt() const { return payload() + 10; }
-  Eigen::Index friction() const { return tilt() + 2; }
-  Eigen::Index drive(Eigen::Index j) const { return friction() + 1 + kDriveUnknowns * j; }
+  Eigen::Index friction(Eigen::Index j) const { return tilt() + 2 + j; }
+  Eigen::Index shift(Eigen::Index j) const { return friction(joints) + j; }
+  Eigen::Index drive(Eigen::Index j) const { return shift(joints) + kDriveUnknowns * j; }
   Eigen::Index kappa(Eigen::Index j) const { return drive(j) + Eigen::Index(kDriveTerms); }
   Eigen::Index delay(Eigen::Index j) const { return kappa(j) + 1; }
   Eigen::Index size() const { return drive(joints); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fit_priors.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -39,6 +40,7 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
       weight_(settings.declared_weight),
       mass_(settings.payload_mass),
       radius_(settings.payload_radius),
+      shift_(settings.day_shift),
       payload_(freedom.payload.has_value()) {
   if (freedom.links)
     for (std::size_t i = 0; i < rig.chain.size(); ++i)
@@ -59,6 +61,10 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
       }
       normal_.push_back({layout_.delay(c), drive.delay, 1 / (kDelayError * kDelayError)});
     }
+    if (freedom.friction) {
+      normal_.push_back({layout_.friction(c), 0, 1 / (settings.day * settings.day)});
+      day_.push_back(c);
+    }
     if (freedom.load && !freedom.drives && drive.load_error > 0) {
       const Eigen::Index place = layout_.drive(c) + Eigen::Index(DriveTerm::load);
       normal_.push_back(
@@ -75,6 +81,8 @@ Eigen::VectorXd Priors::vector_of(const State& state) const {
   for (Eigen::Index i = 0; i < layout_.joints; ++i)
     x.segment<10>(layout_.link(i)) = state.links[std::size_t(i)];
   x.segment<10>(layout_.payload()) = state.payload;
+  x.segment(layout_.friction(0), layout_.joints) = state.friction;
+  x.segment(layout_.shift(0), layout_.joints) = state.shift;
   for (Eigen::Index j = 0; j < layout_.joints; ++j)
     x.segment(layout_.drive(j), kDriveUnknowns) = state.drives.row(j).transpose();
   return x;
@@ -151,6 +159,13 @@ void Priors::follow(const Eigen::VectorXd& x) {
       d.inverse *= 4 / (d.inverse * p).trace();
   }
   for (Positive& p : positive_) p.reference = x[p.place];
+  for (const Eigen::Index j : day_) {
+    const double size = shift_ * x[layout_.drive(j) + Eigen::Index(DriveTerm::coulomb)];
+    normal_.erase(std::remove_if(normal_.begin(), normal_.end(),
+                                 [&](const Normal& n) { return n.place == layout_.shift(j); }),
+                  normal_.end());
+    if (size > 0) normal_.push_back({layout_.shift(j), 0, 1 / (size * size)});
+  }
 }
 
 Eigen::VectorXd Priors::step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g, const State& state,

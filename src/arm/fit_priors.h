@@ -49,6 +49,8 @@ class Priors {
   Layout layout_;
   double weight_ = 1;
   double mass_ = 1, radius_ = 0.1;  // kg, m, of a payload to start from
+  double shift_ = 0.1;              // of offsets, per Coulomb friction
+  std::vector<Eigen::Index> day_;   // joints whose friction is of another day
   bool payload_ = false;
   std::vector<Divergence> bodies_;
   std::vector<Positive> positive_;

@@ -15,7 +15,10 @@ State state_of(const ArmFit& fit, const FitFreedom& freedom, const FitModel& mod
   State state = model.start();
   state.payload = freedom.payload_sign * fit.payload;
   if (freedom.tilt) state.tilt = {fit.tilt[0].value, fit.tilt[1].value};
-  if (freedom.friction) state.friction = std::log(fit.friction_factor.value);
+  if (freedom.friction)
+    for (std::size_t j = 0; j < fit.friction_factors.size(); ++j)
+      state.friction[Eigen::Index(j)] = std::log(fit.friction_factors[j].value),
+      state.shift[Eigen::Index(j)] = fit.shifts[j];
   return state;
 }
 

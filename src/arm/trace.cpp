@@ -50,8 +50,8 @@ struct Candidate {
   std::string effect;
   FitFreedom freedom;
   ArmFit fit;
-  std::vector<double> before, after;
-  double gain = 0, lower = 0, upper = 0;  // of the joint that it helps most
+  std::vector<double> gains, lowers, uppers;  // per joint, and of the mean logarithm of all
+  double gain = 0, lower = 0, upper = 0;      // of the joint that it helps most
   std::size_t joint = 0;
   double all_lower = 0;  // of the mean of all joints' logarithms, lower end
   double all = 0;
@@ -73,21 +73,26 @@ class Tracer {
   void look_for_pushes(const ArmRecord& test);
   void set_held_series(const ArmRecord& test);
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
-  std::vector<Candidate> candidates(const FitFreedom& accepted) const;
-  void try_out(Candidate& c, const Motions& fitted, const Motions& judged) const;
-  Squares squares(const Candidate& c, const Motions& judged) const;
+  std::vector<Candidate> candidates() const;
+  void fit_candidate(Candidate& c, const Motions& fitted) const;
+  void try_out(Candidate& c, const Candidate& without, const Motions& fitted, const Motions& judged) const;
+  Squares squares(const Candidate& without, const Candidate& c, const Motions& judged) const;
   void bootstrap(Candidate& c, const Squares& squares) const;
   std::string refusal(const Candidate& c) const;
   ArmStep step_of(const Candidate& c) const;
-  void finish(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit);
-  void set_unexplained(const std::vector<double>& foretold);
-  void set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit);
+  std::size_t best_of(const std::vector<Candidate>& all) const;
+  void tell_friction(const Candidate& c, const Motions& judged);
+  void finish(const Motions& judged, const Candidate& taken, bool named);
+  void set_augmented(const Candidate& taken);
+  void set_unexplained(const std::vector<double>& errors, const std::vector<double>& foretold);
+  void set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit, bool marked);
 
   const ArmRig& rig_;
   const ArmTraceSettings& settings_;
   const Progress& progress_;
   Motions train_, test_;
   ArmFit base_;
+  Candidate unnamed_;  // what foretells the test record best where nothing is named
   ArmTrace trace_;
 };
 
@@ -100,11 +105,11 @@ void Tracer::set_base() {
   for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
 }
 
-Squares Tracer::squares(const Candidate& c, const Motions& judged) const {
+Squares Tracer::squares(const Candidate& without, const Candidate& c, const Motions& judged) const {
   Squares all;
   for (const ArmMotion& m : judged) {
-    const FittedMotion plain{&m, false}, marked{&m, true};
-    const Prediction before = predict(base_, {}, plain), after = predict(c.fit, c.freedom, marked);
+    const Prediction before = predict(without.fit, without.freedom, {&m, true}),
+                     after = predict(c.fit, c.freedom, {&m, true});
     double begin = -1e300;
     for (std::size_t k = 0; k < m.rows.size(); ++k) {
       if (m.time[m.rows[k]] >= begin + settings_.block) {
@@ -141,34 +146,40 @@ void Tracer::bootstrap(Candidate& c, const Squares& s) const {
     return out;
   };
   for (std::size_t b = 0; b < blocks; ++b) places[b] = b;
-  const std::vector<double> all = gains(places);
-  c.joint = std::size_t(std::max_element(all.begin(), all.end() - 1) - all.begin());
-  c.gain = all[c.joint];
-  c.all = all[joints];
+  c.gains = gains(places);
+  c.joint = std::size_t(std::max_element(c.gains.begin(), c.gains.end() - 1) - c.gains.begin());
   Random random(settings_.seed);
-  std::vector<double> one, together;
+  std::vector<std::vector<double>> drawn(joints + 1);
   for (int d = 0; d < settings_.draws; ++d) {
     for (std::size_t& place : places) place = random.below(blocks);
-    const std::vector<double> drawn = gains(places);
-    one.push_back(drawn[c.joint]);
-    together.push_back(drawn[joints]);
+    const std::vector<double> one = gains(places);
+    for (std::size_t j = 0; j <= joints; ++j) drawn[j].push_back(one[j]);
   }
-  c.lower = signal::quantile(one, 0.025);
-  c.upper = signal::quantile(one, 0.975);
-  c.all_lower = signal::quantile(together, 0.025);
+  c.lowers.clear(), c.uppers.clear();
+  for (const std::vector<double>& of_joint : drawn) {
+    c.lowers.push_back(signal::quantile(of_joint, 0.025));
+    c.uppers.push_back(signal::quantile(of_joint, 0.975));
+  }
+  c.gain = c.gains[c.joint], c.lower = c.lowers[c.joint], c.upper = c.uppers[c.joint];
+  c.all = c.gains[joints], c.all_lower = c.lowers[joints];
 }
 
-void Tracer::try_out(Candidate& c, const Motions& fitted, const Motions& judged) const {
+/// The model with what may differ from day to day, and with the effect.
+void Tracer::fit_candidate(Candidate& c, const Motions& fitted) const {
   std::vector<FittedMotion> motions = as_fitted(fitted, true);
   c.freedom.links = c.freedom.drives = !rig_.fitted;
   c.freedom.load = rig_.fitted && c.freedom.payload;
+  c.freedom.friction = true;
   if (!rig_.fitted)
     for (const FittedMotion& m : as_fitted(train_, false)) motions.push_back(m);
   c.fit = fit_arm(rig_, motions, c.freedom, settings_.fit);
   if (rig_.fitted) c.fit.rig.common_error = rig_.common_error;
-  c.before = relative_errors(base_, {}, as_fitted(judged, false), settings_.fit.least_seconds);
-  c.after = relative_errors(c.fit, c.freedom, as_fitted(judged, true), settings_.fit.least_seconds);
-  bootstrap(c, squares(c, judged));
+}
+
+void Tracer::try_out(Candidate& c, const Candidate& without, const Motions& fitted,
+                     const Motions& judged) const {
+  fit_candidate(c, fitted);
+  bootstrap(c, squares(without, c, judged));
   c.reason = refusal(c);
 }
 
@@ -179,66 +190,42 @@ std::string Tracer::refusal(const Candidate& c) const {
         100 * c.gain, rig_.joints[c.joint].name, 100 * settings_.least_gain);
   if (!(c.lower > 0) || !(c.all_lower > 0))
     return "the part that was not fitted does not confirm it in all blocks of time";
-  if (c.effect == "payload" && !(std::fabs(c.fit.mass.value) > settings_.sure * c.fit.mass.standard_error))
+  if (c.freedom.payload && !(std::fabs(c.fit.mass.value) > settings_.sure * c.fit.mass.standard_error))
     return fmt::format("its mass is not told apart from none: {:.2g} +- {:.1g} kg", c.fit.mass.value,
                        c.fit.mass.standard_error);
-  if (c.effect == "gravity_direction") {
+  if (c.freedom.tilt) {
     const double tilt = std::hypot(c.fit.tilt[0].value, c.fit.tilt[1].value),
                  error = std::hypot(c.fit.tilt[0].standard_error, c.fit.tilt[1].standard_error);
     if (tilt < settings_.least_tilt || tilt < settings_.sure * error)
       return fmt::format("the tilt is {:.2g} +- {:.1g} rad, no more than a level base has", tilt, error);
   }
-  if (c.effect == "friction_drift") {
-    const signal::Measured& f = c.fit.friction_factor;
-    if (std::fabs(f.value - 1) < settings_.least_friction ||
-        std::fabs(f.value - 1) < settings_.sure * f.standard_error)
-      return fmt::format(
-          "friction is {:.2f} +- {:.2f} times that of the training, as warming up makes it too", f.value,
-          f.standard_error);
-  }
   return "";
 }
 
-std::vector<Candidate> Tracer::candidates(const FitFreedom& accepted) const {
+/// In their order: a payload at the last link, come or gone, first.
+std::vector<Candidate> Tracer::candidates() const {
   std::vector<Candidate> all;
-  const auto add = [&](const char* effect, const FitFreedom& freedom) {
-    Candidate c;
-    c.effect = effect;
-    c.freedom = freedom;
-    all.push_back(c);
-  };
-  if (!accepted.payload) {
-    for (std::size_t i = rig_.chain.size(); i-- > 0;)
-      for (const double sign : {1.0, -1.0}) {
-        FitFreedom freedom = accepted;
-        freedom.payload = i;
-        freedom.payload_sign = sign;
-        add("payload", freedom);
-      }
-  }
-  if (!accepted.tilt) {
-    FitFreedom freedom = accepted;
-    freedom.tilt = true;
-    add("gravity_direction", freedom);
-  }
-  if (!accepted.friction) {
-    for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-      FitFreedom freedom = accepted;
-      freedom.friction = j;
-      add("friction_drift", freedom);
+  for (std::size_t i = rig_.chain.size(); i-- > 0;)
+    for (const double sign : {1.0, -1.0}) {
+      Candidate c;
+      c.effect = "payload";
+      c.freedom.payload = i;
+      c.freedom.payload_sign = sign;
+      all.push_back(c);
     }
-  }
+  Candidate tilt;
+  tilt.effect = "gravity_direction";
+  tilt.freedom.tilt = true;
+  all.push_back(tilt);
   return all;
 }
 
 ArmStep Tracer::step_of(const Candidate& c) const {
   ArmStep step;
   step.effect = c.effect;
-  step.before = c.before;
-  step.after = c.after;
   step.channel = rig_.joints[c.joint].name + "/torque";
   step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
-  if (c.effect == "payload") {
+  if (c.freedom.payload) {
     step.link = rig_.chain.joints[*c.freedom.payload].link;
     const double mass = c.fit.mass.value;
     const double error = rig_.fitted ? std::hypot(c.fit.mass.standard_error, mass * rig_.common_error)
@@ -246,65 +233,101 @@ ArmStep Tracer::step_of(const Candidate& c) const {
     step.parameters.push_back({"mass", "kg", {mass, error}});
     static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
     for (int i = 0; i < 3; ++i) step.parameters.push_back({names[i], "m", c.fit.centre[i]});
-  } else if (c.effect == "gravity_direction") {
-    step.parameters = {{"about_x", "rad", c.fit.tilt[0]}, {"about_y", "rad", c.fit.tilt[1]}};
   } else {
-    step.joint = rig_.joints[*c.freedom.friction].name;
-    step.parameters = {{"factor", "-", c.fit.friction_factor}};
+    step.parameters = {{"about_x", "rad", c.fit.tilt[0]}, {"about_y", "rad", c.fit.tilt[1]}};
   }
   return step;
 }
 
+/// Where friction is not that of the training: a step where it is more than a robot's warming up, else a
+/// note.
+void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
+  Candidate base;
+  base.fit = base_;
+  Candidate against = c;
+  bootstrap(against, squares(base, c, judged));
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    const signal::Measured& f = c.fit.friction_factors[j];
+    if (!(std::fabs(f.value - 1) > settings_.sure * f.standard_error)) continue;
+    const bool much = std::fabs(f.value - 1) > settings_.least_friction;
+    const std::string words =
+        fmt::format("friction of {} is {:.2f} +- {:.2f} times that of the training records",
+                    rig_.joints[j].name, f.value, f.standard_error);
+    if (!much || !(against.gains[j] > settings_.least_gain) || !(against.lowers[j] > 0)) {
+      trace_.notes.push_back(words + (much ? ", which the part that was not fitted does not confirm"
+                                           : ", as a robot's that warms up"));
+      continue;
+    }
+    ArmStep step;
+    step.effect = "friction_drift";
+    step.joint = rig_.joints[j].name;
+    step.channel = step.joint + "/torque";
+    step.parameters = {{"factor", "-", f}};
+    step.gain = against.gains[j], step.gain_lower = against.lowers[j], step.gain_upper = against.uppers[j];
+    trace_.steps.push_back(step);
+  }
+}
+
+/// The best of the candidates that are believed; none: the end of the list.
+std::size_t Tracer::best_of(const std::vector<Candidate>& all) const {
+  std::size_t best = all.size(), last = all.size();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all[i].reason.empty()) continue;
+    if (best == all.size() || all[i].all > all[best].all) best = i;
+    if (i < 2 && (last == all.size() || all[i].all > all[last].all)) last = i;
+  }
+  const bool alike = best < all.size() && last < all.size() && all[best].freedom.payload &&
+                     all[best].all - all[last].all < -std::log(1 - settings_.same_link);
+  return alike ? last : best;
+}
+
 /// True where something was found.
 bool Tracer::search(const Motions& fitted, const Motions& judged, const std::string& words) {
-  FitFreedom accepted;
-  ArmFit fit = base_;
-  for (int round = 0; round < 3; ++round) {
-    std::vector<Candidate> all = candidates(accepted);
-    std::size_t best = all.size(), last = all.size();
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
-      // The last link, tried first with both signs, tells whether something has come or gone.
-      if (all[i].effect == "payload" && i > 1 &&
-          (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0)) {
-        all[i].reason = "not tried";
-        continue;
-      }
-      try_out(all[i], fitted, judged);
-      if (!all[i].reason.empty()) continue;
-      if (best == all.size() || all[i].all > all[best].all) best = i;
-      if (all[i].effect == "payload" && all[i].freedom.payload == rig_.chain.size() - 1 &&
-          (last == all.size() || all[i].all > all[last].all))
-        last = i;
-    }
-    if (best < all.size() && last < all.size() && all[best].effect == "payload" &&
-        all[best].all - all[last].all < -std::log(1 - settings_.same_link))
-      best = last;
-    if (round == 0 || best == all.size())
-      for (const Candidate& c : all)
-        if (!c.reason.empty() && (c.effect != "payload" || c.freedom.payload == rig_.chain.size() - 1))
-          trace_.rejected.push_back(
-              {c.effect + (c.freedom.friction ? " of " + rig_.joints[*c.freedom.friction].name : "") +
-                   (c.effect == "payload" && c.freedom.payload_sign < 0 ? " (taken away)" : ""),
-               c.reason});
-    if (best == all.size()) break;
-    if (round > 0) break;  // a second effect is not searched yet: see below
-    trace_.steps.push_back(step_of(all[best]));
-    accepted = all[best].freedom;
-    fit = all[best].fit;
-    break;
+  Candidate without;
+  fit_candidate(without, fitted);
+  std::vector<Candidate> all = candidates();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
+    // Whether something has come or gone is clear from the last link.
+    if (all[i].freedom.payload && i > 1 && (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0))
+      all[i].reason = "not tried";
+    else
+      try_out(all[i], without, fitted, judged);
   }
-  if (trace_.steps.empty()) return false;
+  trace_.rejected.clear();
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (!all[i].reason.empty() && (i < 2 || all[i].freedom.tilt))
+      trace_.rejected.push_back(
+          {all[i].effect + (all[i].freedom.payload_sign < 0 ? " (taken away)" : ""), all[i].reason});
+  trace_.notes.clear();
+  const std::size_t best = best_of(all);
+  const Candidate& taken = best < all.size() ? all[best] : without;
+  if (best < all.size()) trace_.steps.push_back(step_of(taken));
+  tell_friction(taken, judged);
+  for (std::size_t i = 0; best < all.size() && i < all.size(); ++i)
+    if (i != best && all[i].reason.empty() && taken.freedom.payload && all[i].freedom.payload &&
+        taken.all - all[i].all < -std::log(1 - settings_.same_link))
+      trace_.notes.push_back("a payload at " + rig_.chain.joints[*all[i].freedom.payload].link +
+                             " does nearly as well");
+  if (trace_.steps.empty()) {
+    unnamed_ = without;
+    return false;
+  }
   trace_.judged = words;
-  finish(judged, accepted, fit);
+  finish(judged, taken, true);
+  for (ArmStep& step : trace_.steps) step.before = trace_.before, step.after = trace_.after;
   return true;
 }
 
-void Tracer::finish(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit) {
+/// Errors on the part that is judged, and the rig with what is named; `taken` is the model that foretells
+/// best, also where nothing of it is named.
+void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   const double least = settings_.fit.least_seconds;
-  const bool changed = freedom.payload || freedom.tilt || freedom.friction;
+  const FitFreedom& freedom = taken.freedom;
+  const ArmFit& fit = taken.fit;
+  const std::vector<double> best = relative_errors(fit, freedom, as_fitted(judged, true), least);
   trace_.before = relative_errors(base_, {}, as_fitted(judged, false), least);
-  trace_.after = changed ? relative_errors(fit, freedom, as_fitted(judged, true), least) : trace_.before;
+  trace_.after = named ? best : trace_.before;
   trace_.train = relative_errors(base_, {}, as_fitted(train_, false), least);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     double noise = 0, count = 0, sum = 0, squares = 0;
@@ -318,26 +341,33 @@ void Tracer::finish(const Motions& judged, const FitFreedom& freedom, const ArmF
     trace_.floor.push_back(std::isnan(trace_.before[j]) ? kNaN
                                                         : std::sqrt(noise / (squares - sum * sum / count)));
   }
-  trace_.augmented = fit.rig;
-  if (freedom.payload)
-    trace_.augmented.payloads.push_back({rig_.chain.joints[*freedom.payload].link, freedom.payload_sign,
-                                         BodyParameters(freedom.payload_sign * fit.payload)});
-  if (freedom.tilt)
-    trace_.augmented.chain.gravity = tilted(fit.rig.chain.gravity, {fit.tilt[0].value, fit.tilt[1].value});
-  if (freedom.friction)
-    for (const DriveTerm t :
-         {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
-      trace_.augmented.joints[*freedom.friction].terms[std::size_t(t)] *= fit.friction_factor.value;
-  set_series(judged, freedom, fit);
-  set_unexplained(fit.covariance.size() > 0 && !rig_.fitted
-                      ? foretold_errors(fit, freedom, as_fitted(judged, changed), least)
-                      : trace_.train);
+  if (named) set_augmented(taken);
+  set_series(judged, freedom, named ? fit : base_, named);
+  set_unexplained(best,
+                  rig_.fitted ? trace_.train : foretold_errors(fit, freedom, as_fitted(judged, true), least));
 }
 
-void Tracer::set_unexplained(const std::vector<double>& foretold) {
+void Tracer::set_augmented(const Candidate& taken) {
+  const FitFreedom& freedom = taken.freedom;
+  trace_.augmented = taken.fit.rig;
+  if (freedom.payload)
+    trace_.augmented.payloads.push_back({rig_.chain.joints[*freedom.payload].link, freedom.payload_sign,
+                                         BodyParameters(freedom.payload_sign * taken.fit.payload)});
+  if (freedom.tilt)
+    trace_.augmented.chain.gravity =
+        tilted(taken.fit.rig.chain.gravity, {taken.fit.tilt[0].value, taken.fit.tilt[1].value});
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    trace_.augmented.joints[j].terms[std::size_t(DriveTerm::offset)] += taken.fit.shifts[j];
+    for (const DriveTerm t :
+         {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
+      trace_.augmented.joints[j].terms[std::size_t(t)] *= taken.fit.friction_factors[j].value;
+  }
+}
+
+void Tracer::set_unexplained(const std::vector<double>& errors, const std::vector<double>& foretold) {
   double worst = settings_.foretold;
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-    const double ratio = trace_.after[j] / foretold[j];
+    const double ratio = errors[j] / foretold[j];
     if (!(ratio > worst)) continue;
     worst = ratio;
     trace_.unexplained = {
@@ -346,12 +376,13 @@ void Tracer::set_unexplained(const std::vector<double>& foretold) {
   }
 }
 
-void Tracer::set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit) {
+void Tracer::set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit, bool marked) {
   const std::size_t joints = rig_.joints.size();
   trace_.series.measured.resize(joints), trace_.series.before.resize(joints),
       trace_.series.after.resize(joints);
   for (const ArmMotion& m : judged) {
-    const Prediction before = predict(base_, {}, {&m, false}), after = predict(fit, freedom, {&m, true});
+    const Prediction before = predict(base_, {}, {&m, false}),
+                     after = predict(fit, marked ? freedom : FitFreedom(), {&m, marked});
     for (std::size_t k = 0; k < m.rows.size(); ++k) {
       trace_.series.time.push_back(m.time[m.rows[k]]);
       for (std::size_t j = 0; j < joints; ++j) {
@@ -426,13 +457,14 @@ ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test,
   if (rig_.fitted && !same_record &&
       search(train_, test_, "Effects are fitted to the training records and judged on the test record."))
     return std::move(trace_);
-  trace_.rejected.clear();
   if (search(first, second,
              "The test record is of a machine that has changed: effects are fitted to its first half and "
              "judged on its second half."))
     return std::move(trace_);
   trace_.judged = "Errors are those of the whole test record.";
-  finish(test_, {}, base_);
+  if (rig_.fitted && !same_record)
+    trace_.notes.push_back("nothing that the training records may show is confirmed by the test record");
+  finish(test_, unnamed_, false);
   return std::move(trace_);
 }
 

@@ -111,6 +111,21 @@ TEST(Trace, NamesNothingWhereNothingHasChanged) {
   }
 }
 
+// Friction and offsets that differ by some percent are a robot that warms up, and no payload.
+TEST(Trace, WarmingUpIsNoEffect) {
+  const test::Machine machine(21);
+  test::Machine warm = machine;
+  const double factors[] = {0.9, 1.08, 0.92, 1.1, 0.88, 1.05};
+  for (std::size_t j = 0; j < 6; ++j) {
+    for (const int t : {1, 2, 3, 4, 6}) warm.drives[j].terms[std::size_t(t)] *= factors[j];
+    warm.drives[j].terms[5] += 0.02 * (j % 2 == 0 ? 1 : -1) * machine.drives[j].terms[1];
+  }
+  const ArmTrace trace = trace_arm(machine.declared, {machine.record(1)}, warm.record(2), false);
+  EXPECT_TRUE(trace.steps.empty());
+  EXPECT_FALSE(trace.unexplained) << trace.unexplained->channel << trace.unexplained->signature;
+  EXPECT_EQ(trace.notes.size(), 6u);  // told, joint by joint
+}
+
 TEST(Trace, FindsGravityFromAnotherDirection) {
   const test::Machine machine(7);
   test::Machine tilted = machine;
@@ -131,7 +146,7 @@ TEST(Trace, FindsFrictionOfOneJoint) {
   for (const int t : {1, 2, 3, 4, 6}) rubbing.drives[3].terms[std::size_t(t)] *= 1.6;
   const ArmTrace trace =
       trace_arm(machine.declared, {machine.record(1), machine.record(2)}, rubbing.record(3), false);
-  ASSERT_EQ(trace.steps.size(), 1u);
+  ASSERT_EQ(trace.steps.size(), 1u);  // the factor is that of all its friction
   EXPECT_EQ(trace.steps[0].effect, "friction_drift");
   EXPECT_EQ(trace.steps[0].joint, "wrist_1_joint");
   EXPECT_NEAR(trace.steps[0].parameters[0].measured.value, 1.6, 0.1);

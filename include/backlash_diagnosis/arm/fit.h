@@ -30,7 +30,10 @@ struct FitSettings {
   double least_seconds = 5;     // of motion, in which a joint is known; choice
   double rotor_inertia = 0.5;   // kg m^2, to start from: of a joint that lifts some kilograms; choice
   double load_friction = 0.05;  // to start from: a good gear; choice
-  double payload_mass = 1;      // kg, and
+  double day = 0.3;         // of the logarithm of friction from day to day: a warm robot rubs half as much
+                            // (Bittencourt and Axelsson, LiTH-ISY-R-3058)
+  double day_shift = 0.1;   // of the offset from day to day, per Coulomb friction: as its asymmetry; choice
+  double payload_mass = 1;  // kg, and
   double payload_radius = 0.1;  // m, to start from; choice
 };
 
@@ -39,9 +42,9 @@ struct FitFreedom {
   bool links = true, drives = true, constants = true;
   std::optional<std::size_t> payload;  // at this link, in the motions that are marked
   double payload_sign = 1;
-  bool tilt = false;                    // of gravity, in the motions that are marked
-  bool load = false;                    // friction that follows the load, about what is known of it
-  std::optional<std::size_t> friction;  // of this joint, in the motions that are marked: factors of its drive
+  bool tilt = false;      // of gravity, in the motions that are marked
+  bool load = false;      // friction that follows the load, about what is known of it
+  bool friction = false;  // of each joint, in the motions that are marked: a factor
 };
 
 struct FittedMotion {
@@ -61,7 +64,8 @@ struct ArmFit {
   BodyParameters payload = BodyParameters::Zero();  // times the sign
   signal::Measured mass, centre[3];  // of the payload, without the common error of the constants
   signal::Measured tilt[2];          // rad, about x and y of the base
-  signal::Measured friction_factor;  // of the joint
+  std::vector<double> shifts;        // N m, of the joints' offsets, with the factors
+  std::vector<signal::Measured> friction_factors;     // of the joints
   std::vector<std::vector<signal::Measured>> drives;  // per joint: kDriveTerms, constant, delay
   std::vector<BaseParameter> base;
   std::vector<double> deviation;     // sigma_j, unit of the channel; NaN for a joint that does not move
