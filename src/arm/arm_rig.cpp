@@ -72,6 +72,7 @@ JointDrive read_joint(const YamlReader& yaml) {
   }
   joint.delay = yaml.number_or("delay", 0, Range::between(-kLongestDelay, kLongestDelay));
   yaml.uncertainty("delay");
+  joint.training_error = yaml.number_or("training_error", 0, Range::not_negative());
   return joint;
 }
 
@@ -207,6 +208,8 @@ std::string joint_text(const ArmRig& rig, const JointDrive& joint) {
                               joint.load_error, spec.unit)
                 : fmt::format("    {}: {:.8g}  # {}\n", spec.name, value, spec.unit);
   }
+  if (joint.training_error > 0)
+    text += fmt::format("    training_error: {:.4g}  # relative\n", joint.training_error);
   return text + fmt::format("    delay: {:.6g}  # s\n", joint.delay);
 }
 

@@ -320,6 +320,7 @@ void Fit::set_errors(ArmFit& fit, const std::vector<std::vector<Linearised>>& al
     }
     const double spread = squares - sum * sum / count;
     fit.train.push_back(moves_[j] ? std::sqrt(residual / spread) : kNaN);
+    if (freedom_.links && moves_[j]) fit.rig.joints[j].training_error = fit.train.back();
     fit.floor.push_back(moves_[j] ? std::sqrt(noise / spread) : kNaN);
     if (!moves_[j])
       fit.warnings.push_back(rig_.joints[j].name + " does not move long enough: its drive is as declared");

@@ -17,6 +17,10 @@ namespace {
 
 using Motions = std::vector<ArmMotion>;
 
+const char* const kHalves =
+    "The test record is of a machine that has changed: effects are fitted to its first half and judged on "
+    "its second half.";
+
 std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked) {
   std::vector<FittedMotion> all;
   for (const ArmMotion& m : motions) all.push_back({&m, marked});
@@ -70,6 +74,9 @@ class Tracer {
     if (progress_ && !progress_(fraction, phase)) throw Cancelled();
   }
   void set_base();
+  bool changed_since(const Motions& first, const Motions& second);
+  void search_all(bool same_record);
+  void cannot_judge(const std::string& why);
   void look_for_pushes(const ArmRecord& test);
   void set_held_series(const ArmRecord& test);
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
@@ -92,6 +99,7 @@ class Tracer {
   const Progress& progress_;
   Motions train_, test_;
   ArmFit base_;
+  Candidate taken_;    // what was named
   Candidate unnamed_;  // what foretells the test record best where nothing is named
   ArmTrace trace_;
 };
@@ -314,6 +322,7 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
     return false;
   }
   trace_.judged = words;
+  taken_ = taken;
   finish(judged, taken, true);
   for (ArmStep& step : trace_.steps) step.before = trace_.before, step.after = trace_.after;
   return true;
@@ -343,8 +352,11 @@ void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   }
   if (named) set_augmented(taken);
   set_series(judged, freedom, named ? fit : base_, named);
-  set_unexplained(best,
-                  rig_.fitted ? trace_.train : foretold_errors(fit, freedom, as_fitted(judged, true), least));
+  std::vector<double> foretold = trace_.train;  // of a fitted rig: what it says of itself
+  if (!rig_.fitted) foretold = foretold_errors(fit, freedom, as_fitted(judged, true), least);
+  for (std::size_t j = 0; rig_.fitted && j < rig_.joints.size(); ++j)
+    if (rig_.joints[j].training_error > 0) foretold[j] = rig_.joints[j].training_error;
+  set_unexplained(best, foretold);
 }
 
 void Tracer::set_augmented(const Candidate& taken) {
@@ -418,6 +430,59 @@ void Tracer::look_for_pushes(const ArmRecord& test) {
   }
 }
 
+/// Whether what was found in the training records is another one in the test record: then that counts.
+bool Tracer::changed_since(const Motions& first, const Motions& second) {
+  const ArmTrace in_training = trace_;
+  const Candidate old = taken_;
+  trace_.steps.clear(), trace_.floor.clear(), trace_.series = {}, trace_.unexplained.reset();
+  if (search(first, second, kHalves)) {
+    Candidate halves = taken_;
+    bootstrap(halves, squares(old, halves, second));
+    if (halves.all > -std::log(1 - settings_.same_link) && halves.all_lower > 0) {
+      for (const ArmStep& step : in_training.steps)
+        trace_.notes.push_back(fmt::format("the training records show another one: {} {}{}, {} = {:.3g} {}",
+                                           step.effect, step.link, step.joint, step.parameters[0].name,
+                                           step.parameters[0].measured.value, step.parameters[0].unit));
+      return true;
+    }
+  }
+  trace_ = in_training;
+  return false;
+}
+
+void Tracer::cannot_judge(const std::string& why) {
+  for (auto* list : {&trace_.before, &trace_.after, &trace_.floor, &trace_.train})
+    list->assign(rig_.joints.size(), kNaN);
+  trace_.judged = why;
+}
+
+void Tracer::search_all(bool same_record) {
+  const Motions first = parts(test_, -1e300, middle(test_)), second = parts(test_, middle(test_), 1e300);
+  for (const Motions* half : {&first, &second}) {
+    double moving = 0;
+    for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+      double seconds = 0;
+      for (const ArmMotion& m : *half) seconds += moving_seconds(m, j);
+      moving = std::max(moving, seconds);
+    }
+    if (moving >= settings_.fit.least_seconds) continue;
+    trace_.cannot_tell = true;
+    return cannot_judge(
+        fmt::format("No joint moves for {} s in a half of the test record: nothing can be judged.",
+                    settings_.fit.least_seconds));
+  }
+  const bool in_training =
+      rig_.fitted && !same_record &&
+      search(train_, test_, "Effects are fitted to the training records and judged on the test record.");
+  if (in_training) {
+    changed_since(first, second);
+    return;
+  }
+  if (search(first, second, kHalves)) return;
+  trace_.judged = "Errors are those of the whole test record.";
+  finish(test_, unnamed_, false);
+}
+
 ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record) {
   trace_.joints = rig_.joint_names();
   tell(0, "reading the motion");
@@ -427,44 +492,16 @@ ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test,
   tell(0.1, "fitting the base machine");
   set_base();
   trace_.augmented = base_.rig;
-  const std::size_t joints = rig_.joints.size();
   if (holds_pose(test, settings_.push)) {
     look_for_pushes(test);
     set_held_series(test);
-    for (auto* list : {&trace_.before, &trace_.after, &trace_.floor, &trace_.train})
-      list->assign(joints, kNaN);
-    trace_.judged =
+    cannot_judge(
         "The test record holds its pose: friction at rest hides what the drives carry, so no error is given; "
-        "pushes are looked for.";
-    return std::move(trace_);
+        "pushes are "
+        "looked for.");
+  } else {
+    search_all(same_record);
   }
-  const double least = settings_.fit.least_seconds;
-  const Motions first = parts(test_, -1e300, middle(test_)), second = parts(test_, middle(test_), 1e300);
-  double moving = 0;
-  for (std::size_t j = 0; j < joints; ++j) {
-    double seconds = 0;
-    for (const ArmMotion& m : second) seconds += moving_seconds(m, j);
-    moving = std::max(moving, seconds);
-  }
-  if (moving < least) {
-    trace_.cannot_tell = true;
-    for (auto* list : {&trace_.before, &trace_.after, &trace_.floor, &trace_.train})
-      list->assign(joints, kNaN);
-    trace_.judged =
-        fmt::format("No joint moves for {} s in a half of the test record: nothing can be judged.", least);
-    return std::move(trace_);
-  }
-  if (rig_.fitted && !same_record &&
-      search(train_, test_, "Effects are fitted to the training records and judged on the test record."))
-    return std::move(trace_);
-  if (search(first, second,
-             "The test record is of a machine that has changed: effects are fitted to its first half and "
-             "judged on its second half."))
-    return std::move(trace_);
-  trace_.judged = "Errors are those of the whole test record.";
-  if (rig_.fitted && !same_record)
-    trace_.notes.push_back("nothing that the training records may show is confirmed by the test record");
-  finish(test_, unnamed_, false);
   return std::move(trace_);
 }
 

@@ -37,8 +37,9 @@ struct JointDrive {
   double constant = 1;        // k: N m per unit of the channel, > 0
   double constant_error = 0;  // of it, relative, one standard deviation; 0: exact
   std::array<double, kDriveTerms> terms = {};
-  double load_error = 0;  // of the term `load`, one standard deviation; 0: not said
-  double delay = 0;       // d [s]
+  double load_error = 0;      // of the term `load`, one standard deviation; 0: not said
+  double delay = 0;           // d [s]
+  double training_error = 0;  // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
 };
 
 struct ArmIdentification {
