@@ -83,7 +83,9 @@ std::vector<PushEvent> events(const Hold& h, std::size_t joint, double constant,
     const std::size_t end = rest_from(h, active, k, settings.between);
     PushEvent e;
     e.joint = joint;
-    e.begin = h.time[k];
+    e.begin =
+        h.time[k - std::min(k, std::size_t(settings.samples / 2))];  // a mean is late by half of its samples
+    e.clear = std::fabs(h.smooth[k] - level) / h.noise;
     e.released = end < h.time.size();
     e.end = e.released ? h.time[end] : h.time.back();
     for (std::size_t i = k; i < end; ++i)
@@ -102,7 +104,6 @@ std::vector<PushEvent> events(const Hold& h, std::size_t joint, double constant,
   return found;
 }
 
-/// Seconds that the window of activity looks back: a rest begins that much before it is seen.
 bool holds(const record::Record& joint, const PushSettings& settings) {
   const double interval = joint.sampling_interval();
   const std::vector<double>& speed = joint.column(record::Channel::motor_velocity);
@@ -127,8 +128,9 @@ std::vector<PushEvent> pushes(const ArmRecord& record, const ArmRig& rig, const 
     if (!(h.noise > 0)) continue;  // a constant: no sensor
     for (const PushEvent& e : events(h, j, rig.joints[j].constant, settings)) all.push_back(e);
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const PushEvent& a, const PushEvent& b) { return a.begin < b.begin; });
+  std::stable_sort(all.begin(), all.end(), [](const PushEvent& a, const PushEvent& b) {
+    return a.begin != b.begin ? a.begin < b.begin : a.clear > b.clear;
+  });
   return all;
 }
 

@@ -352,10 +352,13 @@ void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   }
   if (named) set_augmented(taken);
   set_series(judged, freedom, named ? fit : base_, named);
-  std::vector<double> foretold = trace_.train;  // of a fitted rig: what it says of itself
-  if (!rig_.fitted) foretold = foretold_errors(fit, freedom, as_fitted(judged, true), least);
-  for (std::size_t j = 0; rig_.fitted && j < rig_.joints.size(); ++j)
-    if (rig_.joints[j].training_error > 0) foretold[j] = rig_.joints[j].training_error;
+  ArmFit known = fit;  // of a fitted rig: what it says of itself, and what the effect is not known to
+  if (rig_.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
+  std::vector<double> foretold = foretold_errors(known, freedom, as_fitted(judged, true), least);
+  for (std::size_t j = 0; rig_.fitted && j < rig_.joints.size(); ++j) {
+    const double said = rig_.joints[j].training_error;
+    foretold[j] = std::hypot(foretold[j], said > 0 ? said : trace_.train[j]);
+  }
   set_unexplained(best, foretold);
 }
 

@@ -111,6 +111,40 @@ TEST(Trace, NamesNothingWhereNothingHasChanged) {
   }
 }
 
+// The same body, mounted in another place: the fitted machine tells that of the test record, and the same
+// mass.
+TEST(Trace, OfAFittedMachineThePayloadOfTheTestRecordCounts) {
+  const test::Machine machine(9);
+  const auto base = motions(machine, {machine.record(1), machine.record(2)});
+  ArmRig rig = fit_arm(machine.declared, fitted(base)).rig;
+  double masses[2];
+  const Eigen::Vector3d centres[] = {{0.03, -0.12, 0.15}, {-0.08, 0.05, 0.2}};
+  const auto loaded = [&](int i) {
+    test::Machine m = machine;
+    Body body;
+    body.mass = 3;
+    body.centre = centres[i];
+    body.inertia = 0.01 * Eigen::Matrix3d::Identity();
+    m.chain.links[5] += parameters_of(body);
+    return m.record(std::uint64_t(20 + i));
+  };
+  for (int i = 0; i < 2; ++i) {
+    const ArmTrace trace = trace_arm(rig, {loaded(1 - i)}, loaded(i), false);
+    ASSERT_EQ(trace.steps.size(), 1u);
+    EXPECT_EQ(trace.steps[0].effect, "payload");
+    const auto& p = trace.steps[0].parameters;
+    masses[i] = p[0].measured.value;
+    EXPECT_LT(std::fabs(masses[i] - 3), 3 * p[0].measured.standard_error);
+    for (int k = 0; k < 3; ++k)
+      EXPECT_LT(std::fabs(p[std::size_t(1 + k)].measured.value - centres[i][k]),
+                4 * p[std::size_t(1 + k)].measured.standard_error + 0.002)
+          << k;
+    EXPECT_FALSE(trace.unexplained);
+    EXPECT_FALSE(trace.notes.empty());  // what the training record carries
+  }
+  EXPECT_NEAR(masses[0] / masses[1], 1, 0.03);
+}
+
 // Friction and offsets that differ by some percent are a robot that warms up, and no payload.
 TEST(Trace, WarmingUpIsNoEffect) {
   const test::Machine machine(21);

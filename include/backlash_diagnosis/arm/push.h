@@ -18,7 +18,7 @@ namespace backlash::arm {
 struct PushSettings {
   double quiet = 1;    // s, at the start, that tells the noise; choice
   double onset = 8;    // deviations of noise from the quiet level; theory: by chance once in 10^15 samples
-  double samples = 5;  // of successive ones in ten, that must be off: a lost sample is no contact; choice
+  double samples = 5;  // whose mean is looked at; choice
   double active =
       4;  // deviations: half the range within `window` above which the torque is not at rest; choice
   double window = 0.5;  // s; choice: hands are slower than noise
@@ -29,6 +29,7 @@ struct PushSettings {
 struct PushEvent {
   std::size_t joint = 0;
   double begin = 0, end = 0;  // s of the record; end: where it is released
+  double clear = 0;           // deviations of noise at the begin
   bool released = true;       // else the record ends in it
   double torque = 0;  // N m, the farthest from the level before; the drive's, so the push has the other sign
   double torque_error =
@@ -36,7 +37,8 @@ struct PushEvent {
   double left = 0;  // N m, the level after less that before: what creep and friction keep
 };
 
-/// Of all joints that hold still, in the order of their begin. `constant` N m per unit of the signal.
+/// Of all joints that hold still, in the order of their begin, the clearest of one sample first. `constant` N
+/// m per unit of the signal.
 std::vector<PushEvent> pushes(const ArmRecord& record, const ArmRig& rig, const PushSettings& settings = {});
 
 /// Whether all joints hold still (slower than `rest`) for the whole record.
