@@ -23,6 +23,15 @@ def joint_figure(series, joint, found):
     """What the drive gave and what both models say; below it what they leave."""
     time = np.array(series["time"], float)
     measured, before, after = (np.array(joint[key], float) for key in ("measured", "before", "after"))
+    if not np.isfinite(before).any():  # a joint at rest: nothing foretells it
+        figure, above = plt.subplots(figsize=plotting.PAGE_FIGURE, layout="constrained")
+        above.plot(time, measured, "-", color=MEASURED, linewidth=0.8)
+        for event in series["events"]:
+            if event["joint"] == joint["name"]:
+                above.axvspan(event["begin"], event["end"], color=EVENT, zorder=0)
+        above.set_ylabel("drive [%s]" % series["unit"])
+        above.set_xlabel("time [s]")
+        return plotting.picture(figure, joint["name"])
     figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(5.6, 4.2), layout="constrained",
                                           gridspec_kw={"height_ratios": (3, 2)})
     above.plot(time, measured, "-", color=MEASURED, linewidth=0.8, label="measured")
@@ -30,9 +39,6 @@ def joint_figure(series, joint, found):
         lines = (("before", before, BEFORE), ("after", after, AFTER)) if found else (("model", before, AFTER),)
         for label, values, colour in lines:
             axes.plot(time, sign * values + offset, "-", color=colour, linewidth=0.8, label=label)
-    for event in series["events"]:
-        if event["joint"] == joint["name"]:
-            above.axvspan(event["begin"], event["end"], color=EVENT, zorder=0)
     above.set_ylabel("drive [%s]" % series["unit"])
     below.set_ylabel("left [%s]" % series["unit"])
     below.set_xlabel("time [s]")
