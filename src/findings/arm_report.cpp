@@ -285,6 +285,7 @@ std::string arm_trace_page(const arm::ArmTrace& trace, const TraceInputs& inputs
                        {"effects", report::Json::array()},
                        {"has_rejected", !trace.rejected.empty()},
                        {"rejected", report::Json::array()},
+                       {"notes", trace.notes},
                        {"warnings", report::warnings_section(trace.warnings)},
                        {"plots", plots},
                        {"provenance", provenance}};
