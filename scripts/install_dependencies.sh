@@ -16,12 +16,14 @@ run=(
   python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
+  liburdfdom-dev liburdfdom-headers-dev                           # robots as URDF
   python3-matplotlib python3-numpy python3-yaml                   # plots
 )
 tests=(
   catkin-lint
   libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
   chromium chromium-driver python3-selenium                       # tests that look at the pages in a browser
+  liborocos-kdl-dev                                               # oracle of the arm's dynamics
   clang-format clang-tidy doxygen                                 # what scripts/check_style.sh and api_doc.sh call
 )
 case ${1:-} in

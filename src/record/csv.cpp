@@ -5,7 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <deque>
 #include <istream>
+#include <iterator>
+#include <map>
 #include <string_view>
 #include <vector>
 
@@ -106,17 +109,18 @@ void split(std::string_view line, std::vector<std::string_view>& fields) {
 
 class Reader {
  public:
-  Reader(std::istream& in, const std::string& name) : lines_(in, name), name_(name) { record_.name = name; }
+  Reader(std::istream& in, const std::string& name) : lines_(in, name), name_(name) {}
 
-  Record read() {
+  std::vector<JointRecord> read() {
     read_header();
     read_rows();
-    if (record_.time.empty()) throw BadData(name_, "no data: there are only column names");
+    if (time_.empty()) throw BadData(name_, "no data: there are only column names");
+    Record& first = joints_.front().record;
     const std::string repeated = stamps_.describe("line " + std::to_string(first_repeated_line_));
-    if (!repeated.empty()) record_.warnings.push_back(repeated);
-    for (std::string& warning : describe_time_base(record_.time))
-      record_.warnings.push_back(std::move(warning));
-    return std::move(record_);
+    if (!repeated.empty()) first.warnings.push_back(repeated);
+    for (std::string& warning : describe_time_base(time_)) first.warnings.push_back(std::move(warning));
+    for (JointRecord& joint : joints_) joint.record.time = time_;
+    return {std::make_move_iterator(joints_.begin()), std::make_move_iterator(joints_.end())};
   }
 
  private:
@@ -128,8 +132,15 @@ class Reader {
     refuse_other_separator();
     for (const std::string_view field : fields_) add_column(std::string(field));
     if (time_column_ == kNone) lines_.fail("no column 'time'; there are: " + joined(names_));
-    if (!has_required_channel(channels_)) {
-      lines_.fail("no torque, position, speed of the motor, current or acceleration: needs at least one of " +
+    for (const JointRecord& joint : joints_) check_channels(joint);
+    if (joints_.empty()) check_channels({});
+  }
+
+  void check_channels(const JointRecord& joint) const {
+    if (!has_required_channel(channels_.count(joint.joint) ? channels_.at(joint.joint)
+                                                           : std::vector<Channel>())) {
+      lines_.fail((joint.joint.empty() ? "" : "joint " + in_quotes(joint.joint) + ": ") +
+                  "no torque, position, speed of the motor, current or acceleration: needs at least one of " +
                   joined(required_names()) + "; there are: " + joined(names_));
     }
   }
@@ -143,13 +154,27 @@ class Reader {
       time_column_ = names_.size();
       targets_.push_back(nullptr);
     } else {
+      const auto slash = name.rfind('/');
+      const std::string joint = slash == std::string::npos ? "" : name.substr(0, slash);
+      const std::string channel = slash == std::string::npos ? name : name.substr(slash + 1);
       const auto known = std::find_if(kChannels.begin(), kChannels.end(),
-                                      [&](Channel channel) { return channel_name(channel) == name; });
-      if (known == kChannels.end()) fail_unknown_column(name);
-      channels_.push_back(*known);
-      targets_.push_back(&record_.column(*known));
+                                      [&](Channel c) { return channel_name(c) == channel; });
+      if (known == kChannels.end() || slash == 0) fail_unknown_column(name);
+      channels_[joint].push_back(*known);
+      targets_.push_back(&record_of(joint).column(*known));
     }
     names_.push_back(name);
+  }
+
+  Record& record_of(const std::string& joint) {
+    const auto known =
+        std::find_if(joints_.begin(), joints_.end(), [&](const JointRecord& j) { return j.joint == joint; });
+    if (known != joints_.end()) return known->record;
+    if (!joints_.empty() && (joint.empty() || joints_.front().joint.empty()))
+      lines_.fail("some columns name their joint and some do not: all or none must (JOINT/channel)");
+    joints_.push_back({joint, {}});
+    joints_.back().record.name = name_;
+    return joints_.back().record;
   }
 
   [[noreturn]] void fail_unknown_column(const std::string& name) const {
@@ -207,7 +232,7 @@ class Reader {
   bool accept_stamp(double stamp) {
     switch (stamps_.next(stamp)) {
       case StampVerdict::accept:
-        record_.time.push_back(stamp);
+        time_.push_back(stamp);
         return true;
       case StampVerdict::repeated:
         if (first_repeated_line_ == 0) first_repeated_line_ = lines_.number();
@@ -223,10 +248,11 @@ class Reader {
 
   LineReader lines_;
   const std::string name_;
-  Record record_;
+  std::deque<JointRecord> joints_;  // targets_ point into them
+  std::vector<double> time_;
   std::vector<std::string> names_;
-  std::vector<Channel> channels_;
-  std::vector<std::vector<double>*> targets_;  // one per column, nullptr for time
+  std::map<std::string, std::vector<Channel>> channels_;  // of each joint
+  std::vector<std::vector<double>*> targets_;             // one per column, nullptr for time
   std::size_t time_column_ = kNone;
   std::vector<std::string_view> fields_;
   std::vector<double> values_;
@@ -288,7 +314,33 @@ Record read_csv(const std::string& path) {
 }
 
 Record read_csv(std::istream& in, const std::string& name) {
+  return record_of_joint(read_joints_csv(in, name), "", name);
+}
+
+std::vector<JointRecord> read_joints_csv(const std::string& path) {
+  std::ifstream in = open_input(path);
+  return read_joints_csv(in, path);
+}
+
+std::vector<JointRecord> read_joints_csv(std::istream& in, const std::string& name) {
   return Reader(in, name).read();
+}
+
+Record record_of_joint(std::vector<JointRecord> joints, const std::string& joint, const std::string& name) {
+  if (joints.size() == 1 && (joints.front().joint.empty() || joint.empty()))
+    return std::move(joints.front().record);
+  std::vector<std::string> names;
+  for (JointRecord& j : joints) {
+    names.push_back(j.joint);
+    if (j.joint != joint || joint.empty()) continue;
+    j.record.warnings.insert(j.record.warnings.begin(), joints.front().record.warnings.begin(),
+                             &j == &joints.front() ? joints.front().record.warnings.begin()
+                                                   : joints.front().record.warnings.end());
+    return std::move(j.record);
+  }
+  throw BadData(name, "several joints: " + joined(names) +
+                          (joint.empty() ? "; the command looks at one, which the rig file names (joint:)"
+                                         : "; the rig file asks for joint " + in_quotes(joint)));
 }
 
 void write_csv(const Record& record, const std::string& path) {

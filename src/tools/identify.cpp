@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/identification_report.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
+#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"
@@ -43,6 +44,8 @@ Command command() {
       "hand with the motor braked (clearance), the driver alone. A gear train with a torque sensor and a "
       "locked output is fitted to square waves of torque, to sensor_torque and motor_position as far as they "
       "are there; its records may be of several states of wear, the first of the one that the file declares. "
+      "An arm (a rig file with urdf) is fitted to records of all its joints, columns JOINT/channel: "
+      "links, drives and torque constants together. "
       "All parameters are those of the load side "
       "of the reduction.";
   c.examples = {"identify run.csv --rig config/two_inertia_servo.yaml --out fitted.yaml --json fit.json",
@@ -67,6 +70,10 @@ void check_outputs(const Arguments& arguments) {
 int identify_machine(const Arguments& arguments) {
   for (const std::string& path : arguments.positionals()) check_record_path(path);
   check_outputs(arguments);
+  if (arm::is_arm_rig(arguments.text("rig"))) {
+    if (arguments.has("plot")) throw UsageError("--plot: there is no plot for an arm");
+    return identify_arm(arguments);
+  }
   const rig_file::RigFile file = rig_file::load_rig_file(arguments.text("rig"));
   std::vector<record::Record> records;
   for (const std::string& path : arguments.positionals()) {

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/identification/effects/traced_rig.h"
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/ros/bag_record.h"
+#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/feedback.h"
@@ -42,7 +43,9 @@ Command command() {
       "(mesh: rigid) and a locked link need motor_torque and motor_position. All records must be sampled at "
       "the "
       "same rate. DIR/rig.yaml can be simulated at once. All parameters are those of the load side of the "
-      "reduction.";
+      "reduction. Of an arm (a rig file with urdf, records with columns JOINT/channel) payload, direction of "
+      "gravity, friction of a joint and pushes are traced; the test record may be of a machine that has "
+      "changed: then effects are fitted to its first half and judged on its second.";
   c.examples = {
       "trace_residual --rig config/two_inertia_servo.yaml --train run1.csv run2.csv --test run3.csv "
       "--out report",
@@ -111,6 +114,10 @@ identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
 }
 
 int trace(const Arguments& arguments) {
+  if (arm::is_arm_rig(arguments.text("rig"))) {
+    if (arguments.has("cutoff")) throw UsageError("--cutoff: the rig file of an arm says it (torque_cutoff)");
+    return trace_arm_residual(arguments);
+  }
   TraceJob job = job_of(arguments);
   identification::Trace done;
   try {

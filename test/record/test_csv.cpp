@@ -376,6 +376,29 @@ std::string unknown_column(const std::string& header) {
   return "";
 }
 
+TEST(Csv, ColumnsOfSeveralJointsAreOneRecordEach) {
+  std::istringstream in("time,b/motor_position,a/motor_current,a/motor_position\n0,1,2,3\n1,4,5,6\n");
+  const std::vector<JointRecord> joints = read_joints_csv(in, "run.csv");
+  ASSERT_EQ(joints.size(), 2u);
+  EXPECT_EQ(joints[0].joint, "b");
+  EXPECT_EQ(joints[1].joint, "a");
+  EXPECT_EQ(joints[0].record.column(Channel::motor_position), (std::vector<double>{1, 4}));
+  EXPECT_EQ(joints[1].record.column(Channel::motor_current), (std::vector<double>{2, 5}));
+  EXPECT_EQ(joints[1].record.time, (std::vector<double>{0, 1}));
+  EXPECT_EQ(record_of_joint(joints, "a", "run.csv").column(Channel::motor_position),
+            (std::vector<double>{3, 6}));
+  EXPECT_EQ(message_of([&] { record_of_joint(joints, "c", "run.csv"); }),
+            "run.csv: several joints: b, a; the rig file asks for joint 'c'");
+  EXPECT_EQ(message_of([&] { parse("time,a/motor_position,motor_torque\n0,1,2\n"); }),
+            "run.csv:1: some columns name their joint and some do not: all or none must (JOINT/channel)");
+  EXPECT_EQ(message_of([&] { parse("time,a/motor_position,b/reference_position\n0,1,2\n"); }).substr(0, 26),
+            "run.csv:1: joint 'b': no t");
+  EXPECT_EQ(message_of([&] { parse("time,a/motor_position,a/motor_position\n0,1,2\n"); }),
+            "run.csv:1: column = 'a/motor_position': there twice");
+  EXPECT_EQ(message_of([&] { parse("time,/motor_position\n0,1\n"); }).substr(0, 40),
+            "run.csv:1: column = '/motor_position': u");
+}
+
 TEST(Csv, MeasuredRecordsAreReadWhole) {
   const fs::path folder = measured_data();
   if (!fs::is_directory(folder)) GTEST_SKIP() << "no measured data at " << folder;
@@ -388,6 +411,17 @@ TEST(Csv, MeasuredRecordsAreReadWhole) {
     std::string header;
     while (std::getline(in, line)) {
       if (lines++ == 0) header = line;
+    }
+    if (header.find('/') != std::string::npos) {
+      const std::vector<JointRecord> joints = read_joints_csv(entry.path().string());
+      EXPECT_GT(joints.size(), 1u);
+      for (const JointRecord& joint : joints) {
+        EXPECT_EQ(joint.record.size() + 1, lines) << entry.path();
+        EXPECT_NE(header.find(joint.joint + "/motor_position"), std::string::npos) << entry.path();
+        EXPECT_EQ(record_of_joint(joints, joint.joint, "x").time, joint.record.time);
+      }
+      EXPECT_THROW(read_csv(entry.path().string()), BadData);
+      continue;
     }
     if (const std::string unknown = unknown_column(header); !unknown.empty()) {
       try {

@@ -5,11 +5,14 @@
 // Reading is strict: what is not plainly right is refused with its place. A byte order mark, CRLF, spaces
 // around fields, empty lines at the end and a missing final line end are accepted. A repeated stamp loses the
 // later row; that, gaps and jitter are told in Record::warnings.
+//
+// A file of several joints names its columns JOINT/channel: one Record per joint, all on one time base.
 #pragma once
 
 #include <cstddef>
 #include <iosfwd>
 #include <string>
+#include <vector>
 
 #include "backlash_diagnosis/record/record.h"
 
@@ -18,9 +21,23 @@ namespace backlash::record {
 constexpr std::size_t kLongestCsvLine = std::size_t{1} << 20;  ///< bytes
 
 /// Throws MissingInput when the file cannot be opened, BadData "path:17: motor_torque = 'abc': not a number"
-/// when its content cannot be used. Record::name is the path as given.
+/// when its content cannot be used, and where the file has several joints. Record::name is the path as given.
 Record read_csv(const std::string& path);
 Record read_csv(std::istream& in, const std::string& name);
+
+/// A joint of a record; no name where the columns have none.
+struct JointRecord {
+  std::string joint;
+  Record record;
+};
+
+/// The joints of a file in the order of their first column; a file of one joint gives one without a name.
+/// Throws as read_csv. The warnings on the time base are those of the first joint.
+std::vector<JointRecord> read_joints_csv(const std::string& path);
+std::vector<JointRecord> read_joints_csv(std::istream& in, const std::string& name);
+
+/// The joint of that name, or the only one there is. Throws BadData with the joints that are there.
+Record record_of_joint(std::vector<JointRecord> joints, const std::string& joint, const std::string& name);
 
 /// Writes the file whole or not at all. Values have all their digits: reading gives the same doubles. Times
 /// have at most nine decimals (1 ns). Throws CannotWrite when the file cannot be written, BadData when

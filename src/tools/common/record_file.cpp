@@ -60,7 +60,7 @@ BagPlace place_of(const rig_file::RigFile& file) {
 }
 
 record::Record read_record(const std::string& path, const BagPlace& place) {
-  if (!is_bag(path)) return record::read_csv(path);
+  if (!is_bag(path)) return record::record_of_joint(record::read_joints_csv(path), place.joint, path);
   return place.channels.declared ? ros_bridge::read_bag(path, place.channels)
                                  : ros_bridge::read_bag(path, place.joint, place.topic);
 }

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The rig file of an arm: its URDF, gravity, and a drive per joint.
+//
+//   k_j s_j(t + d_j) = tau_j(q, v, a) + J_j a_j + friction_j
+//   friction_j = c_j S + b_j v + n_j v |v| + h_j v^3 + o_j + l_j S |tau_j|,   S = tanh(v / v_0)
+//
+// s_j is the recorded channel: a current with k_j [N m/A], or a torque with k_j = 1; later than the motion by
+// d_j. tau_j is the chain's own torque, all at the joint's side of the reduction. Friction that follows the
+// load: e.g. Gautier and Jubien, IROS 2014; quadratic and cubic in speed: what a lubricated gear shows beyond
+// one line.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/arm/chain.h"
+#include "backlash_diagnosis/base/yaml_reader.h"
+#include "backlash_diagnosis/record/record.h"
+
+namespace backlash::arm {
+
+/// What a drive adds to the chain's torque, in the order of the equation above.
+enum class DriveTerm { rotor_inertia, coulomb, viscous, quadratic, cubic, offset, load };
+constexpr std::size_t kDriveTerms = 7;
+
+struct DriveTermSpec {
+  const char* name;  // in rig files and reports
+  const char* unit;
+  bool dissipates;  // must be >= 0
+};
+extern const std::array<DriveTermSpec, kDriveTerms> kDriveTermSpecs;
+
+struct JointDrive {
+  std::string name;
+  double constant = 1;        // k: N m per unit of the channel, > 0
+  double constant_error = 0;  // of it, relative, one standard deviation; 0: exact
+  std::array<double, kDriveTerms> terms = {};
+  double load_error = 0;      // of the term `load`, one standard deviation; 0: not said
+  double delay = 0;           // d [s]
+  double training_error = 0;  // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
+};
+
+struct ArmIdentification {
+  double kinematics_cutoff = 10;  // Hz, of position and speed
+  double torque_cutoff = 5;       // Hz, of the channel and of all that predicts it
+  double slowest = 0.02;          // rad/s: a slower joint does not count, its friction is not known
+  double friction_speed = 0.01;   // rad/s, v_0
+};
+
+/// A body that is carried beside what the URDF says.
+struct Payload {
+  std::string link;
+  double sign = 1;            // -1: a body that is no longer there
+  BodyParameters parameters;  // of the body itself, in the frame of the joint that turns the link
+};
+
+struct ArmRig {
+  std::string name;
+  std::string urdf;  // path
+  record::Channel channel = record::Channel::motor_current;
+  std::vector<DriveTerm> terms;  // that the drives have
+  std::vector<JointDrive> joints;
+  double common_error = 0;  // of all constants together, relative; known of a fitted rig
+  ArmIdentification identification;
+  Chain chain;          // of the URDF, with the fitted links in its place where there are some
+  bool fitted = false;  // the file has links of its own
+  std::vector<Payload> payloads;
+  std::string source;  // path of the rig file
+  std::string text;
+
+  std::vector<std::string> joint_names() const;
+};
+
+/// Whether a rig file is that of an arm: it has `urdf`. Throws MissingInput, BadData.
+bool is_arm_rig(const std::string& path);
+
+/// Throws MissingInput, BadData (file, line, key, value, limit).
+ArmRig load_arm_rig(const std::string& path);
+
+/// The rig as a file that load_arm_rig() reads, with all its values; `comments` stand at the top, one per
+/// line.
+std::string arm_rig_text(const ArmRig& rig, const std::vector<std::string>& comments);
+
+/// The chain with all payloads on its links.
+Chain loaded_chain(const ArmRig& rig);
+
+}  // namespace backlash::arm

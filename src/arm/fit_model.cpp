@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fit_model.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "backlash_diagnosis/arm/dynamics.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+
+namespace backlash::arm {
+namespace {
+
+/// Low-passed as the signal is, at the rows.
+Eigen::VectorXd at_rows(const Eigen::VectorXd& all, const ArmMotion& m, double cutoff) {
+  const std::vector<double> smooth =
+      signal::low_pass({all.data(), all.data() + all.size()}, m.interval, cutoff);
+  Eigen::VectorXd out(Eigen::Index(m.rows.size()));
+  for (std::size_t k = 0; k < m.rows.size(); ++k) out[Eigen::Index(k)] = smooth[m.rows[k]];
+  return out;
+}
+
+/// The signal `delay` later, and its rate, at the rows.
+std::pair<Eigen::VectorXd, Eigen::VectorXd> later(const ArmMotion& m, std::size_t j, double delay) {
+  const auto c = Eigen::Index(j);
+  const std::vector<double> s(m.signal.col(c).data(), m.signal.col(c).data() + m.signal.rows());
+  const std::vector<double> shifted = signal::delayed(s, -delay / m.interval);
+  const std::vector<double> rate = signal::derivative(shifted, m.interval);
+  std::pair<Eigen::VectorXd, Eigen::VectorXd> out{Eigen::VectorXd(Eigen::Index(m.rows.size())),
+                                                  Eigen::VectorXd(Eigen::Index(m.rows.size()))};
+  for (std::size_t k = 0; k < m.rows.size(); ++k) {
+    out.first[Eigen::Index(k)] = shifted[m.rows[k]];
+    out.second[Eigen::Index(k)] = rate[m.rows[k]];
+  }
+  return out;
+}
+
+}  // namespace
+
+Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& tilt) {
+  return Eigen::AngleAxisd(tilt[0], Eigen::Vector3d::UnitX()) *
+         Eigen::AngleAxisd(tilt[1], Eigen::Vector3d::UnitY()) * gravity;
+}
+
+State FitModel::start() const {
+  State state;
+  state.links = rig_.chain.links;
+  state.friction = state.shift = Eigen::VectorXd::Zero(Eigen::Index(rig_.joints.size()));
+  state.drives = Eigen::MatrixXd::Zero(Eigen::Index(rig_.joints.size()), kDriveUnknowns);
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    for (std::size_t t = 0; t < kDriveTerms; ++t)
+      state.drives(Eigen::Index(j), Eigen::Index(t)) = rig_.joints[j].terms[t];
+    state.drives(Eigen::Index(j), kDriveUnknowns - 1) = rig_.joints[j].delay;
+  }
+  return state;
+}
+
+Chain FitModel::chain(const State& state, bool marked) const {
+  Chain chain = rig_.chain;
+  chain.links = state.links;
+  for (const Payload& payload : rig_.payloads)
+    for (std::size_t i = 0; i < chain.size(); ++i)
+      if (chain.joints[i].link == payload.link) chain.links[i] += payload.sign * payload.parameters;
+  if (!marked) return chain;
+  if (freedom_.payload) chain.links[*freedom_.payload] += freedom_.payload_sign * state.payload;
+  if (freedom_.tilt) chain.gravity = tilted(chain.gravity, state.tilt);
+  return chain;
+}
+
+std::vector<Linearised> FitModel::linearised(const State& state, const FittedMotion& motion) const {
+  const ArmMotion& m = *motion.motion;
+  const Chain loaded = chain(state, motion.marked);
+  const auto n = Eigen::Index(m.time.size()), count = m.q.cols();
+  const bool tilts = freedom_.tilt && motion.marked;
+  Eigen::MatrixXd load(n, count);
+  std::vector<Eigen::MatrixXd> tilt(tilts ? 2 : 0, Eigen::MatrixXd(n, count));
+  const Eigen::Matrix<double, 3, 2> turns =
+      (Eigen::Matrix<double, 3, 2>() << Eigen::Vector3d::UnitX().cross(loaded.gravity),
+       Eigen::Vector3d::UnitY().cross(loaded.gravity))
+          .finished();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    load.row(k) = inverse_dynamics(loaded, m.q.row(k), m.v.row(k), m.a.row(k)).transpose();
+    if (!tilts) continue;
+    const Eigen::MatrixXd by_tilt = gravity_regressor(loaded, m.q.row(k)) * turns;
+    for (int i = 0; i < 2; ++i) tilt[std::size_t(i)].row(k) = by_tilt.col(i).transpose();
+  }
+  std::vector<Linearised> all;
+  const double cutoff = rig_.identification.torque_cutoff;
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    const auto c = Eigen::Index(j);
+    Eigen::MatrixXd by_tilt(Eigen::Index(m.rows.size()), tilts ? 2 : 0);
+    for (std::size_t i = 0; i < tilt.size(); ++i)
+      by_tilt.col(Eigen::Index(i)) = at_rows(tilt[i].col(c), m, cutoff);
+    all.push_back(joint(state, motion, j,
+                        at_rows(m.sign.col(c).cwiseProduct(load.col(c).cwiseAbs()), m, cutoff), by_tilt));
+    if (!tilts) continue;
+  }
+  return all;
+}
+
+Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::size_t j,
+                           const Eigen::VectorXd& load, const Eigen::MatrixXd& tilt) const {
+  const ArmMotion& m = *motion.motion;
+  const auto c = Eigen::Index(j);
+  const Layout at{Eigen::Index(rig_.joints.size())};
+  const bool carries = freedom_.payload && motion.marked, rubs = freedom_.friction && motion.marked;
+  const double factor = std::exp(-state.drives(c, kDriveTerms)) / rig_.joints[j].constant;
+  Linearised out;
+  const Eigen::Index links = 10 * at.joints, rows = Eigen::Index(m.rows.size());
+  out.sensitivity.resize(rows, links + kDriveUnknowns + (carries ? 10 : 0) + tilt.cols() + (rubs ? 2 : 0));
+  for (Eigen::Index i = 0; i < links; ++i) out.unknowns.push_back(i);
+  out.sensitivity.leftCols(links) = factor * m.chain[j];
+  Eigen::MatrixXd drive = m.drive[j];
+  drive.col(int(DriveTerm::load)) = load;
+  const Eigen::VectorXd terms = state.drives.row(c).head(kDriveTerms).transpose();
+  Eigen::VectorXd kept = terms;  // what a factor of friction does not change
+  if (rubs)
+    for (const DriveTerm t :
+         {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
+      kept[int(t)] *= std::exp(state.friction[c]);
+  const Chain chain = this->chain(state, motion.marked);
+  out.predicted = drive * kept;
+  if (rubs) out.predicted.array() += state.shift[c];
+  for (Eigen::Index i = 0; i < at.joints; ++i)
+    out.predicted += m.chain[j].middleCols(10 * i, 10) * chain.links[std::size_t(i)];
+  if (tilt.cols() > 0)
+    out.predicted += tilt * state.tilt;  // for small angles; the chain's columns know no tilt
+  out.predicted *= factor;
+  const auto [measured, rate] = later(m, j, state.drives(c, kDriveUnknowns - 1));
+  out.measured = measured;
+  out.sensitivity.middleCols(links, kDriveTerms) = factor * drive;
+  out.sensitivity.col(links + Eigen::Index(kDriveTerms)) = -out.predicted;
+  out.sensitivity.col(links + Eigen::Index(kDriveTerms) + 1) = -rate;
+  for (Eigen::Index i = 0; i < kDriveUnknowns; ++i) out.unknowns.push_back(at.drive(c) + i);
+  Eigen::Index next = links + kDriveUnknowns;
+  if (carries) {
+    out.sensitivity.middleCols(next, 10) =
+        freedom_.payload_sign * factor * m.chain[j].middleCols(10 * Eigen::Index(*freedom_.payload), 10);
+    for (Eigen::Index i = 0; i < 10; ++i) out.unknowns.push_back(at.payload() + i);
+    next += 10;
+  }
+  for (Eigen::Index i = 0; i < tilt.cols(); ++i, ++next) {
+    out.sensitivity.col(next) = factor * tilt.col(i);
+    out.unknowns.push_back(at.tilt() + i);
+  }
+  if (rubs) {
+    Eigen::VectorXd part = kept;
+    part[int(DriveTerm::rotor_inertia)] = part[int(DriveTerm::offset)] = 0;
+    out.sensitivity.col(next) = factor * (drive * part);
+    out.unknowns.push_back(at.friction(c));
+    out.sensitivity.col(next + 1).setConstant(factor);
+    out.unknowns.push_back(at.shift(c));
+  }
+  return out;
+}
+
+}  // namespace backlash::arm

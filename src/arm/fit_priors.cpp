@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fit_priors.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/signal/linear_algebra.h"
+
+namespace backlash::arm {
+namespace {
+
+constexpr int kMostSteps = 60;        // of Newton; choice
+constexpr int kMostHalvings = 40;     // choice: 2^-40 of a step is none
+constexpr double kSettled = 1e-8;     // of the decrease that a step promises; choice
+constexpr double kDelayError = 0.03;  // s, of a delay that nobody declares: some samples; choice
+constexpr double kBall = 0.2;         // theory: Sigma = 0.2 m r^2 of a ball
+
+std::array<Eigen::Matrix4d, 10> pseudo_basis() {
+  std::array<Eigen::Matrix4d, 10> basis;
+  for (std::size_t i = 0; i < 10; ++i) basis[i] = pseudo_inertia(BodyParameters::Unit(Eigen::Index(i)));
+  return basis;
+}
+
+const std::array<Eigen::Matrix4d, 10>& basis() {
+  static const std::array<Eigen::Matrix4d, 10> all = pseudo_basis();
+  return all;
+}
+
+Eigen::Matrix4d inverse(const Eigen::Matrix4d& p) {
+  return signal::symmetric_inverse(Eigen::MatrixXd(p));
+}
+
+}  // namespace
+
+Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& settings,
+               const std::vector<char>& moves)
+    : layout_{Eigen::Index(rig.joints.size())},
+      weight_(settings.declared_weight),
+      mass_(settings.payload_mass),
+      radius_(settings.payload_radius),
+      shift_(settings.day_shift),
+      payload_(freedom.payload.has_value()) {
+  if (freedom.links)
+    for (std::size_t i = 0; i < rig.chain.size(); ++i)
+      bodies_.push_back({layout_.link(Eigen::Index(i)), inverse(pseudo_inertia(rig.chain.links[i]))});
+  if (payload_) bodies_.push_back({layout_.payload(), Eigen::Matrix4d::Identity()});
+  for (std::size_t j = 0; j < rig.joints.size(); ++j) {
+    const auto c = Eigen::Index(j);
+    if (!moves[j]) continue;
+    const JointDrive& drive = rig.joints[j];
+    if (freedom.drives) {
+      for (const DriveTerm t : rig.terms) {
+        if (!kDriveTermSpecs[std::size_t(t)].dissipates) continue;
+        const double declared = drive.terms[std::size_t(t)];
+        const double otherwise = t == DriveTerm::rotor_inertia ? settings.rotor_inertia
+                                 : t == DriveTerm::load        ? settings.load_friction
+                                                        : drive.constant;  // that of 1 A: a size, it follows
+        positive_.push_back({layout_.drive(c) + Eigen::Index(t), declared > 0 ? declared : otherwise});
+      }
+      normal_.push_back({layout_.delay(c), drive.delay, 1 / (kDelayError * kDelayError)});
+    }
+    if (freedom.friction) {
+      normal_.push_back({layout_.friction(c), 0, 1 / (settings.day * settings.day)});
+      day_.push_back(c);
+    }
+    if (freedom.load && !freedom.drives && drive.load_error > 0) {
+      const Eigen::Index place = layout_.drive(c) + Eigen::Index(DriveTerm::load);
+      normal_.push_back(
+          {place, drive.terms[std::size_t(DriveTerm::load)], 1 / (drive.load_error * drive.load_error)});
+      positive_.push_back({place, drive.terms[std::size_t(DriveTerm::load)]});
+    }
+    if (freedom.constants && drive.constant_error > 0)
+      normal_.push_back({layout_.kappa(c), 0, 1 / (drive.constant_error * drive.constant_error)});
+  }
+}
+
+Eigen::VectorXd Priors::vector_of(const State& state) const {
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(layout_.size());
+  for (Eigen::Index i = 0; i < layout_.joints; ++i)
+    x.segment<10>(layout_.link(i)) = state.links[std::size_t(i)];
+  x.segment<10>(layout_.payload()) = state.payload;
+  x.segment(layout_.friction(0), layout_.joints) = state.friction;
+  x.segment(layout_.shift(0), layout_.joints) = state.shift;
+  for (Eigen::Index j = 0; j < layout_.joints; ++j)
+    x.segment(layout_.drive(j), kDriveUnknowns) = state.drives.row(j).transpose();
+  return x;
+}
+
+void Priors::begin(State& state) {
+  if (payload_) {
+    Body ball;
+    ball.mass = mass_;
+    ball.inertia = 2 * kBall * mass_ * radius_ * radius_ * Eigen::Matrix3d::Identity();
+    state.payload = parameters_of(ball);
+  }
+  for (const Positive& p : positive_) {
+    const Eigen::Index j = (p.place - layout_.drive(0)) / kDriveUnknowns,
+                       t = (p.place - layout_.drive(0)) % kDriveUnknowns;
+    if (!(state.drives(j, t) > 0)) state.drives(j, t) = p.reference;
+  }
+}
+
+double Priors::value(const Eigen::VectorXd& x) const {
+  constexpr double kOutside = std::numeric_limits<double>::infinity();
+  double sum = 0;
+  for (const Divergence& d : bodies_) {
+    const Eigen::Matrix4d p = pseudo_inertia(x.segment<10>(d.place));
+    const Eigen::VectorXd eigenvalues = signal::symmetric_eigenvalues(Eigen::MatrixXd(p));
+    if (!(eigenvalues[0] > 0)) return kOutside;
+    sum += weight_ * ((d.inverse * p).trace() - eigenvalues.array().log().sum());
+  }
+  for (const Positive& p : positive_) {
+    const double ratio = x[p.place] / p.reference;
+    if (!(ratio > 0)) return kOutside;
+    sum += weight_ * (ratio - std::log(ratio));
+  }
+  for (const Normal& n : normal_) sum += 0.5 * n.weight * (x[n.place] - n.centre) * (x[n.place] - n.centre);
+  return sum;
+}
+
+void Priors::add_derivatives(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
+                             Eigen::MatrixXd& curvature) const {
+  for (const Divergence& d : bodies_) {
+    const Eigen::Matrix4d own = inverse(pseudo_inertia(x.segment<10>(d.place)));
+    std::array<Eigen::Matrix4d, 10> turned;
+    for (std::size_t i = 0; i < 10; ++i) turned[i] = own * basis()[i];
+    for (Eigen::Index i = 0; i < 10; ++i) {
+      gradient[d.place + i] += weight_ * ((d.inverse - own) * basis()[std::size_t(i)]).trace();
+      for (Eigen::Index k = 0; k < 10; ++k)
+        curvature(d.place + i, d.place + k) +=
+            weight_ * (turned[std::size_t(i)] * turned[std::size_t(k)]).trace();
+    }
+  }
+  for (const Positive& p : positive_) {
+    gradient[p.place] += weight_ * (1 / p.reference - 1 / x[p.place]);
+    curvature(p.place, p.place) += weight_ / (x[p.place] * x[p.place]);
+  }
+  for (const Normal& n : normal_) {
+    gradient[n.place] += n.weight * (x[n.place] - n.centre);
+    curvature(n.place, n.place) += n.weight;
+  }
+}
+
+Eigen::MatrixXd Priors::curvature(const State& state) const {
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(layout_.size());
+  Eigen::MatrixXd curvature = Eigen::MatrixXd::Zero(layout_.size(), layout_.size());
+  add_derivatives(vector_of(state), gradient, curvature);
+  return curvature;
+}
+
+void Priors::follow(const Eigen::VectorXd& x) {
+  for (Divergence& d : bodies_) {
+    const Eigen::Matrix4d p = pseudo_inertia(x.segment<10>(d.place));
+    if (payload_ && d.place == layout_.payload())
+      d.inverse = inverse(p);
+    else
+      d.inverse *= 4 / (d.inverse * p).trace();
+  }
+  for (Positive& p : positive_) p.reference = x[p.place];
+  for (const Eigen::Index j : day_) {
+    const double size = shift_ * x[layout_.drive(j) + Eigen::Index(DriveTerm::coulomb)];
+    normal_.erase(std::remove_if(normal_.begin(), normal_.end(),
+                                 [&](const Normal& n) { return n.place == layout_.shift(j); }),
+                  normal_.end());
+    if (size > 0) normal_.push_back({layout_.shift(j), 0, 1 / (size * size)});
+  }
+}
+
+Eigen::VectorXd Priors::step(const Eigen::MatrixXd& h, const Eigen::VectorXd& g, const State& state,
+                             const std::vector<char>& free) {
+  const Eigen::VectorXd start = vector_of(state);
+  follow(start);
+  std::vector<Eigen::Index> places;
+  for (std::size_t i = 0; i < free.size(); ++i)
+    if (free[i]) places.push_back(Eigen::Index(i));
+  const auto n = Eigen::Index(places.size());
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(start.size());
+  const auto objective = [&](const Eigen::VectorXd& at) {
+    return 0.5 * at.dot(h * at) - g.dot(at) + value(start + at);
+  };
+  double best = objective(x);
+  for (int i = 0; i < kMostSteps; ++i) {
+    Eigen::VectorXd gradient = h * x - g;
+    Eigen::MatrixXd curvature = h;
+    add_derivatives(start + x, gradient, curvature);
+    Eigen::MatrixXd a(n, n);
+    Eigen::VectorXd b(n), scale(n);
+    for (Eigen::Index r = 0; r < n; ++r) {
+      const double d = curvature(places[std::size_t(r)], places[std::size_t(r)]);
+      scale[r] = d > 0 ? 1 / std::sqrt(d) : 0;
+    }
+    for (Eigen::Index r = 0; r < n; ++r) {
+      b[r] = -scale[r] * gradient[places[std::size_t(r)]];
+      for (Eigen::Index c = 0; c < n; ++c)
+        a(r, c) = scale[r] * scale[c] * curvature(places[std::size_t(r)], places[std::size_t(c)]);
+    }
+    const Eigen::VectorXd newton = scale.asDiagonal() * signal::solve_symmetric(a, b);
+    Eigen::VectorXd dx = Eigen::VectorXd::Zero(x.size());
+    for (Eigen::Index r = 0; r < n; ++r) dx[places[std::size_t(r)]] = newton[r];
+    const double promised = -gradient.dot(dx);
+    if (!(promised > kSettled)) break;
+    double t = 1;
+    int halvings = 0;
+    for (; halvings < kMostHalvings && !(objective(x + t * dx) < best); ++halvings) t /= 2;
+    if (halvings == kMostHalvings) break;
+    x += t * dx;
+    best = objective(x);
+  }
+  return x;
+}
+
+std::vector<BaseParameter> base_parameters(const ArmRig& rig, const std::vector<FittedMotion>& motions,
+                                           const State& state, const Eigen::MatrixXd& covariance) {
+  constexpr double kTold = 1e-4;  // choice: of a column's size, below which the motions do not show it
+  static const std::array<const char*, 10> names = {"mass",       "moment_x",   "moment_y",   "moment_z",
+                                                    "inertia_xx", "inertia_xy", "inertia_xz", "inertia_yy",
+                                                    "inertia_yz", "inertia_zz"};
+  static const std::array<const char*, 10> units = {"kg",     "kg m",   "kg m",   "kg m",   "kg m^2",
+                                                    "kg m^2", "kg m^2", "kg m^2", "kg m^2", "kg m^2"};
+  const Eigen::Index size = 10 * Eigen::Index(rig.chain.size());
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(size, size);
+  for (const FittedMotion& m : motions)
+    for (const Eigen::MatrixXd& y : m.motion->chain) gram += signal::gram(y);
+  Eigen::VectorXd theta(size);
+  for (std::size_t i = 0; i < state.links.size(); ++i)
+    theta.segment<10>(10 * Eigen::Index(i)) = state.links[i];
+  const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt();
+  std::vector<Eigen::Index> kept;  // a column that is no combination of those before it
+  Eigen::MatrixXd left = gram;
+  for (Eigen::Index i = 0; i < size; ++i) {
+    if (!(left(i, i) > kTold * kTold * scale[i] * scale[i]) || scale[i] == 0) continue;
+    kept.push_back(i);
+    left = (left - left.col(i) * left.row(i) / left(i, i)).eval();
+  }
+  const auto n = Eigen::Index(kept.size());
+  Eigen::MatrixXd own(n, n), cross(n, size);
+  for (Eigen::Index r = 0; r < n; ++r)
+    for (Eigen::Index c = 0; c < size; ++c) {
+      cross(r, c) = gram(kept[std::size_t(r)], c);
+      for (Eigen::Index k = 0; k < n; ++k) own(r, k) = gram(kept[std::size_t(r)], kept[std::size_t(k)]);
+    }
+  const Eigen::MatrixXd regroup = signal::solve_symmetric(own, cross);
+  const Eigen::VectorXd values = regroup * theta;
+  const Eigen::MatrixXd spread = regroup * covariance.topLeftCorner(size, size) * regroup.transpose();
+  std::vector<BaseParameter> base;
+  for (Eigen::Index r = 0; r < n; ++r) {
+    const auto i = std::size_t(kept[std::size_t(r)]);
+    base.push_back({rig.chain.joints[i / 10].link + "/" + names[i % 10],
+                    {values[r], std::sqrt(std::max(0.0, spread(r, r)))},
+                    units[i % 10]});
+  }
+  return base;
+}
+
+}  // namespace backlash::arm

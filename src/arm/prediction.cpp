@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The part of fit.h that looks at motions with a fit that is done.
+#include <cmath>
+
+#include "backlash_diagnosis/arm/fit.h"
+#include "backlash_diagnosis/base/not_a_number.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
+#include "fit_model.h"
+
+namespace backlash::arm {
+
+namespace {
+
+State state_of(const ArmFit& fit, const FitFreedom& freedom, const FitModel& model) {
+  State state = model.start();
+  state.payload = freedom.payload_sign * fit.payload;
+  if (freedom.tilt) state.tilt = {fit.tilt[0].value, fit.tilt[1].value};
+  if (freedom.friction)
+    for (std::size_t j = 0; j < fit.friction_factors.size(); ++j)
+      state.friction[Eigen::Index(j)] = std::log(fit.friction_factors[j].value),
+      state.shift[Eigen::Index(j)] = fit.shifts[j];
+  return state;
+}
+
+}  // namespace
+
+Prediction predict(const ArmFit& fit, const FitFreedom& freedom, const FittedMotion& motion) {
+  const FitModel model(fit.rig, freedom);
+  const std::vector<Linearised> all = model.linearised(state_of(fit, freedom, model), motion);
+  const auto rows = Eigen::Index(motion.motion->rows.size());
+  Prediction out{Eigen::MatrixXd(rows, Eigen::Index(all.size())),
+                 Eigen::MatrixXd(rows, Eigen::Index(all.size()))};
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    out.measured.col(Eigen::Index(j)) = all[j].measured;
+    out.predicted.col(Eigen::Index(j)) = all[j].predicted;
+  }
+  return out;
+}
+
+std::vector<double> relative_errors(const ArmFit& fit, const FitFreedom& freedom,
+                                    const std::vector<FittedMotion>& motions, double least_seconds) {
+  const std::size_t joints = fit.rig.joints.size();
+  std::vector<double> count(joints, 0), sum(joints, 0), squares(joints, 0), residual(joints, 0),
+      seconds(joints, 0);
+  for (const FittedMotion& m : motions) {
+    const Prediction p = predict(fit, freedom, m);
+    for (std::size_t j = 0; j < joints; ++j) {
+      seconds[j] += moving_seconds(*m.motion, j);
+      const auto c = Eigen::Index(j);
+      for (Eigen::Index k = 0; k < p.measured.rows(); ++k) {
+        if (!m.motion->counts(k, c)) continue;
+        const double s = p.measured(k, c), r = s - p.predicted(k, c);
+        count[j] += 1, sum[j] += s, squares[j] += s * s, residual[j] += r * r;
+      }
+    }
+  }
+  std::vector<double> errors;
+  for (std::size_t j = 0; j < joints; ++j)
+    errors.push_back(seconds[j] >= least_seconds
+                         ? std::sqrt(residual[j] / (squares[j] - sum[j] * sum[j] / count[j]))
+                         : kNaN);
+  return errors;
+}
+
+std::vector<double> foretold_errors(const ArmFit& fit, const FitFreedom& freedom,
+                                    const std::vector<FittedMotion>& motions, double least_seconds) {
+  const std::size_t joints = fit.rig.joints.size();
+  const FitModel model(fit.rig, freedom);
+  std::vector<double> count(joints, 0), sum(joints, 0), squares(joints, 0), expected(joints, 0),
+      seconds(joints, 0);
+  for (const FittedMotion& m : motions) {
+    const std::vector<Linearised> all = model.linearised(state_of(fit, freedom, model), m);
+    for (std::size_t j = 0; j < joints; ++j) {
+      seconds[j] += moving_seconds(*m.motion, j);
+      const std::vector<Eigen::Index>& at = all[j].unknowns;
+      const auto n = Eigen::Index(at.size());
+      Eigen::MatrixXd covariance(n, n);
+      for (Eigen::Index i = 0; i < n; ++i)
+        for (Eigen::Index k = 0; k < n; ++k)
+          covariance(i, k) = fit.covariance(at[std::size_t(i)], at[std::size_t(k)]);
+      const Eigen::MatrixXd spread = signal::product(all[j].sensitivity, covariance);
+      for (Eigen::Index k = 0; k < spread.rows(); ++k) {
+        if (!m.motion->counts(k, Eigen::Index(j))) continue;
+        const double s = all[j].measured[k];
+        count[j] += 1, sum[j] += s, squares[j] += s * s;
+        expected[j] += fit.deviation[j] * fit.deviation[j] + spread.row(k).dot(all[j].sensitivity.row(k));
+      }
+    }
+  }
+  std::vector<double> errors;
+  for (std::size_t j = 0; j < joints; ++j)
+    errors.push_back(seconds[j] >= least_seconds
+                         ? std::sqrt(expected[j] / (squares[j] - sum[j] * sum[j] / count[j]))
+                         : kNaN);
+  return errors;
+}
+
+}  // namespace backlash::arm

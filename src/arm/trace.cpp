@@ -1,0 +1,518 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/arm/trace.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/not_a_number.h"
+#include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "fit_model.h"
+
+namespace backlash::arm {
+namespace {
+
+using Motions = std::vector<ArmMotion>;
+
+const char* const kHalves =
+    "The test record is of a machine that has changed: effects are fitted to its first half and judged on "
+    "its second half.";
+
+std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked) {
+  std::vector<FittedMotion> all;
+  for (const ArmMotion& m : motions) all.push_back({&m, marked});
+  return all;
+}
+
+Motions parts(const Motions& motions, double from, double to) {
+  Motions out;
+  for (const ArmMotion& m : motions)
+    if (ArmMotion part = part_of(m, from, to); !part.rows.empty()) out.push_back(std::move(part));
+  return out;
+}
+
+/// Where one half of the samples lies before.
+double middle(const Motions& motions) {
+  std::size_t all = 0, seen = 0;
+  for (const ArmMotion& m : motions) all += m.rows.size();
+  for (const ArmMotion& m : motions) {
+    if (2 * (seen + m.rows.size()) >= all) return m.time[m.rows[std::min(all / 2 - seen, m.rows.size() - 1)]];
+    seen += m.rows.size();
+  }
+  return 0;
+}
+
+/// Squared residuals of each joint in blocks of time, of two models.
+struct Squares {
+  std::vector<std::vector<double>> before, after;  // block, joint
+};
+
+struct Candidate {
+  std::string effect;
+  FitFreedom freedom;
+  ArmFit fit;
+  std::vector<double> gains, lowers, uppers;  // per joint, and of the mean logarithm of all
+  double gain = 0, lower = 0, upper = 0;      // of the joint that it helps most
+  std::size_t joint = 0;
+  double all_lower = 0;  // of the mean of all joints' logarithms, lower end
+  double all = 0;
+  std::string reason;  // why not; empty: believed
+};
+
+class Tracer {
+ public:
+  Tracer(const ArmRig& rig, const ArmTraceSettings& settings, const Progress& progress)
+      : rig_(rig), settings_(settings), progress_(progress) {}
+
+  ArmTrace run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record);
+
+ private:
+  void tell(double fraction, const char* phase) const {
+    if (progress_ && !progress_(fraction, phase)) throw Cancelled();
+  }
+  void set_base();
+  bool changed_since(const Motions& first, const Motions& second);
+  void search_all(bool same_record);
+  void cannot_judge(const std::string& why);
+  void look_for_pushes(const ArmRecord& test);
+  void set_held_series(const ArmRecord& test);
+  bool search(const Motions& fitted, const Motions& judged, const std::string& words);
+  std::vector<Candidate> candidates() const;
+  void fit_candidate(Candidate& c, const Motions& fitted) const;
+  void try_out(Candidate& c, const Candidate& without, const Motions& fitted, const Motions& judged) const;
+  Squares squares(const Candidate& without, const Candidate& c, const Motions& judged) const;
+  void bootstrap(Candidate& c, const Squares& squares) const;
+  std::string refusal(const Candidate& c) const;
+  ArmStep step_of(const Candidate& c) const;
+  std::size_t best_of(const std::vector<Candidate>& all) const;
+  void tell_friction(const Candidate& c, const Motions& judged);
+  void finish(const Motions& judged, const Candidate& taken, bool named);
+  void set_augmented(const Candidate& taken);
+  void set_unexplained(const std::vector<double>& errors, const std::vector<double>& foretold);
+  void set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit, bool marked);
+
+  const ArmRig& rig_;
+  const ArmTraceSettings& settings_;
+  const Progress& progress_;
+  Motions train_, test_;
+  ArmFit base_;
+  Candidate taken_;    // what was named
+  Candidate unnamed_;  // what foretells the test record best where nothing is named
+  ArmTrace trace_;
+};
+
+void Tracer::set_base() {
+  if (rig_.fitted) {
+    base_.rig = rig_;
+    return;
+  }
+  base_ = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
+  for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
+}
+
+Squares Tracer::squares(const Candidate& without, const Candidate& c, const Motions& judged) const {
+  Squares all;
+  for (const ArmMotion& m : judged) {
+    const Prediction before = predict(without.fit, without.freedom, {&m, true}),
+                     after = predict(c.fit, c.freedom, {&m, true});
+    double begin = -1e300;
+    for (std::size_t k = 0; k < m.rows.size(); ++k) {
+      if (m.time[m.rows[k]] >= begin + settings_.block) {
+        begin = m.time[m.rows[k]];
+        all.before.emplace_back(rig_.joints.size(), 0.0);
+        all.after.emplace_back(rig_.joints.size(), 0.0);
+      }
+      for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+        const auto r = Eigen::Index(k), col = Eigen::Index(j);
+        if (!m.counts(r, col)) continue;
+        all.before.back()[j] += std::pow(before.measured(r, col) - before.predicted(r, col), 2);
+        all.after.back()[j] += std::pow(after.measured(r, col) - after.predicted(r, col), 2);
+      }
+    }
+  }
+  return all;
+}
+
+void Tracer::bootstrap(Candidate& c, const Squares& s) const {
+  const std::size_t joints = rig_.joints.size(), blocks = s.before.size();
+  std::vector<std::size_t> places(blocks);
+  const auto gains = [&](const std::vector<std::size_t>& chosen) {
+    std::vector<double> out(joints + 1, 0);
+    double count = 0;
+    for (std::size_t j = 0; j < joints; ++j) {
+      double before = 0, after = 0;
+      for (const std::size_t b : chosen) before += s.before[b][j], after += s.after[b][j];
+      if (!(before > 0)) continue;
+      out[j] = 1 - after / before;
+      out[joints] -= std::log(after / before);
+      count += 1;
+    }
+    if (count > 0) out[joints] /= count;
+    return out;
+  };
+  for (std::size_t b = 0; b < blocks; ++b) places[b] = b;
+  c.gains = gains(places);
+  c.joint = std::size_t(std::max_element(c.gains.begin(), c.gains.end() - 1) - c.gains.begin());
+  Random random(settings_.seed);
+  std::vector<std::vector<double>> drawn(joints + 1);
+  for (int d = 0; d < settings_.draws; ++d) {
+    for (std::size_t& place : places) place = random.below(blocks);
+    const std::vector<double> one = gains(places);
+    for (std::size_t j = 0; j <= joints; ++j) drawn[j].push_back(one[j]);
+  }
+  c.lowers.clear(), c.uppers.clear();
+  for (const std::vector<double>& of_joint : drawn) {
+    c.lowers.push_back(signal::quantile(of_joint, 0.025));
+    c.uppers.push_back(signal::quantile(of_joint, 0.975));
+  }
+  c.gain = c.gains[c.joint], c.lower = c.lowers[c.joint], c.upper = c.uppers[c.joint];
+  c.all = c.gains[joints], c.all_lower = c.lowers[joints];
+}
+
+/// The model with what may differ from day to day, and with the effect.
+void Tracer::fit_candidate(Candidate& c, const Motions& fitted) const {
+  std::vector<FittedMotion> motions = as_fitted(fitted, true);
+  c.freedom.links = c.freedom.drives = !rig_.fitted;
+  c.freedom.load = rig_.fitted && c.freedom.payload;
+  c.freedom.friction = true;
+  if (!rig_.fitted)
+    for (const FittedMotion& m : as_fitted(train_, false)) motions.push_back(m);
+  c.fit = fit_arm(rig_, motions, c.freedom, settings_.fit);
+  if (rig_.fitted) c.fit.rig.common_error = rig_.common_error;
+}
+
+void Tracer::try_out(Candidate& c, const Candidate& without, const Motions& fitted,
+                     const Motions& judged) const {
+  fit_candidate(c, fitted);
+  bootstrap(c, squares(without, c, judged));
+  c.reason = refusal(c);
+}
+
+std::string Tracer::refusal(const Candidate& c) const {
+  if (c.gain < settings_.least_gain)
+    return fmt::format(
+        "takes {:.0f} % of the squared error of {} away in the part that was not fitted, {:.0f} % are needed",
+        100 * c.gain, rig_.joints[c.joint].name, 100 * settings_.least_gain);
+  if (!(c.lower > 0) || !(c.all_lower > 0))
+    return "the part that was not fitted does not confirm it in all blocks of time";
+  if (c.freedom.payload && !(std::fabs(c.fit.mass.value) > settings_.sure * c.fit.mass.standard_error))
+    return fmt::format("its mass is not told apart from none: {:.2g} +- {:.1g} kg", c.fit.mass.value,
+                       c.fit.mass.standard_error);
+  if (c.freedom.tilt) {
+    const double tilt = std::hypot(c.fit.tilt[0].value, c.fit.tilt[1].value),
+                 error = std::hypot(c.fit.tilt[0].standard_error, c.fit.tilt[1].standard_error);
+    if (tilt < settings_.least_tilt || tilt < settings_.sure * error)
+      return fmt::format("the tilt is {:.2g} +- {:.1g} rad, no more than a level base has", tilt, error);
+  }
+  return "";
+}
+
+/// In their order: a payload at the last link, come or gone, first.
+std::vector<Candidate> Tracer::candidates() const {
+  std::vector<Candidate> all;
+  for (std::size_t i = rig_.chain.size(); i-- > 0;)
+    for (const double sign : {1.0, -1.0}) {
+      Candidate c;
+      c.effect = "payload";
+      c.freedom.payload = i;
+      c.freedom.payload_sign = sign;
+      all.push_back(c);
+    }
+  Candidate tilt;
+  tilt.effect = "gravity_direction";
+  tilt.freedom.tilt = true;
+  all.push_back(tilt);
+  return all;
+}
+
+ArmStep Tracer::step_of(const Candidate& c) const {
+  ArmStep step;
+  step.effect = c.effect;
+  step.channel = rig_.joints[c.joint].name + "/torque";
+  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
+  if (c.freedom.payload) {
+    step.link = rig_.chain.joints[*c.freedom.payload].link;
+    const double mass = c.fit.mass.value;
+    const double error = rig_.fitted ? std::hypot(c.fit.mass.standard_error, mass * rig_.common_error)
+                                     : c.fit.mass.standard_error;
+    step.parameters.push_back({"mass", "kg", {mass, error}});
+    static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
+    for (int i = 0; i < 3; ++i) step.parameters.push_back({names[i], "m", c.fit.centre[i]});
+  } else {
+    step.parameters = {{"about_x", "rad", c.fit.tilt[0]}, {"about_y", "rad", c.fit.tilt[1]}};
+  }
+  return step;
+}
+
+/// Where friction is not that of the training: a step where it is more than a robot's warming up, else a
+/// note.
+void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
+  Candidate base;
+  base.fit = base_;
+  Candidate against = c;
+  bootstrap(against, squares(base, c, judged));
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    const signal::Measured& f = c.fit.friction_factors[j];
+    if (!(std::fabs(f.value - 1) > settings_.sure * f.standard_error)) continue;
+    const bool much = std::fabs(f.value - 1) > settings_.least_friction;
+    const std::string words =
+        fmt::format("friction of {} is {:.2f} +- {:.2f} times that of the training records",
+                    rig_.joints[j].name, f.value, f.standard_error);
+    if (!much || !(against.gains[j] > settings_.least_gain) || !(against.lowers[j] > 0)) {
+      trace_.notes.push_back(words + (much ? ", which the part that was not fitted does not confirm"
+                                           : ", as a robot's that warms up"));
+      continue;
+    }
+    ArmStep step;
+    step.effect = "friction_drift";
+    step.joint = rig_.joints[j].name;
+    step.channel = step.joint + "/torque";
+    step.parameters = {{"factor", "-", f}};
+    step.gain = against.gains[j], step.gain_lower = against.lowers[j], step.gain_upper = against.uppers[j];
+    trace_.steps.push_back(step);
+  }
+}
+
+/// The best of the candidates that are believed; none: the end of the list.
+std::size_t Tracer::best_of(const std::vector<Candidate>& all) const {
+  std::size_t best = all.size(), last = all.size();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all[i].reason.empty()) continue;
+    if (best == all.size() || all[i].all > all[best].all) best = i;
+    if (i < 2 && (last == all.size() || all[i].all > all[last].all)) last = i;
+  }
+  const bool alike = best < all.size() && last < all.size() && all[best].freedom.payload &&
+                     all[best].all - all[last].all < -std::log(1 - settings_.same_link);
+  return alike ? last : best;
+}
+
+/// True where something was found.
+bool Tracer::search(const Motions& fitted, const Motions& judged, const std::string& words) {
+  Candidate without;
+  fit_candidate(without, fitted);
+  std::vector<Candidate> all = candidates();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
+    // Whether something has come or gone is clear from the last link.
+    if (all[i].freedom.payload && i > 1 && (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0))
+      all[i].reason = "not tried";
+    else
+      try_out(all[i], without, fitted, judged);
+  }
+  trace_.rejected.clear();
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (!all[i].reason.empty() && (i < 2 || all[i].freedom.tilt))
+      trace_.rejected.push_back(
+          {all[i].effect + (all[i].freedom.payload_sign < 0 ? " (taken away)" : ""), all[i].reason});
+  trace_.notes.clear();
+  const std::size_t best = best_of(all);
+  const Candidate& taken = best < all.size() ? all[best] : without;
+  if (best < all.size()) trace_.steps.push_back(step_of(taken));
+  tell_friction(taken, judged);
+  for (std::size_t i = 0; best < all.size() && i < all.size(); ++i)
+    if (i != best && all[i].reason.empty() && taken.freedom.payload && all[i].freedom.payload &&
+        taken.all - all[i].all < -std::log(1 - settings_.same_link))
+      trace_.notes.push_back("a payload at " + rig_.chain.joints[*all[i].freedom.payload].link +
+                             " does nearly as well");
+  if (trace_.steps.empty()) {
+    unnamed_ = without;
+    return false;
+  }
+  trace_.judged = words;
+  taken_ = taken;
+  finish(judged, taken, true);
+  for (ArmStep& step : trace_.steps) step.before = trace_.before, step.after = trace_.after;
+  return true;
+}
+
+/// Errors on the part that is judged, and the rig with what is named; `taken` is the model that foretells
+/// best, also where nothing of it is named.
+void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
+  const double least = settings_.fit.least_seconds;
+  const FitFreedom& freedom = taken.freedom;
+  const ArmFit& fit = taken.fit;
+  const std::vector<double> best = relative_errors(fit, freedom, as_fitted(judged, true), least);
+  trace_.before = relative_errors(base_, {}, as_fitted(judged, false), least);
+  trace_.after = named ? best : trace_.before;
+  trace_.train = relative_errors(base_, {}, as_fitted(train_, false), least);
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    double noise = 0, count = 0, sum = 0, squares = 0;
+    for (const ArmMotion& m : judged)
+      for (std::size_t k = 0; k < m.rows.size(); ++k) {
+        if (!m.counts(Eigen::Index(k), Eigen::Index(j))) continue;
+        const double s = m.signal(Eigen::Index(m.rows[k]), Eigen::Index(j));
+        count += 1, sum += s, squares += s * s;
+        noise += m.noise[Eigen::Index(j)] * m.noise[Eigen::Index(j)];
+      }
+    trace_.floor.push_back(std::isnan(trace_.before[j]) ? kNaN
+                                                        : std::sqrt(noise / (squares - sum * sum / count)));
+  }
+  if (named) set_augmented(taken);
+  set_series(judged, freedom, named ? fit : base_, named);
+  ArmFit known = fit;  // of a fitted rig: what it says of itself, and what the effect is not known to
+  if (rig_.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
+  std::vector<double> foretold = foretold_errors(known, freedom, as_fitted(judged, true), least);
+  for (std::size_t j = 0; rig_.fitted && j < rig_.joints.size(); ++j) {
+    const double said = rig_.joints[j].training_error;
+    foretold[j] = std::hypot(foretold[j], said > 0 ? said : trace_.train[j]);
+  }
+  set_unexplained(best, foretold);
+}
+
+void Tracer::set_augmented(const Candidate& taken) {
+  const FitFreedom& freedom = taken.freedom;
+  trace_.augmented = taken.fit.rig;
+  if (freedom.payload)
+    trace_.augmented.payloads.push_back({rig_.chain.joints[*freedom.payload].link, freedom.payload_sign,
+                                         BodyParameters(freedom.payload_sign * taken.fit.payload)});
+  if (freedom.tilt)
+    trace_.augmented.chain.gravity =
+        tilted(taken.fit.rig.chain.gravity, {taken.fit.tilt[0].value, taken.fit.tilt[1].value});
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    trace_.augmented.joints[j].terms[std::size_t(DriveTerm::offset)] += taken.fit.shifts[j];
+    for (const DriveTerm t :
+         {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
+      trace_.augmented.joints[j].terms[std::size_t(t)] *= taken.fit.friction_factors[j].value;
+  }
+}
+
+void Tracer::set_unexplained(const std::vector<double>& errors, const std::vector<double>& foretold) {
+  double worst = settings_.foretold;
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    const double ratio = errors[j] / foretold[j];
+    if (!(ratio > worst)) continue;
+    worst = ratio;
+    trace_.unexplained = {
+        {rig_.joints[j].name + "/torque",
+         fmt::format("the error is {:.3g} times what the training records let expect", ratio)}};
+  }
+}
+
+void Tracer::set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit, bool marked) {
+  const std::size_t joints = rig_.joints.size();
+  trace_.series.measured.resize(joints), trace_.series.before.resize(joints),
+      trace_.series.after.resize(joints);
+  for (const ArmMotion& m : judged) {
+    const Prediction before = predict(base_, {}, {&m, false}),
+                     after = predict(fit, marked ? freedom : FitFreedom(), {&m, marked});
+    for (std::size_t k = 0; k < m.rows.size(); ++k) {
+      trace_.series.time.push_back(m.time[m.rows[k]]);
+      for (std::size_t j = 0; j < joints; ++j) {
+        const auto r = Eigen::Index(k), c = Eigen::Index(j);
+        const bool counts = m.counts(r, c);
+        trace_.series.measured[j].push_back(before.measured(r, c));
+        trace_.series.before[j].push_back(counts ? before.predicted(r, c) : kNaN);
+        trace_.series.after[j].push_back(counts ? after.predicted(r, c) : kNaN);
+      }
+    }
+  }
+}
+
+/// The record as it is: nothing foretells a joint at rest.
+void Tracer::set_held_series(const ArmRecord& test) {
+  trace_.series.time = test.joints.front().time;
+  for (const record::Record& joint : test.joints) {
+    trace_.series.measured.push_back(joint.column(rig_.channel));
+    trace_.series.before.emplace_back(joint.size(), kNaN);
+  }
+  trace_.series.after = trace_.series.before;
+}
+
+void Tracer::look_for_pushes(const ArmRecord& test) {
+  for (const PushEvent& e : pushes(test, base_.rig, settings_.push)) {
+    ArmStep step;
+    step.effect = "external_torque";
+    step.joint = rig_.joints[e.joint].name;
+    step.channel = step.joint + "/torque";
+    step.parameters = {{"torque", "N m", {-e.torque, e.torque_error}}};
+    step.push = e;
+    trace_.steps.push_back(step);
+  }
+}
+
+/// Whether what was found in the training records is another one in the test record: then that counts.
+bool Tracer::changed_since(const Motions& first, const Motions& second) {
+  const ArmTrace in_training = trace_;
+  const Candidate old = taken_;
+  trace_.steps.clear(), trace_.floor.clear(), trace_.series = {}, trace_.unexplained.reset();
+  if (search(first, second, kHalves)) {
+    Candidate halves = taken_;
+    bootstrap(halves, squares(old, halves, second));
+    if (halves.all > -std::log(1 - settings_.same_link) && halves.all_lower > 0) {
+      for (const ArmStep& step : in_training.steps)
+        trace_.notes.push_back(fmt::format("the training records show another one: {} {}{}, {} = {:.3g} {}",
+                                           step.effect, step.link, step.joint, step.parameters[0].name,
+                                           step.parameters[0].measured.value, step.parameters[0].unit));
+      return true;
+    }
+  }
+  trace_ = in_training;
+  return false;
+}
+
+void Tracer::cannot_judge(const std::string& why) {
+  for (auto* list : {&trace_.before, &trace_.after, &trace_.floor, &trace_.train})
+    list->assign(rig_.joints.size(), kNaN);
+  trace_.judged = why;
+}
+
+void Tracer::search_all(bool same_record) {
+  const Motions first = parts(test_, -1e300, middle(test_)), second = parts(test_, middle(test_), 1e300);
+  for (const Motions* half : {&first, &second}) {
+    double moving = 0;
+    for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+      double seconds = 0;
+      for (const ArmMotion& m : *half) seconds += moving_seconds(m, j);
+      moving = std::max(moving, seconds);
+    }
+    if (moving >= settings_.fit.least_seconds) continue;
+    trace_.cannot_tell = true;
+    return cannot_judge(
+        fmt::format("No joint moves for {} s in a half of the test record: nothing can be judged.",
+                    settings_.fit.least_seconds));
+  }
+  const bool in_training =
+      rig_.fitted && !same_record &&
+      search(train_, test_, "Effects are fitted to the training records and judged on the test record.");
+  if (in_training) {
+    changed_since(first, second);
+    return;
+  }
+  if (search(first, second, kHalves)) return;
+  trace_.judged = "Errors are those of the whole test record.";
+  finish(test_, unnamed_, false);
+}
+
+ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record) {
+  trace_.joints = rig_.joint_names();
+  tell(0, "reading the motion");
+  for (const ArmRecord& record : train)
+    for (ArmMotion& m : motions_of(record, rig_, trace_.warnings)) train_.push_back(std::move(m));
+  test_ = motions_of(test, rig_, trace_.warnings);
+  tell(0.1, "fitting the base machine");
+  set_base();
+  trace_.augmented = base_.rig;
+  if (holds_pose(test, settings_.push)) {
+    look_for_pushes(test);
+    set_held_series(test);
+    cannot_judge(
+        "The test record holds its pose: friction at rest hides what the drives carry, so no error is given; "
+        "pushes are "
+        "looked for.");
+  } else {
+    search_all(same_record);
+  }
+  return std::move(trace_);
+}
+
+}  // namespace
+
+ArmTrace trace_arm(const ArmRig& rig, const std::vector<ArmRecord>& train, const ArmRecord& test,
+                   bool same_record, const ArmTraceSettings& settings, const Progress& progress) {
+  return Tracer(rig, settings, progress).run(train, test, same_record);
+}
+
+}  // namespace backlash::arm

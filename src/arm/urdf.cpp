@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The URDF part of chain.h.
+#include <urdf_parser/urdf_parser.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "backlash_diagnosis/arm/chain.h"
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/text.h"
+
+namespace backlash::arm {
+namespace {
+
+constexpr std::size_t kLargestUrdf = std::size_t{4} * 1024 * 1024;  // bytes; choice
+constexpr double kUnitAxis = 1e-6;                                  // choice: rounding of a printed axis
+
+Eigen::Vector3d vector(const urdf::Vector3& v) {
+  return {v.x, v.y, v.z};
+}
+
+Eigen::Matrix3d matrix(const urdf::Rotation& r) {
+  return Eigen::Quaterniond(r.w, r.x, r.y, r.z).normalized().toRotationMatrix();
+}
+
+class Reader {
+ public:
+  Reader(const urdf::ModelInterface& model, const std::string& name) : model_(model), name_(name) {}
+
+  Chain chain(const std::vector<std::string>& names) const {
+    if (names.empty()) throw BadData(name_, "no joints are asked for");
+    Chain chain;
+    std::vector<std::string> moving;
+    for (const std::string& name : names) chain.joints.push_back(joint(name));
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const auto before = model_.getJoint(names[i])->parent_link_name;
+      const std::string carrier = i == 0 ? "" : chain.joints[i - 1].link;
+      fix_to(chain.joints[i], before, carrier);
+      Body body;
+      add(body, *model_.getLink(chain.joints[i].link), Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(),
+          i + 1 < names.size() ? names[i + 1] : "");
+      chain.links.push_back(parameters_of(body));
+    }
+    return chain;
+  }
+
+ private:
+  Joint joint(const std::string& name) const {
+    const auto j = model_.getJoint(name);
+    if (!j) {
+      std::vector<std::string> there;
+      for (const auto& entry : model_.joints_) there.push_back(entry.first);
+      throw BadData(name_, "no joint '" + printable(name) + "'; there are: " + joined(there));
+    }
+    if (j->type != urdf::Joint::REVOLUTE && j->type != urdf::Joint::CONTINUOUS)
+      throw BadData(name_, "joint '" + name + "' is neither revolute nor continuous: only those are known");
+    const Eigen::Vector3d axis = vector(j->axis);
+    if (!(std::fabs(axis.norm() - 1) < kUnitAxis))
+      throw BadData(name_, "joint '" + name + "': axis is no unit vector");
+    return {name, j->child_link_name, matrix(j->parent_to_joint_origin_transform.rotation),
+            vector(j->parent_to_joint_origin_transform.position), axis};
+  }
+
+  /// The joint's frame in that of `carrier` (empty: the base, the frame of the root), from which only fixed
+  /// joints lead to the link `before`.
+  void fix_to(Joint& joint, std::string before, const std::string& carrier) const {
+    while (before != carrier) {
+      const auto link = model_.getLink(before);
+      const auto up = link ? link->parent_joint : nullptr;
+      if (!up && carrier.empty()) return;
+      if (!up || up->type != urdf::Joint::FIXED)
+        throw BadData(name_, "joint '" + joint.name + "' is not the next of one chain after link '" +
+                                 (carrier.empty() ? model_.getRoot()->name : carrier) + "'" +
+                                 (up ? ": joint '" + up->name + "' is between" : ""));
+      const Eigen::Matrix3d rotation = matrix(up->parent_to_joint_origin_transform.rotation);
+      joint.position = rotation * joint.position + vector(up->parent_to_joint_origin_transform.position);
+      joint.rotation = rotation * joint.rotation;
+      before = up->parent_link_name;
+    }
+  }
+
+  /// The link and all that is fixed to it, at a place in the frame of the body.
+  void add(Body& to, const urdf::Link& link, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& position,
+           const std::string& next) const {
+    if (link.inertial) {
+      Body own;
+      own.mass = link.inertial->mass;
+      own.inertia << link.inertial->ixx, link.inertial->ixy, link.inertial->ixz, link.inertial->ixy,
+          link.inertial->iyy, link.inertial->iyz, link.inertial->ixz, link.inertial->iyz, link.inertial->izz;
+      own = moved(own, matrix(link.inertial->origin.rotation), vector(link.inertial->origin.position));
+      const BodyParameters sum = parameters_of(to) + parameters_of(moved(own, rotation, position));
+      if (sum[0] > 0) to = body_of(sum);
+    }
+    for (const auto& joint : link.child_joints) {
+      if (joint->name == next) continue;
+      if (joint->type != urdf::Joint::FIXED)
+        throw BadData(name_, "joint '" + joint->name +
+                                 "' moves and is not one of the rig's: only a serial chain is known");
+      const Eigen::Matrix3d turned = rotation * matrix(joint->parent_to_joint_origin_transform.rotation);
+      add(to, *model_.getLink(joint->child_link_name), turned,
+          position + rotation * vector(joint->parent_to_joint_origin_transform.position), next);
+    }
+  }
+
+  const urdf::ModelInterface& model_;
+  const std::string& name_;
+};
+
+}  // namespace
+
+Chain chain_of_urdf(const std::string& text, const std::string& name,
+                    const std::vector<std::string>& joints) {
+  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
+  if (!model) throw BadData(name, "cannot be read as a URDF");
+  return Reader(*model, name).chain(joints);
+}
+
+Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints) {
+  return chain_of_urdf(read_start(urdf_path, kLargestUrdf), urdf_path, joints);
+}
+
+}  // namespace backlash::arm

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Arms drawn at random, and the UR5's.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <kdl/chain.hpp>
+#include <kdl/chainidsolver_recursive_newton_euler.hpp>
+
+#include "backlash_diagnosis/arm/arm_rig.h"
+#include "backlash_diagnosis/arm/chain.h"
+#include "backlash_diagnosis/arm/dynamics.h"
+#include "backlash_diagnosis/arm/motion.h"
+#include "backlash_diagnosis/base/random.h"
+#include "support/data.h"
+
+namespace backlash::test {
+
+inline Eigen::Vector3d random_vector(Random& random, double size) {
+  return size * Eigen::Vector3d(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+}
+
+inline arm::Joints random_joints(Random& random, Eigen::Index n, double size) {
+  arm::Joints values(n);
+  for (Eigen::Index i = 0; i < n; ++i) values[i] = random.uniform(-size, size);
+  return values;
+}
+
+inline Eigen::Matrix3d random_rotation(Random& random) {
+  return Eigen::AngleAxisd(random.uniform(-3, 3), random_vector(random, 1).normalized()).toRotationMatrix();
+}
+
+/// A cloud of five masses: consistent by construction.
+inline arm::BodyParameters random_body(Random& random) {
+  arm::BodyParameters sum = arm::BodyParameters::Zero();
+  for (int i = 0; i < 5; ++i) {
+    arm::Body point;
+    point.mass = random.uniform(0.1, 2);
+    point.centre = random_vector(random, 0.3);
+    sum += arm::parameters_of(point);
+  }
+  return sum;
+}
+
+inline arm::Chain random_chain(Random& random, std::size_t joints) {
+  arm::Chain chain;
+  chain.gravity = random_vector(random, 10);
+  for (std::size_t i = 0; i < joints; ++i) {
+    chain.joints.push_back({"joint" + std::to_string(i), "link" + std::to_string(i), random_rotation(random),
+                            random_vector(random, 0.5), random_vector(random, 1).normalized()});
+    chain.links.push_back(random_body(random));
+  }
+  return chain;
+}
+
+inline KDL::Frame frame(const Eigen::Matrix3d& r, const Eigen::Vector3d& p) {
+  return {KDL::Rotation(r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0), r(2, 1), r(2, 2)),
+          KDL::Vector(p.x(), p.y(), p.z())};
+}
+
+/// KDL's segment is a joint and then a fixed frame; the body is said in the frame behind both.
+inline KDL::Chain to_kdl(const arm::Chain& chain) {
+  KDL::Chain kdl;
+  kdl.addSegment(
+      KDL::Segment(KDL::Joint(KDL::Joint::None), frame(chain.joints[0].rotation, chain.joints[0].position)));
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const arm::Body b = arm::body_of(chain.links[i]);
+    const Eigen::Vector3d a = chain.joints[i].axis;
+    const KDL::Frame to_next = i + 1 < chain.size()
+                                   ? frame(chain.joints[i + 1].rotation, chain.joints[i + 1].position)
+                                   : KDL::Frame::Identity();
+    const KDL::RigidBodyInertia inertia(
+        b.mass, KDL::Vector(b.centre.x(), b.centre.y(), b.centre.z()),
+        KDL::RotationalInertia(b.inertia(0, 0), b.inertia(1, 1), b.inertia(2, 2), b.inertia(0, 1),
+                               b.inertia(0, 2), b.inertia(1, 2)));
+    kdl.addSegment(
+        KDL::Segment(KDL::Joint(KDL::Vector::Zero(), KDL::Vector(a.x(), a.y(), a.z()), KDL::Joint::RotAxis),
+                     to_next, to_next.Inverse() * inertia));
+  }
+  return kdl;
+}
+
+inline KDL::JntArray to_kdl(const arm::Joints& values) {
+  KDL::JntArray array(unsigned(values.size()));
+  array.data = values;
+  return array;
+}
+
+/// The drives and links of a machine that a rig file does not know, and its records. Torques are KDL's.
+struct Machine {
+  arm::ArmRig declared = arm::load_arm_rig(package_file("config/ur5_arm/ur5_arm.yaml"));
+  arm::Chain chain = declared.chain;
+  std::vector<arm::JointDrive> drives = declared.joints;
+  double noise = 0.02;  // A, white
+
+  /// Links, constants and friction off by some ten percent.
+  explicit Machine(std::uint64_t seed) {
+    Random random(seed);
+    const double scale = random.uniform(0.9, 1.1);  // of all constants
+    for (std::size_t j = 0; j < drives.size(); ++j) {
+      const double f = random.uniform(0.85, 1.15);
+      chain.links[j] *= f;
+      drives[j].constant *= scale * random.uniform(0.95, 1.05);
+      const double size = j < 3 ? 8 : 2;  // N m
+      drives[j].terms = {j < 3 ? 3.0 : 0.4, size * f,    0.6 * size, 0.1 * size,
+                         0.05 * size,       0.02 * size, 0.05 * f};
+      drives[j].delay = 0.005 * random.uniform(0, 2);
+    }
+  }
+
+  arm::ArmRecord record(std::uint64_t seed, double duration = 32) const {
+    Random random(seed);
+    const auto n = Eigen::Index(drives.size());
+    Eigen::MatrixXd amplitude(n, 3), frequency(n, 3), phase(n, 3);
+    for (Eigen::Index j = 0; j < n; ++j)
+      for (Eigen::Index i = 0; i < 3; ++i) {
+        frequency(j, i) = 2 * M_PI * random.uniform(0.04, 0.3);
+        amplitude(j, i) = random.uniform(0.15, 0.35) / frequency(j, i);
+        phase(j, i) = random.uniform(0, 2 * M_PI);
+      }
+    arm::ArmRecord out;
+    out.name = "simulated";
+    out.joints.resize(drives.size());
+    const KDL::Chain kdl = to_kdl(chain);
+    KDL::ChainIdSolver_RNE solver(kdl, KDL::Vector(chain.gravity.x(), chain.gravity.y(), chain.gravity.z()));
+    for (double t = 0; t < duration; t += 0.01) {
+      const auto state = [&](double at) {
+        arm::Joints q = arm::Joints::Zero(n), v = q, a = q;
+        for (Eigen::Index j = 0; j < n; ++j)
+          for (Eigen::Index i = 0; i < 3; ++i) {
+            const double x = frequency(j, i) * at + phase(j, i);
+            q[j] += amplitude(j, i) * std::sin(x);
+            v[j] += amplitude(j, i) * frequency(j, i) * std::cos(x);
+            a[j] -= amplitude(j, i) * frequency(j, i) * frequency(j, i) * std::sin(x);
+          }
+        return std::array<arm::Joints, 3>{q, v, a};
+      };
+      const auto torque_at = [&](const std::array<arm::Joints, 3>& s) {
+        KDL::JntArray torque{unsigned(n)};
+        solver.CartToJnt(to_kdl(s[0]), to_kdl(s[1]), to_kdl(s[2]),
+                         KDL::Wrenches(kdl.getNrOfSegments(), KDL::Wrench::Zero()), torque);
+        return arm::Joints(torque.data);
+      };
+      const auto now = state(t);
+      for (std::size_t j = 0; j < drives.size(); ++j) {
+        const auto earlier = state(t - drives[j].delay);
+        const auto k = Eigen::Index(j);
+        const double load = torque_at(earlier)[k], v = earlier[1][k], sign = std::tanh(v / 0.01);
+        const auto& f = drives[j].terms;
+        const double torque = load + f[0] * earlier[2][k] + f[1] * sign + f[2] * v + f[3] * v * std::fabs(v) +
+                              f[4] * v * v * v + f[5] + f[6] * sign * std::fabs(load);
+        record::Record& r = out.joints[j];
+        r.time.push_back(t);
+        r.column(record::Channel::motor_position).push_back(std::round(now[0][k] * 1e4) / 1e4);
+        r.column(record::Channel::motor_velocity).push_back(std::round(now[1][k] * 1e4) / 1e4);
+        r.column(record::Channel::motor_current)
+            .push_back(torque / drives[j].constant + noise * random.normal());
+      }
+    }
+    return out;
+  }
+};
+
+}  // namespace backlash::test

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "backlash_diagnosis/arm/arm_rig.h"
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/scratch_folder.h"
+#include "support/data.h"
+
+namespace backlash::arm {
+namespace {
+
+std::string text_of(const std::string& path) {
+  std::ifstream in(path);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+std::string with(std::string text, const std::string& what, const std::string& by) {
+  const auto place = text.find(what);
+  EXPECT_NE(place, std::string::npos) << what;
+  return text.replace(place, what.size(), by);
+}
+
+class ArmRigFile : public ::testing::Test {
+ protected:
+  ArmRigFile() {
+    for (const char* name : {"ur5_arm.yaml", "ur5_arm.urdf"})
+      std::filesystem::copy(test::package_file(std::string("config/ur5_arm/") + name), path(name));
+  }
+  std::string path(const std::string& name) const { return folder_.path(name); }
+  std::string refusal(const std::string& rig) const {
+    write_file(path("x.yaml"), rig);
+    try {
+      load_arm_rig(path("x.yaml"));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+  ScratchFolder folder_;
+  const std::string rig_ = text_of(test::package_file("config/ur5_arm/ur5_arm.yaml"));
+  const std::string urdf_ = text_of(test::package_file("config/ur5_arm/ur5_arm.urdf"));
+};
+
+TEST_F(ArmRigFile, IsReadWithItsRobot) {
+  const ArmRig rig = load_arm_rig(path("ur5_arm.yaml"));
+  ASSERT_EQ(rig.chain.size(), 6u);
+  EXPECT_EQ(rig.chain.joints[2].position, Eigen::Vector3d(-0.612, 0, 0));
+  EXPECT_EQ(rig.joints[5].constant, 11.47);
+  EXPECT_EQ(rig.joints[5].constant_error, 0.1);
+  EXPECT_FALSE(rig.fitted);
+  EXPECT_TRUE(is_arm_rig(path("ur5_arm.yaml")));
+  EXPECT_FALSE(is_arm_rig(test::package_file("config/ur5_joint.yaml")));
+}
+
+TEST_F(ArmRigFile, IsWrittenAsItIsRead) {
+  ArmRig rig = load_arm_rig(path("ur5_arm.yaml"));
+  rig.fitted = true;
+  rig.joints[3].terms[1] = 2.5;
+  rig.joints[3].terms[6] = 0.04, rig.joints[3].load_error = 0.01;
+  rig.common_error = 0.035;
+  rig.payloads.push_back({"wrist_3_link", -1, rig.chain.links[5]});
+  write_file(path("y.yaml"), arm_rig_text(rig, {"a comment"}));
+  const ArmRig back = load_arm_rig(path("y.yaml"));
+  EXPECT_TRUE(back.fitted);
+  EXPECT_EQ(back.joints[3].terms, rig.joints[3].terms);
+  EXPECT_EQ(back.joints[3].load_error, 0.01);
+  EXPECT_EQ(back.common_error, 0.035);
+  ASSERT_EQ(back.payloads.size(), 1u);
+  EXPECT_EQ(back.payloads[0].sign, -1);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_LT((back.chain.links[i] - rig.chain.links[i]).norm(), 1e-6);
+  EXPECT_LT(loaded_chain(back).links[5].norm(), 1e-6);
+}
+
+TEST_F(ArmRigFile, WrongFilesAreRefusedWithTheirPlace) {
+  EXPECT_NE(refusal(with(rig_, "ur5_arm.urdf                #", "none.urdf #")).find("none.urdf"),
+            std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "elbow_joint", "elbow")).find("no joint 'elbow'; there are: elbow_joint"),
+            std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "gravity: [0, 0, -9.80665]", "gravity: [0, -9.8]")).find("gravity"),
+            std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "value: 14.87", "value: -14.87")).find("torque_constant"), std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "coulomb,", "coulomp,")).find("coulomp"), std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "torque_cutoff", "torque_cut")).find("torque_cut"), std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "motor_current ", "motor_position ")).find("channel"), std::string::npos);
+  EXPECT_NE(refusal(with(rig_, "  - name: wrist_3_joint", "  - name: wrist_2_joint")).find("there twice"),
+            std::string::npos);
+}
+
+TEST_F(ArmRigFile, WrongRobotsAreRefused) {
+  const std::vector<std::string> joints = load_arm_rig(path("ur5_arm.yaml")).joint_names();
+  const auto told = [&](const std::string& text, std::vector<std::string> names) {
+    try {
+      chain_of_urdf(text, "x.urdf", names);
+    } catch (const BadData& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(told(urdf_, joints), "accepted");
+  EXPECT_NE(told("nonsense", joints).find("cannot be read as a URDF"), std::string::npos);
+  EXPECT_NE(told(urdf_, {"elbow_joint", "shoulder_lift_joint"}).find("not the next of one chain"),
+            std::string::npos);
+  EXPECT_NE(told(urdf_, {"shoulder_pan_joint", "elbow_joint"}).find("moves and is not one of the rig's"),
+            std::string::npos);
+  EXPECT_NE(told(urdf_, {"tool0_joint"}).find("neither revolute nor continuous"), std::string::npos);
+  EXPECT_NE(
+      told(with(urdf_, "name=\"elbow_joint\" type=\"revolute\"", "name=\"elbow_joint\" type=\"prismatic\""),
+           joints)
+          .find("neither revolute nor continuous"),
+      std::string::npos);
+}
+
+// Theory: a cloud of masses has a positive definite pseudo inertia, a body whose inertia breaks the triangle
+// rule has not.
+TEST(Body, PseudoInertiaTellsWhatIsPhysical) {
+  Body b;
+  b.mass = 2;
+  b.centre = {0.1, -0.2, 0.3};
+  b.inertia = Eigen::Vector3d(0.1, 0.1, 0.15).asDiagonal();
+  EXPECT_TRUE(is_consistent(parameters_of(b)));
+  const Body back = body_of(parameters_of(b));
+  EXPECT_LT((back.inertia - b.inertia).norm() + (back.centre - b.centre).norm(), 1e-12);
+  EXPECT_LT((parameters_of_pseudo_inertia(pseudo_inertia(parameters_of(b))) - parameters_of(b)).norm(),
+            1e-12);
+  b.inertia = Eigen::Vector3d(0.1, 0.1, 0.25).asDiagonal();
+  EXPECT_FALSE(is_consistent(parameters_of(b)));
+}
+
+}  // namespace
+}  // namespace backlash::arm

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Oracle: machines whose torques KDL computes.
+#include <gtest/gtest.h>
+
+#include "arm_machines.h"
+#include "backlash_diagnosis/arm/fit.h"
+#include "backlash_diagnosis/arm/trace.h"
+#include "backlash_diagnosis/base/error.h"
+
+namespace backlash::arm {
+namespace {
+
+std::vector<ArmMotion> motions(const test::Machine& machine, const std::vector<ArmRecord>& records) {
+  std::vector<ArmMotion> all;
+  std::vector<std::string> warnings;
+  for (const ArmRecord& record : records)
+    for (ArmMotion& m : motions_of(record, machine.declared, warnings)) all.push_back(std::move(m));
+  return all;
+}
+
+std::vector<FittedMotion> fitted(const std::vector<ArmMotion>& motions) {
+  std::vector<FittedMotion> all;
+  for (const ArmMotion& m : motions) all.push_back({&m, false});
+  return all;
+}
+
+TEST(Fit, FindsDrivesAndForetellsAnotherMotion) {
+  int far = 0, values = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const test::Machine machine(seed);
+    const auto train = motions(machine, {machine.record(10 * seed), machine.record(10 * seed + 1)});
+    const auto test = motions(machine, {machine.record(10 * seed + 2)});
+    const ArmFit fit = fit_arm(machine.declared, fitted(train));
+    const std::vector<double> errors = relative_errors(fit, {}, fitted(test), 5);
+    for (std::size_t j = 0; j < 6; ++j) {
+      // What noise leaves, and one percent for turning points within the low-pass, where friction jumps.
+      EXPECT_LT(errors[j], 2 * fit.floor[j] + 0.01) << seed << " " << j;
+      EXPECT_TRUE(is_consistent(fit.rig.chain.links[j]));
+      const auto check = [&](const signal::Measured& m, double truth) {
+        ++values;
+        const double z = std::fabs(m.value - truth) / m.standard_error;
+        far += z > 3;
+        EXPECT_LT(z, 6) << seed << " " << j << ": " << m.value << " +- " << m.standard_error << ", true "
+                        << truth;
+      };
+      check(fit.drives[j][kDriveTerms], machine.drives[j].constant);
+      check(fit.drives[j][std::size_t(DriveTerm::coulomb)], machine.drives[j].terms[1]);
+      check(fit.drives[j][std::size_t(DriveTerm::offset)], machine.drives[j].terms[5]);
+    }
+  }
+  EXPECT_LE(far, 4) << "of " << values;  // by chance of a normal distribution: one in 370
+}
+
+TEST(Fit, SaysWhyItCannot) {
+  test::Machine machine(1);
+  ArmRecord still = machine.record(1, 20);
+  for (record::Record& joint : still.joints) {
+    for (double& q : joint.column(record::Channel::motor_position)) q = 0.5;
+    for (double& v : joint.column(record::Channel::motor_velocity)) v = 0;
+  }
+  const auto resting = motions(machine, {still});
+  EXPECT_THROW(fit_arm(machine.declared, fitted(resting)), CannotIdentify);
+  std::vector<std::string> warnings;
+  EXPECT_THROW(motions_of(machine.record(1, 2), machine.declared, warnings), BadData);
+  const std::vector<record::JointRecord> one = {{"elbow_joint", still.joints[2]}};
+  EXPECT_THROW(arm_record(one, machine.declared, "x.csv"), BadData);
+}
+
+TEST(Trace, FindsAPayloadWithItsLinkAndMass) {
+  const test::Machine machine(5);
+  test::Machine loaded = machine;
+  Body body;
+  body.mass = 2.5;
+  body.centre = {0.03, -0.08, 0.15};
+  body.inertia = 0.005 * Eigen::Matrix3d::Identity();
+  loaded.chain.links[5] += parameters_of(body);
+  const ArmTrace trace =
+      trace_arm(machine.declared, {machine.record(1), machine.record(2)}, loaded.record(3), false);
+  ASSERT_EQ(trace.steps.size(), 1u);
+  const ArmStep& step = trace.steps[0];
+  EXPECT_EQ(step.effect, "payload");
+  EXPECT_EQ(step.link, "wrist_3_link");
+  const double truth[] = {2.5, 0.03, -0.08, 0.15};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const signal::Measured& m = step.parameters[i].measured;
+    EXPECT_LT(std::fabs(m.value - truth[i]), 4 * m.standard_error)
+        << step.parameters[i].name << " " << m.value;
+    EXPECT_LT(m.standard_error, i == 0 ? 0.3 : 0.02);
+  }
+  EXPECT_FALSE(trace.unexplained);
+  for (std::size_t j = 0; j < 6; ++j) EXPECT_LT(trace.after[j], 0.05);
+  // And the other way round: a body is no longer there.
+  const ArmTrace back =
+      trace_arm(machine.declared, {loaded.record(4), loaded.record(5)}, machine.record(6), false);
+  ASSERT_EQ(back.steps.size(), 1u);
+  EXPECT_EQ(back.steps[0].effect, "payload");
+  const signal::Measured gone = back.steps[0].parameters[0].measured;
+  EXPECT_LT(std::fabs(gone.value + 2.5), 4 * gone.standard_error)
+      << gone.value << " +- " << gone.standard_error;
+}
+
+TEST(Trace, NamesNothingWhereNothingHasChanged) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const test::Machine machine(seed);
+    const ArmTrace trace =
+        trace_arm(machine.declared, {machine.record(100 + seed)}, machine.record(200 + seed), false);
+    EXPECT_TRUE(trace.steps.empty()) << seed << " " << (trace.steps.empty() ? "" : trace.steps[0].effect);
+    EXPECT_FALSE(trace.unexplained) << seed << " " << trace.unexplained->channel
+                                    << trace.unexplained->signature;
+    EXPECT_EQ(trace.before, trace.after);
+  }
+}
+
+// The same body, mounted in another place: the fitted machine tells that of the test record, and the same
+// mass.
+TEST(Trace, OfAFittedMachineThePayloadOfTheTestRecordCounts) {
+  const test::Machine machine(9);
+  const auto base = motions(machine, {machine.record(1), machine.record(2)});
+  ArmRig rig = fit_arm(machine.declared, fitted(base)).rig;
+  double masses[2];
+  const Eigen::Vector3d centres[] = {{0.03, -0.12, 0.15}, {-0.08, 0.05, 0.2}};
+  const auto loaded = [&](int i) {
+    test::Machine m = machine;
+    Body body;
+    body.mass = 3;
+    body.centre = centres[i];
+    body.inertia = 0.01 * Eigen::Matrix3d::Identity();
+    m.chain.links[5] += parameters_of(body);
+    return m.record(std::uint64_t(20 + i));
+  };
+  for (int i = 0; i < 2; ++i) {
+    const ArmTrace trace = trace_arm(rig, {loaded(1 - i)}, loaded(i), false);
+    ASSERT_EQ(trace.steps.size(), 1u);
+    EXPECT_EQ(trace.steps[0].effect, "payload");
+    const auto& p = trace.steps[0].parameters;
+    masses[i] = p[0].measured.value;
+    EXPECT_LT(std::fabs(masses[i] - 3), 3 * p[0].measured.standard_error);
+    for (int k = 0; k < 3; ++k)
+      EXPECT_LT(std::fabs(p[std::size_t(1 + k)].measured.value - centres[i][k]),
+                4 * p[std::size_t(1 + k)].measured.standard_error + 0.002)
+          << k;
+    EXPECT_FALSE(trace.unexplained);
+    EXPECT_FALSE(trace.notes.empty());  // what the training record carries
+  }
+  EXPECT_NEAR(masses[0] / masses[1], 1, 0.03);
+}
+
+// Friction and offsets that differ by some percent are a robot that warms up, and no payload.
+TEST(Trace, WarmingUpIsNoEffect) {
+  const test::Machine machine(21);
+  test::Machine warm = machine;
+  const double factors[] = {0.9, 1.08, 0.92, 1.1, 0.88, 1.05};
+  for (std::size_t j = 0; j < 6; ++j) {
+    for (const int t : {1, 2, 3, 4, 6}) warm.drives[j].terms[std::size_t(t)] *= factors[j];
+    warm.drives[j].terms[5] += 0.02 * (j % 2 == 0 ? 1 : -1) * machine.drives[j].terms[1];
+  }
+  const ArmTrace trace = trace_arm(machine.declared, {machine.record(1)}, warm.record(2), false);
+  EXPECT_TRUE(trace.steps.empty());
+  EXPECT_FALSE(trace.unexplained) << trace.unexplained->channel << trace.unexplained->signature;
+  EXPECT_EQ(trace.notes.size(), 6u);  // told, joint by joint
+}
+
+TEST(Trace, FindsGravityFromAnotherDirection) {
+  const test::Machine machine(7);
+  test::Machine tilted = machine;
+  tilted.chain.gravity = Eigen::AngleAxisd(0.06, Eigen::Vector3d::UnitX()) * machine.chain.gravity;
+  const ArmTrace trace =
+      trace_arm(machine.declared, {machine.record(1), machine.record(2)}, tilted.record(3), false);
+  ASSERT_EQ(trace.steps.size(), 1u);
+  EXPECT_EQ(trace.steps[0].effect, "gravity_direction");
+  const auto& p = trace.steps[0].parameters;
+  EXPECT_LT(std::fabs(p[0].measured.value - 0.06),
+            4 * p[0].measured.standard_error + 0.002);  // linear in the angle
+  EXPECT_LT(std::fabs(p[1].measured.value), 4 * p[1].measured.standard_error + 0.002);
+}
+
+TEST(Trace, FindsFrictionOfOneJoint) {
+  const test::Machine machine(8);
+  test::Machine rubbing = machine;
+  for (const int t : {1, 2, 3, 4, 6}) rubbing.drives[3].terms[std::size_t(t)] *= 1.6;
+  const ArmTrace trace =
+      trace_arm(machine.declared, {machine.record(1), machine.record(2)}, rubbing.record(3), false);
+  ASSERT_EQ(trace.steps.size(), 1u);  // the factor is that of all its friction
+  EXPECT_EQ(trace.steps[0].effect, "friction_drift");
+  EXPECT_EQ(trace.steps[0].joint, "wrist_1_joint");
+  EXPECT_NEAR(trace.steps[0].parameters[0].measured.value, 1.6, 0.1);
+}
+
+}  // namespace
+}  // namespace backlash::arm
