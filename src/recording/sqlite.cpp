@@ -93,12 +93,12 @@ class Sqlite : public Recording {
     if (in.gcount() != 100 || head.compare(0, 15, "SQLite format 3") != 0)
       throw BadData(path_, "no SQLite file");
     const auto byte = [&head](std::size_t i) { return std::uint64_t{static_cast<std::uint8_t>(head[i])}; };
-    const std::uint64_t page = byte(16) << 8 | byte(17);
+    const std::uint64_t stated = byte(16) << 8 | byte(17), page = stated == 1 ? 65536 : stated;
     const std::uint64_t count = byte(28) << 24 | byte(29) << 16 | byte(30) << 8 | byte(31);
     in.seekg(0, std::ios::end);
     const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
     std::error_code error;
-    if (!std::filesystem::exists(path_ + "-wal", error) && size < (page == 1 ? 65536 : page) * count)
+    if (!std::filesystem::exists(path_ + "-wal", error) && size < page * count)
       throw BadData(path_, fmt::format("the file was cut off: {} bytes of {} are there", size, page * count));
   }
 
