@@ -15,6 +15,7 @@ run=(
   rosbash python3-rostest librostest-dev libgtest-dev             # rosrun; the package's CMake file asks for rostest
   python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
+  liblz4-dev libsqlite3-dev libzstd-dev                           # recordings of ROS 2
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
   liburdfdom-dev liburdfdom-headers-dev                           # robots as URDF
   python3-matplotlib python3-numpy python3-yaml                   # plots

@@ -2,16 +2,13 @@
 #include "backlash_diagnosis/ros/bag_record.h"
 
 #include <fmt/format.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
-#include <std_msgs/String.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <exception>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 
@@ -20,23 +17,12 @@
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/record/sample_joiner.h"
 #include "backlash_diagnosis/record/time_base.h"
+#include "backlash_diagnosis/recording/recording.h"
 #include "backlash_diagnosis/ros/joint_state.h"
-#include "bag_structure.h"
+#include "message_source.h"
 
 namespace backlash::ros_bridge {
 namespace {
-
-const std::string kInfoTopic = "/record_info";
-
-std::string type_of(const rosbag::ConnectionInfo& c) {
-  return printable(c.datatype);
-}
-
-template <typename Message>
-bool is_type(const rosbag::ConnectionInfo& c) {
-  return c.datatype == ros::message_traits::DataType<Message>::value() &&
-         c.md5sum == ros::message_traits::MD5Sum<Message>::value();
-}
 
 std::string stamp_text(const ros::Time& stamp) {
   return fmt::format("{}.{:09}", stamp.sec, stamp.nsec);
@@ -60,40 +46,6 @@ std::optional<std::string> joint_of(const std::string& name) {
       return name.substr(0, name.size() - suffix.size());
   return std::nullopt;
 }
-
-/// Lengths of a serialised JointState: a damaged one would make the deserialiser reserve what it asks for.
-bool lengths_fit(const std::vector<std::uint8_t>& bytes) {
-  std::size_t place = 12;  // sequence number, stamp
-  const auto array = [&](std::size_t item, std::uint32_t& count) {
-    if (place + 4 > bytes.size()) return false;
-    std::memcpy(&count, bytes.data() + place, 4);
-    place += 4;
-    if (std::uint64_t{count} * item > bytes.size() - place) return false;
-    place += count * item;
-    return true;
-  };
-  std::uint32_t count = 0, names = 0, ignored = 0;
-  if (!array(1, count)) return false;  // frame_id
-  if (place + 4 > bytes.size()) return false;
-  std::memcpy(&names, bytes.data() + place, 4);
-  place += 4;
-  if (names > (bytes.size() - place) / 4) return false;
-  for (std::uint32_t i = 0; i < names; ++i)
-    if (!array(1, ignored)) return false;
-  for (int i = 0; i < 3; ++i)
-    if (!array(sizeof(double), ignored)) return false;
-  return place == bytes.size();
-}
-
-/// Takes a message's bytes as they lie in the bag. MessageInstance::write asks a stream for no more than
-/// this; to ask the instance for its size before would read its header twice.
-struct RawMessage {
-  std::vector<std::uint8_t> bytes;
-  std::uint8_t* advance(std::uint32_t size) {
-    bytes.resize(size);
-    return bytes.data();
-  }
-};
 
 /// A joint of a topic, message by message.
 class JointRun {
@@ -215,49 +167,34 @@ struct TopicRuns {
 class Reader {
  public:
   Reader(const std::string& path, const std::string& joint, const std::string& topic)
-      : path_(path), joint_(joint), wanted_topic_(topic) {}
+      : path_(path),
+        joint_(joint),
+        wanted_topic_(topic),
+        source_(recording::is_recording(path) ? open_ros2_recording(path) : open_bag(path)) {}
 
   record::Record read() {
-    return guarded([this] {
-      read_origin();
-      return with_own_names(joint_);
-    });
+    read_origin();
+    return with_own_names(joint_);
   }
 
   record::Record read(const record::ChannelMap& map) {
-    return guarded([&] {
-      read_origin();
-      if (origin_) return with_own_names(map.joint);
-      std::vector<std::string> topics;
-      for (const std::string& wanted : map.topics()) {
-        const std::vector<std::string> found = candidate_topics(wanted);
-        if (found.size() > 1)
-          fail("channels: several topics end in " + printable(wanted) + ", name one whole: " + joined(found));
-        topics.push_back(found.front());
-      }
-      if (topics.size() > 1) origin_ = first_stamp(topics);
-      for (std::size_t i = 0; i < topics.size(); ++i) meet(map.on(map.topics()[i]), topics[i]);
-      mapped_ = true;
-      read_messages(topics);
-      return joined_parts(map, topics);
-    });
+    read_origin();
+    if (origin_) return with_own_names(map.joint);
+    std::vector<std::string> topics;
+    for (const std::string& wanted : map.topics()) {
+      const std::vector<std::string> found = candidate_topics(wanted);
+      if (found.size() > 1)
+        fail("channels: several topics end in " + printable(wanted) + ", name one whole: " + joined(found));
+      topics.push_back(found.front());
+    }
+    if (topics.size() > 1) origin_ = first_stamp(topics);
+    for (std::size_t i = 0; i < topics.size(); ++i) meet(map.on(map.topics()[i]), topics[i]);
+    mapped_ = true;
+    read_messages(topics);
+    return told(joined_parts(map, topics));
   }
 
  private:
-  template <typename Action>
-  record::Record guarded(const Action& action) {
-    check_bag_structure(path_);
-    try {
-      bag_.open(path_, rosbag::bagmode::Read);
-      return action();
-    } catch (const Error&) {
-      throw;
-    } catch (const std::exception& e) {
-      throw BadData(path_,
-                    std::string("damaged bag: ") + e.what() + "; 'rosbag reindex' may save a part of it");
-    }
-  }
-
   [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
 
   /// By the names of this package.
@@ -267,19 +204,23 @@ class Reader {
     read_messages(topics);
     JointRun& run = chosen(topics);
     if (run.wrong) std::rethrow_exception(run.wrong);
-    return run.finished();
+    return told(run.finished());
+  }
+
+  record::Record told(record::Record record) const {
+    for (std::string& warning : source_->warnings()) record.warnings.push_back(std::move(warning));
+    return record;
   }
 
   std::vector<std::string> candidate_topics(const std::string& wanted) {
-    rosbag::View all(bag_);
     std::set<std::string> topics, present;
-    for (const rosbag::ConnectionInfo* c : all.getConnections()) {
-      present.insert(printable(c->topic) + " (" + type_of(*c) + ")");
-      if (!topic_matches(c->topic, wanted)) continue;
-      if (!is_type<sensor_msgs::JointState>(*c))
-        fail("topic " + printable(c->topic) + " is of type " + type_of(*c) +
-             ", expected sensor_msgs/JointState");
-      topics.insert(c->topic);
+    for (const MessageSource::Topic& topic : source_->topics()) {
+      present.insert(printable(topic.name) + " (" + topic.type + ")");
+      if (!topic_matches(topic.name, wanted)) continue;
+      if (!topic.joint_states)
+        fail("topic " + printable(topic.name) + " is of type " + topic.type + ", expected " +
+             source_->expected_type());
+      topics.insert(topic.name);
     }
     if (topics.empty())
       fail("no topic " + printable(wanted) + "; there are: " + (present.empty() ? "none" : joined(present)));
@@ -287,14 +228,9 @@ class Reader {
   }
 
   void read_origin() {
-    rosbag::View all(bag_);
-    for (const rosbag::ConnectionInfo* c : all.getConnections())
-      if (c->topic == kInfoTopic && !is_type<std_msgs::String>(*c)) return;  // somebody else's topic
-    rosbag::View view(bag_, rosbag::TopicQuery(kInfoTopic));
-    if (view.begin() == view.end()) return;
-    const auto message = view.begin()->instantiate<std_msgs::String>();
-    if (!message) return;
-    const YamlReader yaml = YamlReader::from_text(message->data, path_ + ": " + kInfoTopic);
+    const std::optional<std::string> text = source_->info();
+    if (!text) return;
+    const YamlReader yaml = YamlReader::from_text(*text, path_ + ": " + kInfoTopic);
     yaml.text("name");
     const YamlReader stamp = yaml.map("time_origin");
     origin_ = ros::Time(
@@ -304,21 +240,9 @@ class Reader {
   }
 
   void read_messages(const std::vector<std::string>& topics) {
-    rosbag::View view(bag_, rosbag::TopicQuery(topics));
-    std::size_t index = 0;
-    RawMessage raw;
-    sensor_msgs::JointState message;  // one for all: its arrays keep their room
-    for (const rosbag::MessageInstance& instance : view) {
-      raw.bytes.clear();  // an empty message asks for nothing
-      instance.write(raw);
-      if (!lengths_fit(raw.bytes))
-        throw BadData(fmt::format("{}: {} message {}", path_, printable(instance.getTopic()), index),
-                      "damaged: its arrays do not fit into it");
-      ros::serialization::IStream in(raw.bytes.data(), static_cast<std::uint32_t>(raw.bytes.size()));
-      ros::serialization::deserialize(in, message);
-      ++index;
-      take(message, instance.getTopic());
-    }
+    source_->read(topics, [this](const sensor_msgs::JointState& message, const std::string& topic) {
+      take(message, topic);
+    });
   }
 
   void take(const sensor_msgs::JointState& message, const std::string& topic) {
@@ -359,9 +283,11 @@ class Reader {
 
   /// Time 0 of all topics.
   ros::Time first_stamp(const std::vector<std::string>& topics) {
-    rosbag::View view(bag_, rosbag::TopicQuery(topics));
-    for (const rosbag::MessageInstance& instance : view)
-      if (const auto message = instance.instantiate<sensor_msgs::JointState>()) return message->header.stamp;
+    std::optional<ros::Time> first;
+    source_->read(topics, [&first](const sensor_msgs::JointState& message, const std::string&) {
+      if (!first) first = message.header.stamp;
+    });
+    if (first) return *first;
     fail("no message on " + joined(topics));
   }
 
@@ -418,7 +344,7 @@ class Reader {
   const std::string path_;
   std::string joint_;
   const std::string wanted_topic_;
-  rosbag::Bag bag_;
+  std::unique_ptr<MessageSource> source_;
   std::optional<ros::Time> origin_;
   std::set<std::string> joints_;
   std::map<std::string, TopicRuns> topics_;

@@ -16,13 +16,14 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/recording/mcap_writer.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "backlash_diagnosis/ros/joint_state.h"
+#include "message_source.h"
 
 namespace backlash::ros_bridge {
 namespace {
 
-const std::string kInfoTopic = "/record_info";
 const std::string kJointTopic = "/joint_states";
 
 /// A file beside the target that vanishes unless it is kept.
@@ -140,7 +141,41 @@ void write_messages(rosbag::Bag& bag, const record::Record& record, const std::v
   }
 }
 
+/// In CDR; seconds of ROS 2 are signed.
+recording::JointState ros2_message(const sensor_msgs::JointState& message, const ros::Time& stamp) {
+  recording::JointState out;
+  out.seconds = static_cast<std::int32_t>(stamp.sec);
+  out.nanoseconds = stamp.nsec;
+  out.name = message.name;
+  out.position = message.position;
+  out.velocity = message.velocity;
+  out.effort = message.effort;
+  return out;
+}
+
 }  // namespace
+
+void write_mcap(const record::Record& record, const std::string& path, const std::string& joint,
+                const ros::Time& origin) {
+  if (joint.empty()) throw InvalidParameter("joint", "''", "must not be empty");
+  check_writable(record);
+  const std::vector<ros::Time> stamps = stamps_of(record, origin);
+  if (stamps.back().sec > static_cast<std::uint32_t>(std::numeric_limits<std::int32_t>::max()))
+    throw BadData(record.name, fmt::format("time = {} s in the last sample: a ROS 2 stamp cannot hold it",
+                                           to_text(record.time.back())));
+  TemporaryFile file(path);
+  recording::McapWriter out(file.name());
+  const auto info = out.add_channel(kInfoTopic, recording::kStringType, recording::kStringDefinition);
+  const auto joints =
+      out.add_channel(kJointTopic, recording::kJointStateType, recording::kJointStateDefinition);
+  out.write(info, stamps.front().toNSec(), recording::to_cdr(info_message(record, origin).data));
+  const JointNames names(joint);
+  for (std::size_t i = 0; i < record.size(); ++i)
+    out.write(joints, stamps[i].toNSec(),
+              recording::to_cdr(ros2_message(make_joint_state(record, i, names), stamps[i])));
+  out.close();
+  file.keep();
+}
 
 void write_bag(const record::Record& record, const std::string& path, const std::string& joint,
                const ros::Time& origin) {

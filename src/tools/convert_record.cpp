@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// CSV to bag and back.
+// CSV to bag or recording of ROS 2 and back.
 #include <iostream>
 
 #include "backlash_diagnosis/rig_file/rig_file.h"
@@ -14,10 +14,10 @@ Command command() {
   Command c;
   c.name = "convert_record";
   c.summary =
-      "Converts a record between CSV and bag (sensor_msgs/JointState on /joint_states); times and values "
-      "survive "
-      "the way there and back.";
-  c.positional = {"IN.{csv,bag}", "OUT.{csv,bag}"};
+      "Converts a record between CSV, bag and MCAP (sensor_msgs/JointState on /joint_states) and reads "
+      "recordings of ROS 2 (MCAP, rosbag2's SQLite file or its folder); times and values survive the way "
+      "there and back.";
+  c.positional = {"IN.{csv,bag,mcap,db3}", "OUT.{csv,bag,mcap}"};
   c.options = {
       {"rig", "RIG.yaml", "rig file whose joint the bag has"},
       {"joint", "NAME",
@@ -29,7 +29,8 @@ Command command() {
   c.notes =
       "Only header stamps count. Time 0 of a CSV becomes the stamp 1000000000 s, as ROS refuses 0; the topic "
       "/record_info in the bag says so. A recorded bag without it begins at time 0.";
-  c.examples = {"convert_record run.csv run.bag --joint elbow", "convert_record run.bag run.csv"};
+  c.examples = {"convert_record run.csv run.bag --joint elbow", "convert_record run.bag run.csv",
+                "convert_record rosbag2_run/ run.mcap --joint elbow"};
   c.exit_codes = "  0   done\n";
   return c;
 }
@@ -37,7 +38,7 @@ Command command() {
 int convert(const Arguments& arguments) {
   const std::string &in = arguments.positional(0), &out = arguments.positional(1);
   check_record_path(in);
-  check_record_path(out);
+  check_written_path(out);
   BagPlace place;
   if (arguments.has("rig")) place = place_of(rig_file::load_rig_file(arguments.text("rig")));
   if (arguments.has("joint") || arguments.has("topic")) place.channels.declared = false;

@@ -35,7 +35,7 @@ Command command() {
   Command c;
   c.name = "diagnose_record";
   c.summary = "Estimates the backlash in a record by all methods that it can serve and grades it.";
-  c.positional = {"RECORD.{csv,bag}"};
+  c.positional = {"RECORD.{csv,bag,mcap,db3}"};
   c.options = {
       {"json", "OUT.json", "report to write; '-' writes it to standard output instead of the summary", true},
       {"report", "OUT.html", "page for people: verdict, estimates, plots, and how it came about"},

@@ -25,7 +25,8 @@ Command command() {
   c.positional = {"RIG.yaml"};
   c.options = {
       {"duration", "S", "length of the record [s]; default: that of --run"},
-      {"out", "RECORD.{csv,bag}", "record to write; a bag has the joint of the rig file on /joint_states"},
+      {"out", "RECORD.{csv,bag,mcap}",
+       "record to write; a bag has the joint of the rig file on /joint_states"},
       {"run", "NAME", "one of the rig file's test runs instead of its excitation"},
       {"list-runs", "", "print the rig file's test runs, simulate nothing"},
       {"backlash", "M",
@@ -78,7 +79,7 @@ int simulate(const Arguments& arguments) {
     if (!arguments.has(option) && !(arguments.has("run") && std::string(option) == "duration"))
       throw UsageError(std::string("missing --") + option);
   const std::string out = arguments.text("out");
-  check_record_path(out);
+  check_written_path(out);
   double duration = arguments.number("duration", 0, Range::positive());
   rig_file::RigFile file = rig_file::load_rig_file(arguments.positional(0));
   if (arguments.has("run")) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Records in bags: sensor_msgs/JointState messages, no roscore needed.
+// Records in bags and in recordings of ROS 2 (recording/recording.h): sensor_msgs/JointState messages, no
+// roscore needed. What is said of bags holds for both.
 //
 // Only header stamps count, never the time at which a message was received. A bag written here says by a
 // latched std_msgs/String message on the topic `record_info` which stamp is time 0 of its record, as YAML:
@@ -45,5 +46,9 @@ record::Record read_bag(const std::string& path, const record::ChannelMap& chann
 /// increase by a nanosecond or whose stamp ROS cannot hold.
 void write_bag(const record::Record& record, const std::string& path, const std::string& joint,
                const ros::Time& origin = kBagTimeOrigin);
+
+/// The same as a recording of ROS 2 (recording/mcap_writer.h), whose stamps end in 2038.
+void write_mcap(const record::Record& record, const std::string& path, const std::string& joint,
+                const ros::Time& origin = kBagTimeOrigin);
 
 }  // namespace backlash::ros_bridge

@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/recording/recording.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "tools/common/command_line.h"
 
@@ -20,9 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_bag(const std::string& path) {
-  check_record_path(path);
-  return fs::path(path).extension() == ".bag";
+bool ends_in(const std::string& path, const char* extension) {
+  return fs::path(path).extension() == extension;
 }
 
 /// Puts off Ctrl-C and its like while a file is written.
@@ -47,9 +47,14 @@ class SignalsBlocked {
 const std::string kDefaultJoint = "joint";
 
 void check_record_path(const std::string& path) {
-  const std::string extension = fs::path(path).extension();
-  if (extension != ".csv" && extension != ".bag")
-    throw UsageError("'" + printable(path, 4096) + "': a record must end in .csv or .bag");
+  if (!ends_in(path, ".csv") && !ends_in(path, ".bag") && !recording::is_recording(path))
+    throw UsageError("'" + printable(path, 4096) +
+                     "': a record must end in .csv, .bag, .mcap or .db3 or be a folder of rosbag2");
+}
+
+void check_written_path(const std::string& path) {
+  if (!ends_in(path, ".csv") && !ends_in(path, ".bag") && !ends_in(path, ".mcap"))
+    throw UsageError("'" + printable(path, 4096) + "': a record is written as .csv, .bag or .mcap");
 }
 
 BagPlace place_of(const rig_file::RigFile& file) {
@@ -60,15 +65,19 @@ BagPlace place_of(const rig_file::RigFile& file) {
 }
 
 record::Record read_record(const std::string& path, const BagPlace& place) {
-  if (!is_bag(path)) return record::record_of_joint(record::read_joints_csv(path), place.joint, path);
+  check_record_path(path);
+  if (ends_in(path, ".csv")) return record::record_of_joint(record::read_joints_csv(path), place.joint, path);
   return place.channels.declared ? ros_bridge::read_bag(path, place.channels)
                                  : ros_bridge::read_bag(path, place.joint, place.topic);
 }
 
 void write_record(const record::Record& record, const std::string& path, const std::string& joint) {
+  check_written_path(path);
   const SignalsBlocked blocked;
-  if (is_bag(path))
+  if (ends_in(path, ".bag"))
     ros_bridge::write_bag(record, path, joint);
+  else if (ends_in(path, ".mcap"))
+    ros_bridge::write_mcap(record, path, joint);
   else
     record::write_csv(record, path);
 }

@@ -23,8 +23,11 @@ struct BagPlace {
 /// Where the joint of a rig file is.
 BagPlace place_of(const rig_file::RigFile& file);
 
-/// Throws UsageError for a path that ends in neither .csv nor .bag.
+/// Throws UsageError for a path that is none of .csv, .bag, .mcap, .db3 and a folder of rosbag2.
 void check_record_path(const std::string& path);
+
+/// Throws UsageError for a path that is none of .csv, .bag, .mcap.
+void check_written_path(const std::string& path);
 
 /// Throws UsageError as above and what read_csv and read_bag throw.
 record::Record read_record(const std::string& path, const BagPlace& place = {});
