@@ -10,9 +10,9 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kLeastOrder = 2, kMostOrder = 80, kOrderStep = 0.5;  // 1/rad. Choice
-constexpr double kFrictionOrders = 5;                                 // 1/rad. Choice
-constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};                 // - of the rms speed. Choice
+constexpr double kMostOrder = 80, kOrderStep = 0.5;    // 1/rad. Choice
+constexpr double kFrictionOrders = 5;                  // 1/rad. Choice
+constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};  // - of the rms speed. Choice
 
 double direction(const Moment& m, double) {
   return m.direction;

@@ -11,6 +11,8 @@
 
 namespace backlash::identification {
 
+constexpr double kLeastOrder = 2;  // 1/rad, of cogging: below is gravity. Choice
+
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
   double shape = 0;  // order [1/rad] or speed [rad/s], where the effect has one

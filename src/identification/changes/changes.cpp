@@ -52,6 +52,7 @@ class ChangeSearch {
   std::optional<FoundChange> best(const Background& b) const;
   FoundChange scanned(const ScannedEffect& c, const Background& b, std::size_t step) const;
   bool believed(const FoundChange& f, const Background& b) const;
+  bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
   void find_end(FoundChange& f, const Background& b) const;
@@ -176,6 +177,7 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
     for (int i = -5; i <= 5; ++i) {
       ChangeEffect e = f.effect;
       e.shape = middle + step * i;
+      if (e.shape < kLeastOrder) continue;
       const EffectSums sums(motion_, effect_columns(motion_, e), b, settings_.block, false);
       EffectSums::Score s = sums.score(f.from, f.to, b);
       if (s.gain <= f.score.gain) continue;
@@ -216,6 +218,16 @@ void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
   if (more > threshold(1) && ended.score.gain > (1 + 5 * settings_.least_further) * f.score.gain) f = ended;
 }
 
+/// A change of its own, not what the shape of an earlier one leaves.
+bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChange>& found) const {
+  for (const FoundChange& f : found) {
+    const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
+    const double least = apart < settings_.same_event ? settings_.least_beside : settings_.least_further;
+    if (next.gain < least * f.gain) return false;
+  }
+  return true;
+}
+
 std::vector<FoundChange> ChangeSearch::run() {
   std::vector<FoundChange> found;
   for (int k = 0; k < settings_.most_changes; ++k) {
@@ -224,7 +236,7 @@ std::vector<FoundChange> ChangeSearch::run() {
     if (!next) break;
     refine(*next, b);
     if (!believed(*next, b)) break;
-    if (!found.empty() && next->gain < settings_.least_further * found.front().gain) break;
+    if (!further(*next, found)) break;
     find_end(*next, b);
     found.push_back(*next);
     // Each anew beside the others.

@@ -65,7 +65,8 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
 
 }  // namespace
 
-MotionSampling sampling_of(const std::vector<const record::Record*>& records, const ChangeSettings& settings) {
+MotionSampling sampling_of(const std::vector<const record::Record*>& records,
+                           const ChangeSettings& settings) {
   MotionSampling s;
   for (const record::Record* r : records) {
     if (r->size() < 100)

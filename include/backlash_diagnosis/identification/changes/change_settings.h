@@ -34,13 +34,16 @@ struct ChangeSettings {
   double block = 0.2;  // s, resolution of the onset. Choice
   double margin = 8;   // s at either end in which no change begins. Choice
   double least_explained = 0.1;  // - of the squares of the residual after the onset. Choice
-  double least_further = 0.02;   // - of the first change's gain. Choice: what a first one leaves by its shape
-  int most_changes = 4;          // Choice
-  double onset_drop = 8;         // of twice the log likelihood, as wide as the onset is uncertain. Simulation
-  double onset_least = 0.1;      // s, half of the narrowest interval. Choice
-  double unknown_left = 0.4;     // - of the squares after the onset that may be left. Choice
-  double alike = 0.97;           // - of the best gain: effects that fit alike. Choice
-  double model_error = 0.03;     // - of a size, as the shape of an effect is an idealisation. Choice
+  double least_further =
+      0.05;               // - of the first change's gain. Simulation: what a first one leaves by its shape
+  double same_event = 5;  // s: two that begin so close may be one whose shape is another. Choice
+  double least_beside = 0.25;  // - of the gain of the other that a second one of an event has. Choice
+  int most_changes = 4;        // Choice
+  double onset_drop = 8;       // of twice the log likelihood, as wide as the onset is uncertain. Simulation
+  double onset_least = 0.1;    // s, half of the narrowest interval. Choice
+  double unknown_left = 0.4;   // - of the squares after the onset that may be left. Choice
+  double alike = 0.97;         // - of the best gain: effects that fit alike. Choice
+  double model_error = 0.03;   // - of a size, as the shape of an effect is an idealisation. Choice
 };
 
 }  // namespace backlash::identification
