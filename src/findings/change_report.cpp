@@ -41,7 +41,7 @@ std::string change_summary(const identification::Changes& found) {
     for (const identification::ChangeSize& s : c.size)
       text += fmt::format("; {} {} {}", s.name, with_error(s.measured), s.unit);
     if (c.effect == "unknown")
-      text += "; no effect explains it, nearest: " + joined(c.alike);
+      text += "; no effect explains it" + (c.alike.empty() ? "" : ", nearest: " + joined(c.alike));
     else if (!c.alike.empty())
       text += "; the record does not tell it from: " + joined(c.alike);
     text += "\n";

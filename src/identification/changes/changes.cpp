@@ -36,7 +36,7 @@ class ChangeSearch {
         candidates_(std::move(candidates)),
         settings_(settings),
         progress_(progress),
-        first_(residual_of(model, motion)),
+        first_(residual_of(model, motion, settings)),
         margin_(static_cast<std::size_t>(settings.margin / settings.block)),
         blocks_(static_cast<std::size_t>(motion.moments.back().time / settings.block) + 1) {}
 
@@ -45,6 +45,7 @@ class ChangeSearch {
   std::size_t windows() const;
   Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
   bool explained(const std::vector<FoundChange>& all) const;
+  std::optional<Change> louder() const;
 
  private:
   Background background(const std::vector<FoundChange>& others) const;
@@ -262,6 +263,44 @@ bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
   return left - 2 * noise * rows < settings_.unknown_left * squares;
 }
 
+/// A residual that grows and follows no effect.
+std::optional<Change> ChangeSearch::louder() const {
+  const Eigen::VectorXd left = background({}).left();
+  std::vector<double> begin, squares, rows;  // of windows
+  for (Eigen::Index r = 0; r < left.size(); ++r) {
+    if (begin.empty() || motion_.time(r) - begin.back() >= settings_.window) {
+      begin.push_back(motion_.time(r));
+      squares.push_back(0);
+      rows.push_back(0);
+    }
+    squares.back() += left[r] * left[r];
+    ++rows.back();
+  }
+  const double total = left.squaredNorm(), count = double(left.size());
+  double before = 0, rows_before = 0, most = 0;
+  std::optional<Change> change;
+  for (std::size_t k = 1; k + 1 < begin.size(); ++k) {
+    before += squares[k - 1];
+    rows_before += rows[k - 1];
+    const double a = before / rows_before, b = (total - before) / (count - rows_before);
+    // Twice the log likelihood ratio of another variance from here on.
+    const double gain =
+        count * std::log(total / count) - rows_before * std::log(a) - (count - rows_before) * std::log(b);
+    if (begin[k] < settings_.margin || gain <= most) continue;
+    most = gain;
+    change.reset();
+    if (b < settings_.unknown_louder * std::max(a, model_.noise * model_.noise)) continue;
+    change.emplace();
+    change->effect = "unknown";
+    change->gain = gain;
+    change->since = motion_.start + begin[k];
+    change->since_from = change->since - settings_.window;
+    change->since_to = change->since + settings_.window;
+    change->error_before = change->error_after = std::sqrt(b);
+  }
+  return change;
+}
+
 void ChangeSearch::onset_interval(const FoundChange& f, const Background& b, Change& change) const {
   const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   double rows = 0;
@@ -318,7 +357,7 @@ std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
   for (const ChangeEffect& e : change_effects(model.sampling)) all.push_back({e, 1});
   for (const record::Record& r : healthy) {
     const SampledMotion motion = motion_by(model, r, settings);
-    const Eigen::VectorXd residual = residual_of(model, motion).residual;
+    const Eigen::VectorXd residual = residual_of(model, motion, settings).residual;
     for (ScannedEffect& c : all)
       c.inflation = std::max(c.inflation, score_inflation(motion, residual, effect_columns(motion, c.effect),
                                                           model.noise * model.noise, settings.window));
@@ -347,6 +386,8 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
   for (const FoundChange& f : found) out.changes.push_back(search.told(f, found, rig.linear));
   std::sort(out.changes.begin(), out.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });
+  if (found.empty())
+    if (const auto change = search.louder()) out.changes.push_back(*change);
   if (!search.explained(found)) {
     Change unknown = out.changes.front();
     unknown.effect = "unknown";

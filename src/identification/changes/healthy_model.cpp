@@ -2,6 +2,7 @@
 #include "healthy_model.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
@@ -11,6 +12,9 @@ namespace backlash::identification {
 namespace {
 
 constexpr double kWarmUps[] = {20, 40, 60, 80, 110, 150, 220, 300, 400};  // s, tried. Choice
+
+constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
+constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
 
 // Columns of the equation of motion, in this order.
 enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kWarmViscous, kWarmCoulomb, kBaseColumns };
@@ -217,16 +221,53 @@ SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
   return motion;
 }
 
-Whitened residual_of(const HealthyModel& model, const SampledMotion& motion) {
-  Eigen::MatrixXd x = base_columns(motion, model.warm_up);
-  for (const ChangeEffect& e : model.further) x = beside(x, effect_columns(motion, e));
+namespace {
+
+struct Rest {
+  double from, to;  // s, without motion
+};
+
+/// The longest ones.
+std::vector<Rest> rests_of(const SampledMotion& motion, const ChangeSettings& settings) {
+  std::vector<Rest> rests;
+  for (Eigen::Index r = 1; r < motion.size(); ++r)
+    if (motion.time(r) - motion.time(r - 1) > settings.rest)
+      rests.push_back({motion.time(r - 1), motion.time(r)});
+  std::sort(rests.begin(), rests.end(),
+            [](const Rest& a, const Rest& b) { return a.to - a.from > b.to - b.from; });
+  if (rests.size() > kMostRests) rests.resize(kMostRests);
+  return rests;
+}
+
+void add_nuisance(Whitened& out, const Eigen::VectorXd& x, double spread) {
+  out.nuisances = beside(out.nuisances, x);
+  out.spread.conservativeResize(out.spread.size() + 1);
+  out.spread[out.spread.size() - 1] = std::max(spread, kLeastSpread);
+}
+
+}  // namespace
+
+Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
   Whitened out;
-  out.residual = motion.torque - x * model.values;
+  out.nuisances = base_columns(motion, model.warm_up);
+  for (const ChangeEffect& e : model.further)
+    out.nuisances = beside(out.nuisances, effect_columns(motion, e));
+  out.residual = motion.torque - out.nuisances * model.values;
+  out.spread = model.spread;
   const double length = motion.moments.back().time;
-  out.nuisances =
-      beside(x, column(motion, [&](const Moment& m) { return m.direction * (m.time / length - 0.5); }));
-  out.spread.resize(model.spread.size() + 1);
-  out.spread << model.spread, std::max(model.drift, 1e-9);
+  add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * (m.time / length - 0.5); }),
+               model.drift);
+  // At rest the machine cools down, and warms up again after; or the clock was set.
+  for (const Rest& rest : rests_of(motion, settings)) {
+    const auto cooled = [&](const Moment& m) {
+      return m.time < rest.to ? 0 : std::exp(-(m.time - rest.to) / model.warm_up);
+    };
+    const double share = 1 - std::exp(-(rest.to - rest.from) / model.warm_up);
+    add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * cooled(m); }),
+                 share * model.spread[kWarmCoulomb]);
+    add_nuisance(out, column(motion, [&](const Moment& m) { return m.speed * cooled(m); }),
+                 share * model.spread[kWarmViscous]);
+  }
   return out;
 }
 

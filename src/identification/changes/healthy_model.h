@@ -30,10 +30,10 @@ SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
 
 /// Residual of the model and its nuisances: columns of its values and a drift of friction.
 struct Whitened {
-  Eigen::VectorXd residual;   // N m
-  Eigen::MatrixXd nuisances;  // per unit of `spread`
-  Eigen::VectorXd spread;     // standard deviation of each
+  Eigen::VectorXd residual;  // N m
+  Eigen::MatrixXd nuisances;
+  Eigen::VectorXd spread;  // standard deviation of each
 };
-Whitened residual_of(const HealthyModel& model, const SampledMotion& motion);
+Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings);
 
 }  // namespace backlash::identification

@@ -28,6 +28,7 @@ struct ChangeSettings {
   double prior_least = 1e-3;  // - of the rms torque. Choice
   double prior_factor = 2;    // -, of the difference between records. Choice: few records
   double drift = 0.1;         // - of dry friction over a record, by temperature. Choice
+  double rest = 10;           // s without motion, after which the machine has another temperature. Choice
 
   // Changes
   double window = 4;   // s, over which scores are summed. Choice: longer than the residual remembers
@@ -42,8 +43,10 @@ struct ChangeSettings {
   double onset_drop = 8;       // of twice the log likelihood, as wide as the onset is uncertain. Simulation
   double onset_least = 0.1;    // s, half of the narrowest interval. Choice
   double unknown_left = 0.4;   // - of the squares after the onset that may be left. Choice
-  double alike = 0.97;         // - of the best gain: effects that fit alike. Choice
-  double model_error = 0.03;   // - of a size, as the shape of an effect is an idealisation. Choice
+  double unknown_louder =
+      4;                // -, squares of the residual after over before, of what no effect explains. Choice
+  double alike = 0.97;  // - of the best gain: effects that fit alike. Choice
+  double model_error = 0.03;  // - of a size, as the shape of an effect is an idealisation. Choice
 };
 
 }  // namespace backlash::identification
