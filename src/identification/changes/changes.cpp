@@ -7,6 +7,7 @@
 #include <map>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "change_scan.h"
 
@@ -46,6 +47,7 @@ class ChangeSearch {
   Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
   bool explained(const std::vector<FoundChange>& all) const;
   std::optional<Change> louder() const;
+  const std::vector<std::string>& different() const { return different_; }
 
  private:
   Background background(const std::vector<FoundChange>& others) const;
@@ -53,6 +55,8 @@ class ChangeSearch {
   std::optional<FoundChange> best(const Background& b) const;
   FoundChange scanned(const ScannedEffect& c, const Background& b, std::size_t step) const;
   bool believed(const FoundChange& f, const Background& b) const;
+  bool begins_before(const FoundChange& f, const Background& b) const;
+  void differ(FoundChange f);
   bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
@@ -65,7 +69,8 @@ class ChangeSearch {
   const std::vector<ScannedEffect> candidates_;
   const ChangeSettings& settings_;
   const Progress& progress_;
-  const Whitened first_;
+  Whitened first_;
+  std::vector<std::string> different_;  // effects that the record has from its beginning
   const std::size_t margin_, blocks_;
 };
 
@@ -219,6 +224,23 @@ void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
   if (more > threshold(1) && ended.score.gain > (1 + 5 * settings_.least_further) * f.score.gain) f = ended;
 }
 
+/// Whether it may have begun before the record did.
+bool ChangeSearch::begins_before(const FoundChange& f, const Background& b) const {
+  Change change;
+  onset_interval(f, b, change);
+  return change.since_from <= motion_.start;
+}
+
+/// The record as a whole has another value of the effect: a nuisance from then on.
+void ChangeSearch::differ(FoundChange f) {
+  different_.push_back(f.effect.name());
+  f.from = 0;
+  f.to = blocks_ + 1;
+  const Background with = background({f});
+  first_.nuisances = with.columns;
+  first_.spread = with.spread;
+}
+
 /// A change of its own, not what the shape of an earlier one leaves.
 bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChange>& found) const {
   for (const FoundChange& f : found) {
@@ -237,6 +259,10 @@ std::vector<FoundChange> ChangeSearch::run() {
     if (!next) break;
     refine(*next, b);
     if (!believed(*next, b)) break;
+    if (begins_before(*next, b)) {
+      differ(*next);
+      continue;
+    }
     if (!further(*next, found)) break;
     find_end(*next, b);
     found.push_back(*next);
@@ -252,6 +278,8 @@ std::vector<FoundChange> ChangeSearch::run() {
 
 bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
   if (all.empty()) return true;
+  // So many at once are rather one of another shape.
+  if (all.size() >= static_cast<std::size_t>(settings_.most_changes)) return false;
   std::size_t from = blocks_;
   for (const FoundChange& f : all) from = std::min(from, f.from);
   const Background before = background({}), after = background(all);
@@ -389,13 +417,21 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
   if (found.empty())
     if (const auto change = search.louder()) out.changes.push_back(*change);
   if (!search.explained(found)) {
-    Change unknown = out.changes.front();
-    unknown.effect = "unknown";
-    unknown.size.clear();
-    unknown.until.reset();
-    for (const Change& c : out.changes) unknown.alike.push_back(c.effect);
-    out.changes = {unknown};
+    std::vector<std::string> nearest;
+    for (const Change& c : out.changes) nearest.push_back(c.effect);
+    out.changes.clear();
+    if (std::optional<Change> unknown = search.louder()) {
+      unknown->alike = nearest;
+      out.changes.push_back(*unknown);
+    } else {
+      out.warnings.push_back(
+          "the record differs from the healthy ones in a way that no effect explains (nearest: " +
+          joined(nearest) + "): commission with more motion of this kind");
+    }
   }
+  for (const std::string& name : search.different())
+    out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
+                           ": that is no change within it");
   return out;
 }
 
