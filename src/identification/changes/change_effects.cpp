@@ -11,7 +11,7 @@ namespace backlash::identification {
 namespace {
 
 constexpr double kMostOrder = 80, kOrderStep = 0.5;    // 1/rad. Choice
-constexpr double kFrictionOrders = 5;                  // 1/rad. Choice
+constexpr double kMostFrictionOrder = 12;              // 1/rad. Choice
 constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};  // - of the rms speed. Choice
 
 double direction(const Moment& m, double) {
@@ -92,7 +92,7 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
                                    {"quadratic_drag", 0, {drag}},
                                    {"friction_drift", 0, {direction, drift}, true}};
   for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});
-  for (double n = 1; n <= kFrictionOrders; ++n)
+  for (double n = kLeastFrictionOrder; n <= kMostFrictionOrder; n += kOrderStep)
     all.push_back({"position_dependent_friction", n, {rubbed_cosine, rubbed_sine}});
   for (double n = kLeastOrder; n <= kMostOrder; n += kOrderStep)
     all.push_back({"cogging", n, {cosine, sine}});

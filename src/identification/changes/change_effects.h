@@ -11,7 +11,8 @@
 
 namespace backlash::identification {
 
-constexpr double kLeastOrder = 2;  // 1/rad, of cogging: below is gravity. Choice
+constexpr double kLeastOrder = 2;          // 1/rad, of cogging: below is gravity. Choice
+constexpr double kLeastFrictionOrder = 1;  // 1/rad, of position-dependent friction. Choice
 
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value

@@ -177,13 +177,14 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
 }
 
 void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
-  if (!f.effect.has_order() || f.effect.id != "cogging") return;
+  if (!f.effect.has_order()) return;
+  const double least = f.effect.id == "cogging" ? kLeastOrder : kLeastFrictionOrder;
   for (const double step : {0.1, 0.02}) {
     const double middle = f.effect.shape;
     for (int i = -5; i <= 5; ++i) {
       ChangeEffect e = f.effect;
       e.shape = middle + step * i;
-      if (e.shape < kLeastOrder) continue;
+      if (e.shape < least) continue;
       const EffectSums sums(motion_, effect_columns(motion_, e), b, settings_.block, false);
       EffectSums::Score s = sums.score(f.from, f.to, b);
       if (s.gain <= f.score.gain) continue;
@@ -360,6 +361,13 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   change.alike = f.alike;
   change.gain = f.gain;
   onset_interval(f, b, change);
+  // Changes of one event hold each other's onset.
+  for (const FoundChange& o : others)
+    if (std::fabs(double(o.from) - double(f.from)) * settings_.block < settings_.same_event) {
+      change.since_from -= settings_.same_event / 2;
+      change.since_to += settings_.same_event / 2;
+      break;
+    }
   if (f.to < blocks_) change.until = motion_.start + settings_.block * double(f.to);
   double rows = 0;
   change.error_before = std::sqrt(left_after(b, f.from, f.to, rows) / std::max(rows, 1.0));
