@@ -48,11 +48,43 @@ void add(sensor_msgs::JointState& m, const std::string& name, double position, d
   m.effort.push_back(effort);
 }
 
+double value(const model::Observation& o, record::Channel channel) {
+  switch (channel) {
+    case record::Channel::motor_torque:
+      return o.motor_torque;
+    case record::Channel::motor_position:
+      return o.motor_position;
+    case record::Channel::motor_velocity:
+      return o.motor_velocity;
+    case record::Channel::sensor_torque:
+      return o.sensor_torque;
+    case record::Channel::load_position:
+      return o.load_position;
+    case record::Channel::load_velocity:
+      return o.load_velocity;
+    case record::Channel::output_torque:
+      return o.output_torque;
+    case record::Channel::motor_current:
+      return o.motor_current;
+    case record::Channel::acceleration:
+      return o.acceleration;
+    case record::Channel::reference_position:
+      return kAbsent;
+  }
+  return kAbsent;
+}
+
 void empty_if_absent(std::vector<double>& array) {
   if (std::all_of(array.begin(), array.end(), [](double v) { return std::isnan(v); })) array.clear();
 }
 
 }  // namespace
+
+void empty_if_absent(sensor_msgs::JointState& m) {
+  empty_if_absent(m.position);
+  empty_if_absent(m.velocity);
+  empty_if_absent(m.effort);
+}
 
 JointNames::JointNames(const std::string& joint)
     : motor(joint + "_motor"),
@@ -153,6 +185,28 @@ void add_joint_state(const model::Observation& o, const JointNames& names, senso
   add(m, names.accelerometer, kAbsent, kAbsent, o.acceleration);
 }
 
+JointStateWriter::JointStateWriter(const record::ChannelMap& sources) {
+  for (const record::ChannelSource& source : sources.sources) {
+    auto name =
+        std::find_if(names_.begin(), names_.end(), [&](const Name& n) { return n.name == source.name; });
+    if (name == names_.end()) name = names_.insert(names_.end(), {source.name, {}});
+    name->sources.push_back(source);
+  }
+}
+
+void JointStateWriter::add(const model::Observation& o, sensor_msgs::JointState& m) const {
+  for (const Name& name : names_) {
+    double position = kAbsent, velocity = kAbsent, effort = kAbsent;
+    for (const record::ChannelSource& s : name.sources) {
+      double& field = s.field == record::Field::position   ? position
+                      : s.field == record::Field::velocity ? velocity
+                                                           : effort;
+      field = (value(o, s.channel) - s.offset) / s.scale;
+    }
+    ros_bridge::add(m, name.name, position, velocity, effort);
+  }
+}
+
 sensor_msgs::JointState make_joint_state(const model::Observation& o, const JointNames& names) {
   sensor_msgs::JointState m;
   add_joint_state(o, names, m);
@@ -173,9 +227,7 @@ sensor_msgs::JointState make_joint_state(const record::Record& record, std::size
   add(m, names.reference, get(record::Channel::reference_position), kAbsent, kAbsent);
   add(m, names.current, kAbsent, kAbsent, get(record::Channel::motor_current));
   add(m, names.accelerometer, kAbsent, kAbsent, get(record::Channel::acceleration));
-  empty_if_absent(m.position);
-  empty_if_absent(m.velocity);
-  empty_if_absent(m.effort);
+  empty_if_absent(m);
   return m;
 }
 

@@ -1,36 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/ros/monitor_settings.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <optional>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/ros/rig_folder.h"
 
 namespace backlash::ros_bridge {
 namespace {
-
-/// By the joint that each names.
-using RigFiles = std::map<std::string, rig_file::RigFile>;
-
-RigFiles rig_files_of(const std::string& folder) {
-  if (!std::filesystem::is_directory(folder))
-    throw InvalidParameter("~rig_folder", folder, "must be a folder that exists");
-  std::vector<std::string> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (entry.path().extension() == ".yaml") paths.push_back(entry.path().string());
-  std::sort(paths.begin(), paths.end());
-  RigFiles rigs;
-  for (const std::string& path : paths) {
-    rig_file::RigFile rig = rig_file::load_rig_file(path);
-    const std::string joint = rig.rig.joint;
-    if (!rigs.emplace(joint, std::move(rig)).second)
-      throw InvalidParameter("~rig_folder", path, "is the second rig file there of joint '" + joint + "'");
-  }
-  if (rigs.empty()) throw InvalidParameter("~rig_folder", folder, "has no rig file (*.yaml)");
-  return rigs;
-}
 
 /// The channel map under ~NAME; nothing where there is none.
 std::optional<record::ChannelMap> read_channels(Parameters& parameters, const std::string& name,
@@ -89,7 +68,7 @@ void use_curve(MonitorSettings& monitor, const std::string& path) {
 
 /// What is said of all joints.
 struct Common {
-  RigFiles by_joint;  // of ~rig_folder
+  std::map<std::string, rig_file::RigFile> by_joint;  // of ~rig_folder
   std::optional<rig_file::RigFile> rig;
   std::string curve, limits, baseline;
   std::vector<std::string> joints;
@@ -104,7 +83,7 @@ Common read_common(Parameters& parameters) {
     common.rig = rig.empty() ? rig_file::default_rig_file() : rig_file::load_rig_file(rig);
     common.joints = {common.rig->rig.joint};
   } else {
-    common.by_joint = rig_files_of(folder);
+    common.by_joint = load_rig_folder(folder);
     for (const auto& [joint, file] : common.by_joint) common.joints.push_back(joint);
   }
   common.joints = parameters.texts("joints", common.joints);

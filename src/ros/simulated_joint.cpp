@@ -13,6 +13,7 @@ namespace backlash::ros_bridge {
 namespace {
 
 constexpr std::chrono::seconds kWarningInterval{1};
+const char* const kTopic = "joint_states";  // where the rig file names none
 
 struct LiveNoise {
   record::Channel channel;
@@ -44,6 +45,9 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
           std::ceil(settings.torque_timeout * settings.file.simulation.sensors.sampling_rate))),
       next_torque_warning_(std::chrono::steady_clock::now()),
       handle_(handle) {
+  if (const record::ChannelMap& channels = settings.file.channels; channels.declared)
+    for (const std::string& topic : channels.topics())
+      writers_.emplace(topic, JointStateWriter(channels.on(topic)));
   rig_description_ = handle_.advertise<std_msgs::String>("rig_description", 1, true);
   std_msgs::String description;
   description.data = settings.description;
@@ -57,9 +61,18 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
   live_ = std::make_unique<LiveServer<Live>>(services, live(), [this](const Live& wanted) { apply(wanted); });
 }
 
-void SimulatedJoint::step(sensor_msgs::JointState& message) {
+std::vector<std::string> SimulatedJoint::topics() const {
+  if (writers_.empty()) return {kTopic};
+  std::vector<std::string> topics;
+  for (const auto& [topic, writer] : writers_) topics.push_back(topic);
+  return topics;
+}
+
+void SimulatedJoint::step(std::map<std::string, sensor_msgs::JointState>& messages) {
   if (torque_samples_ > 0 && torque_age_++ == torque_samples_) simulation_.plant().set_torque(0);
-  add_joint_state(simulation_.step(), names_, message);
+  const model::Observation sample = simulation_.step();
+  if (writers_.empty()) add_joint_state(sample, names_, messages[kTopic]);
+  for (const auto& [topic, writer] : writers_) writer.add(sample, messages[topic]);
 }
 
 void SimulatedJoint::reset() {

@@ -10,6 +10,7 @@ Usage: rosrun backlash_diagnosis simulator [_PARAMETER:=VALUE ...] [NAME:=NEW_NA
 
 Private parameters; unknown ones are refused. In brackets: units of values that override the rig file
   rig                   path of a rig file; without it the built-in rig of Sarkar et al. (1997)
+  rig_folder            folder with a rig file for each joint of a robot, instead of rig: all are simulated (see joints)
   run                   [text] one of the rig file's test_runs: its excitation replaces that of the rig file
   joint                 [text] prefix of the names in joint_states: JOINT_motor, JOINT_sensor, JOINT_load, and
                         JOINT_current, JOINT_accelerometer where the rig file declares these sensors
@@ -32,7 +33,8 @@ Private parameters; unknown ones are refused. In brackets: units of values that 
   diagnostic_period     1 s; wall time between two messages on /diagnostics
 
 Publishes
-  joint_states          sensor_msgs/JointState, every sample; stamps exactly 1/sampling_rate apart, always
+  joint_states          sensor_msgs/JointState, every sample; stamps exactly 1/sampling_rate apart, always. A joint whose
+                        rig file has `channels` is published as they say: topic, name, field, sign and unit
   rig_description       std_msgs/String, latched: the rig file; a comment in its first line names the source
   true_backlash         std_msgs/Float64, latched: m (rig without base radius: rad)
   /clock                rosgraph_msgs/Clock if publish_clock: 1 to 10 ms apart, from wall time on

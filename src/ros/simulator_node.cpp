@@ -74,11 +74,14 @@ SimulatorNode::SimulatorNode(const ros::NodeHandle& handle, const ros::NodeHandl
 }
 
 void SimulatorNode::advertise() {
-  joint_states_ = handle_.advertise<sensor_msgs::JointState>("joint_states", queue_length(sampling_rate_));
   for (const JointSettings& joint : settings_.joints) {
     const std::string scope = settings_.named_joints ? joint.file.rig.joint : "";
     joints_.push_back(std::make_unique<SimulatedJoint>(joint, ros::NodeHandle(handle_, scope),
                                                        ros::NodeHandle(private_handle_, scope)));
+    for (const std::string& topic : joints_.back()->topics())
+      if (joint_states_.count(topic) == 0)
+        joint_states_[topic] =
+            handle_.advertise<sensor_msgs::JointState>(topic, queue_length(sampling_rate_));
   }
   if (settings_.publish_clock) {  // latched: who comes before the first sample sees a valid time
     clock_ = handle_.advertise<rosgraph_msgs::Clock>("/clock", 1000, true);
@@ -107,13 +110,16 @@ bool SimulatorNode::wait_for_start() {
   while (ros::ok()) {
     // Stamps need a ROS time; the node's own clock gives it.
     const bool no_time = !settings_.publish_clock && !ros::Time::isValid();
-    const bool no_subscriber = settings_.wait_for_subscriber && joint_states_.getNumSubscribers() == 0;
+    const bool no_subscriber = settings_.wait_for_subscriber &&
+                               std::all_of(joint_states_.begin(), joint_states_.end(), [](const auto& topic) {
+                                 return topic.second.getNumSubscribers() == 0;
+                               });
     if (!no_time && !no_subscriber) return true;
     if (due(next_warning_, kWarningInterval)) {
       if (no_time)
         ROS_WARN("use_sim_time is true: waiting for /clock (publish_clock: true lets this node provide it)");
       else
-        ROS_INFO_STREAM("waiting for a subscriber of " << joint_states_.getTopic());
+        ROS_INFO_STREAM("waiting for a subscriber of " << joint_states_.begin()->second.getTopic());
     }
     serve(kIdle);
   }
@@ -163,14 +169,18 @@ void SimulatorNode::publish_burst() {
 }
 
 void SimulatorNode::publish_sample() {
-  sensor_msgs::JointState message;
-  for (const auto& joint : joints_) joint->step(message);
-  message.header.stamp = stamp(published_);
-  if (settings_.publish_clock && message.header.stamp >= next_clock_) {
-    publish_clock(message.header.stamp);
+  std::map<std::string, sensor_msgs::JointState> messages;
+  for (const auto& joint : joints_) joint->step(messages);
+  const ros::Time now = stamp(published_);
+  if (settings_.publish_clock && now >= next_clock_) {
+    publish_clock(now);
     next_clock_ += clock_step_;
   }
-  joint_states_.publish(message);
+  for (auto& [topic, message] : messages) {
+    message.header.stamp = now;
+    empty_if_absent(message);
+    joint_states_.at(topic).publish(message);
+  }
   ++published_;
 }
 

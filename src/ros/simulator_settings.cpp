@@ -6,12 +6,14 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/ros/parameters.h"
+#include "backlash_diagnosis/ros/rig_folder.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -45,6 +47,9 @@ class Overrides {
 
   /// The n-th joint of a list; noise of several joints must not be the same.
   void joint(const std::string& name, int n) {
+    if (file_.channels.declared && file_.rig.joint != name)
+      throw InvalidParameter("~joints", name,
+                             "shares a rig file whose channels are of joint " + file_.rig.joint);
     file_.rig.joint = name;
     given_.push_back("joint = " + printable(name));
     if (parameters_.has(name + "/seed") || n == 0) return;
@@ -151,15 +156,29 @@ void require_topic_name(const std::string& joint) {
     throw InvalidParameter("~joints", printable(joint), "must be names of topics, without '/'");
 }
 
-std::vector<JointSettings> read_joints(Parameters& parameters, const rig_file::RigFile& common) {
+using RigFiles = std::map<std::string, rig_file::RigFile>;
+
+const rig_file::RigFile& rig_of(const std::string& joint, const RigFiles& by_joint,
+                                const rig_file::RigFile& common) {
+  if (by_joint.empty()) return common;
+  const auto found = by_joint.find(joint);
+  if (found == by_joint.end()) throw InvalidParameter("~joints", joint, "has no rig file in ~rig_folder");
+  return found->second;
+}
+
+/// `by_joint`: of ~rig_folder; else empty.
+std::vector<JointSettings> read_joints(Parameters& parameters, const RigFiles& by_joint,
+                                       const rig_file::RigFile& common) {
   if (parameters.has("joint"))
-    throw InvalidParameter("~joint", "given", "cannot be given together with ~joints");
+    throw InvalidParameter("~joint", "given", "cannot be given together with ~joints or ~rig_folder");
+  std::vector<std::string> wanted;
+  for (const auto& [joint, file] : by_joint) wanted.push_back(joint);
   std::vector<JointSettings> joints;
   std::set<std::string> names;
-  for (const std::string& name : parameters.texts("joints", {})) {
+  for (const std::string& name : parameters.texts("joints", wanted)) {
     require_topic_name(name);
     if (!names.insert(name).second) throw InvalidParameter("~joints", name, "is named twice");
-    JointSettings joint{read_rig_parameter(parameters, name + "/rig", common), {}};
+    JointSettings joint{read_rig_parameter(parameters, name + "/rig", rig_of(name, by_joint, common)), {}};
     Overrides overrides(parameters, joint.file);
     overrides.apply("");
     overrides.joint(name, int(joints.size()));
@@ -197,10 +216,14 @@ SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle)
   parameters.allow("live");
   SimulatorSettings settings;
   const rig_file::RigFile common = read_rig_parameter(parameters, "rig", rig_file::default_rig_file());
+  const std::string folder = parameters.text("rig_folder", "");
+  if (!folder.empty() && parameters.has("rig"))
+    throw InvalidParameter("~rig_folder", folder, "cannot be given beside ~rig");
+  const RigFiles by_joint = folder.empty() ? RigFiles() : load_rig_folder(folder);
   parameters.allow("joints");
-  settings.named_joints = parameters.has("joints");
+  settings.named_joints = parameters.has("joints") || !folder.empty();
   if (settings.named_joints)
-    settings.joints = read_joints(parameters, common);
+    settings.joints = read_joints(parameters, by_joint, common);
   else
     settings.joints = {read_joint(parameters, common)};
   const double timeout = parameters.number("torque_timeout", 0, Range::between(0, kLongestHold));

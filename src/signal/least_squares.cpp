@@ -143,6 +143,53 @@ Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, co
   return j;
 }
 
+Eigen::MatrixXd central_jacobian(const ResidualFunction& residuals, const Eigen::VectorXd& p,
+                                 const Eigen::VectorXd& steps, bool parallel) {
+  std::vector<Eigen::VectorXd> columns(std::size_t(p.size()));
+  for_each_column(p.size(), parallel, [&](int i) {
+    Eigen::VectorXd above = p, below = p;
+    above[i] += steps[i];
+    below[i] -= steps[i];
+    above = try_residuals(residuals, above), below = try_residuals(residuals, below);
+    if (above.size() == 0 || above.size() != below.size())
+      throw CannotIdentify("the model cannot be evaluated beside parameter " + std::to_string(i));
+    columns[std::size_t(i)] = (above - below) / (2 * steps[i]);
+  });
+  Eigen::MatrixXd j(columns.front().size(), p.size());
+  for (Eigen::Index i = 0; i < p.size(); ++i) {
+    j.col(i) = columns[std::size_t(i)];
+    require_effect(j, i);
+  }
+  return j;
+}
+
+struct Point {
+  Eigen::VectorXd p, r;
+};
+
+/// The next step that lowers the sum of squares; whether another is worth it. `j` in units of `scale`.
+bool advance(Point& at, const Eigen::MatrixXd& j, double& damping, const ResidualFunction& residuals,
+             const Eigen::VectorXd& scale, const NonlinearOptions& options) {
+  const Eigen::MatrixXd normal = gram(j);
+  const Eigen::VectorXd gradient = j.transpose() * at.r;
+  for (;; damping *= 10) {
+    if (damping > kMostDamping) return false;
+    Eigen::MatrixXd damped = normal;
+    damped.diagonal() *= 1 + damping;
+    const Eigen::VectorXd step = -solve_symmetric(damped, gradient);
+    Point next{at.p + scale.cwiseProduct(step), {}};
+    next.r = try_residuals(residuals, next.p);
+    const bool small = step.norm() < options.tolerance;
+    if (next.r.size() == at.r.size() && next.r.squaredNorm() < at.r.squaredNorm()) {
+      const double gain = 1 - next.r.squaredNorm() / at.r.squaredNorm();
+      at = std::move(next);
+      damping = std::max(kLeastDamping, damping / 10);
+      return gain >= options.tolerance && !small;
+    }
+    if (small) return false;
+  }
+}
+
 double variance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
   return r.squaredNorm() / std::max<double>(1, double(j.rows() - j.cols()));
 }
@@ -158,52 +205,32 @@ Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
 
 LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::VectorXd& start,
                               const Eigen::VectorXd& scale, const NonlinearOptions& options) {
-  Eigen::VectorXd p = start, r = residuals(p);
-  if (!usable(r)) throw CannotIdentify("the model cannot be evaluated at the start values");
+  Point at{start, residuals(start)};
+  if (!usable(at.r)) throw CannotIdentify("the model cannot be evaluated at the start values");
   double damping = 1e-3;
-  bool done = false;
-  Eigen::MatrixXd j = jacobian(residuals, p, r, scale, options);
-  for (int i = 0; i < options.iterations && !done; ++i) {
-    const Eigen::MatrixXd normal = gram(j);
-    const Eigen::VectorXd gradient = j.transpose() * r;
-    for (bool better = false; !better && !done;) {
-      Eigen::MatrixXd damped = normal;
-      damped.diagonal() *= 1 + damping;
-      const Eigen::VectorXd step = -solve_symmetric(damped, gradient);
-      const Eigen::VectorXd q = p + scale.cwiseProduct(step);
-      const Eigen::VectorXd moved = try_residuals(residuals, q);
-      better = moved.size() == r.size() && moved.squaredNorm() < r.squaredNorm();
-      if (better) {
-        const double gain = 1 - moved.squaredNorm() / r.squaredNorm();
-        done = gain < options.tolerance || step.norm() < options.tolerance;
-        p = q;
-        r = moved;
-        damping = std::max(kLeastDamping, damping / 10);
-      } else {
-        damping *= 10;
-        done = damping > kMostDamping || step.norm() < options.tolerance;
-      }
-    }
-    if (!done || i == 0) j = jacobian(residuals, p, r, scale, options);
-  }
+  Eigen::MatrixXd j = jacobian(residuals, at.p, at.r, scale, options);
   LeastSquaresFit fit;
-  fit.values = p;
-  fit.residuals = r;
+  for (int i = 0; i < options.iterations && !fit.converged; ++i) {
+    fit.converged = !advance(at, j, damping, residuals, scale, options);
+    if (!fit.converged) j = jacobian(residuals, at.p, at.r, scale, options);
+  }
+  damping = 1e-3;
+  for (int i = 0; i < options.wide_iterations; ++i) {
+    const Eigen::MatrixXd wide =
+        central_jacobian(residuals, at.p, options.wide_step * scale, options.parallel) * scale.asDiagonal();
+    if (!advance(at, wide, damping, residuals, scale, options)) break;
+  }
+  fit.values = at.p;
+  fit.residuals = at.r;
   fit.jacobian = j * scale.cwiseInverse().asDiagonal();
-  fit.covariance = covariance(fit.jacobian, r);
-  fit.deviation = std::sqrt(variance(fit.jacobian, r));
+  fit.covariance = covariance(fit.jacobian, at.r);
+  fit.deviation = std::sqrt(variance(fit.jacobian, at.r));
   return fit;
 }
 
 void widen_jacobian(LeastSquaresFit& fit, const ResidualFunction& residuals, const Eigen::VectorXd& steps,
                     bool parallel) {
-  for_each_column(fit.values.size(), parallel, [&](int i) {
-    Eigen::VectorXd above = fit.values, below = fit.values;
-    above[i] += steps[i];
-    below[i] -= steps[i];
-    fit.jacobian.col(i) = (residuals(above) - residuals(below)) / (2 * steps[i]);
-    require_effect(fit.jacobian, i);
-  });
+  fit.jacobian = central_jacobian(residuals, fit.values, steps, parallel);
   fit.covariance = covariance(fit.jacobian, fit.residuals);
 }
 

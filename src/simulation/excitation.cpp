@@ -10,8 +10,9 @@
 namespace backlash::simulation {
 namespace {
 
-const std::vector<std::string> kTypes = {"square",   "sine",  "chirp",        "multi_sine",     "random",
-                                         "constant", "topic", "stepped_sine", "constant_speed", "sine_speed"};
+const std::vector<std::string> kTypes = {"square",         "sine",       "chirp", "multi_sine",
+                                         "random",         "constant",   "topic", "stepped_sine",
+                                         "constant_speed", "sine_speed", "moves"};
 
 void read_random(const YamlReader& yaml, ExcitationSettings& settings) {
   settings.amplitude = yaml.number("rms", Range::not_negative());
@@ -53,12 +54,27 @@ void read_waves(const YamlReader& yaml, ExcitationSettings& settings) {
   settings.cycles = static_cast<int>(yaml.integer("cycles", 1, 1'000'000));
 }
 
+MoveSettings read_moves(const YamlReader& yaml) {
+  MoveSettings moves;
+  moves.positions = yaml.numbers("positions", Range::any());
+  if (moves.positions.size() < 2) yaml.fail("positions", "needs at least two positions");
+  moves.speed = yaml.number("speed", Range::positive());
+  moves.acceleration = yaml.number("acceleration", Range::positive());
+  moves.dwell = yaml.number("dwell", Range::positive());
+  moves.position_gain = yaml.number("position_gain", Range::positive());
+  return moves;
+}
+
 void read_speed_loop(const YamlReader& yaml, ExcitationSettings& settings) {
   const YamlReader controller = yaml.map("controller");
   settings.controller.rate = controller.number("rate", Range::positive());
   settings.controller.proportional = controller.number("proportional", Range::not_negative());
   settings.controller.integral = controller.number("integral", Range::not_negative());
   settings.controller.torque_limit = controller.number("torque_limit", Range::positive());
+  if (settings.type == "moves") {
+    settings.moves = read_moves(yaml);
+    return;
+  }
   settings.ramp = yaml.number("ramp", Range::positive());
   if (settings.type == "sine_speed") {
     settings.bias = yaml.number("offset", Range::any());
@@ -90,7 +106,7 @@ double Excitation::shortest_period(long) const {
 }
 
 bool ExcitationSettings::is_speed_loop() const {
-  return type == "constant_speed" || type == "sine_speed";
+  return type == "constant_speed" || type == "sine_speed" || type == "moves";
 }
 
 std::unique_ptr<Excitation> ExcitationSettings::create() const {
@@ -106,6 +122,7 @@ std::unique_ptr<Excitation> ExcitationSettings::create() const {
     return stepped_sine_excitation(amplitude, start_frequency, end_frequency, step_frequency, cycles, bias);
   if (type == "constant_speed") return constant_speed_excitation(controller, speeds, hold, ramp);
   if (type == "sine_speed") return sine_speed_excitation(controller, bias, amplitude, frequency, ramp);
+  if (type == "moves") return moves_excitation(controller, moves);
   throw InvalidParameter("excitation.type", type, "must be one of " + joined(kTypes));
 }
 

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Several joints in one simulator: each is as it would be alone, and all are in the same messages."""
+import os
 import shutil
 import tempfile
 import unittest
@@ -9,7 +10,7 @@ import rospy
 import rostest
 from backlash_diagnosis.srv import SetBacklash
 from sensor_msgs.msg import JointState
-from simulator_support import Inbox, Simulator, TIMEOUT, default_rig, latched, write_rig
+from simulator_support import Inbox, Simulator, TIMEOUT, default_rig, latched, package_folder, write_rig
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
 
@@ -41,6 +42,20 @@ class SimulatorJointsTest(unittest.TestCase):
         for joint, own in alone.items():
             one = recorded(dict(common, joint=joint, **own), 600)
             self.assertEqual(motion(several, joint), motion(one, joint), joint)
+
+    def test_a_folder_of_rig_files_that_is_wrong_is_refused(self):
+        robot = os.path.join(package_folder(), "config", "simulated_robot")
+        shoulder = os.path.join(robot, "shoulder.yaml")
+        for parameters, words in (({"rig_folder": "/nowhere"}, ("~rig_folder", "/nowhere")),
+                                  ({"rig_folder": robot, "rig": shoulder}, ("~rig_folder", "beside ~rig")),
+                                  ({"rig_folder": robot, "joint": "elbow"}, ("~joint", "~rig_folder")),
+                                  ({"rig_folder": robot, "joints": ["wrist"]}, ("wrist", "no rig file in ~rig_folder")),
+                                  ({"rig": shoulder, "joints": ["shoulder", "knee"]}, ("knee", "of joint shoulder"))):
+            with Simulator(parameters) as simulator:
+                code, output = simulator.wait()
+            self.assertEqual(code, 64, output)
+            for word in words:
+                self.assertIn(word, output)
 
     def test_topics_and_services_are_below_the_name_of_the_joint(self):
         parameters = {"joints": ["left", "right"], "right": {"backlash": 1e-4}}

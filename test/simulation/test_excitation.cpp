@@ -250,6 +250,31 @@ TEST(ExcitationSettings, SpeedLoopsAreReadAndCreated) {
   EXPECT_EQ(asked(*created("{type: constant_speed, speed: 9, ramp: 1, " + controller + "}"), 99), 5);
 }
 
+TEST(ExcitationSettings, MovesGoFromPositionToPosition) {
+  const std::string controller = "controller: {rate: 100, proportional: 2, integral: 0, torque_limit: 500}";
+  const auto loop = created(
+      "{type: moves, positions: [1, -0.5], speed: 1, acceleration: 2, dwell: 0.5, position_gain: 8, " +
+      controller + "}");
+  const auto asked = [&](double t, double position) {
+    model::Observation machine{};
+    machine.motor_position = position;
+    const long sample = std::lround(100 * t);
+    loop->begin_segment(sample, machine);
+    return loop->torque(t, sample) / 2;
+  };
+  // To 1: 0.5 s up to 1 rad/s (0.25 rad), 0.5 s on, 0.5 s down; there 0.5 s. To -0.5: 2 s, there 0.5 s. Back:
+  // 2 s.
+  EXPECT_NEAR(asked(0.25, 0.0625), 0.5, 1e-12);
+  EXPECT_NEAR(asked(0.26, 0), 0.52 + 8 * 0.26 * 0.26, 1e-12);
+  EXPECT_NEAR(asked(0.75, 0.5), 1, 1e-12);
+  EXPECT_NEAR(asked(1.25, 1 - 0.0625), 0.5, 1e-12);
+  EXPECT_NEAR(asked(1.75, 0.9), 8 * 0.1, 1e-12);
+  EXPECT_NEAR(asked(3, 0.25), -1, 1e-12);
+  EXPECT_NEAR(asked(4.2, -0.5), 0, 1e-12);
+  EXPECT_NEAR(asked(4.75, -0.5 + 0.0625), 0.5, 1e-12);
+  EXPECT_NEAR(asked(3 + 5000, 0.25), -1, 1e-9) << "a cycle takes 5 s";
+}
+
 TEST(ExcitationSettings, PlaceAndBrake) {
   const auto read = [](const std::string& text) { return read_excitation(parse(text)); };
   const ExcitationSettings plain = read("{type: constant, torque: 1}");
@@ -321,10 +346,10 @@ TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
   } cases[] = {
       {"amplitude: 1\n",
        "rig.yaml:1: type: is missing, expected one of square, sine, chirp, multi_sine, random, constant, "
-       "topic, stepped_sine, constant_speed, sine_speed"},
+       "topic, stepped_sine, constant_speed, sine_speed, moves"},
       {"type: triangle\n",
        "rig.yaml:1: type = triangle: must be one of square, sine, chirp, multi_sine, random, constant, "
-       "topic, stepped_sine, constant_speed, sine_speed"},
+       "topic, stepped_sine, constant_speed, sine_speed, moves"},
       {"type: square\nfrequency: 10\n", "rig.yaml:1: amplitude: is missing"},
       {"type: square\namplitude: -1\nfrequency: 10\n", "rig.yaml:2: amplitude = -1: must be >= 0"},
       {"type: square\namplitude: 1\nfrequency: 0\n", "rig.yaml:3: frequency = 0: must be > 0"},
@@ -360,6 +385,8 @@ TEST(ExcitationSettings, RefusalNamesFileLineKeyValueAndLimit) {
       {kLoop + "ramp: 1\nspeeds: []\nhold: 1\n", "rig.yaml:4: speeds = [...]: needs at least one"},
       {kLoop + "ramp: 1\nspeeds: [1]\n", "rig.yaml:1: hold: is missing"},
       {kLoop + "ramp: 1\nspeed: 1\nhold: 1\n", "rig.yaml:5: hold = 1: unknown key"},
+      {"type: moves\ncontroller: {rate: 1, proportional: 1, integral: 1, torque_limit: 1}\npositions: [1]\n",
+       "rig.yaml:3: positions = [...]: needs at least two positions"},
       {kLoop + "ramp: 1\nspeed: 1\nat: load\n", "rig.yaml:5: at = load: a speed loop drives the motor"},
       {kLoop + "ramp: 1\nspeed: 1\nmotor_brake: true\n", "rig.yaml:5: motor_brake = true: needs at: load"},
       {"type: constant\ntorque: 1\nat: gear\n", "rig.yaml:3: at = gear: must be one of motor, load"},

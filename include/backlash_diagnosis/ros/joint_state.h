@@ -82,6 +82,27 @@ record::ChannelValues read_joint_state(const sensor_msgs::JointState& message, c
 void add_joint_state(const model::Observation& observation, const JointNames& names,
                      sensor_msgs::JointState& message);
 
+/// Empties the arrays of a message in which no name has that quantity.
+void empty_if_absent(sensor_msgs::JointState& message);
+
+/// Writes simulated samples of one joint as its channel map reads them, on one topic. The fields of a name
+/// that carry no channel are NaN.
+class JointStateWriter {
+ public:
+  /// `sources`: those on this topic.
+  explicit JointStateWriter(const record::ChannelMap& sources);
+
+  /// Adds the joint to a message, which may have others.
+  void add(const model::Observation& observation, sensor_msgs::JointState& message) const;
+
+ private:
+  struct Name {
+    std::string name;
+    std::vector<record::ChannelSource> sources;
+  };
+  std::vector<Name> names_;
+};
+
 /// Message for a simulated sample, without stamp.
 sensor_msgs::JointState make_joint_state(const model::Observation& observation, const JointNames& names);
 

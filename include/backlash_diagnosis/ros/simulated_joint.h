@@ -9,8 +9,10 @@
 #include <std_msgs/Float64.h>
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "backlash_diagnosis/SetBacklash.h"
 #include "backlash_diagnosis/SimulatedJointLiveConfig.h"
@@ -30,8 +32,10 @@ class SimulatedJoint {
   SimulatedJoint(const SimulatedJoint&) = delete;  // callbacks refer to this object
   SimulatedJoint& operator=(const SimulatedJoint&) = delete;
 
-  /// The next sample, added to a message.
-  void step(sensor_msgs::JointState& message);
+  /// Where its samples go: joint_states, or what the rig file's `channels` say.
+  std::vector<std::string> topics() const;
+  /// The next sample, added to the message of each of its topics.
+  void step(std::map<std::string, sensor_msgs::JointState>& messages);
   /// At rest in the middle of the gap, backlash as at the start.
   void reset();
   std::string true_backlash() const;  // with its unit, for people
@@ -52,6 +56,7 @@ class SimulatedJoint {
   std::string name_;
   bool angular_;
   JointNames names_;
+  std::map<std::string, JointStateWriter> writers_;  // by topic, of a rig file that says where; else empty
   simulation::Simulation simulation_;
   long torque_samples_;  // that a torque_command is held for; 0: for ever
   long torque_age_ = 0;  // samples since the last one

@@ -12,7 +12,9 @@
 #include <std_srvs/Trigger.h>
 
 #include <chrono>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "backlash_diagnosis/ros/pacer.h"
@@ -68,7 +70,8 @@ class SimulatorNode {
 
   ros::NodeHandle handle_, private_handle_;
   std::vector<std::unique_ptr<SimulatedJoint>> joints_;
-  ros::Publisher joint_states_, clock_;
+  std::map<std::string, ros::Publisher> joint_states_;  // by topic
+  ros::Publisher clock_;
   ros::ServiceServer reset_;
   diagnostic_updater::Updater updater_;
 };

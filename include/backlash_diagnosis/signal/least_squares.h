@@ -16,6 +16,7 @@ struct LeastSquaresFit {
   Eigen::MatrixXd covariance;  // of the values
   Eigen::VectorXd residuals;   // measured minus fitted, one per row
   Eigen::MatrixXd jacobian;    // of the residuals, fit_nonlinear only
+  bool converged = false;      // fit_nonlinear only; else it ran out of iterations
   double deviation = 0;        // standard deviation of the residuals, degrees of freedom considered
 
   Measured parameter(Eigen::Index i) const;
@@ -37,6 +38,10 @@ struct NonlinearOptions {
   double tolerance =
       1e-6;            // of the relative decrease of the sum of squares, and of the step in units of `scale`
   double step = 1e-4;  // of the forward differences, in units of `scale`
+  // Where the forward differences lead no further: steps with central ones over `wide_step`, in the same
+  // units, which average over places where the model stumbles. 0: none.
+  int wide_iterations = 0;
+  double wide_step = 1e-2;
   bool parallel = false;  // differences on all processors: the function is called from several threads
 };
 

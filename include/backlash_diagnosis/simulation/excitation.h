@@ -92,9 +92,22 @@ std::unique_ptr<Excitation> constant_speed_excitation(const SpeedController& con
 std::unique_ptr<Excitation> sine_speed_excitation(const SpeedController& controller, double offset,
                                                   double amplitude, double frequency, double ramp);
 
+/// A task of moves from position to position, as a robot's controller makes them: the speed that the
+/// controller is asked for is
+///   v(t) + G (q(t) - position)
+/// q, v: a trapezoid of the speed. After the last position comes the first again. Given the exact position.
+struct MoveSettings {
+  std::vector<double> positions;  // rad, of the motor as motor_position counts it; at least two
+  double speed = 0;               // rad/s, the largest
+  double acceleration = 0;        // rad/s^2, the largest
+  double dwell = 0;               // s, at each position
+  double position_gain = 0;       // G, 1/s
+};
+std::unique_ptr<Excitation> moves_excitation(const SpeedController& controller, const MoveSettings& moves);
+
 /// What a rig file says under `excitation`; a recipe, so that copies of it can run side by side.
 struct ExcitationSettings {
-  // square, sine, chirp, multi_sine, random, constant, topic, stepped_sine, constant_speed, sine_speed
+  // square, sine, chirp, multi_sine, random, constant, topic, stepped_sine, constant_speed, sine_speed, moves
   std::string type = "square";
   double amplitude =
       0;  // N m; the torque itself for `constant`, its rms for `random`; rad/s for `sine_speed`
@@ -107,11 +120,12 @@ struct ExcitationSettings {
   std::vector<SineLine> lines;  // multi_sine
   int line_count = 0;           // random, with start_ and end_frequency as the band
   std::uint64_t seed = 0;       // random
-  SpeedController controller;   // constant_speed and sine_speed
-  std::vector<double> speeds;   // rad/s, constant_speed
-  double hold = 0, ramp = 0;    // s, constant_speed; sine_speed has a ramp
-  bool at_load = false;         // the torque acts on the load, not on the motor
-  bool motor_brake = false;     // the motor is held
+  SpeedController controller;   // constant_speed, sine_speed and moves
+  MoveSettings moves;
+  std::vector<double> speeds;  // rad/s, constant_speed
+  double hold = 0, ramp = 0;   // s, constant_speed; sine_speed has a ramp
+  bool at_load = false;        // the torque acts on the load, not on the motor
+  bool motor_brake = false;    // the motor is held
 
   bool is_speed_loop() const;
   std::unique_ptr<Excitation> create() const;

@@ -26,12 +26,12 @@ BandFit fit_with_effects(Machine machine, bool delay, const SearchContext& conte
   else
     machine.largest_delay = Machine().largest_delay;  // calibration may have stood in for the effect
   Machine rough =
-      fit_in_band(context.data, machine, settings.cutoff, settings.rough_tolerance, settings).fit.machine;
+      fit_settled(context.data, machine, settings.cutoff, settings.rough_tolerance, settings).fit.machine;
   if (!delay) {
     restore_hold(rough);
     limit_delay(rough, settings.calibration_delay);
   }
-  return fit_in_band(context.data, rough, settings.cutoff, settings.tolerance, settings);
+  return fit_settled(context.data, rough, settings.cutoff, settings.tolerance, settings);
 }
 
 }  // namespace

@@ -159,6 +159,18 @@ void RecordSet::weigh(const Machine& machine) {
   }
 }
 
+double RecordSet::difference_of_weights(const RecordSet& other) const {
+  double largest = 0;
+  const auto compare = [&](double a, double b) {
+    if (std::isfinite(a) && std::isfinite(b) && b > 0) largest = std::max(largest, std::fabs(a / b - 1));
+  };
+  for (std::size_t i = 0; i < weights_.size(); ++i) {
+    compare(weights_[i].torque, other.weights_[i].torque);
+    compare(weights_[i].deflection, other.weights_[i].deflection);
+  }
+  return largest;
+}
+
 Misfit RecordSet::misfit(const Machine& machine) const {
   Misfit sum;
   for (std::size_t i = 0; i < records_.size(); ++i) {

@@ -54,6 +54,8 @@ class RecordSet {
 
   /// The larger of noise floor and actual residual: a misfit must not overrule what other records say well.
   void weigh(const Machine& machine);
+  /// The largest relative difference between a weight of these and of the others, of as many records.
+  double difference_of_weights(const RecordSet& other) const;
   Misfit misfit(const Machine& machine) const;
   /// Other records of the same lengths with the weights of these. `data` must outlive it.
   RecordSet of_others(const std::vector<ServoData>& data) const;

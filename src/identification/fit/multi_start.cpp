@@ -15,6 +15,7 @@ signal::NonlinearOptions fit_options(const FitSettings& settings, double toleran
   options.iterations = with_map ? settings.iterations_of_map : settings.iterations;
   options.step = settings.step;
   options.tolerance = tolerance;
+  if (tolerance <= settings.tolerance) options.wide_iterations = with_map ? 0 : settings.wide_iterations;
   options.parallel = true;
   return options;
 }
@@ -26,6 +27,18 @@ BandFit fit_in_band(const std::vector<ServoData>& data, Machine start, double cu
   MachineFit fit = fit_machine(start, records, fit_options(settings, tolerance, start.has_map));
   const Misfit misfit = records.misfit(fit.machine);
   return {std::move(fit), std::move(start), std::move(records), misfit};
+}
+
+BandFit fit_settled(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
+                    const FitSettings& settings) {
+  BandFit fit = fit_in_band(data, std::move(start), cutoff, tolerance, settings);
+  for (int i = 0; i < settings.renewals; ++i) {
+    RecordSet renewed = fit.records;
+    renewed.weigh(fit.fit.machine);
+    if (fit.fit.fit.converged && renewed.difference_of_weights(fit.records) < settings.same_weights) break;
+    fit = fit_in_band(data, fit.fit.machine, cutoff, tolerance, settings);
+  }
+  return fit;
 }
 
 Machine other_start(Machine machine, double spread, std::uint64_t seed) {
@@ -60,7 +73,7 @@ BandFit fit_to_records(const std::vector<ServoData>& data, const Machine& start,
                        const BeforeFit& before_fit) {
   const auto fit = [&](const Machine& from, double tolerance) {
     if (before_fit) before_fit();
-    return fit_in_band(data, from, settings.cutoff, tolerance, settings);
+    return fit_settled(data, from, settings.cutoff, tolerance, settings);
   };
   Machine machine = fit_from_starts(data, start, settings, before_fit).fit.machine;
   release_hold(machine);
