@@ -97,7 +97,7 @@ arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
 arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) {
   check_record_path(path);
   std::vector<record::JointRecord> joints;
-  if (fs::path(path).extension() == ".bag") {
+  if (fs::path(path).extension() != ".csv") {
     for (const arm::JointDrive& joint : rig.joints)
       joints.push_back({joint.name, ros_bridge::read_bag(path, stock_channels(joint.name, rig.channel))});
   } else {

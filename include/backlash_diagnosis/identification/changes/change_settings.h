@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the search for changes of a machine rests on, and where each number comes from.
+#pragma once
+
+namespace backlash::identification {
+
+struct ChangeSettings {
+  double false_alarms_per_hour = 1.0 / 720;  // 1/h, one a month
+
+  // Signals
+  double cutoff = 12;                   // Hz, of torque and columns. Choice: tasks of arms end below
+  double cutoff_share = 0.125;          // - of the sampling rate at most. Choice
+  double position_cutoff = 20;          // Hz, before it is differentiated. Choice
+  double position_cutoff_share = 0.16;  // - of the sampling rate at most. Choice
+  double rate_share = 4.5;              // -, sampling rate that is kept over the cutoff. Theory: above 2
+  double slow = 0.05;                   // - of the rms speed: slower counts for nothing. Choice
+  double friction_speed = 0.02;         // - of the rms speed, over which dry friction turns. Choice
+  double guard = 1.06;                  // / cutoff, about a reversal. Simulation: bristles and filter settle
+  double fast = 1.2;                    // - of the fastest healthy speed: no extrapolation. Choice
+  double gap = 2.5;                     // intervals between samples that are none. Choice
+  double longest_gap = 600;             // s. Choice: the machine has another temperature then
+  double shortest = 30;                 // s, of usable motion in a record. Choice
+
+  // The healthy machine
+  double least_share = 0.03;  // - of the squares of the residual that a further column explains. Choice
+  int most_columns = 8;       // further columns. Choice
+  double prior_share = 0.02;  // - of a value, its own spread from day to day. Choice
+  double prior_least = 1e-3;  // - of the rms torque. Choice
+  double prior_factor = 2;    // -, of the difference between records. Choice: few records
+  double drift = 0.1;         // - of dry friction over a record, by temperature. Choice
+  double rest = 10;           // s without motion, after which the machine has another temperature. Choice
+
+  // Changes
+  double window = 4;   // s, over which scores are summed. Choice: longer than the residual remembers
+  double block = 0.2;  // s, resolution of the onset. Choice
+  double margin = 8;   // s at either end in which no change begins. Choice
+  double least_explained = 0.1;  // - of the squares of the residual after the onset. Choice
+  double least_further =
+      0.05;               // - of the first change's gain. Simulation: what a first one leaves by its shape
+  double same_event = 5;  // s: two that begin so close may be one whose shape is another. Choice
+  double least_beside = 0.25;  // - of the gain of the other that a second one of an event has. Choice
+  int most_changes = 4;        // Choice
+  double onset_drop = 8;       // of twice the log likelihood, as wide as the onset is uncertain. Simulation
+  double onset_least = 0.1;    // s, half of the narrowest interval. Choice
+  double unknown_left = 0.4;   // - of the squares after the onset that may be left. Choice
+  double unknown_louder =
+      4;                // -, squares of the residual after over before, of what no effect explains. Choice
+  double alike = 0.97;  // - of the best gain: effects that fit alike. Choice
+  double model_error = 0.03;  // - of a size, as the shape of an effect is an idealisation. Choice
+};
+
+}  // namespace backlash::identification

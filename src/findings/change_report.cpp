@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/findings/change_report.h"
+
+#include <fmt/format.h>
+
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/findings/trace_report.h"
+#include "report/json.h"
+
+namespace backlash::findings {
+namespace {
+
+report::Json change_json(const identification::Change& c, const std::string& joint) {
+  report::Json size = report::Json::object();
+  for (const identification::ChangeSize& s : c.size) {
+    size[s.name] = report::measured(s.measured);
+    size[s.name]["unit"] = s.unit;
+  }
+  report::Json json = {{"effect", c.effect},
+                       {"joint", joint},
+                       {"since", c.since},
+                       {"since_interval", {c.since_from, c.since_to}},
+                       {"until", nullptr},
+                       {"size", size},
+                       {"equivalent_to", c.alike},
+                       {"gain", report::json_number(c.gain)},
+                       {"error_before", report::json_number(c.error_before)},
+                       {"error_after", report::json_number(c.error_after)}};
+  if (c.until) json["until"] = *c.until;
+  return json;
+}
+
+}  // namespace
+
+std::string change_summary(const identification::Changes& found) {
+  std::string text;
+  for (const identification::Change& c : found.changes) {
+    text += fmt::format("{} since {:.1f} s ({:.1f} to {:.1f})", c.effect, c.since, c.since_from, c.since_to);
+    if (c.until) text += fmt::format(", until {:.1f} s", *c.until);
+    for (const identification::ChangeSize& s : c.size)
+      text += fmt::format("; {} {} {}", s.name, with_error(s.measured), s.unit);
+    if (c.effect == "unknown")
+      text += "; no effect explains it" + (c.alike.empty() ? "" : ", nearest: " + joined(c.alike));
+    else if (!c.alike.empty())
+      text += "; the record does not tell it from: " + joined(c.alike);
+    text += "\n";
+  }
+  if (text.empty()) text = "no change found\n";
+  return text + fmt::format("{} windows of motion judged\n", found.windows);
+}
+
+std::string change_json(const identification::Changes& found, const ChangeInputs& inputs) {
+  report::Json changes = report::Json::array();
+  for (const identification::Change& c : found.changes) changes.push_back(change_json(c, inputs.joint));
+  const report::Json json = {
+      {"schema_version", 1},
+      {"version", version()},
+      {"record", inputs.record},
+      {"rig", inputs.rig},
+      {"healthy", inputs.healthy},
+      {"changes", changes},
+      {"windows", found.windows},
+      {"false_alarms_per_hour", inputs.false_alarms_per_hour},
+      {"threshold", report::json_number(found.threshold)},
+      {"healthy_residual", report::json_number(found.noise)},
+      {"healthy_terms", found.healthy_terms},
+      {"warnings", found.warnings},
+  };
+  return report::dumped(json, 2);
+}
+
+}  // namespace backlash::findings

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The effects of one inertia that a record of torque and position can tell, as columns: the motor torque that
+// one unit of each value takes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/changes/changes.h"
+#include "sampled_motion.h"
+
+namespace backlash::identification {
+
+constexpr double kLeastOrder = 2;          // 1/rad, of cogging: below is gravity. Choice
+constexpr double kLeastFrictionOrder = 1;  // 1/rad, of position-dependent friction. Choice
+
+struct ChangeEffect {
+  std::string id;    // of the registry of terms, or the name of a declared value
+  double shape = 0;  // order [1/rad] or speed [rad/s], where the effect has one
+  /// Columns of one moment. Two: cosine and sine of a wave; friction_drift: dry friction and that times time.
+  std::vector<double (*)(const Moment&, double shape)> columns;
+  /// friction_drift: the second column grows from the onset on.
+  bool ramp = false;
+
+  bool has_order() const { return id == "cogging" || id == "position_dependent_friction"; }
+  std::string name() const;  // with its shape
+};
+
+/// Simple ones first. Orders whose wave the filter would take away leave columns of nothing.
+std::vector<ChangeEffect> change_effects(const MotionSampling& sampling);
+
+Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect);
+
+/// The values of an effect as its equation has them, from those of its columns and their covariance.
+std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::VectorXd& values,
+                                    const Eigen::MatrixXd& covariance, bool linear);
+
+}  // namespace backlash::identification

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "change_scan.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace backlash::identification {
+
+void Background::solve() {
+  Eigen::MatrixXd information = columns.transpose() * columns / variance;
+  for (Eigen::Index i = 0; i < spread.size(); ++i)
+    information(i, i) += std::isfinite(spread[i]) ? 1 / (spread[i] * spread[i]) : 1e-9 * information(i, i);
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
+  inverse = scale.asDiagonal() * Eigen::MatrixXd(scaled.ldlt().solve(identity)) * scale.asDiagonal();
+  estimate = inverse * (columns.transpose() * residual / variance);
+}
+
+EffectSums::EffectSums(const SampledMotion& motion, const Eigen::MatrixXd& z, const Background& background,
+                       double block, bool ramp)
+    : block_(block), ramp_(ramp) {
+  const auto blocks = static_cast<std::size_t>(motion.moments.back().time / block) + 1;
+  gram_.assign(blocks + 1, Eigen::MatrixXd::Zero(z.cols(), z.cols()));
+  cross_.assign(blocks + 1, Eigen::MatrixXd::Zero(z.cols(), background.columns.cols()));
+  moments_.assign(blocks + 1, Eigen::VectorXd::Zero(z.cols()));
+  Eigen::Index end = motion.size();
+  for (std::size_t k = blocks; k-- > 0;) {
+    Eigen::Index begin = end;
+    while (begin > 0 && motion.time(begin - 1) >= block * double(k)) --begin;
+    const auto rows = z.middleRows(begin, end - begin);
+    gram_[k] = gram_[k + 1];
+    cross_[k] = cross_[k + 1];
+    moments_[k] = moments_[k + 1];
+    if (begin < end) {
+      gram_[k] += rows.transpose() * rows;
+      cross_[k] += rows.transpose() * background.columns.middleRows(begin, end - begin);
+      moments_[k] += rows.transpose() * background.residual.segment(begin, end - begin);
+    }
+    end = begin;
+  }
+}
+
+EffectSums::Score EffectSums::score(std::size_t from, std::size_t to, const Background& background) const {
+  const double v = background.variance;
+  Eigen::MatrixXd a = (gram_[from] - gram_[to]) / v, b = (cross_[from] - cross_[to]) / v;
+  Eigen::VectorXd c = (moments_[from] - moments_[to]) / v;
+  if (ramp_) {  // (t - onset) f = t f - onset f
+    Eigen::RowVector2d w(-onset(from), 1);
+    const Eigen::MatrixXd wa = w * a * w.transpose(), wb = w * b;
+    const Eigen::VectorXd wc = w * c;
+    a = wa;
+    b = wb;
+    c = wc;
+  }
+  const Eigen::MatrixXd s = a - b * background.inverse * b.transpose();
+  Score score;
+  for (Eigen::Index i = 0; i < s.rows(); ++i)
+    if (!(s(i, i) > kToldApart * a(i, i)) || !(a(i, i) > 0)) return score;
+  const Eigen::VectorXd y = c - b * background.estimate;
+  score.covariance = s.inverse();
+  score.values = score.covariance * y;
+  score.gain = y.dot(score.values);
+  if (!std::isfinite(score.gain) || score.gain < 0) return {};
+  return score;
+}
+
+double score_inflation(const SampledMotion& motion, const Eigen::VectorXd& residual,
+                       const Eigen::MatrixXd& columns, double variance, double window) {
+  double most = 1;
+  for (Eigen::Index i = 0; i < columns.cols(); ++i) {
+    double squares = 0, sum = 0, last = 0;
+    for (Eigen::Index r = 0; r < columns.rows(); ++r) {
+      if (motion.time(r) - last > window) {
+        squares += sum * sum;
+        sum = 0;
+        last = motion.time(r);
+      }
+      sum += columns(r, i) * residual[r];
+    }
+    squares += sum * sum;
+    if (const double white = variance * columns.col(i).squaredNorm(); white > 0)
+      most = std::max(most, squares / white);
+  }
+  return most;
+}
+
+}  // namespace backlash::identification

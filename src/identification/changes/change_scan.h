@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Scores: twice the log likelihood ratio of an effect that begins at an onset, the nuisances eliminated. Sums
+// over short blocks, which a live monitor can add one by one, are all that is needed.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "healthy_model.h"
+
+namespace backlash::identification {
+
+constexpr double kToldApart = 1e-3;  // - of its squares that an effect must have for itself. Choice
+
+/// What is known beside the effect: residual, nuisances, variance of the noise.
+struct Background {
+  Eigen::VectorXd residual;
+  Eigen::MatrixXd columns;   // nuisances, and changes that were found
+  Eigen::VectorXd spread;    // of each; infinite: not known at all
+  double variance = 0;       // of a row of the residual [N^2 m^2]
+  Eigen::MatrixXd inverse;   // of the information of the columns
+  Eigen::VectorXd estimate;  // of the columns' values
+
+  void solve();  // `inverse`, `estimate` from the rest
+  Eigen::VectorXd left() const { return residual - columns * estimate; }
+};
+
+/// An effect in a record, summed from blocks to the end.
+class EffectSums {
+ public:
+  EffectSums(const SampledMotion& motion, const Eigen::MatrixXd& columns, const Background& background,
+             double block, bool ramp);
+
+  struct Score {
+    double gain = 0;  // of white noise
+    Eigen::VectorXd values;
+    Eigen::MatrixXd covariance;
+  };
+  /// From block `from` to before block `to`. No values where the record cannot tell.
+  Score score(std::size_t from, std::size_t to, const Background& background) const;
+
+  std::size_t blocks() const { return moments_.size() - 1; }
+  double onset(std::size_t block) const { return block_ * double(block); }
+
+ private:
+  double block_;
+  bool ramp_;
+  std::vector<Eigen::MatrixXd> gram_, cross_;  // from block k on
+  std::vector<Eigen::VectorXd> moments_;
+};
+
+/// By how much the scores of an effect in windows scatter more than those of white noise would, >= 1.
+double score_inflation(const SampledMotion& motion, const Eigen::VectorXd& residual,
+                       const Eigen::MatrixXd& columns, double variance, double window);
+
+}  // namespace backlash::identification

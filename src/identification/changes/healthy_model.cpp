@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "healthy_model.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/error.h"
+#include "change_scan.h"
+
+namespace backlash::identification {
+namespace {
+
+constexpr double kWarmUps[] = {20, 40, 60, 80, 110, 150, 220, 300, 400};  // s, tried. Choice
+
+constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
+constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
+
+// Columns of the equation of motion, in this order.
+enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kWarmViscous, kWarmCoulomb, kBaseColumns };
+
+Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
+  Eigen::MatrixXd x(motion.size(), kBaseColumns);
+  x.col(kInertia) = column(motion, [](const Moment& m) { return m.acceleration; });
+  x.col(kViscous) = column(motion, [](const Moment& m) { return m.speed; });
+  x.col(kCoulomb) = column(motion, [](const Moment& m) { return m.direction; });
+  x.col(kOffset).setOnes();
+  x.col(kCosine) = column(motion, [](const Moment& m) { return std::cos(m.position); });
+  x.col(kSine) = column(motion, [](const Moment& m) { return std::sin(m.position); });
+  x.col(kWarmViscous) =
+      column(motion, [&](const Moment& m) { return m.speed * std::exp(-m.time / warm_up); });
+  x.col(kWarmCoulomb) =
+      column(motion, [&](const Moment& m) { return m.direction * std::exp(-m.time / warm_up); });
+  return x;
+}
+
+Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  Eigen::MatrixXd out(a.rows(), a.cols() + b.cols());
+  out << a, b;
+  return out;
+}
+
+struct HealthyData {
+  std::vector<SampledMotion> motions;
+  std::vector<Eigen::MatrixXd> columns;
+};
+
+/// Least squares with a weak pull to `about`, by 1 / `sd` per column.
+Eigen::VectorXd pulled_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& moment,
+                           const Eigen::VectorXd& about, const Eigen::VectorXd& sd, double variance) {
+  const Eigen::VectorXd weight = variance * sd.array().square().inverse();
+  const Eigen::MatrixXd a = gram + Eigen::MatrixXd(weight.asDiagonal());
+  return a.ldlt().solve(moment + weight.cwiseProduct(about));
+}
+
+struct PooledFit {
+  Eigen::VectorXd values;
+  double squares = 0;
+  Eigen::Index rows = 0;
+};
+
+PooledFit pooled(const HealthyData& data) {
+  const Eigen::Index p = data.columns.front().cols();
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(p, p);
+  Eigen::VectorXd moment = Eigen::VectorXd::Zero(p);
+  PooledFit fit;
+  for (std::size_t r = 0; r < data.motions.size(); ++r) {
+    gram += data.columns[r].transpose() * data.columns[r];
+    moment += data.columns[r].transpose() * data.motions[r].torque;
+    fit.rows += data.motions[r].size();
+  }
+  // Columns of any size; what the motion does not tell stays 0.
+  const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-12 * gram.diagonal().maxCoeff()).cwiseSqrt();
+  const Eigen::VectorXd inverse = scale.cwiseInverse();
+  Eigen::MatrixXd scaled = inverse.asDiagonal() * gram * inverse.asDiagonal();
+  scaled.diagonal().array() += 1e-9;
+  fit.values = inverse.cwiseProduct(Eigen::VectorXd(scaled.ldlt().solve(inverse.cwiseProduct(moment))));
+  for (std::size_t r = 0; r < data.motions.size(); ++r)
+    fit.squares += (data.motions[r].torque - data.columns[r] * fit.values).squaredNorm();
+  return fit;
+}
+
+void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
+  for (Moment& m : motion.moments)
+    m.load = values[kInertia] * m.acceleration + values[kCosine] * std::cos(m.position) +
+             values[kSine] * std::sin(m.position);
+}
+
+double best_warm_up(HealthyData& data) {
+  double best = 0, least = std::numeric_limits<double>::infinity();
+  for (const double tau : kWarmUps) {
+    for (std::size_t r = 0; r < data.motions.size(); ++r)
+      data.columns[r] = base_columns(data.motions[r], tau);
+    if (const double squares = pooled(data).squares; squares < least) {
+      least = squares;
+      best = tau;
+    }
+  }
+  for (std::size_t r = 0; r < data.motions.size(); ++r) data.columns[r] = base_columns(data.motions[r], best);
+  return best;
+}
+
+/// Squares that one more effect would take from the residual.
+double squares_taken(const HealthyData& data, const std::vector<Eigen::VectorXd>& residuals,
+                     const Eigen::LDLT<Eigen::MatrixXd>& gram, const ChangeEffect& effect) {
+  Eigen::MatrixXd a, b;
+  Eigen::VectorXd c;
+  for (std::size_t r = 0; r < data.motions.size(); ++r) {
+    const Eigen::MatrixXd z = effect_columns(data.motions[r], effect);
+    if (r == 0) {
+      a = Eigen::MatrixXd::Zero(z.cols(), z.cols());
+      b = Eigen::MatrixXd::Zero(z.cols(), data.columns[r].cols());
+      c = Eigen::VectorXd::Zero(z.cols());
+    }
+    a += z.transpose() * z;
+    b += z.transpose() * data.columns[r];
+    c += z.transpose() * residuals[r];
+  }
+  const Eigen::MatrixXd s = a - b * gram.solve(b.transpose());
+  for (Eigen::Index i = 0; i < s.rows(); ++i)
+    if (!(s(i, i) > kToldApart * a(i, i))) return 0;
+  return c.dot(s.ldlt().solve(c));
+}
+
+/// Adds what the healthy machine shows, the largest first.
+void add_further(HealthyData& data, HealthyModel& model, const ChangeSettings& settings) {
+  const std::vector<ChangeEffect> effects = change_effects(model.sampling);
+  for (int k = 0; k < settings.most_columns; ++k) {
+    const PooledFit fit = pooled(data);
+    std::vector<Eigen::VectorXd> residuals;
+    Eigen::MatrixXd gram =
+        1e-9 * Eigen::MatrixXd::Identity(data.columns.front().cols(), data.columns.front().cols());
+    for (std::size_t r = 0; r < data.motions.size(); ++r) {
+      set_loads(fit.values, data.motions[r]);
+      residuals.push_back(data.motions[r].torque - data.columns[r] * fit.values);
+      gram += data.columns[r].transpose() * data.columns[r];
+    }
+    const Eigen::LDLT<Eigen::MatrixXd> solver(gram);
+    double most = settings.least_share * fit.squares;
+    const ChangeEffect* best = nullptr;
+    for (const ChangeEffect& e : effects) {
+      if (e.ramp) continue;
+      if (const double taken = squares_taken(data, residuals, solver, e); taken > most) {
+        most = taken;
+        best = &e;
+      }
+    }
+    if (!best) return;
+    model.further.push_back(*best);
+    for (std::size_t r = 0; r < data.motions.size(); ++r)
+      data.columns[r] = beside(data.columns[r], effect_columns(data.motions[r], *best));
+  }
+}
+
+/// What a value differs by from record to record (of one record: from half to half), and some more.
+Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const ChangeSettings& settings) {
+  const double variance = fit.squares / double(fit.rows);
+  double torque = 0;
+  Eigen::VectorXd size = Eigen::VectorXd::Zero(fit.values.size());
+  std::vector<Eigen::VectorXd> fits;
+  for (std::size_t r = 0; r < data.motions.size(); ++r) {
+    const Eigen::MatrixXd& x = data.columns[r];
+    const Eigen::VectorXd& u = data.motions[r].torque;
+    torque += u.squaredNorm();
+    size += x.colwise().squaredNorm().transpose();
+    const Eigen::VectorXd sd = fit.values.cwiseAbs().array() + 1e-3;
+    const Eigen::Index parts = data.motions.size() > 1 ? 1 : 2, length = u.size() / parts;
+    for (Eigen::Index i = 0; i < parts; ++i) {
+      const auto rows = x.middleRows(i * length, length);
+      fits.push_back(pulled_fit(rows.transpose() * rows, rows.transpose() * u.segment(i * length, length),
+                                fit.values, sd, variance));
+    }
+  }
+  Eigen::VectorXd low = fits.front(), high = fits.front();
+  for (const Eigen::VectorXd& f : fits) {
+    low = low.cwiseMin(f);
+    high = high.cwiseMax(f);
+  }
+  const Eigen::VectorXd least =
+      (settings.prior_least * std::sqrt(torque) * size.cwiseMax(1e-12).cwiseSqrt().cwiseInverse());
+  Eigen::VectorXd spread =
+      settings.prior_factor * (high - low).cwiseMax(settings.prior_share * fit.values.cwiseAbs() + least);
+  // A record may begin warm, or colder than before.
+  for (const int k : {kWarmViscous, kWarmCoulomb}) spread[k] = std::max(spread[k], std::fabs(fit.values[k]));
+  return spread;
+}
+
+}  // namespace
+
+HealthyModel commission_healthy(const std::vector<record::Record>& records, const MotionSampling& sampling,
+                                const ChangeSettings& settings) {
+  if (records.empty()) throw CannotIdentify("there is no healthy record");
+  HealthyModel model;
+  model.sampling = sampling;
+  double squares = 0, count = 0;
+  for (const record::Record& r : records)
+    for (const Moment& m : sampled_motion(r, sampling, settings).moments) {
+      squares += m.speed * m.speed;
+      model.sampling.fastest = std::max(model.sampling.fastest, settings.fast * std::fabs(m.speed));
+      ++count;
+    }
+  model.sampling.speed = std::sqrt(squares / count);
+  if (!(model.sampling.speed > 0)) throw CannotIdentify(records.front().name + " does not move");
+  HealthyData data;
+  for (const record::Record& r : records) data.motions.push_back(sampled_motion(r, model.sampling, settings));
+  data.columns.resize(data.motions.size());
+  model.warm_up = best_warm_up(data);
+  add_further(data, model, settings);
+  const PooledFit fit = pooled(data);
+  model.values = fit.values;
+  model.spread = spread_of(data, fit, settings);
+  model.noise = std::sqrt(fit.squares / double(fit.rows));
+  model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
+  return model;
+}
+
+SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
+                        const ChangeSettings& settings) {
+  SampledMotion motion = sampled_motion(record, model.sampling, settings);
+  set_loads(model.values, motion);
+  return motion;
+}
+
+namespace {
+
+struct Rest {
+  double from, to;  // s, without motion
+};
+
+/// The longest ones.
+std::vector<Rest> rests_of(const SampledMotion& motion, const ChangeSettings& settings) {
+  std::vector<Rest> rests;
+  for (Eigen::Index r = 1; r < motion.size(); ++r)
+    if (motion.time(r) - motion.time(r - 1) > settings.rest)
+      rests.push_back({motion.time(r - 1), motion.time(r)});
+  std::sort(rests.begin(), rests.end(),
+            [](const Rest& a, const Rest& b) { return a.to - a.from > b.to - b.from; });
+  if (rests.size() > kMostRests) rests.resize(kMostRests);
+  return rests;
+}
+
+void add_nuisance(Whitened& out, const Eigen::VectorXd& x, double spread) {
+  out.nuisances = beside(out.nuisances, x);
+  out.spread.conservativeResize(out.spread.size() + 1);
+  out.spread[out.spread.size() - 1] = std::max(spread, kLeastSpread);
+}
+
+}  // namespace
+
+Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
+  Whitened out;
+  out.nuisances = base_columns(motion, model.warm_up);
+  for (const ChangeEffect& e : model.further)
+    out.nuisances = beside(out.nuisances, effect_columns(motion, e));
+  out.residual = motion.torque - out.nuisances * model.values;
+  out.spread = model.spread;
+  const double length = motion.moments.back().time;
+  add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * (m.time / length - 0.5); }),
+               model.drift);
+  // At rest the machine cools down, and warms up again after; or the clock was set.
+  for (const Rest& rest : rests_of(motion, settings)) {
+    const auto cooled = [&](const Moment& m) {
+      return m.time < rest.to ? 0 : std::exp(-(m.time - rest.to) / model.warm_up);
+    };
+    const double share = 1 - std::exp(-(rest.to - rest.from) / model.warm_up);
+    add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * cooled(m); }),
+                 share * model.spread[kWarmCoulomb]);
+    add_nuisance(out, column(motion, [&](const Moment& m) { return m.speed * cooled(m); }),
+                 share * model.spread[kWarmViscous]);
+  }
+  return out;
+}
+
+}  // namespace backlash::identification

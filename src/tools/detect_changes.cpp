@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Says whether a joint has changed since it was commissioned, by which effect and since when.
+#include <filesystem>
+#include <iostream>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/findings/change_report.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
+#include "tools/common/command_line.h"
+#include "tools/common/exit_codes.h"
+#include "tools/common/progress_bar.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+namespace {
+
+Command command() {
+  Command c;
+  c.name = "detect_changes";
+  c.summary =
+      "Says whether a joint of one inertia has changed since healthy records of it were made, by which "
+      "effect, "
+      "how much and since when.";
+  c.positional = {"RECORD"};
+  c.options = {
+      {"rig", "RIG.yaml", "the machine as declared (mesh: rigid)", true},
+      {"healthy", "RECORD...", "records (.csv or .bag) of the healthy machine, better two tasks than one",
+       true},
+      {"json", "OUT.json", "changes with size, onset and intervals", true},
+      {"false-alarms-per-hour", "X",
+       "how often a healthy machine may be called changed; default: 1/720, once a month"},
+  };
+  c.notes =
+      "Records need motor_torque and motor_position; ordinary motion will do, but must be no faster than in "
+      "the "
+      "healthy records. Warm-up as in the healthy records, and slow drift of friction by up to 10 %, is no "
+      "change. Sizes are what was added at the onset. A change that no effect explains is called unknown.";
+  c.examples = {
+      "detect_changes --rig config/ur5_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
+      "today.csv"};
+  c.exit_codes =
+      "  0   done: changes are listed, or there are none\n"
+      "  3   the records cannot tell (too little motion, more than one inertia)\n";
+  return c;
+}
+
+record::Record read(const std::string& path, const rig_file::RigFile& rig,
+                    std::vector<std::string>& warnings) {
+  record::Record record = read_record(path, place_of(rig));
+  record.name = std::filesystem::path(path).filename();
+  for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
+  return record;
+}
+
+int detect(const Arguments& arguments) {
+  const findings::ChangeInputs inputs = {
+      arguments.text("rig"), "", arguments.texts("healthy"), arguments.positional(0),
+      arguments.number("false-alarms-per-hour", identification::ChangeSettings{}.false_alarms_per_hour,
+                       Range::positive())};
+  std::vector<std::string> files = inputs.healthy;
+  files.push_back(inputs.record);
+  for (const std::string& file : files) check_record_path(file);
+  files.push_back(inputs.rig);
+  check_output(arguments.text("json"), files);
+  const rig_file::RigFile rig = rig_file::load_rig_file(inputs.rig);
+  std::vector<std::string> warnings;
+  std::vector<record::Record> healthy;
+  for (const std::string& file : inputs.healthy) healthy.push_back(read(file, rig, warnings));
+  const record::Record record = read(inputs.record, rig, warnings);
+  identification::ChangeSettings settings;
+  settings.false_alarms_per_hour = inputs.false_alarms_per_hour;
+  identification::Changes found;
+  try {
+    ProgressBar bar;
+    found = identification::detect_changes(rig.rig, healthy, record, settings, bar.progress());
+  } catch (const CannotIdentify& error) {
+    std::cerr << "detect_changes: " << error.what() << '\n';
+    return kInconclusive;
+  }
+  found.warnings.insert(found.warnings.begin(), warnings.begin(), warnings.end());
+  findings::ChangeInputs told = inputs;
+  told.joint = rig.rig.joint;
+  write_text(arguments.text("json"), findings::change_json(found, told));
+  std::cout << findings::change_summary(found);
+  return kHealthy;
+}
+
+}  // namespace
+}  // namespace backlash::tools
+
+int main(int argc, char** argv) {
+  using namespace backlash::tools;
+  return run_command(command(), argc, argv, detect);
+}

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Changes of a machine that the test itself writes down: the inverse dynamics of a joint with gravity and
+// friction along sums of sines, with white noise of the torque.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/changes/changes.h"
+#include "backlash_diagnosis/signal/distributions.h"
+
+namespace backlash::identification {
+namespace {
+
+constexpr double kRate = 125;    // Hz
+constexpr double kNoise = 0.03;  // N m
+
+struct Motion {
+  double t, q, w, a;
+};
+
+/// Torque that is added to the healthy machine's.
+using Added = double (*)(const Motion&);
+
+double sign(double x) {
+  return x < 0 ? -1 : 1;
+}
+
+record::Record made(unsigned seed, double duration, Added added) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, kNoise);
+  std::uniform_real_distribution<double> phase(0, 2 * M_PI);
+  const double p[] = {phase(random), phase(random), phase(random)}, f[] = {0.11, 0.17, 0.29},
+               a[] = {0.8, 0.6, 0.3};
+  record::Record r;
+  r.name = "made";
+  for (int k = 0; k < int(duration * kRate); ++k) {
+    Motion m{k / kRate, 0, 0, 0};
+    for (int i = 0; i < 3; ++i) {
+      const double w = 2 * M_PI * f[i];
+      m.q += a[i] * std::sin(w * m.t + p[i]);
+      m.w += a[i] * w * std::cos(w * m.t + p[i]);
+      m.a -= a[i] * w * w * std::sin(w * m.t + p[i]);
+    }
+    const double warm = 1 + 0.3 * std::exp(-m.t / 80);
+    r.time.push_back(m.t);
+    r.column(record::Channel::motor_position).push_back(m.q);
+    r.column(record::Channel::motor_torque)
+        .push_back(0.45 * m.a + warm * (1.1 * m.w + 0.75 * sign(m.w)) + 3 * std::sin(m.q) + added(m) +
+                   noise(random));
+  }
+  return r;
+}
+
+model::Rig one_inertia() {
+  model::Rig rig;
+  rig.mesh.rigid = true;
+  return rig;
+}
+
+double nothing(const Motion&) {
+  return 0;
+}
+
+Changes changes_of(const record::Record& record, double false_alarms_per_hour = 1.0 / 720) {
+  ChangeSettings settings;
+  settings.false_alarms_per_hour = false_alarms_per_hour;
+  return detect_changes(one_inertia(), {made(1, 200, nothing), made(2, 200, nothing)}, record, settings);
+}
+
+TEST(Changes, NothingIsToldOfHealthyRecords) {
+  // Ten records of 200 s at one false alarm a month: 1 in 1300 would be chance.
+  for (unsigned seed = 10; seed < 20; ++seed)
+    EXPECT_TRUE(changes_of(made(seed, 200, nothing)).changes.empty()) << seed;
+}
+
+TEST(Changes, ThresholdIsTheQuantileThatTheRateAsksFor) {
+  const Changes often = changes_of(made(10, 200, nothing), 1),
+                seldom = changes_of(made(10, 200, nothing), 0.01);
+  EXPECT_EQ(often.windows, seldom.windows);
+  // One degree of freedom: P(X > x) = erfc(sqrt(x / 2)), a hundred times as often.
+  EXPECT_NEAR(std::erfc(std::sqrt(often.threshold / 2)) / std::erfc(std::sqrt(seldom.threshold / 2)), 100, 1);
+}
+
+struct Case {
+  const char* effect;
+  Added added;
+  const char* value;
+  double size;
+};
+
+class ChangesOf : public testing::TestWithParam<Case> {};
+
+TEST_P(ChangesOf, AreNamedWithSizeAndTime) {
+  const Changes found = changes_of(made(30, 200, GetParam().added));
+  ASSERT_EQ(found.changes.size(), 1u);
+  const Change& c = found.changes.front();
+  EXPECT_EQ(c.effect, GetParam().effect);
+  EXPECT_LE(c.since_from, 120);
+  EXPECT_GE(c.since_to, 120);
+  EXPECT_LT(c.since_to - c.since_from, 4);  // a reversal each 1 to 3 s hides the onset for that long
+  EXPECT_FALSE(c.until);
+  for (const ChangeSize& s : c.size)
+    if (s.name == GetParam().value)
+      // 3 standard errors: one of the cases in 60 would miss by chance
+      EXPECT_NEAR(s.measured.value, GetParam().size, 3 * s.measured.standard_error);
+}
+
+constexpr double kOnset = 120;  // s
+
+const Case kCases[] = {
+    {"motor_coulomb", [](const Motion& m) { return m.t < kOnset ? 0 : 0.15 * sign(m.w); }, "motor_coulomb",
+     0.15},
+    {"motor_viscous", [](const Motion& m) { return m.t < kOnset ? 0 : 0.2 * m.w; }, "motor_viscous", 0.2},
+    {"motor_inertia", [](const Motion& m) { return m.t < kOnset ? 0 : 0.1 * m.a; }, "motor_inertia", 0.1},
+    {"gravity", [](const Motion& m) { return m.t < kOnset ? 0 : 0.4 * std::sin(m.q + 0.3); }, "amplitude",
+     0.4},
+    {"cogging", [](const Motion& m) { return m.t < kOnset ? 0 : 0.2 * std::sin(9 * m.q + 1); }, "phase", 1},
+    {"asymmetric_coulomb", [](const Motion& m) { return m.t < kOnset ? 0 : 0.2; }, "torque", 0.2},
+    {"load_dependent_friction",
+     [](const Motion& m) {
+       return m.t < kOnset ? 0 : 0.06 * std::fabs(0.45 * m.a + 3 * std::sin(m.q)) * sign(m.w);
+     },
+     "coefficient", 0.06},
+};
+INSTANTIATE_TEST_SUITE_P(Effects, ChangesOf, testing::ValuesIn(kCases),
+                         [](const auto& info) { return info.param.effect; });
+
+TEST(Changes, ThatEndAreToldWithTheirEnd) {
+  const Changes found =
+      changes_of(made(40, 200, [](const Motion& m) { return m.t < 70 || m.t > 140 ? 0 : 0.2 * sign(m.w); }));
+  ASSERT_EQ(found.changes.size(), 1u);
+  EXPECT_EQ(found.changes.front().effect, "motor_coulomb");
+  ASSERT_TRUE(found.changes.front().until);
+  EXPECT_NEAR(*found.changes.front().until, 140, 1);
+}
+
+TEST(Changes, ThatFollowNoEffectAreUnknown) {
+  const Changes found =
+      changes_of(made(50, 200, [](const Motion& m) { return m.t < kOnset ? 0 : 0.3 * std::sin(3 * m.t); }));
+  ASSERT_EQ(found.changes.size(), 1u);
+  EXPECT_EQ(found.changes.front().effect, "unknown");
+  EXPECT_NEAR(found.changes.front().since, kOnset, 6);
+}
+
+TEST(Changes, ARecordThatBeginsWarmOrPausesHasNone) {
+  record::Record warm = made(60, 300, nothing).slice(100, 300);
+  EXPECT_TRUE(changes_of(warm).changes.empty());
+  record::Record pause = made(61, 200, nothing);
+  for (double& t : pause.time)
+    if (t > 100) t += 90;
+  EXPECT_TRUE(changes_of(pause).changes.empty());
+}
+
+TEST(Changes, StampsThatMakeNoSenseAndOtherMachinesAreRefused) {
+  record::Record jump = made(62, 200, nothing);
+  for (double& t : jump.time)
+    if (t > 100) t += 3600;
+  EXPECT_THROW(changes_of(jump), BadData);
+  model::Rig two = one_inertia();
+  two.mesh.rigid = false;
+  const record::Record r = made(1, 200, nothing);
+  EXPECT_THROW(detect_changes(two, {r}, r), CannotIdentify);
+  EXPECT_THROW(changes_of(made(1, 20, nothing)), CannotIdentify);
+}
+
+}  // namespace
+}  // namespace backlash::identification
