@@ -39,7 +39,8 @@ Command command() {
       "detect_changes --rig config/ur5_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
       "today.csv"};
   c.exit_codes =
-      "  0   done: changes are listed, or there are none\n"
+      "  0   nothing has changed\n"
+      "  2   something has\n"
       "  3   the records cannot tell (too little motion, more than one inertia)\n";
   return c;
 }
@@ -82,7 +83,7 @@ int detect(const Arguments& arguments) {
   told.joint = rig.rig.joint;
   write_text(arguments.text("json"), findings::change_json(found, told));
   std::cout << findings::change_summary(found);
-  return kHealthy;
+  return found.changes.empty() ? kHealthy : kFault;
 }
 
 }  // namespace

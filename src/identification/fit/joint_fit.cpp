@@ -27,7 +27,9 @@ constexpr double kOversampling =
     1.25;  // theory: rows per second over those of a signal of this bandwidth, 2 cutoff
 constexpr double kSkewOfSample = 1e-3;     // simulation: samples, that interpolation leaves wrong of a skew
 constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
-constexpr long kFewestBlocks = 4;          // choice: per unknown, for a covariance from blocks
+constexpr double kEquations = 5e-5;  // simulation: relative, of a value > 0 that moves the load: how well a
+                                     // record is simulated between its samples
+constexpr long kFewestBlocks = 4;  // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));
@@ -97,6 +99,14 @@ void add_timing(MachineFit& fit, const Machine& start, double interval) {
       variance += std::pow(kSkewOfSample * interval, 2) + std::pow(skew_of_friction(fit.machine.rig), 2);
     if (start.parameters[i].name == delay) variance += std::pow(kUnsureOfHold * interval, 2);
   }
+}
+
+/// A machine whose load is simulated is told no better than it is simulated.
+void add_equations(MachineFit& fit, const Machine& start) {
+  if (!simulation::load_moves_freely(start.rig)) return;
+  for (std::size_t i = 0; i < start.parameters.size(); ++i)
+    if (start.parameters[i].positive)
+      fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) += std::pow(kEquations, 2);
 }
 
 /// What is left beyond noise may follow what a value changes, wholly where the machine is not to be modelled:
@@ -319,6 +329,7 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   fit.fit.covariance *=
       std::pow(signal::student_t_quantile(0.975, std::max(1.0, free)) / signal::kNormalQuantile975, 2);
   add_timing(fit, start, records.records().front().data().interval);
+  add_equations(fit, start);
   const Eigen::VectorXd edge = shift_of_contact_edge(fit, records);
   fit.fit.covariance += edge * edge.transpose();
   const Eigen::VectorXd bias = sampling_bias(fit, records);
