@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "change_effects.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/text.h"
@@ -10,9 +11,10 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kMostOrder = 80, kOrderStep = 0.5;    // 1/rad. Choice
-constexpr double kMostFrictionOrder = 12;              // 1/rad. Choice
-constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};  // - of the rms speed. Choice
+constexpr double kMostOrder = 80, kOrderStep = 0.5;                    // 1/rad. Choice
+constexpr double kMostFrictionOrder = 12;                              // 1/rad. Choice
+constexpr double kFluctuationSpeeds[] = {0.4, 0.7, 1, 1.4, 1.8, 2.3};  // - of the rms speed. Choice
+constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};                  // - of the rms speed. Choice
 
 double direction(const Moment& m, double) {
   return m.direction;
@@ -43,6 +45,11 @@ double rubbed_sine(const Moment& m, double n) {
 }
 double load_rub(const Moment& m, double) {
   return m.direction * std::fabs(m.load);
+}
+/// The mean of a load that fluctuates from the speed w0 on, as the term has it.
+double fluctuating_load_rub(const Moment& m, double w0) {
+  const double t = std::fabs(m.load), a = m.fluctuation * std::max(0.0, std::fabs(m.speed) - w0);
+  return m.direction * (t >= a ? t : (t * t + a * a) / (2 * a));
 }
 double drag(const Moment& m, double) {
   return m.speed * std::fabs(m.speed);
@@ -91,6 +98,8 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
                                    {"asymmetric_viscous", 0, {speed_size}},
                                    {"quadratic_drag", 0, {drag}},
                                    {"friction_drift", 0, {direction, drift}, true}};
+  for (const double share : kFluctuationSpeeds)
+    all.push_back({"load_dependent_friction", share * sampling.speed, {fluctuating_load_rub}});
   for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});
   for (double n = kLeastFrictionOrder; n <= kMostFrictionOrder; n += kOrderStep)
     all.push_back({"position_dependent_friction", n, {rubbed_cosine, rubbed_sine}});
@@ -116,6 +125,8 @@ std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::Vec
   if (values.size() == 1) {
     add(value_name(effect.id), values[0], std::sqrt(covariance(0, 0)));
     if (effect.id == "stribeck") add("speed", effect.shape, effect.shape);
+    if (effect.id == "load_dependent_friction" && effect.shape > 0)
+      add("fluctuation_speed", effect.shape, effect.shape);
     return out;
   }
   // c cos x + s sin x = A sin(x + p)

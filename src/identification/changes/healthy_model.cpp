@@ -11,6 +11,8 @@
 namespace backlash::identification {
 namespace {
 
+constexpr double kFluctuation =
+    3.5;  // simulation: times rms torque over rms speed, see load_dependent_friction
 constexpr double kWarmUps[] = {20, 40, 60, 80, 110, 150, 220, 300, 400};  // s, tried. Choice
 
 constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
@@ -81,9 +83,12 @@ PooledFit pooled(const HealthyData& data) {
 }
 
 void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
-  for (Moment& m : motion.moments)
+  const double torque = motion.torque.norm() / std::sqrt(double(std::max<Eigen::Index>(1, motion.size())));
+  for (Moment& m : motion.moments) {
+    m.fluctuation = kFluctuation * torque / motion.sampling.speed;
     m.load = values[kInertia] * m.acceleration + values[kCosine] * std::cos(m.position) +
              values[kSine] * std::sin(m.position);
+  }
 }
 
 double best_warm_up(HealthyData& data) {

@@ -27,6 +27,7 @@ struct Moment {
   double acceleration;  // rad/s^2
   double direction;     // -1..1
   double load;          // N m, that the healthy machine's load takes
+  double fluctuation;   // N m s/rad, by which that may fluctuate per speed, faster than the record shows
 };
 
 struct SampledMotion {
