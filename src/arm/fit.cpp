@@ -116,7 +116,7 @@ void Fit::set_weights(const std::vector<std::vector<Linearised>>& all) {
     double square = 0, count = 0, step = 0;
     for (std::size_t m = 0; m < all.size(); ++m) {
       const Eigen::VectorXd counts = motions_[m].motion->counts.col(Eigen::Index(j)).cast<double>();
-      residuals.push_back((all[m][j].measured - all[m][j].predicted).cwiseProduct(counts));
+      residuals.emplace_back((all[m][j].measured - all[m][j].predicted).cwiseProduct(counts));
       square += residuals.back().squaredNorm();
       count += counts.sum();
       const ArmMotion& motion = *motions_[m].motion;

@@ -137,7 +137,7 @@ void add_further(HealthyData& data, HealthyModel& model, const ChangeSettings& s
         1e-9 * Eigen::MatrixXd::Identity(data.columns.front().cols(), data.columns.front().cols());
     for (std::size_t r = 0; r < data.motions.size(); ++r) {
       set_loads(fit.values, data.motions[r]);
-      residuals.push_back(data.motions[r].torque - data.columns[r] * fit.values);
+      residuals.emplace_back(data.motions[r].torque - data.columns[r] * fit.values);
       gram += data.columns[r].transpose() * data.columns[r];
     }
     const Eigen::LDLT<Eigen::MatrixXd> solver(gram);
