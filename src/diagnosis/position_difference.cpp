@@ -40,6 +40,10 @@ constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
 // wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
 constexpr double kLargestFactor = 2;
+// Parts of a record with a moving load tell the same play: to within a share of it, their errors, and what
+// the shape of the deflection leaves. Choices, tried on plays that grow within the record.
+constexpr std::size_t kMostParts = 16, kFewestWindows = 32;  // of a part, at least
+constexpr double kPartChange = 0.05, kPartErrors = 4, kPartResiduals = 2;
 constexpr double kSkewErrors = 2;        // theory: standard errors to either side, 95 %
 constexpr std::size_t kFewestStays = 6;  // on a flank
 constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
@@ -272,6 +276,45 @@ Shaped fit_shapes(const TwoEncoders& motion, const FlankModel& model) {
   return best;
 }
 
+TwoEncoders part_of(const TwoEncoders& motion, std::size_t begin, std::size_t end) {
+  const auto cut = [&](const auto& column) {
+    return std::decay_t<decltype(column)>(column.begin() + long(begin), column.begin() + long(end));
+  };
+  return {motion.interval, cut(motion.torque), cut(motion.motor), cut(motion.load), cut(motion.unbroken)};
+}
+
+/// What the parts of a record tell, in as many as half of them still tell something.
+std::vector<FlankFit> told_by_parts(const TwoEncoders& motion, const FlankModel& model) {
+  const std::size_t n = motion.motor.size();
+  for (std::size_t parts = kMostParts; parts > 1; parts /= 2) {
+    std::vector<FlankFit> told;
+    for (std::size_t k = 0; k < parts; ++k) {
+      if (n / parts < kFewestWindows * kShortestWindow) break;
+      const FlankFit fit = fit_record(part_of(motion, k * n / parts, (k + 1) * n / parts), model).fit;
+      if (fit.found && fit.stays >= kFewestStays) told.push_back(fit);
+    }
+    if (2 * told.size() >= parts) return told;
+  }
+  return {};
+}
+
+/// A play that grows within the record gives groups of deflections that are those of no machine, and a play
+/// that lies anywhere. `whole`: what all of it tells.
+void require_constant(const TwoEncoders& motion, const FlankModel& model, const FlankFit& whole) {
+  const std::vector<FlankFit> told = told_by_parts(motion, model);
+  if (told.empty()) return;
+  const auto less = [](const FlankFit& a, const FlankFit& b) { return a.gap < b.gap; };
+  const auto [least, most] = std::minmax_element(told.begin(), told.end(), less);
+  const double errors = kPartErrors * std::hypot(least->standard_error, most->standard_error) +
+                        kPartResiduals * std::max(least->residual, most->residual);
+  const double over_position = whole.varies ? whole.largest_gap - whole.least_gap : 0;
+  if (most->gap - least->gap > kPartChange * most->gap + errors + over_position)
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("the play is not the same throughout the record: parts of it tell {:.4g} to {:.4g} rad",
+                    least->gap, most->gap)};
+}
+
 std::string describe(const FlankFit& fit, bool moves) {
   std::string message = std::to_string(fit.used[0]) + " and " + std::to_string(fit.used[1]) +
                         " windows on the two flanks, " + std::to_string(fit.stays) + " stays; ";
@@ -310,8 +353,10 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   model.elastic_deviation = settings.elastic_uncertainty / 1.96;
   model.moving = load_moves(motion);
   const signal::Measured skew = model.moving ? clear_skew(motion, inertia) : signal::Measured{0, 0};
-  const Shaped shaped = fit_shapes(without_skew(motion, skew.value), model);
+  const TwoEncoders together = without_skew(motion, skew.value);
+  const Shaped shaped = fit_shapes(together, model);
   const FlankFit &fit = shaped.fits.fit, &longer = shaped.fits.longer;
+  if (model.moving) require_constant(together, model, fit);
   const double skewed = gap_change(motion, model, skew, fit.gap);
 
   const double scatter =

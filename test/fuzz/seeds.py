@@ -47,6 +47,8 @@ def write(folder, name, text):
 
 def main(config, out):
     for name in sorted(os.listdir(config)):
+        if os.path.isdir(os.path.join(config, name)):
+            continue
         with open(os.path.join(config, name), encoding="utf-8") as stream:
             text = re.sub(r"(?m)^test_runs: .*$", "", stream.read())  # names another file
         bare = re.sub(r"(?m) *(#.*)?$\n?", lambda m: "\n" if m.group().endswith("\n") else "", text)

@@ -22,7 +22,14 @@ const std::set<std::pair<std::string, std::string>> kOtherMeanings = {
     {"backlash", ""},  // the quantity: keys of files, of JSON and of messages
     {"delay", "src/findings/identification_report.cpp"},         // of the sensors, a key of the identify JSON
     {"delay", "src/identification/procedures/one_inertia.cpp"},  // the option of that name
+    {"delay", "src/findings/arm_report.cpp"},                    // of a joint's current, a key of its JSON
+    {"delay", "src/arm/arm_rig.cpp"},                            // the same in the rig file of an arm
+    {"gravity", "src/arm/arm_rig.cpp"},                          // where it points, a key there
+    {"friction_drift", "src/arm/trace.cpp"},                     // an arm has no terms: the effect of a joint
 };
+
+/// What changes with the time is looked for in columns of a regression, each of which is one term's law.
+const std::set<std::string> kOtherDictionaries = {"src/identification/changes/change_effects.cpp"};
 
 std::string text_of(const fs::path& path) {
   std::ifstream in(path);
@@ -36,6 +43,7 @@ TEST(TermIds, AreLiteralsOfTheirOwnFilesOnly) {
       const std::string path = fs::relative(entry.path(), kSource).string();
       const std::string extension = entry.path().extension().string();
       if ((extension != ".cpp" && extension != ".h") || path.find("src/model/terms/") == 0) continue;
+      if (kOtherDictionaries.count(path) > 0) continue;
       ++files;
       const std::string text = text_of(entry.path());
       for (const TermType& type : term_types()) {

@@ -11,8 +11,10 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kMostOrder = 80, kOrderStep = 0.5;                    // 1/rad. Choice
-constexpr double kMostFrictionOrder = 12;                              // 1/rad. Choice
+constexpr double kLeastOrder = 2;                    // 1/rad, of cogging: below is gravity. Choice
+constexpr double kLeastFrictionOrder = 1;            // 1/rad, of position-dependent friction. Choice
+constexpr double kMostOrder = 80, kOrderStep = 0.5;  // 1/rad. Choice
+constexpr double kMostFrictionOrder = 12;            // 1/rad. Choice
 constexpr double kFluctuationSpeeds[] = {0.4, 0.7, 1, 1.4, 1.8, 2.3};  // - of the rms speed. Choice
 constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};                  // - of the rms speed. Choice
 
@@ -83,6 +85,14 @@ std::string value_name(const std::string& id) {
 }
 
 }  // namespace
+
+bool ChangeEffect::has_order() const {
+  return id == "cogging" || id == "position_dependent_friction";
+}
+
+double ChangeEffect::least_order() const {
+  return id == "cogging" ? kLeastOrder : kLeastFrictionOrder;
+}
 
 std::string ChangeEffect::name() const {
   return shape > 0 ? id + " " + to_text(shape) : id;

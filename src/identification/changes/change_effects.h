@@ -11,9 +11,6 @@
 
 namespace backlash::identification {
 
-constexpr double kLeastOrder = 2;          // 1/rad, of cogging: below is gravity. Choice
-constexpr double kLeastFrictionOrder = 1;  // 1/rad, of position-dependent friction. Choice
-
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
   double shape = 0;  // order [1/rad] or speed [rad/s], where the effect has one
@@ -22,8 +19,9 @@ struct ChangeEffect {
   /// friction_drift: the second column grows from the onset on.
   bool ramp = false;
 
-  bool has_order() const { return id == "cogging" || id == "position_dependent_friction"; }
-  std::string name() const;  // with its shape
+  bool has_order() const;
+  double least_order() const;  // that is tried, of one that has one
+  std::string name() const;    // with its shape
 };
 
 /// Simple ones first. Orders whose wave the filter would take away leave columns of nothing.

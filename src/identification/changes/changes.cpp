@@ -178,7 +178,7 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
 
 void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
   if (!f.effect.has_order()) return;
-  const double least = f.effect.id == "cogging" ? kLeastOrder : kLeastFrictionOrder;
+  const double least = f.effect.least_order();
   for (const double step : {0.1, 0.02}) {
     const double middle = f.effect.shape;
     for (int i = -5; i <= 5; ++i) {
