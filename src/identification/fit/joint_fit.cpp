@@ -29,7 +29,7 @@ constexpr double kSkewOfSample = 1e-3;     // simulation: samples, that interpol
 constexpr double kUnsureOfSampling = 0.3;  // simulation: of what sampling makes of a value
 constexpr double kEquations = 5e-5;  // simulation: relative, of a value > 0 that moves the load: how well a
                                      // record is simulated between its samples
-constexpr long kFewestBlocks = 4;  // choice: per unknown, for a covariance from blocks
+constexpr long kFewestBlocks = 4;    // choice: per unknown, for a covariance from blocks
 
 std::size_t stride(const PreparedServo& record) {
   return std::max(1L, std::lround(1 / (2 * kOversampling * record.cutoff * record.data().interval)));
