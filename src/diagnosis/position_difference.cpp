@@ -32,6 +32,9 @@ constexpr double kLockedTravel = 0.05;  // of the motor's travel
 constexpr double kLockedResidual = 2, kMovingResidual = 0.15;
 // Of the play, of a moving load: what windows over touches and coarse encoders shift. Simulation.
 constexpr double kMovingModel = 0.003;
+// The same where the deflection bends otherwise than declared: its law is none of those that are tried
+// exactly. Simulation.
+constexpr double kBentModel = 0.02;
 // Powers of the torque that a deflection may follow: Hertz's contact, a spring. Theory.
 constexpr double kPowers[] = {2.0 / 3, 1};
 constexpr double kOtherPower = 0.1;  // from the declared one, beyond which it is another: choice
@@ -364,7 +367,7 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
       fit.standard_error;
   const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
   const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
-  const double bounce = (model.moving ? kMovingModel : kBounce) * fit.gap;
+  const double bounce = (!model.moving ? kBounce : shaped.declared ? kMovingModel : kBentModel) * fit.gap;
   const double declared = model.moving ? 0 : declared_error(motion, settings);
   const double half = std::hypot(std::hypot(scatter, windows),
                                  std::hypot(unexplained, std::hypot(bounce, std::hypot(skewed, declared))));
