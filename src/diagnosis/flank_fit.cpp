@@ -305,6 +305,9 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   if (prior_g_ > 0) variance += std::pow(row[elastic_at_] * prior_g_ * model_.elastic_deviation, 2);
   fit.standard_error = std::sqrt(variance);
   fit.compliance_factor = p_[elastic_at_];
+  const double noise = squares / (p_[elastic_at_] * p_[elastic_at_]);
+  const double left = 1 - noise * inverse_(elastic_at_, elastic_at_);
+  fit.attenuation = left > 0 ? noise * p_[elastic_at_] * row[elastic_at_] / left : INFINITY;
   fit.found = std::min(fit.used[0], fit.used[1]) >= kFewest;
   return fit;
 }
@@ -376,10 +379,30 @@ FlankWindows average_windows(const TwoEncoders& motion, std::size_t half) {
     out.load.push_back(load);
     out.speed.push_back(speed(motion.motor));
     out.slip.push_back(out.speed.back() - speed(motion.load));
-    out.acceleration.push_back((motion.motor[c + half] - 2 * motion.motor[c] + motion.motor[c - half]) /
-                               (span * span));
+    const auto acceleration = [&](const std::vector<double>& q) {
+      return (q[c + half] - 2 * q[c] + q[c - half]) / (span * span);
+    };
+    out.acceleration.push_back(acceleration(motion.motor));
+    out.load_acceleration.push_back(acceleration(motion.load));
   }
   return out;
+}
+
+FlankWindows with_balanced_torque(FlankWindows windows) {
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  if (windows.size() < 4 * kFewest) return windows;
+  const MatrixXd position =
+      hats(windows.load, static_cast<int>(std::min<double>(kCommonKnots, scaled(double(n), 40))));
+  MatrixXd a(n, position.cols() + 4);
+  a.leftCols(position.cols()) = position;
+  for (Eigen::Index i = 0; i < n; ++i)
+    a.row(i).tail(4) << windows.acceleration[i], windows.load_acceleration[i], windows.speed[i],
+        windows.speed[i] > 0 ? 1.0 : -1.0;
+  // Scaled to unit length: the columns are of different units. A knot that no window lies near gets nothing.
+  for (Eigen::Index k = 0; k < a.cols(); ++k) a.col(k) /= std::max(1e-300, a.col(k).norm());
+  const VectorXd recorded = Eigen::Map<const VectorXd>(windows.torque.data(), n);
+  Eigen::Map<VectorXd>(windows.torque.data(), n) = a * signal::solve_least_squares(a, recorded).x;
+  return windows;
 }
 
 FlankFit fit_flanks(const FlankWindows& windows, const FlankModel& model) {

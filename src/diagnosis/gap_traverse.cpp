@@ -16,7 +16,8 @@ namespace backlash::diagnosis {
 namespace {
 
 // All choices, tried on simulated machines, but where another origin is given.
-constexpr double kModel = 0.1;                 // of the play, see gap_traverse.h: simulation
+constexpr double kModel = 0.2;                 // of the play, see gap_traverse.h: simulation
+constexpr double kAlike = 0.2;                 // of the play, between fits that tell the same: choice
 constexpr int kFewest = 20;                    // crossings
 constexpr int kMost = 60;                      // beyond them the errors do not shrink: the equations limit
 constexpr int kSearched = 16;                  // for the first guesses
@@ -89,7 +90,7 @@ Solution solve(const TraverseData& data, const GapTraverseSettings& settings) {
   const double gap = best->value(kTraverseGap);
   Solution solution{*best, gap, std::numeric_limits<double>::infinity()};
   for (const TraverseFit& other : fits)
-    if (std::fabs(std::log(other.value(kTraverseGap) / gap)) > 2 * kModel &&
+    if (std::fabs(std::log(other.value(kTraverseGap) / gap)) > kAlike &&
         cost(other) - cost(*best) < solution.rival_cost)
       solution.rival_gap = other.value(kTraverseGap), solution.rival_cost = cost(other) - cost(*best);
   return solution;

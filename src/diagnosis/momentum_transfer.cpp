@@ -20,9 +20,12 @@ namespace backlash::diagnosis {
 namespace momentum {
 namespace {
 
-constexpr double kSamplesPerCycle = 10;    // of motor against pinion
-constexpr double kFlight = 0.3;            // torque left in flight over that in contact, at most
-constexpr double kTiming = 0.5;            // samples, when the impact began
+constexpr double kSamplesPerCycle = 10;  // of motor against pinion
+constexpr double kFlight = 0.3;          // torque left in flight over that in contact, at most
+constexpr double kTiming = 0.5;          // samples, when the impact began
+// Of the averages' half width, by which noise moves impact and release where it is as large as may be:
+// simulated servos with 20 % torque noise.
+constexpr double kNoisyTiming = 0.8;
 constexpr double kToldElasticShare = 0.2;  // simulation: the level is told to some 10 %
 constexpr double kElasticShare = 0.14;     // of the elastic deflections in the interval
 
@@ -92,7 +95,7 @@ void fill(const record::Record& record, const MomentumTransferSettings& s, Estim
   // The integral of a speed that jumps between two samples is known to half a sample too.
   const double blur = kTiming * (motor.tachometer ? 1 + shortness : 1);
   const double elastic_share = motor.torque_measured ? kElasticShare : kToldElasticShare;
-  std::vector<double> gaps, timing, elastic, speeds;
+  std::vector<double> gaps, timing, elastic, speeds, smears;
   for (const Crossing& c : crossings) {
     const auto place = [&](double index) { return at(flank.pinion.position, index) - at(motor.load, index); };
     const double deflection =
@@ -100,15 +103,24 @@ void fill(const record::Record& record, const MomentumTransferSettings& s, Estim
     gaps.push_back(c.side * (place(c.impact) - place(c.release)) - deflection);
     timing.push_back(std::abs(place(c.impact) - place(c.impact - blur)));
     elastic.push_back(deflection);
+    smears.push_back(std::abs(place(c.impact) - place(c.impact - double(flank.half))));
     speeds.push_back(std::abs(at(motor.speed, c.impact)));
   }
   const signal::RobustScale scale = signal::robust_scale(gaps, 0);
   const double scatter =
       signal::student_t_quantile(0.975, std::max(1.0, static_cast<double>(gaps.size()) - 1)) * 1.25 *
       scale.deviation / std::sqrt(static_cast<double>(gaps.size()));
-  const double half = std::sqrt(scatter * scatter + std::pow(signal::median(timing), 2) +
-                                std::pow(elastic_share * signal::median(elastic), 2));
   const double gap = std::max(0.0, scale.centre);
+  const double smear = signal::median(smears);
+  if (smear > gap + scatter)
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("within the +-{:.4g} s that torque and speed must be averaged over for their noise, the "
+                    "motor side travels {:.4g} rad, farther than the gap",
+                    static_cast<double>(flank.half) * motor.interval, smear)};
+  const double noisy = kNoisyTiming * smear * std::min(1.0, 2 * kNoiseFree * flank.noise / flank.level);
+  const double half = std::sqrt(scatter * scatter + std::pow(signal::median(timing), 2) + noisy * noisy +
+                                std::pow(elastic_share * signal::median(elastic), 2));
   estimate.angle_lower = std::max(0.0, scale.centre - half);
   estimate.angle_upper = scale.centre + half;
   if (!(estimate.angle_upper > 0)) {

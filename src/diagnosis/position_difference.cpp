@@ -15,6 +15,7 @@
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/robust.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "flank_choice.h"
 #include "refusal.h"
 
 namespace backlash::diagnosis {
@@ -28,17 +29,13 @@ constexpr double kNoiseFalls = 2.0;
 // period.
 constexpr double kBounce = 0.03;
 constexpr double kLockedTravel = 0.05;  // of the motor's travel
-// Share of the rms residual in the interval, of a locked rig and of a moving load.
-constexpr double kLockedResidual = 2, kMovingResidual = 0.15;
+constexpr double kLockedResidual = 2;   // share of the rms residual in the interval, of a locked rig
 // Of the play, of a moving load: what windows over touches and coarse encoders shift. Simulation.
-constexpr double kMovingModel = 0.003;
+constexpr double kMovingModel = 0.01;
 // The same where the deflection bends otherwise than declared: its law is none of those that are tried
 // exactly. Simulation.
 constexpr double kBentModel = 0.02;
-// Powers of the torque that a deflection may follow: Hertz's contact, a spring. Theory.
-constexpr double kPowers[] = {2.0 / 3, 1};
-constexpr double kOtherPower = 0.1;  // from the declared one, beyond which it is another: choice
-constexpr double kShapeErrors = 3;   // standard errors by which the record tells two shapes apart: choice
+constexpr double kLargeTorque = 0.95;  // quantile, where laws of the deflection are the same: choice
 constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
 // wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
@@ -193,23 +190,6 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
   }
 }
 
-/// By how much the play changes at either end of the interval of the skew that was taken out.
-double gap_change(const TwoEncoders& motion, const FlankModel& model, const signal::Measured& skew,
-                  double gap) {
-  if (skew.standard_error == 0) return 0;
-  double largest = 0;
-  for (const double side : {-kSkewErrors, kSkewErrors}) {
-    const FlankFit fit = fit_record(without_skew(motion, skew.value + side * skew.standard_error), model).fit;
-    if (!fit.found)
-      throw Refusal{Status::out_of_domain,
-                    fmt::format("the load encoder is {:.3g} +- {:.2g} ms late, and within that error the "
-                                "flanks are lost",
-                                1e3 * skew.value, 1e3 * skew.standard_error)};
-    largest = std::max(largest, std::abs(fit.gap - gap));
-  }
-  return largest;
-}
-
 void require_sound(const FlankFit& fit) {
   if (!fit.found)
     throw Refusal{Status::out_of_domain,
@@ -229,71 +209,21 @@ void require_sound(const FlankFit& fit) {
                               100 * fit.scale_error)};
 }
 
-double typical_torque(const TwoEncoders& motion) {
+double torque_size(const TwoEncoders& motion, double share) {
   std::vector<double> size;
   for (const double torque : motion.torque) size.push_back(std::abs(torque));
-  return signal::median(std::move(size));
-}
-
-/// The models whose deflection follows another power of the torque, the same at a typical torque.
-std::vector<FlankModel> bent_otherwise(const FlankModel& model, const TwoEncoders& motion) {
-  const double torque = typical_torque(motion), typical = std::abs(model.elastic(torque));
-  std::vector<FlankModel> others;
-  if (!model.moving || !(typical > 0)) return others;
-  const double declared = std::log2(std::abs(model.elastic(2 * torque)) / typical);
-  for (const double power : kPowers) {
-    if (std::abs(power - declared) < kOtherPower) continue;
-    others.push_back(model);
-    others.back().elastic = [elastic = model.elastic, typical, bend = power / declared](double t) {
-      const double e = elastic(t);
-      return std::copysign(typical * std::pow(std::abs(e) / typical, bend), e);
-    };
-  }
-  return others;
-}
-
-/// The flanks by the declared shape of the deflection, or another where that is told to fit better.
-struct Shaped {
-  Fits fits;
-  bool declared = true;
-  double least = 0, largest = 0;  // rad, play by any shape that the record does not rule out
-};
-
-Shaped fit_shapes(const TwoEncoders& motion, const FlankModel& model) {
-  Shaped best{fit_record(motion, model), true, 0, 0};
-  require_sound(best.fits.fit);
-  std::vector<FlankFit> all = {best.fits.fit};
-  const double told = 1 + kShapeErrors * kShapeErrors / double(best.fits.fit.stays);
-  const auto squares = [](const FlankFit& fit) { return fit.residual * fit.residual; };
-  for (const FlankModel& shape : bent_otherwise(model, motion)) {
-    const Fits other = fit_record(motion, shape);
-    if (!other.fit.found || !(other.fit.gap > 0)) continue;
-    all.push_back(other.fit);
-    if (told * squares(other.fit) < squares(best.fits.fit)) best.fits = other, best.declared = false;
-  }
-  best.least = best.largest = best.fits.fit.gap;
-  for (const FlankFit& fit : all) {
-    if (squares(fit) > told * squares(best.fits.fit)) continue;
-    best.least = std::min(best.least, fit.gap), best.largest = std::max(best.largest, fit.gap);
-  }
-  return best;
-}
-
-TwoEncoders part_of(const TwoEncoders& motion, std::size_t begin, std::size_t end) {
-  const auto cut = [&](const auto& column) {
-    return std::decay_t<decltype(column)>(column.begin() + long(begin), column.begin() + long(end));
-  };
-  return {motion.interval, cut(motion.torque), cut(motion.motor), cut(motion.load), cut(motion.unbroken)};
+  return signal::quantile(size, share);
 }
 
 /// What the parts of a record tell, in as many as half of them still tell something.
-std::vector<FlankFit> told_by_parts(const TwoEncoders& motion, const FlankModel& model) {
-  const std::size_t n = motion.motor.size();
+std::vector<FlankFit> told_by_parts(const FlankReading& whole) {
+  const std::size_t n = whole.windows.size();
   for (std::size_t parts = kMostParts; parts > 1; parts /= 2) {
     std::vector<FlankFit> told;
     for (std::size_t k = 0; k < parts; ++k) {
-      if (n / parts < kFewestWindows * kShortestWindow) break;
-      const FlankFit fit = fit_record(part_of(motion, k * n / parts, (k + 1) * n / parts), model).fit;
+      if (n / parts < kFewestWindows) break;
+      const FlankFit fit =
+          fit_flanks(part_of(whole.windows, k * n / parts, (k + 1) * n / parts), whole.model);
       if (fit.found && fit.stays >= kFewestStays) told.push_back(fit);
     }
     if (2 * told.size() >= parts) return told;
@@ -301,16 +231,32 @@ std::vector<FlankFit> told_by_parts(const TwoEncoders& motion, const FlankModel&
   return {};
 }
 
+/// Noise of the torque draws the compliance, and with it the play, towards that of no deflection at all. And
+/// a play that is another as soon as windows are longer is none.
+void require_told(const FlankReading& reading) {
+  const FlankFit& fit = reading.fit;
+  if (!std::isfinite(fit.attenuation) || !std::isfinite(reading.windows_change))
+    throw Refusal{
+        Status::out_of_domain,
+        "how the deflection follows the torque is lost in the noise of the torque or of the encoders"};
+  if (reading.windows_change > std::max(0.0, fit.gap) + kPartErrors * error_of(fit))
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("the play changes by {:.4g} rad with the length of the windows: motion that is too "
+                    "slow or too even to tell play from deflection",
+                    reading.windows_change)};
+}
+
 /// A play that grows within the record gives groups of deflections that are those of no machine, and a play
 /// that lies anywhere. `whole`: what all of it tells.
-void require_constant(const TwoEncoders& motion, const FlankModel& model, const FlankFit& whole) {
-  const std::vector<FlankFit> told = told_by_parts(motion, model);
+void require_constant(const FlankReading& whole) {
+  const std::vector<FlankFit> told = told_by_parts(whole);
   if (told.empty()) return;
   const auto less = [](const FlankFit& a, const FlankFit& b) { return a.gap < b.gap; };
   const auto [least, most] = std::minmax_element(told.begin(), told.end(), less);
   const double errors = kPartErrors * std::hypot(least->standard_error, most->standard_error) +
                         kPartResiduals * std::max(least->residual, most->residual);
-  const double over_position = whole.varies ? whole.largest_gap - whole.least_gap : 0;
+  const double over_position = whole.fit.varies ? whole.fit.largest_gap - whole.fit.least_gap : 0;
   if (most->gap - least->gap > kPartChange * most->gap + errors + over_position)
     throw Refusal{
         Status::out_of_domain,
@@ -338,11 +284,88 @@ std::string describe(const FlankFit& fit, bool moves) {
 
 /// What the machine's elastic deflection, both sides, may differ from the declared one by [rad].
 double declared_error(const TwoEncoders& motion, const PositionDifferenceSettings& settings) {
-  const double level = typical_torque(motion);
+  const double level = torque_size(motion, 0.5);
   return 2 * settings.declared_uncertainty * std::abs(settings.elastic_deflection(level));
 }
 
-void fill(const record::Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
+/// What the flanks tell, and how wide the interval must be for what is known of the record [rad].
+struct Answer {
+  FlankFit fit;
+  double half = 0;                // of the interval, about each of
+  double least = 0, largest = 0;  // rad, play by all that the record does not rule out
+  std::string remark;
+  bool declared_law = true;
+  double declared = 0;  // rad, share of the declared machine in `half`
+};
+
+/// Of a locked output all windows lie at nearly one torque: the declared deflection counts.
+Answer read_locked(const TwoEncoders& motion, const FlankModel& model,
+                   const PositionDifferenceSettings& settings) {
+  const Fits fits = fit_record(motion, model);
+  require_sound(fits.fit);
+  const double windows = fits.longer.found ? std::abs(fits.longer.gap - fits.fit.gap) : 0;
+  const double unexplained = std::hypot(kLockedResidual * fits.fit.residual, kBounce * fits.fit.gap);
+  const double half = std::hypot(std::hypot(scatter_of(fits.fit), windows),
+                                 std::hypot(unexplained, declared_error(motion, settings)));
+  return {fits.fit, half, fits.fit.gap, fits.fit.gap, ""};
+}
+
+/// A reading, and the skew of the encoders that was taken out for it.
+struct Unskewed {
+  FlankReading reading;
+  signal::Measured skew = {0, 0};
+};
+
+/// Friction that is not as declared looks like a skew to whoever looks at the whole record: it is taken out
+/// where the flanks are then told more surely.
+Unskewed read_unskewed(const TwoEncoders& motion, const FlankModel& model, double torque) {
+  Unskewed together{read_flanks(motion, model, torque), {0, 0}};
+  const signal::Measured skew = clear_skew(motion, model.inertia);
+  if (skew.value == 0) return together;
+  FlankReading other = read_flanks(without_skew(motion, skew.value), model, torque);
+  if (other.fit.found &&
+      (!together.reading.fit.found || error_of(other.fit) < error_of(together.reading.fit)))
+    together = {std::move(other), skew};
+  return together;
+}
+
+/// By how much the play changes at either end of the interval of the skew that was taken out.
+double skew_change(const TwoEncoders& motion, const FlankReading& reading, const signal::Measured& skew) {
+  if (skew.standard_error == 0) return 0;
+  double largest = 0;
+  for (const double side : {-kSkewErrors, kSkewErrors}) {
+    const FlankFit fit = read_again(without_skew(motion, skew.value + side * skew.standard_error), reading);
+    if (!fit.found)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("the load encoder is {:.3g} +- {:.2g} ms late, and within that error the "
+                                "flanks are lost",
+                                1e3 * skew.value, 1e3 * skew.standard_error)};
+    largest = std::max(largest, std::abs(fit.gap - reading.fit.gap));
+  }
+  return largest;
+}
+
+Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
+  const auto [reading, skew] = read_unskewed(motion, model, torque_size(motion, kLargeTorque));
+  const FlankFit& fit = reading.fit;
+  require_sound(fit);
+  require_told(reading);
+  require_constant(reading);
+  const double model_error = (reading.declared_law ? kMovingModel : kBentModel) * fit.gap;
+  const double half = std::hypot(
+      std::hypot(scatter_of(fit), reading.windows_change),
+      std::hypot(std::hypot(kResidualShare * fit.residual, model_error), skew_change(motion, reading, skew)));
+  Answer answer{fit, half, reading.least, reading.largest, ""};
+  (fit.attenuation < 0 ? answer.least : answer.largest) += fit.attenuation;
+  if (!reading.declared_law)
+    answer.remark += "; the deflection bends over the torque otherwise than declared";
+  if (skew.value != 0)
+    answer.remark += fmt::format("; the load encoder is {:.3g} +- {:.2g} ms later than the rig file says",
+                                 1e3 * skew.value, 1e3 * skew.standard_error);
+  return answer;
+}
+
+Answer read(const record::Record& record, const PositionDifferenceSettings& settings) {
   const TwoEncoders motion = without_skew(collect(record, settings), settings.encoder_skew);
   if (settings.output_locked && travel(motion.load) > kLockedTravel * travel(motion.motor))
     throw Refusal{Status::out_of_domain,
@@ -355,26 +378,19 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   model.inertia = inertia;
   model.elastic_deviation = settings.elastic_uncertainty / 1.96;
   model.moving = load_moves(motion);
-  const signal::Measured skew = model.moving ? clear_skew(motion, inertia) : signal::Measured{0, 0};
-  const TwoEncoders together = without_skew(motion, skew.value);
-  const Shaped shaped = fit_shapes(together, model);
-  const FlankFit &fit = shaped.fits.fit, &longer = shaped.fits.longer;
-  if (model.moving) require_constant(together, model, fit);
-  const double skewed = gap_change(motion, model, skew, fit.gap);
+  Answer answer = model.moving ? read_moving(motion, model) : read_locked(motion, model, settings);
+  answer.remark = describe(answer.fit, model.moving) + answer.remark;
+  if (!model.moving) answer.declared = declared_error(motion, settings);
+  return answer;
+}
 
-  const double scatter =
-      signal::student_t_quantile(0.975, std::max(1.0, std::floor(0.5 * static_cast<double>(fit.stays)) - 1)) *
-      fit.standard_error;
-  const double windows = longer.found ? std::abs(longer.gap - fit.gap) : 0;
-  const double unexplained = (model.moving ? kMovingResidual : kLockedResidual) * fit.residual;
-  const double bounce = (!model.moving ? kBounce : shaped.declared ? kMovingModel : kBentModel) * fit.gap;
-  const double declared = model.moving ? 0 : declared_error(motion, settings);
-  const double half = std::hypot(std::hypot(scatter, windows),
-                                 std::hypot(unexplained, std::hypot(bounce, std::hypot(skewed, declared))));
-  double lower = shaped.least - half, upper = shaped.largest + half;
+void fill(const record::Record& record, const PositionDifferenceSettings& settings, Estimate& estimate) {
+  const Answer answer = read(record, settings);
+  const FlankFit& fit = answer.fit;
+  double lower = answer.least - answer.half, upper = answer.largest + answer.half;
   if (fit.varies) {
-    lower = std::min(lower, fit.least_gap - half);
-    upper = std::max(upper, fit.largest_gap + half);
+    lower = std::min(lower, fit.least_gap - answer.half);
+    upper = std::max(upper, fit.largest_gap + answer.half);
   }
   if (upper < 0)
     throw Refusal{Status::out_of_domain, fmt::format("the flanks are {:.4g} rad closer than the declared "
@@ -387,12 +403,9 @@ void fill(const record::Record& record, const PositionDifferenceSettings& settin
   estimate.backlash = settings.base_radius * estimate.backlash_angle;
   estimate.lower = settings.base_radius * estimate.angle_lower;
   estimate.upper = settings.base_radius * estimate.angle_upper;
-  estimate.declared = declared;
-  estimate.message = describe(fit, model.moving);
-  if (!shaped.declared) estimate.message += "; the deflection bends over the torque otherwise than declared";
-  if (skew.value != 0)
-    estimate.message += fmt::format("; the load encoder is {:.3g} +- {:.2g} ms later than the rig file says",
-                                    1e3 * skew.value, 1e3 * skew.standard_error);
+  estimate.declared = answer.declared;
+  estimate.must_hold = fit.varies || !answer.declared_law;
+  estimate.message = answer.remark;
 }
 
 }  // namespace

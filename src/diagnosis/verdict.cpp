@@ -141,7 +141,8 @@ Amount amount_of(const Estimate& e, bool angular) {
   return a;
 }
 
-/// Intervals that miss each other and do not contradict: the truth may lie in any of them.
+/// Intervals that miss each other and do not contradict: the truth may lie in any of them. And what one of
+/// them saw, the others did not look for.
 Amount hull(const Estimates& all, const Set& members, Amount sum, bool angular) {
   for (const int i : members) {
     const Amount a = amount_of(all[i], angular);
@@ -168,7 +169,8 @@ Amount combination(const Estimates& all, const Set& members, bool angular) {
     weights += weight;
   }
   const Amount mean = {sum.value / weights, sum.lower / weights, sum.upper / weights};
-  return share_a_point(all, members, 1) ? mean : hull(all, members, mean, angular);
+  if (!share_a_point(all, members, 1)) return hull(all, members, mean, angular);
+  return hull(all, filtered(members, [&](int i) { return all[i].must_hold; }), mean, angular);
 }
 
 /// Value, or lower bound where there is none: what is compared and graded.

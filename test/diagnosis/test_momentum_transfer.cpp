@@ -152,6 +152,15 @@ TEST(MomentumTransfer, RefusesWhatItCannotSee) {
   EXPECT_EQ(estimate_momentum_transfer(crossing(0.01), s).status, Status::out_of_domain);
 }
 
+// A flight of 2 ms under noise that asks for averages over more: 5 N m each 0.1 ms on 1 N m.
+TEST(MomentumTransfer, RefusesFlightsShorterThanTheNoiseMustBeAveraged) {
+  record::Record record = crossing(2e-3);
+  Random random(7);
+  for (double& torque : record.column(record::Channel::motor_torque)) torque += 1.0 * random.normal();
+  const Estimate e = estimate_momentum_transfer(record, settings());
+  EXPECT_EQ(e.status, Status::out_of_domain) << e.message << e.backlash_angle;
+}
+
 TEST(MomentumTransfer, RefusesFlightsThatTheDeclaredInertiaDoesNotExplain) {
   record::Record record = crossing(0.01);
   for (double& torque : record.column(record::Channel::motor_torque))

@@ -26,6 +26,7 @@ PositionDifferenceSettings settings() {
 struct Servo {
   double gap = kGap, gap_wave = 0;  // rad, relative amplitude over the position
   double stiffness = kStiffness;
+  double hardening = 0;  // 1/rad^2, torque = stiffness x (1 + hardening x^2)
   double motor_inertia = kMotorInertia;
   double motor_coulomb = 50, load_coulomb = 10;  // N m
   double offset = 0, scale = 1;                  // of the load encoder
@@ -42,9 +43,15 @@ struct Servo {
     const double acceleration = (load(t + h) - 2 * load(t) + load(t - h)) / (h * h);
     return kLoadInertia * acceleration + load_coulomb * std::tanh(speed / 1e-3);
   }
+  double elastic(double torque) const {
+    double x = torque / stiffness;
+    for (int k = 0; hardening > 0 && k < 30; ++k)  // Newton's method, quadratic
+      x -= (stiffness * x * (1 + hardening * x * x) - torque) / (stiffness * (1 + 3 * hardening * x * x));
+    return x;
+  }
   double motor(double t) const {
     const double torque = transmitted(t), q = load(t);
-    return q + torque / stiffness + eccentricity * std::sin(2 * M_PI * q / 0.5) +
+    return q + elastic(torque) + eccentricity * std::sin(2 * M_PI * q / 0.5) +
            0.5 * gap * (1 + gap_wave * std::sin(3 * q)) * std::erf(torque / 1.0);
   }
   record::Record record(double rate = 1000) const {
@@ -97,10 +104,41 @@ TEST(PositionDifference, FreePlayOfAServoWhoseLoadMoves) {
     EXPECT_NEAR(e.backlash_angle, gap, kNear);
     EXPECT_LE(e.angle_lower, gap);
     EXPECT_GE(e.angle_upper, gap);
-    EXPECT_LT(e.angle_upper - e.angle_lower, 10 * kNear + 0.008 * gap);  // 0.3 % to either side is declared
+    EXPECT_LT(e.angle_upper - e.angle_lower, 10 * kNear + 0.022 * gap);  // 1 % to either side is declared
     EXPECT_TRUE(std::isnan(e.backlash));
     EXPECT_EQ(e.method, "position_difference");
   }
+}
+
+// Noise of a regressor draws its coefficient towards 0, here the compliance, and the play follows: without
+// looking at the load's motion it is told 3 to 8 % wrong from these records. 1 % is declared to either side.
+TEST(PositionDifference, NoiseOfTheTorqueIsNoPlay) {
+  for (const double gap : {2e-4, 5e-4})
+    for (const double noise : {30.0, 60.0, 120.0}) {  // N m, of about 150
+      Servo servo;
+      servo.gap = gap;
+      servo.torque_noise = noise;
+      const Estimate e = estimate_position_difference(servo.record(), settings());
+      ASSERT_EQ(e.status, Status::ok) << e.message;
+      EXPECT_NEAR(e.backlash_angle, gap, 0.02 * gap) << noise;
+      EXPECT_LE(e.angle_lower, gap) << noise;
+      EXPECT_GE(e.angle_upper, gap) << noise;
+    }
+}
+
+// Teeth that press harder the deeper they go: at 200 N m, 0.5 mrad, these are stiffer by a quarter, and by
+// all.
+TEST(PositionDifference, TeethThatHardenAreToldOrTheIntervalHoldsThem) {
+  for (const double hardening : {1e6, 4e6})
+    for (const double gap : {2e-4, 5e-4}) {
+      Servo servo;
+      servo.gap = gap;
+      servo.hardening = hardening;
+      const Estimate e = estimate_position_difference(servo.record(), settings());
+      if (e.status != Status::ok) continue;  // an honest answer
+      EXPECT_LE(e.angle_lower, gap) << hardening << e.message;
+      EXPECT_GE(e.angle_upper, gap) << hardening << e.message;
+    }
 }
 
 /// The record of a torque sensor behind the gear instead of the motor's torque: the torque that the servo's

@@ -71,6 +71,17 @@ TEST(Verdict, IntervalsThatJustMissEachOtherWidenTheAnswer) {
 }
 
 // Told by who is believed, also where the play is too small to be told; not by who is contradicted.
+// 9e-5 +- 3e-5 over the travel, and 8e-5 +- 2e-6 where another looked.
+TEST(Verdict, HoldsWhatOneSawAndOthersDidNotLookFor) {
+  Estimate wide = ok("a", 9e-5, 3e-5);
+  EXPECT_NEAR(combined({wide, ok("b", 8e-5, 2e-6)}).upper, 8.2e-5, 5e-7);
+  wide.must_hold = true;
+  const Verdict all = combined({wide, ok("b", 8e-5, 2e-6)});
+  EXPECT_NEAR(all.backlash, 8e-5, 5e-7);
+  EXPECT_DOUBLE_EQ(all.lower, 6e-5);
+  EXPECT_DOUBLE_EQ(all.upper, 1.2e-4);
+}
+
 TEST(Verdict, SaysWhatInTheFileIsWrong) {
   const ContradictedValue damping = {"motor damping", "N m s/rad", 0.0048, 0.0029, 2e-5};
   const std::string text =

@@ -56,6 +56,9 @@ struct Estimate {
   std::optional<PlayComponents> components;
   double declared = 0;  ///< rad, >= 0, half width of the 95 % interval by declared values alone, where known
   std::string witness;  ///< equal for methods that share signal, curve and declared values; empty: its own
+  /// The interval holds what others do not see: a play that depends on the position, teeth that yield by
+  /// another law than the declared one. The verdict's holds it too.
+  bool must_hold = false;
   bool from_record = false;   ///< what the value depends on was measured on the record, not declared
   bool fits_machine = false;  // of from_record: the values of the machine that other methods take from the
                               // rig file were fitted with it, so that they add nothing

@@ -30,9 +30,16 @@ struct TwoEncoders {
 struct FlankWindows {
   std::vector<std::size_t> centre;                                          // sample
   std::vector<double> torque, deflection, load, speed, slip, acceleration;  // slip: motor minus load speed
+  std::vector<double> load_acceleration;
   std::size_t size() const { return centre.size(); }
 };
 FlankWindows average_windows(const TwoEncoders& motion, std::size_t half);
+
+/// The torque that the motion of the whole machine takes, in the gap as on the flanks,
+///   tau = J_M a_M + J_L a_L + d w_M + C sign(w_M) + h(q_L),
+/// fitted to the recorded one, instead of it: free of its noise, and wrong where the machine has more.
+/// Two-stage least squares, the load's motion as instrument (Theil 1953).
+FlankWindows with_balanced_torque(FlankWindows windows);
 
 struct FlankModel {
   std::function<double(double)> elastic;
@@ -49,9 +56,12 @@ struct FlankFit {
   bool compliance_from_record = false;    // else declared
   double compliance_factor = 1;           // g
   double scale_error = 0;                 // slope of f over q_L
-  double residual = 0;                    // rad, rms
-  std::size_t used[2] = {0, 0};           // windows on the negative and the positive flank
-  std::size_t stays = 0;                  // uninterrupted stays on a flank
+  /// rad, what the gap gains if all of the residual is noise of the torque, which draws the compliance
+  /// towards 0 (Fuller 1987, Section 1.1); infinite where then no compliance is told.
+  double attenuation = 0;
+  double residual = 0;           // rad, rms
+  std::size_t used[2] = {0, 0};  // windows on the negative and the positive flank
+  std::size_t stays = 0;         // uninterrupted stays on a flank
 };
 
 /// Windows count in which the flank is loaded for certain: deflection and predicted elastic deflection both

@@ -14,8 +14,10 @@
 // against the load, and 20 crossings that begin in contact. No period.
 //
 // Interval, 95 %: Student's t with the larger of two standard errors of the logarithm (crossings as clusters;
-// the fit's own), and kModel besides for what these equations do not hold: set by simulated machines with
+// the fit's own), and 20 % besides for what these equations do not hold: set by simulated machines with
 // cogging, gravity, Stribeck friction, varying play and transmission errors that are not told to the fit.
+// Teeth after Hertz are not among them: the motor alone does not tell them from a spring, and the play comes
+// out too large by a quarter, or twice as large where the torque is noisy.
 #pragma once
 
 #include "backlash_diagnosis/diagnosis/estimate.h"

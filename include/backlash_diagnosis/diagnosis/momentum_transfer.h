@@ -39,8 +39,9 @@
 //
 // Interval, 95 %, root of the sum of squares of: scatter of the median over the crossings (Student t), the
 // travel of the pinion within half a sample at the impact (a sample by tachometer on a rigid flank, where
-// speed jumps), and a seventh of the elastic deflections. About 94 % coverage in simulations, see
-// test_rig_estimators.cpp.
+// speed jumps), a share of its travel within the averages as large as the noise, and a seventh of the elastic
+// deflections. Travel within the averages beyond the gap is out of the domain. About 94 % coverage in
+// simulations, see test_rig_estimators.cpp.
 #pragma once
 
 #include <functional>

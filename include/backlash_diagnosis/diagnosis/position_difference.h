@@ -7,27 +7,34 @@
 // position.
 //
 // Skew: a load encoder that is d [s] late adds d w_L to the difference. Where the load moves, the record
-// tells d (record/encoder_skew.h); four standard errors away from the declared one it is taken out. A smaller
-// one acts like a friction of the motor, which the fit holds.
+// tells d (record/encoder_skew.h); where it is four standard errors away from the declared one and the flanks
+// are told more surely without it, it is taken out. A smaller one acts like a friction of the motor, which
+// the fit holds.
 //
 // Elastic deflection: where the load moves, the record itself tells how deflection follows torque; where it
 // is locked, or the record does not hold it to 10 %, the declared function counts.
+//
+// A load that moves tells the torque on the flanks as well: what the motion of both takes, fitted to the
+// recorded torque (with_balanced_torque), is free of its noise, which as a regressor would draw compliance
+// and play towards others (Fuller 1987). The record is read by either torque and over windows of 7 to 63
+// samples; that reading counts which is surest. Read also with a deflection that follows the torque by other
+// laws (powers between Hertz's 2/3 and a spring's 1, springs that harden): where the declared one fits worse
+// than another, the better counts, and the interval holds the play by all that are not clearly worse.
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t times the standard error, stays on a flank counted as independent,
 // - the declared elastic deflection, where used: its uncertainty; with a locked output also that of the whole
 //   declared machine,
-// - windows: the difference to the same fit with windows twice as long,
+// - windows: the difference to the same fit with windows of another length,
 // - what the model does not hold: twice the rms residual with a locked output, where all windows lie at
-//   nearly one torque and a pinion that keeps bouncing shifts all of them alike; 0.15 times it where the load
+//   nearly one torque and a pinion that keeps bouncing shifts all of them alike; 0.3 times it where the load
 //   moves,
 // - the skew of the encoders, where it was taken out: the change of the play over its interval,
 // - with a locked output 3 % of the play, for the bouncing that the residual does not show; where the load
-//   moves 0.3 %.
-// Where the load moves the deflection is also fitted as the other of a spring's and Hertz's power of the
-// torque: the better counts, and the interval holds the play by either where the record does not tell them
-// apart.
-// The shares are set by simulation, see test_rig_estimators.cpp.
+//   moves 1 %, and 2 % where the deflection bends otherwise than declared;
+// and on one side what the play would change if all of the residual were noise of the torque.
+// The shares are set by simulation, see test_rig_estimators.cpp, and for loads that move by the machines of
+// scripts/trace_machines.sh (doc/reference/estimators.md).
 //
 // Where the play depends on the position of the load, the interval is widened to the least and the largest
 // play over the travel; backlash_angle is then the mean over the windows.
@@ -78,7 +85,8 @@ struct PositionDifferenceSettings {
 ///   insufficient_data  no motor_position, no load_position, no torque, too few samples or changes of flank
 ///   out_of_domain      the output moves although it is locked; torque does not press both flanks; the
 ///   deflection does not follow the torque; the
-///                      encoders differ by more than 1 % in scale; the play is negative beyond the interval
+///                      encoders differ by more than 1 % in scale; the play is negative beyond the interval,
+///                      another in other parts of the record, or another with windows of another length
 /// Torque is motor_torque where present, else sensor_torque, else output_torque, which the motor's inertia
 /// and friction do not reach: the friction in the fit is then that between the teeth and the sensor.
 Estimate estimate_position_difference(const record::Record& record,

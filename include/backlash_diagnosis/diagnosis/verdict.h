@@ -29,9 +29,10 @@ struct Verdict {
 };
 
 /// Sound are estimates with status ok, and with above_range where they give a lower bound. They agree where
-/// their intervals, twice as wide (four standard deviations), have
-/// a point in common; where they have none as they are the answer's interval holds all of them. The verdict
-/// stands on all sound estimates if they agree.
+/// their intervals, twice as wide (four standard deviations), have a point in common; where they have none as
+/// they are the answer's interval holds all of them. Where one saw what others do not look for
+/// (Estimate::must_hold) it holds all of that interval as well. The verdict stands on all sound estimates if
+/// they agree.
 ///
 /// Combination: the weighted mean of the members' values, of their lower and of their upper ends, weight
 /// 1 / width^2 (inverse variance; lower bounds and estimates without interval have weight 0), the width being
