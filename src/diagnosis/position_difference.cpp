@@ -357,6 +357,7 @@ Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
       std::hypot(std::hypot(kResidualShare * fit.residual, model_error), skew_change(motion, reading, skew)));
   Answer answer{fit, half, reading.least, reading.largest, ""};
   (fit.attenuation < 0 ? answer.least : answer.largest) += fit.attenuation;
+  answer.declared_law = reading.declared_law;
   if (!reading.declared_law)
     answer.remark += "; the deflection bends over the torque otherwise than declared";
   if (skew.value != 0)

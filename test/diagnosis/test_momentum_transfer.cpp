@@ -152,13 +152,19 @@ TEST(MomentumTransfer, RefusesWhatItCannotSee) {
   EXPECT_EQ(estimate_momentum_transfer(crossing(0.01), s).status, Status::out_of_domain);
 }
 
-// A flight of 2 ms under noise that asks for averages over more: 5 N m each 0.1 ms on 1 N m.
-TEST(MomentumTransfer, RefusesFlightsShorterThanTheNoiseMustBeAveraged) {
-  record::Record record = crossing(2e-3);
-  Random random(7);
-  for (double& torque : record.column(record::Channel::motor_torque)) torque += 1.0 * random.normal();
-  const Estimate e = estimate_momentum_transfer(record, settings());
-  EXPECT_EQ(e.status, Status::out_of_domain) << e.message << e.backlash_angle;
+// Averages of up to 3.4 ms blur flights of 1 and 2 ms: the play may be told, but not to a hundredth.
+TEST(MomentumTransfer, NoiseMovesReleaseAndImpact) {
+  for (const double gap : {5e-4, 1e-3, 2e-3})
+    for (const double noise : {0.1, 0.2, 0.3, 0.5}) {  // N m, of 1
+      record::Record record = crossing(gap);
+      Random random(7);
+      for (double& torque : record.column(record::Channel::motor_torque)) torque += noise * random.normal();
+      for (double& speed : record.column(record::Channel::motor_velocity)) speed += 0.01 * random.normal();
+      const Estimate e = estimate_momentum_transfer(record, settings());
+      ASSERT_EQ(e.status, Status::ok) << e.message;
+      EXPECT_LE(e.angle_lower, gap) << noise;
+      EXPECT_GE(e.angle_upper, gap) << noise;
+    }
 }
 
 TEST(MomentumTransfer, RefusesFlightsThatTheDeclaredInertiaDoesNotExplain) {
