@@ -111,7 +111,8 @@ void fill(const record::Record& record, const MomentumTransferSettings& s, Estim
       signal::student_t_quantile(0.975, std::max(1.0, static_cast<double>(gaps.size()) - 1)) * 1.25 *
       scale.deviation / std::sqrt(static_cast<double>(gaps.size()));
   const double gap = std::max(0.0, scale.centre);
-  const double smear = signal::median(smears);
+  // A flexible coupling limits the averages to a part of its own cycle.
+  const double smear = flexible(s) ? 0 : signal::median(smears);
   if (smear > gap + scatter)
     throw Refusal{
         Status::out_of_domain,

@@ -43,7 +43,7 @@ constexpr double kLargestFactor = 2;
 // Parts of a record with a moving load tell the same play: to within a share of it, their errors, and what
 // the shape of the deflection leaves. Choices, tried on plays that grow within the record.
 constexpr std::size_t kMostParts = 16, kFewestWindows = 32;  // of a part, at least
-constexpr double kPartChange = 0.05, kPartErrors = 4, kPartResiduals = 2;
+constexpr double kPartChange = 0.1, kPartErrors = 4, kPartResiduals = 2;
 constexpr double kSkewErrors = 2;        // theory: standard errors to either side, 95 %
 constexpr std::size_t kFewestStays = 6;  // on a flank
 constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
@@ -247,6 +247,17 @@ void require_told(const FlankReading& reading) {
                     reading.windows_change)};
 }
 
+/// An interval as wide as the elastic deflection says that play is not told from that.
+void require_worth_saying(const FlankReading& reading, double width, double large_torque) {
+  const double elastic = std::abs(reading.fit.compliance_factor * reading.model.elastic(large_torque));
+  if (width > elastic)
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("the play is told to {:.4g} rad only, where the teeth yield by {:.4g} rad: too few "
+                    "torques, or too few reversals, to tell play from deflection",
+                    width, elastic)};
+}
+
 /// A play that grows within the record gives groups of deflections that are those of no machine, and a play
 /// that lies anywhere. `whole`: what all of it tells.
 void require_constant(const FlankReading& whole) {
@@ -346,7 +357,8 @@ double skew_change(const TwoEncoders& motion, const FlankReading& reading, const
 }
 
 Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
-  const auto [reading, skew] = read_unskewed(motion, model, torque_size(motion, kLargeTorque));
+  const double large_torque = torque_size(motion, kLargeTorque);
+  const auto [reading, skew] = read_unskewed(motion, model, large_torque);
   const FlankFit& fit = reading.fit;
   require_sound(fit);
   require_told(reading);
@@ -357,6 +369,7 @@ Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
       std::hypot(std::hypot(kResidualShare * fit.residual, model_error), skew_change(motion, reading, skew)));
   Answer answer{fit, half, reading.least, reading.largest, ""};
   (fit.attenuation < 0 ? answer.least : answer.largest) += fit.attenuation;
+  require_worth_saying(reading, answer.largest - answer.least + 2 * half, large_torque);
   answer.declared_law = reading.declared_law;
   if (!reading.declared_law)
     answer.remark += "; the deflection bends over the torque otherwise than declared";
