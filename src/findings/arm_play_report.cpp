@@ -54,7 +54,8 @@ void print_arm_plays(const ArmPlayReport& report, std::ostream& out) {
   for (std::size_t j = 0; j < report.plays.size(); ++j) {
     const geared_arm::JointPlay& play = report.plays[j];
     const diagnosis::Estimate& e = play.estimate;
-    out << fmt::format("{}: {}", play.joint, diagnosis::to_string(report.verdicts[j].grade));
+    const bool small = e.status == diagnosis::Status::below_range;
+    out << play.joint << ": " << (small ? "no play" : diagnosis::to_string(report.verdicts[j].grade));
     if (std::isfinite(e.backlash_angle))
       out << fmt::format(", play {:.4g} mrad [{:.4g}, {:.4g}]", 1e3 * e.backlash_angle, 1e3 * e.angle_lower,
                          1e3 * e.angle_upper);

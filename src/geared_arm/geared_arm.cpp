@@ -15,6 +15,7 @@ Gear read_gear(const YamlReader& yaml) {
   // Such a law needs the moment of each touch, which this plant does not look for.
   if (gear.contact->needs_impact_speed())
     contact.fail("law", "needs the speed of a touch, which an arm does not have");
+  yaml.finish();
   return gear;
 }
 
@@ -34,7 +35,10 @@ GearedJoint read_joint(const YamlReader& yaml, const arm::JointDrive& drive, boo
   if (!simulated) return joint;
   const auto term = [&](arm::DriveTerm t) { return drive.terms[std::size_t(t)]; };
   if (term(arm::DriveTerm::load) != 0) yaml.fail("load", "cannot be simulated: must be 0 or absent");
-  if (joint.held) return joint;
+  if (joint.held) {
+    yaml.ignore("excitation");
+    return joint;
+  }
   if (joint.gear && !(term(arm::DriveTerm::rotor_inertia) > 0))
     yaml.fail("name", "a joint with a gear needs rotor_inertia > 0: the motor's side of its gap");
   joint.excitation = simulation::read_excitation(yaml.map("excitation"));

@@ -30,7 +30,8 @@ struct Rows {
 
 struct Fit {
   double play = 0, error = 0, slope = 0, residual = 0;
-  double degrees = 0;  // of freedom: stays less what is fitted
+  double compliance = 0;  // rad/(N m), at the mean load
+  double degrees = 0;     // of freedom: stays less what is fitted
 };
 
 /// The record with the link's own angle as position: the chain moves with it, not with the motor.
@@ -136,6 +137,9 @@ Fit fit(const Rows& rows, const std::vector<int>& sides, const std::vector<std::
   f.play = b[0] / scale[0];
   f.error = std::sqrt(variance * double(stays) / f.degrees) / scale[0];
   f.slope = b[1] / scale[1];
+  double load = 0;
+  for (const std::size_t k : used) load += std::fabs(rows.torque[k]) / double(used.size());
+  f.compliance = f.slope * power * std::pow(load, power - 1);
   f.residual = std::sqrt(residual.squaredNorm() / double(y.size()));
   return f;
 }
@@ -155,17 +159,19 @@ std::optional<double> showing_pose(const arm::Chain& chain, const arm::Joints& m
   return std::nullopt;
 }
 
-std::string one_flank_message(const JointPlay& play, std::size_t present, double least) {
-  std::string text = fmt::format(
-      "cannot tell: {} the teeth on {} flank throughout (mesh torque between {:.3g} and {:.3g} N m, certain "
-      "beyond "
-      "{:.2g} N m)",
-      "the load holds", present == 0 ? "no known" : "one", play.least_torque, play.largest_torque, least);
-  if (present == 0) return text + "; faster motion or a pose in which gravity loads the joint would do";
-  return text + (play.pose
-                     ? fmt::format("; motion that passes a pose with {} at {:.2f} rad would do", play.joint,
-                                   *play.pose)
-                     : std::string("; gravity turns it in no pose of this joint: faster motion would do"));
+std::string one_flank_message(const JointPlay& play, bool any, double least) {
+  const bool turns = play.least_torque < -least && play.largest_torque > least;
+  std::string text =
+      fmt::format("cannot tell: {} (mesh torque between {:.3g} and {:.3g} N m, certain beyond {:.2g} N m)",
+                  turns ? "the load presses the other flank only for moments"
+                  : any ? "the load holds the teeth on one flank throughout"
+                        : "no flank is loaded for long enough",
+                  play.least_torque, play.largest_torque, least);
+  if (play.pose)
+    return text +
+           fmt::format("; motion that passes a pose with {} at {:.2f} rad would do", play.joint, *play.pose);
+  return text + (any ? "; gravity turns it in no pose of this joint: faster motion would do"
+                     : "; faster motion or a pose in which gravity loads the joint would do");
 }
 
 void judge(JointPlay& play, const Rows& rows, const std::vector<int>& sides,
@@ -175,7 +181,7 @@ void judge(JointPlay& play, const Rows& rows, const std::vector<int>& sides,
   const Fit &best = bends ? hertz : spring, &other = bends ? spring : hertz;
   const bool told_apart = other.residual > settings.same_fit * best.residual;
   diagnosis::Estimate& e = play.estimate;
-  e.components = diagnosis::PlayComponents{best.play, best.slope, kNaN, kNaN};
+  e.components = diagnosis::PlayComponents{best.play, best.compliance, kNaN, kNaN};
   if (best.residual > settings.worst_residual * std::fabs(best.play) && best.play > 3 * best.error) {
     e.status = diagnosis::Status::ambiguous;
     e.message = fmt::format(
@@ -184,7 +190,7 @@ void judge(JointPlay& play, const Rows& rows, const std::vector<int>& sides,
   }
   const double t = signal::student_t_quantile(0.975, best.degrees);
   const double half = std::hypot(std::hypot(t * best.error, settings.bend * best.play),
-                                 bends ? 0 : friction * std::fabs(best.slope));
+                                 2 * friction * std::fabs(best.compliance));
   const double apart = told_apart ? 0 : other.play - best.play;
   e.angle_lower = std::fmax(0, best.play + std::fmin(0, apart) - half);
   e.angle_upper = std::fmax(0, best.play + std::fmax(0, apart) + half);
@@ -228,8 +234,9 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
     play.least_torque = *least, play.largest_torque = *largest;
     play.lower_position = *lower, play.upper_position = *upper;
     for (const double speed : rows.speed) play.fastest = std::fmax(play.fastest, std::fabs(speed));
-    const double certain =
-        loads[j].link_coulomb + settings.least_load * std::fmax(std::fabs(*least), std::fabs(*largest));
+    const double most = std::fmax(std::fabs(*least), std::fabs(*largest));
+    const double certain = loads[j].link_coulomb + settings.least_load * most;
+    const double friction = std::fmax(loads[j].link_coulomb, settings.least_friction * most);
     // Rows follow each other by a fifth of a cycle or less, see ArmMotion.
     const auto guard = std::size_t(std::ceil(settings.settle * 5));
     const std::vector<int> sides = sides_of(rows, certain, guard);
@@ -240,13 +247,13 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
       const int present = play.stays[0] > 0 ? -1 : play.stays[1] > 0 ? 1 : 0;
       if (present != 0) play.pose = showing_pose(chain, mean, j, -present, certain);
       play.estimate.status = diagnosis::Status::out_of_domain;
-      play.estimate.message = one_flank_message(play, std::size_t(std::abs(present)), certain);
+      play.estimate.message = one_flank_message(play, present != 0, certain);
     } else if (std::min(play.stays[0], play.stays[1]) < settings.least_stays) {
       play.estimate.message = fmt::format(
           "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: a longer record",
           play.stays[1], play.stays[0], settings.least_stays);
     } else {
-      judge(play, rows, sides, stay, loads[j].link_coulomb, settings);
+      judge(play, rows, sides, stay, friction, settings);
     }
     plays.push_back(std::move(play));
   }

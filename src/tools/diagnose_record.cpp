@@ -56,11 +56,14 @@ Command command() {
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
       {"periods", "N", "use only the last N whole excitation periods after settling"},
   };
-  c.notes = std::string(
-                "backlash is the total free play along the line of action [m], backlash_angle the same as an "
-                "angle on "
-                "the axis of motor_position [rad]; intervals hold with 95 %. ") +
-            needs_of_methods();
+  c.notes =
+      std::string(
+          "backlash is the total free play along the line of action [m], backlash_angle the same as an "
+          "angle on "
+          "the axis of motor_position [rad]; intervals hold with 95 %. ") +
+      needs_of_methods() +
+      " The rig file of an arm (urdf) tells the play of each joint with motor_position and load_position, in "
+      "one run; only --rig and --json hold there.";
   c.examples = {
       "diagnose_record run.csv --rig config/sarkar_1997.yaml --json report.json --report report.html",
       "diagnose_record run.bag --joint elbow --curve curve.yaml --json -",

@@ -12,7 +12,8 @@
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t times the standard error, each stay on a flank counted as one (sandwich estimator over
 //   stays, see diagnosis/flank_fit.h),
-// - the friction behind the gap, as uncertain as it is large, over the stiffness,
+// - the friction behind the gap, as uncertain as it is large, over the stiffness, on both flanks; where the
+//   file says less, 1 % of the largest load,
 // - 2 % of the play, as position_difference where the deflection bends otherwise than either.
 #pragma once
 
@@ -34,7 +35,8 @@ struct JointLoad {
 struct PlaySettings {
   double least_load = 0.1;  // of the largest |T|, beyond friction: below it the side is not certain. Choice:
                             // what a payload that nobody declared may change
-  double settle = 1.5;      // cycles of torque_cutoff that a low-pass smears a change of flank over; choice
+  double least_friction = 0.01;  // of the largest |T|: friction behind the gap that nobody declared; choice
+  double settle = 1.5;  // cycles of torque_cutoff that a low-pass smears a change of flank over; choice
   std::size_t least_stays = 3;  // on each flank, for a standard error that means something; choice
   double same_fit = 1.1;        // ratio of residuals below which two deflections are not told apart; choice
   double bend = 0.02;           // of the play, see above
