@@ -43,6 +43,7 @@ std::string arm_play_json(const ArmPlayReport& report) {
     joint["mesh_torque"] = report::json_interval(play.least_torque, play.largest_torque);
     joint["pose"] = report::json_interval(play.lower_position, play.upper_position);
     joint["fastest"] = report::json_number(play.fastest);
+    joint["torque_disagreement"] = report::json_number(play.disagreement);
     joint["stays"] = {play.stays[0], play.stays[1]};
     joint["showing_pose"] = report::json_number(play.pose.value_or(std::nan("")));
     json["joints"][play.joint] = std::move(joint);

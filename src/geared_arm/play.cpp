@@ -24,7 +24,9 @@ constexpr double kSameColumn = 1e-9;  // of its size: a column that is constant 
 /// What the fit of one joint looks at: one row per low-passed sample.
 struct Rows {
   std::vector<double> torque, twist, position, speed;
-  std::vector<bool> first;  // of a stretch
+  std::vector<double> sign, lacking;  // S; of the motor's torque, beyond chain and rotor [N m]
+  double noise = 0;                   // of lacking: sum of variances [N^2 m^2]
+  std::vector<bool> first;            // of a stretch
   std::size_t size() const { return torque.size(); }
 };
 
@@ -58,19 +60,40 @@ std::vector<double> twist_of(const record::Record& joint, const arm::ArmMotion& 
 }
 
 void append(Rows& rows, const arm::ArmMotion& motion, std::size_t joint, const Eigen::VectorXd& links,
-            const JointLoad& load, const std::vector<double>& twist) {
+            const arm::JointDrive& drive, const JointLoad& load, const std::vector<double>& twist) {
   const auto j = Eigen::Index(joint);
   const Eigen::VectorXd chain = motion.chain[joint] * links;
+  const double noise = drive.constant * motion.noise[j];
+  rows.noise += noise * noise * double(motion.rows.size());
   for (std::size_t k = 0; k < motion.rows.size(); ++k) {
     const auto row = Eigen::Index(k);
     const double speed = motion.drive[joint](row, int(arm::DriveTerm::viscous));
     rows.torque.push_back(chain[row] + load.link_viscous * speed +
                           load.link_coulomb * motion.drive[joint](row, int(arm::DriveTerm::coulomb)));
+    rows.sign.push_back(motion.drive[joint](row, int(arm::DriveTerm::coulomb)));
+    rows.lacking.push_back(drive.constant * motion.signal(Eigen::Index(motion.rows[k]), j) - chain[row] -
+                           drive.terms[std::size_t(arm::DriveTerm::rotor_inertia)] *
+                               motion.drive[joint](row, int(arm::DriveTerm::rotor_inertia)));
     rows.twist.push_back(twist.empty() ? 0 : twist[motion.rows[k]]);
     rows.position.push_back(motion.q(Eigen::Index(motion.rows[k]), j));
     rows.speed.push_back(speed);
     rows.first.push_back(k == 0);
   }
+}
+
+/// What of the motor's torque neither the chain nor any friction (Coulomb, viscous, an offset) explains, over
+/// the chain's torque, rms, white noise of the torque taken off.
+double disagreement(const Rows& rows) {
+  const auto n = Eigen::Index(rows.size());
+  Eigen::MatrixXd x(n, 3);
+  double load = 0;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    x.row(k) << rows.sign[std::size_t(k)], rows.speed[std::size_t(k)], 1;
+    load += rows.torque[std::size_t(k)] * rows.torque[std::size_t(k)];
+  }
+  const Eigen::Map<const Eigen::VectorXd> y(rows.lacking.data(), n);
+  const Eigen::VectorXd left = y - x * x.completeOrthogonalDecomposition().solve(y);
+  return load > 0 ? std::sqrt(std::fmax(0, left.squaredNorm() - rows.noise) / load) : 0;
 }
 
 /// Per row 1, -1, or 0 where the flank is not certain: the load small, or small within `guard` rows.
@@ -225,7 +248,7 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
     const bool two_encoders = record.joints[j].has(Channel::load_position);
     Rows rows;
     for (const arm::ArmMotion& m : motions)
-      append(rows, m, j, links, loads[j],
+      append(rows, m, j, links, rig.joints[j], loads[j],
              two_encoders ? twist_of(record.joints[j], m, rig.identification.torque_cutoff)
                           : std::vector<double>());
     if (rows.size() == 0) throw BadData(record.name, "is too short for torque_cutoff");
@@ -234,6 +257,7 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
     play.least_torque = *least, play.largest_torque = *largest;
     play.lower_position = *lower, play.upper_position = *upper;
     for (const double speed : rows.speed) play.fastest = std::fmax(play.fastest, std::fabs(speed));
+    play.disagreement = disagreement(rows);
     const double most = std::fmax(std::fabs(*least), std::fabs(*largest));
     const double certain = loads[j].link_coulomb + settings.least_load * most;
     const double friction = std::fmax(loads[j].link_coulomb, settings.least_friction * most);
@@ -252,6 +276,13 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
       play.estimate.message = fmt::format(
           "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: a longer record",
           play.stays[1], play.stays[0], settings.least_stays);
+    } else if (play.disagreement > settings.disagreement) {
+      play.estimate.status = diagnosis::Status::out_of_domain;
+      play.estimate.message = fmt::format(
+          "cannot tell: the motor's torque differs from that of the declared chain by {:.0f} % of it: "
+          "declare "
+          "what the arm carries, or fit links and drives (identify)",
+          100 * play.disagreement);
     } else {
       judge(play, rows, sides, stay, friction, settings);
     }

@@ -120,6 +120,19 @@ TEST(ArmPlay, DrawnArmsAreRightOrUnknown) {
   EXPECT_GE(told, asked / 4);  // the rest stays on one flank
 }
 
+TEST(ArmPlay, APayloadThatTheFileDoesNotKnowMakesNoAnswer) {
+  const GearedArm declared = arm_of("two_link_arm");
+  GearedArm machine = declared;
+  arm::Body payload;  // half as heavy as the forearm, at its end: gravity's moment at the elbow doubles
+  payload.mass = 0.5;
+  payload.centre = {0.3, 0, 0};
+  machine.rig.chain.links[1] += arm::parameters_of(payload);
+  for (const JointPlay& play : diagnosed(machine, declared)) {
+    EXPECT_EQ(play.estimate.status, Status::out_of_domain) << play.joint;
+    EXPECT_GT(play.disagreement, 0.1);
+  }
+}
+
 TEST(ArmPlay, OneEncoderIsNotEnough) {
   const GearedArm arm = arm_of("two_link_arm");
   std::vector<record::JointRecord> joints = simulate_arm(arm, 10);

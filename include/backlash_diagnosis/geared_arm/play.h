@@ -6,8 +6,9 @@
 //
 // tau: the chain's torque at the joint (arm/dynamics.h), side: the sign of T where it is large for certain
 // and stays so. f: offset of the encoders, s: their scale, d: their skew in time. e(T) is that of a spring or
-// Hertz's power 2/3, whichever fits; where the record does not tell, the interval holds both. Nothing of
-// motor torque or its friction is used.
+// Hertz's power 2/3, whichever fits; where the record does not tell, the interval holds both. The
+// motor's torque only tells whether the declared chain is the one that moved: beyond any friction of the
+// motor it must agree with T.
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t times the standard error, each stay on a flank counted as one (sandwich estimator over
@@ -38,6 +39,7 @@ struct PlaySettings {
   double least_friction = 0.01;  // of the largest |T|: friction behind the gap that nobody declared; choice
   double settle = 1.5;  // cycles of torque_cutoff that a low-pass smears a change of flank over; choice
   std::size_t least_stays = 3;  // on each flank, for a standard error that means something; choice
+  double disagreement = 0.1;    // beyond it the chain is not the one that moved; choice, see doc/arm.md
   double same_fit = 1.1;        // ratio of residuals below which two deflections are not told apart; choice
   double bend = 0.02;           // of the play, see above
   double worst_residual = 0.2;  // of the play: beyond it the teeth do not rest on their flanks; choice
@@ -49,7 +51,8 @@ struct JointPlay {
   double least_torque = 0, largest_torque = 0;    // N m, T over the record
   double lower_position = 0, upper_position = 0;  // rad, of the joint
   double fastest = 0;                             // rad/s
-  std::size_t stays[2] = {0, 0};                  // on the negative and the positive flank
+  double disagreement = 0;        // of the motor's torque and the chain's, relative, rms, friction aside
+  std::size_t stays[2] = {0, 0};  // on the negative and the positive flank
   std::optional<double> pose;  // rad, of this joint, the others as they were on average: where gravity would
                                // turn the load that never turned
 };
