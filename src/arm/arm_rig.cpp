@@ -72,6 +72,9 @@ JointDrive read_joint(const YamlReader& yaml) {
   }
   joint.delay = yaml.number_or("delay", 0, Range::between(-kLongestDelay, kLongestDelay));
   yaml.uncertainty("delay");
+  // of the room geared_arm
+  for (const char* key : {"gear", "limits", "link_coulomb", "link_viscous", "held", "excitation"})
+    yaml.ignore(key);
   joint.training_error = yaml.number_or("training_error", 0, Range::not_negative());
   return joint;
 }
@@ -177,6 +180,7 @@ ArmRig load_arm_rig(const std::string& path) {
     if (!is_consistent(rig.chain.links[i]))
       throw BadData(rig.urdf, "link '" + rig.chain.joints[i].link +
                                   "': no body has such an inertia (mass > 0 is needed)");
+  yaml.ignore("simulation");  // as above
   yaml.finish();
   return rig;
 }

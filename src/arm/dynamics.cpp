@@ -2,6 +2,7 @@
 #include "backlash_diagnosis/arm/dynamics.h"
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
@@ -174,9 +175,11 @@ std::vector<ArticulatedBody> moving_bodies(const Chain& chain, const Joints& q, 
 }  // namespace
 
 Joints forward_dynamics(const Chain& chain, const Joints& q, const Joints& v, const Joints& torque,
-                        const Joints& rotor_inertia) {
+                        const Joints& rotor_inertia, const Joints& given) {
   check_sizes(chain, q), check_sizes(chain, v), check_sizes(chain, torque);
   if (rotor_inertia.size() > 0) check_sizes(chain, rotor_inertia);
+  if (given.size() > 0) check_sizes(chain, given);
+  const auto is_given = [&](Eigen::Index k) { return given.size() > 0 && !std::isnan(given[k]); };
   std::vector<ArticulatedBody> bodies = moving_bodies(chain, q, v);
   for (std::size_t i = chain.size(); i-- > 0;) {
     ArticulatedBody& b = bodies[i];
@@ -185,8 +188,8 @@ Joints forward_dynamics(const Chain& chain, const Joints& q, const Joints& v, co
     b.d = b.axis.dot(b.u) + (rotor_inertia.size() > 0 ? rotor_inertia[k] : 0);
     b.rest = torque[k] - b.axis.dot(b.force);
     if (i == 0) break;
-    const Matrix6 left = b.inertia - b.u * b.u.transpose() / b.d;
-    const Vector6 force = b.force + left * b.bias + b.u * (b.rest / b.d);
+    const Matrix6 left = is_given(k) ? b.inertia : Matrix6(b.inertia - b.u * b.u.transpose() / b.d);
+    const Vector6 force = b.force + left * b.bias + b.u * (is_given(k) ? given[k] : b.rest / b.d);
     bodies[i - 1].inertia += b.transform.transpose() * left * b.transform;
     bodies[i - 1].force += b.transform.transpose() * force;
   }
@@ -196,8 +199,9 @@ Joints forward_dynamics(const Chain& chain, const Joints& q, const Joints& v, co
   for (std::size_t i = 0; i < chain.size(); ++i) {
     const ArticulatedBody& b = bodies[i];
     const Vector6 carried = b.transform * before + b.bias;
-    acceleration[Eigen::Index(i)] = (b.rest - b.u.dot(carried)) / b.d;
-    before = carried + b.axis * acceleration[Eigen::Index(i)];
+    const auto k = Eigen::Index(i);
+    acceleration[k] = is_given(k) ? given[k] : (b.rest - b.u.dot(carried)) / b.d;
+    before = carried + b.axis * acceleration[k];
   }
   return acceleration;
 }

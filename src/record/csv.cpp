@@ -344,17 +344,31 @@ Record record_of_joint(std::vector<JointRecord> joints, const std::string& joint
 }
 
 void write_csv(const Record& record, const std::string& path) {
-  const std::vector<Channel> channels = present_channels(record);
-  check_writable(record, channels);
-  const std::vector<std::string> stamps = stamp_texts(record);
+  write_joints_csv({{"", record}}, path);
+}
+
+void write_joints_csv(const std::vector<JointRecord>& joints, const std::string& path) {
+  if (joints.empty()) throw BadData(path, "a record without joints cannot be written");
+  const Record& first = joints.front().record;
   std::string content = kTimeColumn;
-  for (const Channel channel : channels) content += kSeparator + channel_name(channel);
-  content += '\n';
-  for (std::size_t i = 0; i < record.size(); ++i) {
-    content += stamps[i];
+  std::vector<const std::vector<double>*> columns;
+  for (const JointRecord& joint : joints) {
+    const std::vector<Channel> channels = present_channels(joint.record);
+    check_writable(joint.record, channels);
+    if (joint.record.time != first.time)
+      throw BadData(path, joint.joint + ": has other times than the first joint");
     for (const Channel channel : channels) {
+      content += kSeparator + (joint.joint.empty() ? "" : joint.joint + "/") + channel_name(channel);
+      columns.push_back(&joint.record.column(channel));
+    }
+  }
+  const std::vector<std::string> stamps = stamp_texts(first);
+  content += '\n';
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    content += stamps[i];
+    for (const std::vector<double>* column : columns) {
       content += kSeparator;
-      content += to_text(record.column(channel)[i]);
+      content += to_text((*column)[i]);
     }
     content += '\n';
   }

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs a rig without ROS and writes what its sensors measure.
 #include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/geared_arm/plant.h"
+#include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -39,6 +42,10 @@ Command command() {
   c.examples = {"simulate config/sarkar_1997.yaml --duration 2 --backlash 60e-6 --out run.csv",
                 "simulate config/yumrukcal_2013.yaml --run sine_sweep --out sweep.csv",
                 "simulate config/yumrukcal_2013.yaml --list-runs"};
+  c.notes =
+      "The rig file of an arm (urdf, with simulation) gives one record of all its joints, a .csv with "
+      "columns "
+      "JOINT/channel.";
   c.exit_codes = "  0   done\n";
   return c;
 }
@@ -73,7 +80,39 @@ int list_runs(const Arguments& arguments) {
   return kHealthy;
 }
 
+/// The rig file of an arm: all joints into one record.
+int simulate_arm(const Arguments& arguments) {
+  for (const char* option : {"run", "list-runs", "backlash", "half-gap"})
+    if (arguments.has(option))
+      throw UsageError(std::string("--") + option +
+                       " is for a rig of one joint; this is the rig file of an arm");
+  for (const char* option : {"out", "duration"})
+    if (!arguments.has(option)) throw UsageError(std::string("missing --") + option);
+  const std::string out = arguments.text("out"), path = arguments.positional(0);
+  if (std::filesystem::path(out).extension() != ".csv")
+    throw UsageError("'" + out + "': the record of an arm is written as .csv");
+  geared_arm::GearedArm arm = geared_arm::load_geared_arm(path);
+  arm.sensors.seed =
+      arguments.integer("seed", arm.sensors.seed, 0, std::numeric_limits<std::uint64_t>::max());
+  arm.sensors.sampling_rate = arguments.number("sample-rate", arm.sensors.sampling_rate, Range::positive());
+  check_output(out, {path, arm.rig.urdf});
+  std::vector<record::JointRecord> joints;
+  {
+    ProgressBar bar;
+    joints = of_file(path, [&] {
+      return geared_arm::simulate_arm(arm, arguments.number("duration", 0, Range::positive()),
+                                      bar.progress());
+    });
+  }
+  record::write_joints_csv(joints, out);
+  std::cout << out << ": " << joints.front().record.size() << " samples at "
+            << to_text(arm.sensors.sampling_rate) << " Hz of " << arm.rig.name << ", " << joints.size()
+            << " joints\n";
+  return kHealthy;
+}
+
 int simulate(const Arguments& arguments) {
+  if (arm::is_arm_rig(arguments.positional(0))) return simulate_arm(arguments);
   if (arguments.has("list-runs")) return list_runs(arguments);
   for (const char* option : {"out", "duration"})
     if (!arguments.has(option) && !(arguments.has("run") && std::string(option) == "duration"))

@@ -22,9 +22,10 @@ Eigen::MatrixXd regressor(const Chain& chain, const Joints& q, const Joints& v, 
 Eigen::MatrixXd gravity_regressor(const Chain& chain, const Joints& q);
 
 /// a [rad/s^2] that the torques give: articulated bodies. `rotor_inertia` [kg m^2, joint side, >= 0] of each
-/// drive turns with its joint only; may be empty.
+/// drive turns with its joint only; may be empty. `given` [rad/s^2]: a joint that moves so whatever
+/// its torque (Featherstone, chapter 9); NaN: one that follows its torque; may be empty.
 Joints forward_dynamics(const Chain& chain, const Joints& q, const Joints& v, const Joints& torque,
-                        const Joints& rotor_inertia = {});
+                        const Joints& rotor_inertia = {}, const Joints& given = {});
 
 /// Kinetic and potential energy [J]; the potential one is 0 where all centres of mass are at the base's
 /// origin.

@@ -45,4 +45,8 @@ Record record_of_joint(std::vector<JointRecord> joints, const std::string& joint
 /// are not finite, times that do not increase by a nanosecond.
 void write_csv(const Record& record, const std::string& path);
 
+/// The same for several joints with one time base, columns JOINT/channel. Throws also BadData where the times
+/// of two joints differ.
+void write_joints_csv(const std::vector<JointRecord>& joints, const std::string& path);
+
 }  // namespace backlash::record

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// identify and trace_residual for the rig file of an arm.
+// identify, trace_residual and diagnose_record for the rig file of an arm.
 #pragma once
 
 #include <string>

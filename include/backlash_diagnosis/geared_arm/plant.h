@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The arm in time: all joints in one integrator, a motor torque per joint by its excitation.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "backlash_diagnosis/arm/dynamics.h"
+#include "backlash_diagnosis/base/progress.h"
+#include "backlash_diagnosis/geared_arm/geared_arm.h"
+#include "backlash_diagnosis/record/csv.h"
+
+namespace backlash::geared_arm {
+
+class ArmPlant {
+ public:
+  /// At rest at time 0: every joint at 0 or where it is held, every motor in the middle of its gap.
+  explicit ArmPlant(const GearedArm& arm);
+  ArmPlant(const ArmPlant&) = delete;  // the integrator calls it back
+  ArmPlant& operator=(const ArmPlant&) = delete;
+
+  double time() const { return time_; }
+  /// Throws IntegrationError.
+  void advance_to(double t);
+
+  /// What exact sensors would show of a joint now; sensor_torque is NaN, output_torque that of the mesh.
+  model::Observation observe(std::size_t joint) const;
+
+  /// Kinetic, potential and elastic energy of all parts [J].
+  double energy() const;
+
+  /// Sets position and speed of the links and of the motors (those of joints without gear do not count).
+  void set_state(const arm::Joints& q, const arm::Joints& v, const arm::Joints& motor_q,
+                 const arm::Joints& motor_v);
+  arm::Joints link_positions() const;
+  simulation::IntegratorStatistics statistics() const { return integrator_->statistics(); }
+
+ private:
+  struct Drive {
+    std::unique_ptr<simulation::Excitation> excitation;  // null: held
+    long segment = 0;
+    double compensation = 0;  // N m, of gravity
+    Eigen::Index motor = -1;  // place among the angles; -1: turns with the link
+  };
+  void begin_segments();
+  void derivative(double t, const double* state, double* rate) const;
+  double mesh_torque(std::size_t joint, const double* state) const;
+  double motor_friction(std::size_t joint, double speed) const;
+  double motor_torque(std::size_t joint, double t) const;
+  arm::Joints motor_positions() const;
+
+  GearedArm arm_;
+  arm::Chain chain_;
+  std::vector<Drive> drives_;
+  Eigen::Index links_, angles_;
+  arm::Joints rotors_, given_;  // of joints without gear; 0 where held, NaN elsewhere
+  std::vector<double> state_;   // angles of links, of motors; their speeds
+  double time_ = 0;
+  bool begun_ = false;
+  std::unique_ptr<simulation::Integrator> integrator_;
+};
+
+/// What the declared sensors of all joints measure, from rest, for `duration` [s]: motor_torque,
+/// motor_position, load_position, and what else `sensors` declares. Deterministic for a seed. Throws
+/// InvalidParameter, IntegrationError; Cancelled when `progress` returns false.
+std::vector<record::JointRecord> simulate_arm(const GearedArm& arm, double duration,
+                                              const Progress& progress = nullptr);
+
+}  // namespace backlash::geared_arm

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The play of each joint of an arm with two encoders, from ordinary motion of all of them. The flank on which
+// the teeth of a joint rest follows from the load that the moving chain puts on them:
+//
+//   T = tau(q, v, a) + friction behind the gap,   phi = q_M - q = f + side b / 2 + g e(T) + s q + d v
+//
+// tau: the chain's torque at the joint (arm/dynamics.h), side: the sign of T where it is large for certain
+// and stays so. f: offset of the encoders, s: their scale, d: their skew in time. e(T) is that of a spring or
+// Hertz's power 2/3, whichever fits; where the record does not tell, the interval holds both. The
+// motor's torque only tells whether the declared chain is the one that moved: beyond any friction of the
+// motor it must agree with T.
+//
+// Interval, 95 %, root of the sum of squares of
+// - scatter: Student t times the standard error, each stay on a flank counted as one (sandwich estimator over
+//   stays, see diagnosis/flank_fit.h),
+// - the friction behind the gap, as uncertain as it is large, over the stiffness, on both flanks; where the
+//   file says less, 1 % of the largest load,
+// - 2 % of the play, as position_difference where the deflection bends otherwise than either.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/arm/motion.h"
+#include "backlash_diagnosis/diagnosis/estimate.h"
+
+namespace backlash::geared_arm {
+
+/// What is known of a joint beside the chain; its play is not.
+struct JointLoad {
+  double link_coulomb = 0;  // N m
+  double link_viscous = 0;  // N m s/rad
+};
+
+struct PlaySettings {
+  double least_load = 0.1;  // of the largest |T|, beyond friction: below it the side is not certain. Choice:
+                            // what a payload that nobody declared may change
+  double least_friction = 0.01;  // of the largest |T|: friction behind the gap that nobody declared; choice
+  double settle = 1.5;  // cycles of torque_cutoff that a low-pass smears a change of flank over; choice
+  std::size_t least_stays = 3;  // on each flank, for a standard error that means something; choice
+  double disagreement = 0.1;    // beyond it the chain is not the one that moved; choice, see doc/arm.md
+  double same_fit = 1.1;        // ratio of residuals below which two deflections are not told apart; choice
+  double bend = 0.02;           // of the play, see above
+  double worst_residual = 0.2;  // of the play: beyond it the teeth do not rest on their flanks; choice
+};
+
+struct JointPlay {
+  std::string joint;
+  diagnosis::Estimate estimate;                   // position_difference
+  double least_torque = 0, largest_torque = 0;    // N m, T over the record
+  double lower_position = 0, upper_position = 0;  // rad, of the joint
+  double fastest = 0;                             // rad/s
+  double disagreement = 0;        // of the motor's torque and the chain's, relative, rms, friction aside
+  std::size_t stays[2] = {0, 0};  // on the negative and the positive flank
+  std::optional<double> pose;  // rad, of this joint, the others as they were on average: where gravity would
+                               // turn the load that never turned
+};
+
+/// One per joint of the rig. Throws BadData as arm::motions_of().
+std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointLoad>& loads,
+                                const arm::ArmRecord& record, std::vector<std::string>& warnings,
+                                const PlaySettings& settings = {});
+
+}  // namespace backlash::geared_arm

@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/geared_arm/play.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/arm/dynamics.h"
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/resampling.h"
+#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/zero_phase.h"
+
+namespace backlash::geared_arm {
+namespace {
+
+using record::Channel;
+
+constexpr double kHertz = 2.0 / 3;    // theory: deflection over torque of a Hertzian contact
+constexpr double kSameColumn = 1e-9;  // of its size: a column that is constant tells nothing
+
+/// What the fit of one joint looks at: one row per low-passed sample.
+struct Rows {
+  std::vector<double> torque, twist, position, speed;
+  std::vector<double> sign, lacking;  // S; of the motor's torque, beyond chain and rotor [N m]
+  double noise = 0;                   // of lacking: sum of variances [N^2 m^2]
+  std::vector<bool> first;            // of a stretch
+  std::size_t size() const { return torque.size(); }
+};
+
+struct Fit {
+  double play = 0, error = 0, slope = 0, residual = 0;
+  double compliance = 0;  // rad/(N m), at the mean load
+  double degrees = 0;     // of freedom: stays less what is fitted
+};
+
+/// The record with the link's own angle as position: the chain moves with it, not with the motor.
+arm::ArmRecord by_links(const arm::ArmRecord& record) {
+  arm::ArmRecord out = record;
+  for (record::Record& joint : out.joints) {
+    if (!joint.has(Channel::load_position)) continue;
+    joint.column(Channel::motor_position) = joint.column(Channel::load_position);
+    joint.column(Channel::motor_velocity) = joint.column(Channel::load_velocity);
+  }
+  return out;
+}
+
+/// phi of a stretch, low-passed as the torque is.
+std::vector<double> twist_of(const record::Record& joint, const arm::ArmMotion& motion, double cutoff) {
+  const record::Record even =
+      record::evenly_sampled(joint.slice(motion.time.front(), motion.time.back() + motion.interval / 2));
+  std::vector<double> twist = even.column(Channel::motor_position);
+  const std::vector<double>& load = even.column(Channel::load_position);
+  if (twist.size() != motion.time.size())
+    throw BadData(joint.name, "motor_position has other times than the record of the arm");
+  for (std::size_t k = 0; k < twist.size(); ++k) twist[k] -= load[k];
+  return signal::low_pass(twist, motion.interval, cutoff);
+}
+
+void append(Rows& rows, const arm::ArmMotion& motion, std::size_t joint, const Eigen::VectorXd& links,
+            const arm::JointDrive& drive, const JointLoad& load, const std::vector<double>& twist) {
+  const auto j = Eigen::Index(joint);
+  const Eigen::VectorXd chain = motion.chain[joint] * links;
+  const double noise = drive.constant * motion.noise[j];
+  rows.noise += noise * noise * double(motion.rows.size());
+  for (std::size_t k = 0; k < motion.rows.size(); ++k) {
+    const auto row = Eigen::Index(k);
+    const double speed = motion.drive[joint](row, int(arm::DriveTerm::viscous));
+    rows.torque.push_back(chain[row] + load.link_viscous * speed +
+                          load.link_coulomb * motion.drive[joint](row, int(arm::DriveTerm::coulomb)));
+    rows.sign.push_back(motion.drive[joint](row, int(arm::DriveTerm::coulomb)));
+    rows.lacking.push_back(drive.constant * motion.signal(Eigen::Index(motion.rows[k]), j) - chain[row] -
+                           drive.terms[std::size_t(arm::DriveTerm::rotor_inertia)] *
+                               motion.drive[joint](row, int(arm::DriveTerm::rotor_inertia)));
+    rows.twist.push_back(twist.empty() ? 0 : twist[motion.rows[k]]);
+    rows.position.push_back(motion.q(Eigen::Index(motion.rows[k]), j));
+    rows.speed.push_back(speed);
+    rows.first.push_back(k == 0);
+  }
+}
+
+/// What of the motor's torque neither the chain nor any friction (Coulomb, viscous, an offset) explains, over
+/// the chain's torque, rms, white noise of the torque taken off.
+double disagreement(const Rows& rows) {
+  const auto n = Eigen::Index(rows.size());
+  Eigen::MatrixXd x(n, 3);
+  double load = 0;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    x.row(k) << rows.sign[std::size_t(k)], rows.speed[std::size_t(k)], 1;
+    load += rows.torque[std::size_t(k)] * rows.torque[std::size_t(k)];
+  }
+  const Eigen::Map<const Eigen::VectorXd> y(rows.lacking.data(), n);
+  const Eigen::VectorXd left = y - x * x.completeOrthogonalDecomposition().solve(y);
+  return load > 0 ? std::sqrt(std::fmax(0, left.squaredNorm() - rows.noise) / load) : 0;
+}
+
+/// Per row 1, -1, or 0 where the flank is not certain: the load small, or small within `guard` rows.
+std::vector<int> sides_of(const Rows& rows, double least, std::size_t guard) {
+  std::vector<int> sides(rows.size(), 0);
+  std::size_t since = 0;  // rows on the same side without a break
+  int last = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const int side = rows.torque[k] > least ? 1 : rows.torque[k] < -least ? -1 : 0;
+    since = side != 0 && side == last && !rows.first[k] ? since + 1 : 0;
+    last = side;
+    if (since >= 2 * guard) sides[k - guard] = side;
+  }
+  return sides;
+}
+
+/// Number of the stay per row that counts; `count` per side.
+std::vector<std::size_t> stays_of(const std::vector<int>& sides, std::size_t count[2]) {
+  std::vector<std::size_t> stay(sides.size(), 0);
+  count[0] = count[1] = 0;
+  for (std::size_t k = 0; k < sides.size(); ++k) {
+    if (sides[k] == 0) continue;
+    if (k == 0 || sides[k - 1] != sides[k]) ++count[sides[k] > 0];
+    stay[k] = count[0] + count[1] - 1;
+  }
+  return stay;
+}
+
+Eigen::MatrixXd columns_of(const Rows& rows, const std::vector<int>& sides,
+                           const std::vector<std::size_t>& used, double power) {
+  Eigen::MatrixXd x(Eigen::Index(used.size()), 5);
+  for (Eigen::Index r = 0; r < x.rows(); ++r) {
+    const std::size_t k = used[std::size_t(r)];
+    x.row(r) << sides[k] / 2.0, std::copysign(std::pow(std::fabs(rows.torque[k]), power), rows.torque[k]), 1,
+        rows.position[k], rows.speed[k];
+  }
+  for (Eigen::Index c = 3; c < 5; ++c) {  // less correlated so
+    x.col(c).array() -= x.col(c).mean();
+    if (x.col(c).norm() < kSameColumn * std::sqrt(double(x.rows()))) x.col(c).setZero();
+  }
+  return x;
+}
+
+Fit fit(const Rows& rows, const std::vector<int>& sides, const std::vector<std::size_t>& stay, double power) {
+  std::vector<std::size_t> used;
+  for (std::size_t k = 0; k < sides.size(); ++k)
+    if (sides[k] != 0) used.push_back(k);
+  const Eigen::MatrixXd x = columns_of(rows, sides, used, power);
+  Eigen::VectorXd y(x.rows());
+  for (Eigen::Index r = 0; r < y.size(); ++r) y[r] = rows.twist[used[std::size_t(r)]];
+  const Eigen::VectorXd scale = x.colwise().norm().cwiseMax(1e-300).transpose();
+  const Eigen::MatrixXd scaled = x * scale.cwiseInverse().asDiagonal();
+  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(scaled);
+  const Eigen::VectorXd b = solver.solve(y), residual = y - scaled * b;
+  const Eigen::MatrixXd inverse = solver.pseudoInverse();
+  const std::size_t stays = *std::max_element(stay.begin(), stay.end()) + 1;
+  std::vector<double> influence(stays, 0.0);  // of each stay's residuals on the play
+  for (Eigen::Index r = 0; r < y.size(); ++r)
+    influence[stay[used[std::size_t(r)]]] += inverse(0, r) * residual[r];
+  double variance = 0;
+  for (const double each : influence) variance += each * each;
+  Fit f;
+  f.degrees = std::fmax(1, double(stays) - double(solver.rank()));
+  f.play = b[0] / scale[0];
+  f.error = std::sqrt(variance * double(stays) / f.degrees) / scale[0];
+  f.slope = b[1] / scale[1];
+  double load = 0;
+  for (const std::size_t k : used) load += std::fabs(rows.torque[k]) / double(used.size());
+  f.compliance = f.slope * power * std::pow(load, power - 1);
+  f.residual = std::sqrt(residual.squaredNorm() / double(y.size()));
+  return f;
+}
+
+/// Where gravity would press the other flank by twice the least load: the nearest to where the joint was.
+std::optional<double> showing_pose(const arm::Chain& chain, const arm::Joints& mean, std::size_t joint,
+                                   int wanted, double least) {
+  constexpr int kSteps = 90;  // choice: 2 degrees
+  const arm::Joints rest = arm::Joints::Zero(mean.size());
+  for (int step = 1; step <= kSteps; ++step)
+    for (const int way : {1, -1}) {
+      arm::Joints q = mean;
+      q[Eigen::Index(joint)] += way * step * M_PI / kSteps;
+      if (wanted * arm::inverse_dynamics(chain, q, rest, rest)[Eigen::Index(joint)] > 2 * least)
+        return std::remainder(q[Eigen::Index(joint)], 2 * M_PI);
+    }
+  return std::nullopt;
+}
+
+std::string one_flank_message(const JointPlay& play, bool any, double least) {
+  const bool turns = play.least_torque < -least && play.largest_torque > least;
+  std::string text =
+      fmt::format("cannot tell: {} (mesh torque between {:.3g} and {:.3g} N m, certain beyond {:.2g} N m)",
+                  turns ? "the load presses the other flank only for moments"
+                  : any ? "the load holds the teeth on one flank throughout"
+                        : "no flank is loaded for long enough",
+                  play.least_torque, play.largest_torque, least);
+  if (play.pose)
+    return text +
+           fmt::format("; motion that passes a pose with {} at {:.2f} rad would do", play.joint, *play.pose);
+  return text + (any ? "; gravity turns it in no pose of this joint: faster motion would do"
+                     : "; faster motion or a pose in which gravity loads the joint would do");
+}
+
+void judge(JointPlay& play, const Rows& rows, const std::vector<int>& sides,
+           const std::vector<std::size_t>& stay, double friction, const PlaySettings& settings) {
+  const Fit spring = fit(rows, sides, stay, 1), hertz = fit(rows, sides, stay, kHertz);
+  const bool bends = hertz.residual < spring.residual;
+  const Fit &best = bends ? hertz : spring, &other = bends ? spring : hertz;
+  const bool told_apart = other.residual > settings.same_fit * best.residual;
+  diagnosis::Estimate& e = play.estimate;
+  e.components = diagnosis::PlayComponents{best.play, best.compliance, kNaN, kNaN};
+  if (best.residual > settings.worst_residual * std::fabs(best.play) && best.play > 3 * best.error) {
+    e.status = diagnosis::Status::ambiguous;
+    e.message = fmt::format(
+        "cannot tell: the teeth do not rest on their flanks, {:.2g} rad are left of the fit", best.residual);
+    return;
+  }
+  const double t = signal::student_t_quantile(0.975, best.degrees);
+  const double half = std::hypot(std::hypot(t * best.error, settings.bend * best.play),
+                                 2 * friction * std::fabs(best.compliance));
+  const double apart = told_apart ? 0 : other.play - best.play;
+  e.angle_lower = std::fmax(0, best.play + std::fmin(0, apart) - half);
+  e.angle_upper = std::fmax(0, best.play + std::fmax(0, apart) + half);
+  e.from_record = true;
+  if (e.angle_lower > 0) {
+    e.status = diagnosis::Status::ok;
+    e.backlash_angle = best.play;
+    e.message = fmt::format("{} and {} stays on the two flanks by the chain's load; deflection of a {}",
+                            play.stays[1], play.stays[0], bends ? "Hertzian contact" : "spring");
+  } else {
+    e.status = diagnosis::Status::below_range;
+    e.message = fmt::format("no play that is larger than its interval: at most {:.3g} rad", e.angle_upper);
+  }
+}
+
+}  // namespace
+
+std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointLoad>& loads,
+                                const arm::ArmRecord& record, std::vector<std::string>& warnings,
+                                const PlaySettings& settings) {
+  const std::vector<arm::ArmMotion> motions = arm::motions_of(by_links(record), rig, warnings);
+  const arm::Chain chain = arm::loaded_chain(rig);
+  Eigen::VectorXd links(10 * Eigen::Index(chain.size()));
+  for (std::size_t i = 0; i < chain.size(); ++i) links.segment<10>(10 * Eigen::Index(i)) = chain.links[i];
+  arm::Joints mean = arm::Joints::Zero(Eigen::Index(chain.size()));
+  for (const arm::ArmMotion& m : motions) mean += m.q.colwise().mean().transpose() / double(motions.size());
+  std::vector<JointPlay> plays;
+  for (std::size_t j = 0; j < chain.size(); ++j) {
+    JointPlay play;
+    play.joint = rig.joints[j].name;
+    play.estimate.method = "position_difference";
+    const bool two_encoders = record.joints[j].has(Channel::load_position);
+    Rows rows;
+    for (const arm::ArmMotion& m : motions)
+      append(rows, m, j, links, rig.joints[j], loads[j],
+             two_encoders ? twist_of(record.joints[j], m, rig.identification.torque_cutoff)
+                          : std::vector<double>());
+    if (rows.size() == 0) throw BadData(record.name, "is too short for torque_cutoff");
+    const auto [least, largest] = std::minmax_element(rows.torque.begin(), rows.torque.end());
+    const auto [lower, upper] = std::minmax_element(rows.position.begin(), rows.position.end());
+    play.least_torque = *least, play.largest_torque = *largest;
+    play.lower_position = *lower, play.upper_position = *upper;
+    for (const double speed : rows.speed) play.fastest = std::fmax(play.fastest, std::fabs(speed));
+    play.disagreement = disagreement(rows);
+    const double most = std::fmax(std::fabs(*least), std::fabs(*largest));
+    const double certain = loads[j].link_coulomb + settings.least_load * most;
+    const double friction = std::fmax(loads[j].link_coulomb, settings.least_friction * most);
+    // Rows follow each other by a fifth of a cycle or less, see ArmMotion.
+    const auto guard = std::size_t(std::ceil(settings.settle * 5));
+    const std::vector<int> sides = sides_of(rows, certain, guard);
+    const std::vector<std::size_t> stay = stays_of(sides, play.stays);
+    if (!two_encoders) {
+      play.estimate.message = "needs load_position";
+    } else if (play.stays[0] == 0 || play.stays[1] == 0) {
+      const int present = play.stays[0] > 0 ? -1 : play.stays[1] > 0 ? 1 : 0;
+      if (present != 0) play.pose = showing_pose(chain, mean, j, -present, certain);
+      play.estimate.status = diagnosis::Status::out_of_domain;
+      play.estimate.message = one_flank_message(play, present != 0, certain);
+    } else if (std::min(play.stays[0], play.stays[1]) < settings.least_stays) {
+      play.estimate.message = fmt::format(
+          "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: a longer record",
+          play.stays[1], play.stays[0], settings.least_stays);
+    } else if (play.disagreement > settings.disagreement) {
+      play.estimate.status = diagnosis::Status::out_of_domain;
+      play.estimate.message = fmt::format(
+          "cannot tell: the motor's torque differs from that of the declared chain by {:.0f} % of it: "
+          "declare "
+          "what the arm carries, or fit links and drives (identify)",
+          100 * play.disagreement);
+    } else {
+      judge(play, rows, sides, stay, friction, settings);
+    }
+    plays.push_back(std::move(play));
+  }
+  return plays;
+}
+
+}  // namespace backlash::geared_arm

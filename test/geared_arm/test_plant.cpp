@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Arms with gears against energy, today's rig of one joint, KDL and statics.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "arm/arm_machines.h"
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/geared_arm/plant.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
+#include "backlash_diagnosis/simulation/simulation.h"
+#include "support/data.h"
+
+namespace backlash::geared_arm {
+namespace {
+
+constexpr auto kRotor = std::size_t(arm::DriveTerm::rotor_inertia);
+
+GearedArm two_links() {
+  GearedArm arm = load_geared_arm(test::package_file("config/two_link_arm/two_link_arm.yaml"));
+  arm.solver = {"verner", 1e-9, 1e-12, 1e-10};
+  return arm;
+}
+
+/// No friction, no damping, no torque.
+GearedArm free_arm() {
+  GearedArm arm = two_links();
+  for (std::size_t j = 0; j < arm.joints.size(); ++j) {
+    arm.joints[j].link_coulomb = arm.joints[j].link_viscous = 0;
+    const double rotor = arm.rig.joints[j].terms[kRotor];
+    arm.rig.joints[j].terms = {};
+    arm.rig.joints[j].terms[kRotor] = rotor;
+    arm.joints[j].gear->contact =
+        model::make_contact_law("linear", {{"stiffness", j == 0 ? 8000 : 3000}, {"damping", 0}});
+    arm.joints[j].excitation.type = "constant";
+    arm.joints[j].excitation.amplitude = 0;
+  }
+  arm.gravity_compensation = false;
+  return arm;
+}
+
+TEST(GearedArm, UndampedArmKeepsItsEnergy) {
+  ArmPlant plant(free_arm());
+  const double before = plant.energy();
+  double largest = 0, touches = 0;
+  for (int i = 1; i <= 2000; ++i) {
+    plant.advance_to(i * 1e-3);
+    largest = std::fmax(largest, std::fabs(plant.energy() - before));
+    touches += plant.observe(0).output_torque != 0;
+  }
+  EXPECT_GT(touches, 100);  // it does strike
+  EXPECT_LT(touches, 1900);
+  // The arm falls through some 10 J; tolerances of 1e-9 over 2 s of impacts.
+  EXPECT_NEAR(largest, 0, 2e-5);
+}
+
+/// Today's rig with the same numbers as the shoulder, with the elbow held and no gravity.
+TEST(GearedArm, OneGearWithTheRestHeldIsTheRigOfOneJoint) {
+  GearedArm arm = two_links();
+  arm.rig.chain.gravity.setZero();
+  arm.gravity_compensation = false;
+  arm.joints[1].held = 0.0;
+  arm.joints[0].link_coulomb = 0, arm.joints[0].link_viscous = 0.02;
+  arm.rig.joints[0].terms[std::size_t(arm::DriveTerm::coulomb)] = 0;
+  // About the shoulder: two rods of 0.3 m, 2 kg and 1 kg, m (l^2 / 12 + d^2), d = 0.15 and 0.45 m.
+  const double inertia = 2.0 * (0.09 / 12 + 0.15 * 0.15) + 1.0 * (0.09 / 12 + 0.45 * 0.45);
+
+  rig_file::RigFile file = rig_file::load_rig_file(test::package_file("config/two_inertia_servo.yaml"));
+  model::Rig& rig = file.rig;
+  rig.motor.inertia = arm.rig.joints[0].terms[kRotor];
+  rig.motor.viscous_damping = arm.rig.joints[0].terms[std::size_t(arm::DriveTerm::viscous)];
+  rig.motor.coulomb_friction = 0;
+  rig.reduction_ratio = 1;
+  rig.link.inertia = inertia;
+  rig.link.viscous_damping = 0.02;
+  rig.link.coulomb_friction = 0;
+  rig.mesh.backlash = arm.joints[0].gear->backlash;
+  rig.mesh.contact = arm.joints[0].gear->contact;
+  simulation::Plant one(rig, arm.joints[0].excitation, arm.solver);
+  ArmPlant plant(arm);
+  double moved = 0;
+  for (int i = 1; i <= 2000; ++i) {
+    one.advance_to(i * 1e-3);
+    plant.advance_to(i * 1e-3);
+    const model::Observation a = plant.observe(0), b = one.observe();
+    // Integration tolerances of 1e-9, which impacts and the loop pass on.
+    ASSERT_NEAR(a.motor_position, b.motor_position, 1e-7) << i;
+    ASSERT_NEAR(a.load_position, b.load_position, 1e-7) << i;
+    moved = std::fmax(moved, std::fabs(a.load_position));
+  }
+  EXPECT_GT(moved, 0.3);
+}
+
+TEST(GearedArm, JointsWithoutGearMoveAsKdlSays) {
+  GearedArm arm = free_arm();
+  for (std::size_t j = 0; j < 2; ++j) {
+    arm.joints[j].gear.reset();
+    arm.joints[j].excitation.amplitude = j == 0 ? 4.0 : -1.5;
+  }
+  ArmPlant plant(arm);
+  const KDL::Chain kdl = test::to_kdl(arm.rig.chain);
+  KDL::ChainIdSolver_RNE solver(kdl, KDL::Vector(0, 0, -9.80665));
+  constexpr double h = 1e-4;  // s: differences of speed over 2 h, error of order h^2
+  for (int i = 1; i <= 10; ++i) {
+    arm::Joints q(2), v(2), before(2), after(2);
+    const auto speeds = [&](double t, arm::Joints& out) {
+      plant.advance_to(t);
+      for (std::size_t j = 0; j < 2; ++j) out[Eigen::Index(j)] = plant.observe(j).load_velocity;
+    };
+    speeds(0.05 * i - h, before);
+    speeds(0.05 * i, v);
+    q = plant.link_positions();
+    speeds(0.05 * i + h, after);
+    const arm::Joints a = (after - before) / (2 * h);
+    KDL::JntArray torque(2);
+    solver.CartToJnt(test::to_kdl(q), test::to_kdl(v), test::to_kdl(a),
+                     KDL::Wrenches(kdl.getNrOfSegments(), KDL::Wrench::Zero()), torque);
+    for (Eigen::Index j = 0; j < 2; ++j)
+      EXPECT_NEAR(torque(unsigned(j)) + arm.rig.joints[std::size_t(j)].terms[kRotor] * a[j],
+                  arm.joints[std::size_t(j)].excitation.amplitude, 1e-4);
+  }
+}
+
+TEST(GearedArm, AGivenJointMovesAsToldAndTheOthersAsKdlSays) {
+  Random random(5);
+  for (int i = 0; i < 20; ++i) {
+    const arm::Chain chain = test::random_chain(random, 5);
+    const arm::Joints q = test::random_joints(random, 5, 3), v = test::random_joints(random, 5, 2),
+                      torque = test::random_joints(random, 5, 10);
+    arm::Joints given = arm::Joints::Constant(5, NAN);
+    given[i % 5] = random.uniform(-5, 5);
+    given[(i + 2) % 5] = 0;
+    const arm::Joints a = arm::forward_dynamics(chain, q, v, torque, {}, given);
+    const KDL::Chain kdl = test::to_kdl(chain);
+    KDL::ChainIdSolver_RNE solver(kdl, KDL::Vector(chain.gravity.x(), chain.gravity.y(), chain.gravity.z()));
+    KDL::JntArray needed(5);
+    solver.CartToJnt(test::to_kdl(q), test::to_kdl(v), test::to_kdl(a),
+                     KDL::Wrenches(kdl.getNrOfSegments(), KDL::Wrench::Zero()), needed);
+    for (Eigen::Index j = 0; j < 5; ++j) {
+      if (std::isnan(given[j]))
+        EXPECT_NEAR(needed(unsigned(j)), torque[j], 1e-8);
+      else
+        EXPECT_EQ(a[j], given[j]);
+    }
+  }
+}
+
+TEST(GearedArm, AtRestTheMeshCarriesGravity) {
+  GearedArm arm = two_links();
+  for (GearedJoint& joint : arm.joints) {
+    joint.excitation.moves.positions = {0.0, 0.0};
+    joint.link_coulomb = 0;
+  }
+  ArmPlant plant(arm);
+  plant.advance_to(6);
+  const double q1 = plant.link_positions()[0], q12 = q1 + plant.link_positions()[1], g = 9.80665;
+  const double elbow = 1.0 * g * 0.15 * std::cos(q12);
+  const double shoulder = 2.0 * g * 0.15 * std::cos(q1) + 1.0 * g * 0.3 * std::cos(q1) + elbow;
+  // What still creeps through the friction of the motors: a thousandth.
+  EXPECT_NEAR(plant.observe(0).output_torque, shoulder, 1e-3 * shoulder);
+  EXPECT_NEAR(plant.observe(1).output_torque, elbow, 1e-3 * elbow);
+  // The gap and the spring: b / 2 + T / k.
+  const model::Observation o = plant.observe(0);
+  EXPECT_NEAR(o.motor_position - o.load_position, 1e-3 + shoulder / 8000, 1e-5);
+}
+
+TEST(GearedArm, TheSameSeedGivesTheSameRecord) {
+  const GearedArm arm = load_geared_arm(test::package_file("config/two_link_arm/two_link_arm.yaml"));
+  const auto a = simulate_arm(arm, 0.2), b = simulate_arm(arm, 0.2);
+  ASSERT_EQ(a.size(), 2u);
+  for (std::size_t j = 0; j < 2; ++j)
+    EXPECT_EQ(a[j].record.column(record::Channel::motor_torque),
+              b[j].record.column(record::Channel::motor_torque));
+  EXPECT_NE(a[0].record.column(record::Channel::motor_position),
+            a[1].record.column(record::Channel::motor_position));
+  EXPECT_THROW(simulate_arm(arm, -1), InvalidParameter);
+}
+
+}  // namespace
+}  // namespace backlash::geared_arm

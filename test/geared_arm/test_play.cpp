@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Plays of simulated arms, whose truth is known: right or "cannot tell", never the wrong joint.
+#include <gtest/gtest.h>
+
+#include <iostream>
+
+#include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/geared_arm/plant.h"
+#include "backlash_diagnosis/geared_arm/play.h"
+#include "support/data.h"
+
+namespace backlash::geared_arm {
+namespace {
+
+using diagnosis::Status;
+
+GearedArm arm_of(const std::string& name) {
+  return load_geared_arm(test::package_file("config/two_link_arm/" + name + ".yaml"));
+}
+
+std::vector<JointPlay> diagnosed(const GearedArm& machine, const GearedArm& declared, double duration = 30) {
+  std::vector<std::string> warnings;
+  std::vector<JointLoad> loads;
+  for (const GearedJoint& joint : declared.joints) loads.push_back({joint.link_coulomb, joint.link_viscous});
+  return plays_of(declared.rig, loads,
+                  arm::arm_record(simulate_arm(machine, duration), declared.rig, "simulated"), warnings);
+}
+
+TEST(ArmPlay, PosesThatShowTheGapsTellBothPlays) {
+  const GearedArm declared = arm_of("two_link_arm");
+  for (const double shoulder : {5e-4, 2e-3, 6e-3}) {
+    GearedArm machine = declared;
+    machine.joints[0].gear->backlash = shoulder;
+    const std::vector<JointPlay> plays = diagnosed(machine, declared);
+    const double truth[] = {shoulder, 3e-3};
+    for (std::size_t j = 0; j < 2; ++j) {
+      const diagnosis::Estimate& e = plays[j].estimate;
+      ASSERT_EQ(e.status, Status::ok) << plays[j].joint << ": " << e.message;
+      EXPECT_NEAR(e.backlash_angle, truth[j], 0.1 * truth[j]);  // the promise of the page
+      EXPECT_LE(e.angle_lower, truth[j]);
+      EXPECT_GE(e.angle_upper, truth[j]);
+    }
+  }
+}
+
+TEST(ArmPlay, NeverTheWrongJoint) {
+  const GearedArm declared = arm_of("two_link_arm");
+  for (const std::size_t tight : {0, 1}) {
+    GearedArm machine = declared;
+    machine.joints[tight].gear->backlash = 0;
+    const std::vector<JointPlay> plays = diagnosed(machine, declared);
+    EXPECT_EQ(plays[tight].estimate.status, Status::below_range) << plays[tight].estimate.message;
+    EXPECT_LT(plays[tight].estimate.angle_upper, 3e-4);  // a tenth of the other joint's play or less
+    EXPECT_EQ(plays[1 - tight].estimate.status, Status::ok);
+  }
+}
+
+TEST(ArmPlay, PosesThatHideTheGapsAreToldWithOneThatShowsThem) {
+  const GearedArm arm = arm_of("two_link_arm_hidden");
+  for (const JointPlay& play : diagnosed(arm, arm)) {
+    EXPECT_EQ(play.estimate.status, Status::out_of_domain);
+    EXPECT_NE(play.estimate.message.find("cannot tell"), std::string::npos);
+    EXPECT_TRUE(std::isnan(play.estimate.backlash_angle));
+    EXPECT_TRUE(play.pose.has_value());
+  }
+}
+
+TEST(ArmPlay, FrictionAndMassThatTheFileDoesNotKnowMakeNoWrongAnswer) {
+  const GearedArm declared = arm_of("two_link_arm");
+  GearedArm machine = declared;
+  for (std::size_t j = 0; j < 2; ++j) {
+    machine.joints[j].link_coulomb *= 1.8;
+    machine.rig.chain.links[j] *= j == 0 ? 1.1 : 0.92;
+    machine.joints[j].gear->contact =
+        model::make_contact_law("hunt_crossley", {{"stiffness", 2e5}, {"exponent", 1.5}, {"alpha", 0.5}});
+  }
+  const double truth[] = {2e-3, 3e-3};
+  const std::vector<JointPlay> plays = diagnosed(machine, declared);
+  for (std::size_t j = 0; j < 2; ++j) {
+    const diagnosis::Estimate& e = plays[j].estimate;
+    if (e.status != Status::ok) continue;
+    EXPECT_LE(e.angle_lower, truth[j]) << e.message;
+    EXPECT_GE(e.angle_upper, truth[j]) << e.message;
+  }
+}
+
+/// Poses, plays and contacts drawn; friction behind the gap that the file does not know.
+TEST(ArmPlay, DrawnArmsAreRightOrUnknown) {
+  Random random(3);
+  GearedArm declared = arm_of("two_link_arm");
+  int told = 0, asked = 0;
+  for (int i = 0; i < 12; ++i) {
+    GearedArm machine = declared;
+    const double centre = i % 3 == 0 ? 0 : -M_PI / 2, plays[] = {0, 2e-4, 1e-3, 4e-3};
+    double truth[2];
+    machine.sensors.seed = std::uint64_t(10 * i);
+    for (std::size_t j = 0; j < 2; ++j) {
+      GearedJoint& joint = machine.joints[j];
+      for (double& position : joint.excitation.moves.positions)
+        position = (j == 0 ? centre : 0) + random.uniform(-1.2, 1.2);
+      joint.gear->backlash = truth[j] = plays[int(random.uniform(0, 4))];
+      if (random.uniform(0, 1) < 0.4)
+        joint.gear->contact = model::make_contact_law(
+            "hunt_crossley", {{"stiffness", j == 0 ? 3e5 : 1e5}, {"exponent", 1.5}, {"alpha", 0.5}});
+    }
+    for (GearedJoint& joint : declared.joints) joint.link_coulomb = 0;
+    const std::vector<JointPlay> found = diagnosed(machine, declared);
+    for (std::size_t j = 0; j < 2; ++j) {
+      const diagnosis::Estimate& e = found[j].estimate;
+      ++asked;
+      if (e.status != Status::ok && e.status != Status::below_range) continue;
+      ++told;
+      EXPECT_LE(e.angle_lower, truth[j]) << i << ' ' << j << ' ' << e.message;
+      EXPECT_GE(e.angle_upper, truth[j]) << i << ' ' << j << ' ' << e.message;
+      if (e.status == Status::below_range) continue;
+      EXPECT_NEAR(e.backlash_angle, truth[j], 0.1 * truth[j]) << i << ' ' << j;
+    }
+  }
+  std::cout << told << " of " << asked << " told\n";
+  EXPECT_GE(told, asked / 4);  // the rest stays on one flank
+}
+
+TEST(ArmPlay, APayloadThatTheFileDoesNotKnowMakesNoAnswer) {
+  const GearedArm declared = arm_of("two_link_arm");
+  GearedArm machine = declared;
+  arm::Body payload;  // half as heavy as the forearm, at its end: gravity's moment at the elbow doubles
+  payload.mass = 0.5;
+  payload.centre = {0.3, 0, 0};
+  machine.rig.chain.links[1] += arm::parameters_of(payload);
+  for (const JointPlay& play : diagnosed(machine, declared)) {
+    EXPECT_EQ(play.estimate.status, Status::out_of_domain) << play.joint;
+    EXPECT_GT(play.disagreement, 0.1);
+  }
+}
+
+TEST(ArmPlay, OneEncoderIsNotEnough) {
+  const GearedArm arm = arm_of("two_link_arm");
+  std::vector<record::JointRecord> joints = simulate_arm(arm, 10);
+  joints[0].record.column(record::Channel::load_position).clear();
+  std::vector<std::string> warnings;
+  const auto plays = plays_of(arm.rig, {{}, {}}, arm::arm_record(joints, arm.rig, "simulated"), warnings);
+  EXPECT_EQ(plays[0].estimate.status, Status::insufficient_data);
+  EXPECT_EQ(plays[0].estimate.message, "needs load_position");
+}
+
+}  // namespace
+}  // namespace backlash::geared_arm
