@@ -81,20 +81,21 @@ double rate_of_look(double rate, double window, double interval, std::size_t joi
 }
 
 /// The change that this one is, of those that no other of the same look is; null: a new one.
-KnownChange* ChangeLedger::match(const FoundChange& found, std::vector<long>& taken) {
+KnownChange* ChangeLedger::match(const FoundChange& found, std::vector<long>& keys_taken) {
   KnownChange* best = nullptr;
   for (KnownChange& k : known_) {
-    const bool free = std::find(taken.begin(), taken.end(), k.id) == taken.end();
+    const bool free = std::find(keys_taken.begin(), keys_taken.end(), k.key) == keys_taken.end();
     if (!free || k.state == ChangeState::withdrawn || !same_event(k.found, found)) continue;
     if (!best || (k.found.effect == found.effect && best->found.effect != found.effect)) best = &k;
   }
-  if (best) taken.push_back(best->id);
+  if (best) keys_taken.push_back(best->key);
   return best;
 }
 
 long ChangeLedger::undone_by(const FoundChange& found) const {
   for (auto k = known_.rbegin(); k != known_.rend(); ++k)
-    if (k->state == ChangeState::standing && k->found.since_to < found.since_from && undoes(k->found, found))
+    if (k->id > 0 && k->state == ChangeState::standing && k->found.since_to < found.since_from &&
+        undoes(k->found, found))
       return k->id;
   return 0;
 }
@@ -104,9 +105,12 @@ bool ChangeLedger::confirm(KnownChange& known) {
   if (known.state != ChangeState::suspected) return false;
   known.state = known.found.until ? ChangeState::ended : ChangeState::standing;
   known.ends = undone_by(known.found);
-  if (known.ends == 0) return true;
+  if (known.ends == 0) {
+    known.id = ++last_id_;
+    return true;
+  }
   for (KnownChange& k : known_)
-    if (k.id == known.ends) {
+    if (k.id > 0 && k.id == known.ends) {
       k.state = ChangeState::ended;
       k.found.until = known.found.since;
     }
@@ -115,12 +119,12 @@ bool ChangeLedger::confirm(KnownChange& known) {
 }
 
 std::vector<long> ChangeLedger::take(const ChangeLook& look) {
-  std::vector<long> taken, news;
+  std::vector<long> keys_taken, news;
   for (const FoundChange& found : look.changes) {
-    KnownChange* known = match(found, taken);
+    KnownChange* known = match(found, keys_taken);
     if (!known) {
-      known_.push_back({++last_id_, ChangeState::suspected, found, look.to, 0, 0});
-      taken.push_back(last_id_);
+      known_.push_back({0, ChangeState::suspected, found, look.to, 0, ++last_key_, 0});
+      keys_taken.push_back(last_key_);
       continue;
     }
     known->seen = look.to;
@@ -136,17 +140,19 @@ std::vector<long> ChangeLedger::take(const ChangeLook& look) {
       if (ends && known->state == ChangeState::standing) known->state = ChangeState::ended;
     }
   }
-  miss(look, taken, news);
+  miss(look, keys_taken, news);
   note_difference(look);
   return news;
 }
 
 /// Changes that this look should have found and did not.
-void ChangeLedger::miss(const ChangeLook& look, const std::vector<long>& taken, std::vector<long>& news) {
+void ChangeLedger::miss(const ChangeLook& look, const std::vector<long>& keys_taken,
+                        std::vector<long>& news) {
   for (KnownChange& k : known_) {
     const bool inside = k.found.since_from > look.from + kEdge && k.found.since_to < look.to - kEdge;
     const bool open = k.state == ChangeState::suspected || k.state == ChangeState::standing;
-    if (!open || !inside || std::find(taken.begin(), taken.end(), k.id) != taken.end()) continue;
+    if (!open || !inside || std::find(keys_taken.begin(), keys_taken.end(), k.key) != keys_taken.end())
+      continue;
     if (k.state == ChangeState::standing && ++k.missed < kMostMissed) continue;
     if (k.state == ChangeState::standing) news.push_back(k.id);
     k.state = ChangeState::withdrawn;
@@ -181,6 +187,7 @@ void ChangeLedger::restart() {
 void ChangeLedger::restore(const std::vector<KnownChange>& told) {
   for (const KnownChange& k : told) {
     known_.push_back(k);
+    known_.back().key = ++last_key_;
     last_id_ = std::max(last_id_, k.id);
   }
 }

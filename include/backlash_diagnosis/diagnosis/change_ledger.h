@@ -54,13 +54,14 @@ const char* to_string(ChangeState state);
 std::optional<ChangeState> change_state_from(const std::string& name);
 
 struct KnownChange {
-  long id = 0;  // counted from 1
+  long id = 0;  // counted from 1 in the order in which they are told; 0: not told
   ChangeState state = ChangeState::suspected;
   FoundChange found;  // the sharpest so far
   double seen = 0;    // s, end of the last stretch in which it was found
   int missed = 0;     // looks in a row that should have found it
+  long key = 0;       // of the ledger
   long ends = 0;      // the change that this one undoes, by id; 0: none. Not told by itself
-  bool told() const { return state != ChangeState::suspected && ends == 0; }
+  bool told() const { return id > 0; }
 };
 
 class ChangeLedger {
@@ -86,16 +87,16 @@ class ChangeLedger {
   static constexpr int kLooksOfDifference = 3;
 
  private:
-  KnownChange* match(const FoundChange& found, std::vector<long>& taken);
+  KnownChange* match(const FoundChange& found, std::vector<long>& keys_taken);
   long undone_by(const FoundChange& found) const;
   bool confirm(KnownChange& known);
-  void miss(const ChangeLook& look, const std::vector<long>& taken, std::vector<long>& news);
+  void miss(const ChangeLook& look, const std::vector<long>& keys_taken, std::vector<long>& news);
   void note_difference(const ChangeLook& look);
 
   std::vector<KnownChange> known_;
   std::vector<std::string> different_;
   int different_looks_ = 0;
-  long last_id_ = 0;
+  long last_id_ = 0, last_key_ = 0;
 };
 
 /// 1/h for one look at `window` seconds each `interval` seconds, of one of `joints` joints, so that all looks
