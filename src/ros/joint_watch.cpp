@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/scratch_folder.h"
@@ -111,45 +112,39 @@ std::optional<JointWatch::Task> JointWatch::begin_look() {
   return task;
 }
 
-/// What the command finds; nothing where it cannot tell.
-std::optional<diagnosis::ChangeLook> JointWatch::run(const Task& task, const Progress& go_on) {
-  try {
-    const ScratchFolder scratch;
-    const std::string record = scratch.path(task.healthy.empty() ? "healthy.csv" : "newest.csv");
-    record::write_csv(task.record, record);
-    Job job;
-    job.words = {command_path("detect_changes"), "--rig", file_of(settings_.joint.rig, scratch), "--healthy"};
-    const std::vector<std::string> learning = {record};
-    const auto& healthy = task.healthy.empty() ? learning : task.healthy;
-    job.words.insert(job.words.end(), healthy.begin(), healthy.end());
-    const std::string json = scratch.path("changes.json");
-    job.words.insert(job.words.end(),
-                     {"--false-alarms-per-hour", to_text(settings_.rate), "--json", json, record});
-    job.done = {kNone, kSome};
-    job.memory = settings_.job_memory;
-    job.progress = go_on;
-    run_job(job);
-    diagnosis::ChangeLook look = report::read_changes(json, task.origin);
-    look.from = task.origin;
-    look.to = task.origin + task.record.time.back();
-    return look;
-  } catch (const Cancelled&) {
-    throw;
-  } catch (const Error& error) {
-    cannot_tell(error.what());
-    return std::nullopt;
-  }
+diagnosis::ChangeLook JointWatch::found(const Task& task, const Progress& go_on) const {
+  const ScratchFolder scratch;
+  const std::string record = scratch.path("newest.csv"), json = scratch.path("changes.json");
+  record::write_csv(task.record, record);
+  Job job;
+  job.words = {command_path("detect_changes"), "--rig", file_of(settings_.joint.rig, scratch), "--healthy"};
+  job.words.insert(job.words.end(), task.healthy.begin(), task.healthy.end());
+  job.words.insert(job.words.end(),
+                   {"--false-alarms-per-hour", to_text(settings_.rate), "--json", json, record});
+  job.done = {kNone, kSome};
+  job.memory = settings_.job_memory;
+  job.progress = go_on;
+  run_job(job);
+  diagnosis::ChangeLook look = report::read_changes(json, task.origin);
+  look.from = task.origin;
+  look.to = task.origin + task.record.time.back();
+  return look;
 }
 
 std::vector<diagnosis::KnownChange> JointWatch::look(const Progress& go_on) {
   const std::optional<Task> task = begin_look();
   if (!task) return {};
   std::vector<diagnosis::KnownChange> news;
-  const auto found = run(*task, go_on);
-  if (found && task->healthy.empty())
-    learn(*task, *found);
-  else if (found)
-    news = judge(*task, *found);
+  try {
+    if (task->healthy.empty())
+      learn(*task, go_on);
+    else
+      news = judge(*task, found(*task, go_on));
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    cannot_tell(error.what());
+  }
   const std::lock_guard<std::mutex> lock(mutex_);
   ++state_.looks;
   looking_ = false;
@@ -161,19 +156,23 @@ void JointWatch::cannot_tell(const std::string& why) {
   state_.why_not = why;
 }
 
-/// Takes the record for the healthy machine, unless something changes in it.
-void JointWatch::learn(const Task& task, const diagnosis::ChangeLook& look) {
-  if (!look.changes.empty()) {
+/// Takes the record for the healthy machine, unless something changes in it: either half of it, taken for
+/// healthy, must find nothing in the whole. The whole by itself would take a change for a scatter of its
+/// values.
+void JointWatch::learn(const Task& task, const Progress& go_on) {
+  const double middle = task.record.time.back() / 2;
+  for (const auto& [from, to] : {std::pair(0.0, middle), std::pair(middle, 2 * middle)}) {
+    const ScratchFolder scratch;
+    Task half = task;
+    half.healthy = {scratch.path("half_of_what_is_learned.csv")};
+    record::write_csv(task.record.slice(from, to), half.healthy.front());
+    const diagnosis::ChangeLook look = found(half, go_on);
+    if (look.changes.empty()) continue;
     cannot_tell("the samples to learn the healthy machine from change within themselves: " +
                 report::change_text(look.changes.front()));
     return;
   }
-  try {
-    record::write_csv(task.record, settings_.learned);
-  } catch (const Error& error) {
-    cannot_tell(error.what());
-    return;
-  }
+  record::write_csv(task.record, settings_.learned);
   const std::lock_guard<std::mutex> lock(mutex_);
   healthy_ = {settings_.learned};
   ring_.set_window(look_length());

@@ -76,8 +76,9 @@ class JointWatch {
 
   double look_length() const { return healthy_.empty() ? settings_.learn : settings_.window; }
   std::optional<Task> begin_look();
-  std::optional<diagnosis::ChangeLook> run(const Task& task, const Progress& go_on);
-  void learn(const Task& task, const diagnosis::ChangeLook& look);
+  /// What the command finds in a task's record. Throws what it could not do.
+  diagnosis::ChangeLook found(const Task& task, const Progress& go_on) const;
+  void learn(const Task& task, const Progress& go_on);
   std::vector<diagnosis::KnownChange> judge(const Task& task, const diagnosis::ChangeLook& look);
   void cannot_tell(const std::string& why);
 
