@@ -57,8 +57,9 @@ parameters (private)
   joints    list of joint names; default: the joint of the rig file, or all of rig_folder
   channels/CHANNEL/...   topic, name, field, scale, offset: where the robot publishes that channel, as
             `channels` of the rig file, and instead of them
-  healthy   list of records (.csv, .bag, .mcap) of the healthy machine; default: the record of an earlier
-            start in folder, else the machine is learned from what it does first
+  healthy   list (in a launch file: <rosparam>) of records (.csv, .bag, .mcap) of the healthy machine;
+            default: the record of an earlier start in folder, else the machine is learned from what it
+            does first
   learn     s of samples that the healthy machine is learned from; default 600, at least 60. They should
             hold all of its tasks, and the way from cold to warm
   false_alarms   how often healthy joints may be called changed, all joints together; default

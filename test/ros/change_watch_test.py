@@ -3,6 +3,7 @@
 """simulated_robot.launch with changes:=true: the healthy robot is learned from its own topics, then one joint changes."""
 import os
 import shutil
+import subprocess
 import threading
 import time
 import unittest
@@ -57,6 +58,8 @@ def rig_text(added):
 
 
 class ChangeWatchTest(unittest.TestCase):
+    wrong = 0  # nodes with wrong parameters so far: each has a name, and parameters, of its own
+
     @classmethod
     def setUpClass(cls):
         cls.statuses = Statuses()
@@ -128,6 +131,26 @@ class ChangeWatchTest(unittest.TestCase):
             answer = self.set_rig(text)
             self.assertFalse(answer.success)
             self.assertIn(reason, answer.message)
+
+    def test_6_wrong_parameters_end_the_node_with_their_name(self):
+        rig = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), "config", "ur5_joint.yaml")
+        for words, code, shown in (([], 64, ("~rig", "must be given")),
+                                   (["_rig:=" + rig, "_windw:=100"], 64, ("~windw",)),
+                                   (["_rig:=" + rig, "_window:=5"], 64, ("~window", "5")),
+                                   (["_rig:=" + rig, "_false_alarms:='1 per moon'"], 64, ("~false_alarms", "1 per moon")),
+                                   (["_rig:=" + rig, "_history:=/nowhere"], 64, ("~history", "/nowhere")),
+                                   (["_rig:=" + rig, "_healthy:=monday.csv"], 64, ("~healthy", "list")),
+                                   (["_rig:=" + rig], 66, ("/nowhere/monday.csv",)),
+                                   (["_rig:=/nowhere/rig.yaml"], 66, ("/nowhere/rig.yaml",))):
+            name = "wrong_%d" % self.wrong
+            ChangeWatchTest.wrong += 1
+            if code == 66:  # a list comes from a launch file
+                rospy.set_param("/%s/healthy" % name, ["/nowhere/monday.csv"])
+            done = subprocess.run(["rosrun", PACKAGE, "change_watch", "__name:=" + name] + words, timeout=TIMEOUT,
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+            self.assertEqual(done.returncode, code, done.stdout)
+            for text in shown:
+                self.assertIn(text, done.stdout)
 
 
 if __name__ == "__main__":
