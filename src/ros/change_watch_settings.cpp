@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Parameters of the node `change_watch`.
-#include <cstdlib>
-#include <filesystem>
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file_folder.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/ros/change_watch_node.h"
+#include "backlash_diagnosis/ros/node_folders.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -15,19 +14,6 @@ namespace {
 constexpr std::pair<const char*, double> kHours[] = {
     {"hour", 1}, {"day", 24}, {"week", 168}, {"month", 720}, {"year", 8760}};
 constexpr double kShortest = 60;  // s, of a window or of what is learned from: twice what can be judged
-
-std::string default_folder() {
-  if (const char* ros_home = std::getenv("ROS_HOME")) return std::string(ros_home) + "/backlash_diagnosis";
-  const char* home = std::getenv("HOME");
-  return std::string(home ? home : ".") + "/.ros/backlash_diagnosis";
-}
-
-std::string history_folder(Parameters& parameters) {
-  const std::string folder = parameters.text("history", "");
-  if (!folder.empty() && !std::filesystem::is_directory(folder))
-    throw InvalidParameter("~history", folder, "must be a folder that exists");
-  return folder;
-}
 
 }  // namespace
 
@@ -98,7 +84,7 @@ ChangeWatchSettings load_change_watch_settings(const ros::NodeHandle& private_ha
   common.healthy = parameters.texts("healthy", {});
   const double rate = false_alarm_rate(parameters.text("false_alarms", "1 per month"));
   const FileFolder folder("~folder", parameters.text("folder", default_folder()));
-  const std::string history = history_folder(parameters);
+  const std::string history = read_history_folder(parameters);
   settings.queue = static_cast<int>(parameters.integer("queue", settings.queue, 1, 10'000'000));
   settings.stale = parameters.number("stale", settings.stale, Range::positive());
   parameters.allow("diagnostic_period");  // of diagnostic_updater
