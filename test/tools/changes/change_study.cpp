@@ -29,6 +29,7 @@ struct Options {
   int onsets = 0;
   unsigned long seed = 1;
   double sampling = 50;  // Hz
+  double wander = 0.02;  // - of friction, up and down in ten minutes
 };
 
 double uniform(Random& random, double low, double high) {
@@ -42,17 +43,18 @@ struct Added {
 };
 
 struct Joint {
-  double inertia, viscous, coulomb, gravity, warm, cooling, noise;
-  explicit Joint(Random& random)
+  double inertia, viscous, coulomb, gravity, warm, cooling, noise, wander;
+  Joint(Random& random, double wandering)
       : inertia(uniform(random, 0.3, 0.6)),
         viscous(uniform(random, 0.6, 1.5)),
         coulomb(uniform(random, 0.5, 1)),
         gravity(uniform(random, 1, 4)),
         warm(uniform(random, 0, 0.35)),
         cooling(uniform(random, 60, 150)),
-        noise(uniform(random, 0.02, 0.06)) {}
+        noise(uniform(random, 0.02, 0.06)),
+        wander(wandering) {}
 
-  /// `cold`: whether it begins so. Friction wanders by 2 % up and down in ten minutes.
+  /// `cold`: whether it begins so. Friction wanders up and down in ten minutes.
   record::Record record(Random& random, double duration, double rate, bool cold, bool rests,
                         const Added& added = {}) const {
     std::normal_distribution<double> white(0, noise);
@@ -71,7 +73,7 @@ struct Joint {
         acceleration -= a[i] * o * o * std::sin(o * t + p);
       }
       const double temperature = 1 + (cold ? warm * std::exp(-stamp / cooling) : 0) +
-                                 0.02 * std::sin(2 * M_PI * stamp / 600 + phase);
+                                 wander * std::sin(2 * M_PI * stamp / 600 + phase);
       const double sign = w < 0 ? -1 : 1;
       double extra = 0;
       if (t >= added.since)
@@ -133,7 +135,7 @@ void healthy(const Options& options) {
   double seconds = 0;
   const double rate = diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1);
   while (seconds < 3600 * options.hours) {
-    const Joint joint(random);
+    const Joint joint(random, options.wander);
     const std::vector<record::Record> learned = {joint.record(random, kLearn, options.sampling, true, false)};
     const record::Record stream = joint.record(random, kStream, options.sampling, false, true);
     diagnosis::ChangeLedger ledger;
@@ -151,7 +153,14 @@ void healthy(const Options& options) {
       }
     }
     seconds += stream.time.back();
-    told += static_cast<long>(ledger.told().size());
+    for (const diagnosis::KnownChange& c : ledger.told()) {
+      ++told;
+      const double size = c.found.size.empty() ? 0 : c.found.size.front().value;
+      fmt::print(
+          "told: {} {:.3g}, gain {:.3g}, of a joint with {:.2g} N m dry and {:.2g} N m s/rad viscous "
+          "friction\n",
+          c.found.effect, size, c.found.gain, joint.coulomb, joint.viscous);
+    }
   }
   fmt::print(
       "healthy: {:.1f} h, {} looks, {} cannot tell; {:.3g} false alarms allowed; looks that found one {}, "
@@ -166,7 +175,7 @@ void onsets(const Options& options) {
   int found_any = 0, named = 0, onset = 0, size = 0, others = 0;
   double width = 0;
   for (int i = 0; i < options.onsets; ++i) {
-    const Joint joint(random);
+    const Joint joint(random, options.wander);
     const std::string effect = effects[i % 4];
     const double of = effect == "motor_coulomb"   ? joint.coulomb
                       : effect == "motor_viscous" ? joint.viscous
@@ -210,6 +219,7 @@ int main(int argc, char** argv) {
   add("false-alarms-per-hour", po::value(&options.rate), "that are allowed; default 1/720");
   add("onsets", po::value(&options.onsets), "joints that change once");
   add("rate", po::value(&options.sampling), "of the samples [Hz]; default 50");
+  add("wander", po::value(&options.wander), "of friction, share up and down in ten minutes; default 0.02");
   add("seed", po::value(&options.seed), "default 1");
   try {
     po::variables_map given;
