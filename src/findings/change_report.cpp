@@ -65,6 +65,7 @@ std::string change_json(const identification::Changes& found, const ChangeInputs
       {"threshold", report::json_number(found.threshold)},
       {"healthy_residual", report::json_number(found.noise)},
       {"healthy_terms", found.healthy_terms},
+      {"different_from_beginning", found.different},
       {"warnings", found.warnings},
   };
   return report::dumped(json, 2);

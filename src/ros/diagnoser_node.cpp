@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/ros/curve_job.h"
+#include "backlash_diagnosis/ros/joint_rigs.h"
 #include "backlash_diagnosis/ros/messages.h"
 #include "backlash_diagnosis/ros/parameters.h"
 
@@ -21,17 +22,8 @@ constexpr int kTick = 100;  // ms: a change of level is published so soon
 constexpr int kTicks = 10;  // from one report on /diagnostics to the next without a change
 std::vector<record::ChannelMap> channels_of(const std::vector<MonitorSettings>& joints) {
   std::vector<record::ChannelMap> maps;
-  for (const MonitorSettings& joint : joints) {
-    maps.push_back(joint.rig.channels.declared ? joint.rig.channels : record::usual_channels(joint.joint));
-    maps.back().joint = joint.joint;
-  }
+  for (const MonitorSettings& joint : joints) maps.push_back(JointRig{joint.joint, joint.rig}.channels());
   return maps;
-}
-
-/// A joint's name may have parts, a file's name may not.
-std::string history_path(const std::string& folder, std::string joint) {
-  std::replace(joint.begin(), joint.end(), '/', '_');
-  return folder + "/" + joint + ".csv";
 }
 
 void require(bool condition, const std::string& name, double value, const std::string& limit) {
@@ -72,7 +64,7 @@ void DiagnoserNode::add_joint(MonitorSettings settings, const DiagnoserSettings&
   const auto& limits = settings.rig.diagnosis.limits;
   if (!common.history.empty())
     joint.history = std::make_unique<JointHistory>(
-        JointHistory::Settings{history_path(common.history, settings.joint), common.history_interval,
+        JointHistory::Settings{joint_path(common.history, settings.joint, ".csv"), common.history_interval,
                                limits ? limits->angular : mesh.angular(), settings.rig.digest});
   settings.job_memory = common.job_memory;
   joint.monitor = std::make_unique<JointMonitor>(

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "backlash_diagnosis/report/change_file.h"
+
 namespace backlash::ros_bridge {
 namespace {
 
@@ -138,6 +140,44 @@ backlash_diagnosis::MonitoringCurve to_message(const diagnosis::MonitoringCurve&
     p.monotonic = point.monotonic;
     m.points.push_back(p);
   }
+  return m;
+}
+
+ros::Time to_stamp(double time) {
+  constexpr double kEnd = 4294967295.0;  // s, the last that fits
+  return time > 0 && time < kEnd ? ros::Time(time) : ros::Time();
+}
+
+backlash_diagnosis::Change to_message(const diagnosis::KnownChange& change, const std::string& joint) {
+  constexpr double k95 = 1.959964;  // standard errors of a 95 % interval
+  using Message = backlash_diagnosis::Change;
+  const diagnosis::FoundChange& found = change.found;
+  Message m;
+  m.joint = joint;
+  m.id = static_cast<std::uint32_t>(change.id);
+  m.state = change.state == diagnosis::ChangeState::standing ? Message::STANDING
+            : change.state == diagnosis::ChangeState::ended  ? Message::ENDED
+                                                             : Message::WITHDRAWN;
+  m.state_name = diagnosis::to_string(change.state);
+  m.effect = found.effect;
+  m.equivalent_to = found.equivalent_to;
+  for (const diagnosis::FoundSize& s : found.size) {
+    backlash_diagnosis::ChangeSize size;
+    size.name = s.name;
+    size.unit = s.unit;
+    size.value = s.value;
+    size.lower = s.value - k95 * s.standard_error;
+    size.upper = s.value + k95 * s.standard_error;
+    m.size.push_back(size);
+  }
+  m.since = to_stamp(found.since);
+  m.since_from = to_stamp(found.since_from);
+  m.since_to = to_stamp(found.since_to);
+  if (found.until) m.until = to_stamp(*found.until);
+  m.gain = found.gain;
+  m.error_before = found.error_before;
+  m.error_after = found.error_after;
+  m.text = report::change_text(found);
   return m;
 }
 

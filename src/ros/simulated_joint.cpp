@@ -58,6 +58,7 @@ SimulatedJoint::SimulatedJoint(const JointSettings& settings, const ros::NodeHan
     torque_command_ = handle_.subscribe("torque_command", 100, &SimulatedJoint::set_torque, this);
   ros::NodeHandle services(private_handle);
   set_backlash_ = services.advertiseService("set_backlash", &SimulatedJoint::set_backlash, this);
+  set_rig_ = services.advertiseService("set_rig", &SimulatedJoint::set_rig, this);
   live_ = std::make_unique<LiveServer<Live>>(services, live(), [this](const Live& wanted) { apply(wanted); });
 }
 
@@ -110,6 +111,24 @@ bool SimulatedJoint::set_backlash(backlash_diagnosis::SetBacklash::Request& requ
     response.success = false;
     response.message = error.what();
     ROS_WARN_STREAM(name_ << ": set_backlash refused: " << response.message);
+  }
+  return true;
+}
+
+bool SimulatedJoint::set_rig(backlash_diagnosis::SetRig::Request& request,
+                             backlash_diagnosis::SetRig::Response& response) {
+  try {
+    const rig_file::RigFile file = rig_file::rig_file_from_text(request.rig, "set_rig");
+    simulation_.plant().set_machine(file.rig);
+    publish_true_backlash();
+    live_->update(live());
+    response.success = true;
+    response.message = "the machine is " + file.rig.name + " of digest " + file.digest;
+    ROS_INFO_STREAM(name_ << ": " << response.message);
+  } catch (const Error& error) {
+    response.success = false;
+    response.message = error.what();
+    ROS_WARN_STREAM(name_ << ": set_rig refused: " << response.message);
   }
   return true;
 }

@@ -45,6 +45,7 @@ Subscribes
 
 Services
   ~set_backlash         backlash_diagnosis/SetBacklash; acts from the last sample on
+  ~set_rig              backlash_diagnosis/SetRig; gear train and terms of another rig file from the last sample on
   ~reset                std_srvs/Trigger; at rest in the middle of the gap, backlash as at start; stamps go on
   ~live, ~JOINT/live    dynamic_reconfigure: backlash, noise of each sensor; what is wrong is refused
 

@@ -40,13 +40,15 @@ Plant::Plant(const model::Rig& rig, const ExcitationSettings& excitation, const 
                   state_tolerances(gear_train_.dof(), solver), solver,
                   [this](double t, const double* state, double* values) { events(t, state, values); },
                   event_count(gear_train_)),
-      initial_backlash_(rig.mesh.backlash) {
+      initial_(rig) {
   reset();
 }
 
 void Plant::reset() {
   excitation_ = excitation_settings_.create();
-  gear_train_.set_backlash(initial_backlash_);
+  if (other_) gear_train_ = gear_train_of(initial_, excitation_settings_);
+  other_ = false;
+  gear_train_.set_backlash(initial_.mesh.backlash);
   state_.fill(0);
   time_ = 0;
   segment_ = 0;
@@ -147,6 +149,21 @@ void Plant::advance_to(double t) {
 
 void Plant::set_backlash(double backlash) {
   gear_train_.set_backlash(backlash);
+  begin();
+}
+
+void Plant::set_machine(const model::Rig& rig) {
+  model::GearTrain train = gear_train_of(rig, excitation_settings_);
+  const auto require = [](bool same, const std::string& what) {
+    if (!same) throw InvalidParameter("rig", what, "must be as in the machine that is simulated");
+  };
+  require(train.dof() == gear_train_.dof(), std::to_string(train.dof()) + " degrees of freedom");
+  require(train.ratio() == gear_train_.ratio(), "the reduction ratio");
+  require(train.needs_touches() == gear_train_.needs_touches(), "the kind of contact law");
+  require(event_count(train) == event_count(gear_train_), "where there is dry friction");
+  gear_train_ = std::move(train);
+  other_ = true;
+  gear_train_.begin_friction(time_, state_.data(), applied_torque());
   begin();
 }
 

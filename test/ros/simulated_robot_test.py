@@ -37,7 +37,7 @@ class SimulatedRobotTest(unittest.TestCase):
 
     def test_1_topics_are_those_of_the_robot(self):
         states = rospy.wait_for_message("/joint_states", JointState, TIMEOUT)
-        self.assertEqual((sorted(states.name), states.velocity), (["elbow_joint", "shoulder_joint"], ()))
+        self.assertEqual((sorted(states.name), states.velocity), (["elbow_joint", "shoulder_joint", "wrist_joint"], ()))
         self.assertEqual(rospy.wait_for_message("/link_states", JointState, TIMEOUT).name, ["shoulder_link"])
 
     def test_2_ordinary_motion_tells_both_joints(self):

@@ -49,7 +49,7 @@ class SimulatorJointsTest(unittest.TestCase):
         for parameters, words in (({"rig_folder": "/nowhere"}, ("~rig_folder", "/nowhere")),
                                   ({"rig_folder": robot, "rig": shoulder}, ("~rig_folder", "beside ~rig")),
                                   ({"rig_folder": robot, "joint": "elbow"}, ("~joint", "~rig_folder")),
-                                  ({"rig_folder": robot, "joints": ["wrist"]}, ("wrist", "no rig file in ~rig_folder")),
+                                  ({"rig_folder": robot, "joints": ["ankle"]}, ("ankle", "no rig file in ~rig_folder")),
                                   ({"rig": shoulder, "joints": ["shoulder", "knee"]}, ("knee", "of joint shoulder"))):
             with Simulator(parameters) as simulator:
                 code, output = simulator.wait()

@@ -153,6 +153,29 @@ TEST(Plant, BacklashMayChangeWhileTheTeethAreInContact) {
   EXPECT_NEAR(plant.state()[0] - settled[0], -3 * step, 1e-9);
 }
 
+TEST(Plant, AnotherMachineGoesOnInTheSameMotion) {
+  model::Rig rig;
+  rig.mesh.rigid = true;
+  rig.input_coupling.rigid = rig.output_coupling.rigid = true;
+  rig.motor.inertia = 2;
+  Plant plant(rig, test::constant(4), test::solver(1e-8));
+  const double inertia = plant.gear_train().motor_inertia();
+  plant.advance_to(1);
+  const double speed = plant.state()[1];
+  EXPECT_NEAR(speed, 4 / inertia, 1e-6);  // w = T t / J
+  rig.motor.inertia += inertia;           // twice as much in all
+  plant.set_machine(rig);
+  EXPECT_EQ(plant.state()[1], speed);
+  plant.advance_to(2);
+  EXPECT_NEAR(plant.state()[1] - speed, 2 / inertia, 1e-6);
+  EXPECT_THROW(plant.set_machine(test::sarkar_rig(30e-6)), InvalidParameter);
+  rig.motor.coulomb_friction = 1;  // friction begins where there was none
+  EXPECT_THROW(plant.set_machine(rig), InvalidParameter);
+  plant.reset();
+  plant.advance_to(1);
+  EXPECT_NEAR(plant.state()[1], speed, 1e-9);
+}
+
 TEST(Plant, RefusedChangesLeaveItAlone) {
   Plant plant = make_plant(30e-6), undisturbed = make_plant(30e-6);
   plant.advance_to(0.02);

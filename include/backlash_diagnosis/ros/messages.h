@@ -5,9 +5,11 @@
 
 #include <backlash_diagnosis/AmplitudeDistribution.h>
 #include <backlash_diagnosis/BacklashEstimate.h>
+#include <backlash_diagnosis/Change.h>
 #include <backlash_diagnosis/MonitoringCurve.h>
 #include <backlash_diagnosis/Verdict.h>
 
+#include "backlash_diagnosis/diagnosis/change_ledger.h"
 #include "backlash_diagnosis/diagnosis/diagnose.h"
 
 namespace backlash::ros_bridge {
@@ -26,5 +28,9 @@ backlash_diagnosis::BacklashEstimate to_message(const diagnosis::Estimate& estim
 backlash_diagnosis::Verdict to_message(const diagnosis::Verdict& verdict,
                                        const std::vector<diagnosis::Estimate>& estimates);
 backlash_diagnosis::MonitoringCurve to_message(const diagnosis::MonitoringCurve& curve);
+backlash_diagnosis::Change to_message(const diagnosis::KnownChange& change, const std::string& joint);
+
+/// Seconds since 1970 as a stamp; 0 for those that ROS cannot hold.
+ros::Time to_stamp(double time);
 
 }  // namespace backlash::ros_bridge

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/SetBacklash.h"
+#include "backlash_diagnosis/SetRig.h"
 #include "backlash_diagnosis/SimulatedJointLiveConfig.h"
 #include "backlash_diagnosis/ros/joint_state.h"
 #include "backlash_diagnosis/ros/live_server.h"
@@ -25,8 +26,8 @@ namespace backlash::ros_bridge {
 
 class SimulatedJoint {
  public:
-  /// Topics rig_description, true_backlash and torque_command are relative to `handle`, the service
-  /// set_backlash and the live parameters to `private_handle`.
+  /// Topics rig_description, true_backlash and torque_command are relative to `handle`, the services
+  /// set_backlash and set_rig and the live parameters to `private_handle`.
   SimulatedJoint(const JointSettings& settings, const ros::NodeHandle& handle,
                  const ros::NodeHandle& private_handle);
   SimulatedJoint(const SimulatedJoint&) = delete;  // callbacks refer to this object
@@ -51,6 +52,7 @@ class SimulatedJoint {
   void apply(const Live& wanted);
   bool set_backlash(backlash_diagnosis::SetBacklash::Request& request,
                     backlash_diagnosis::SetBacklash::Response& response);
+  bool set_rig(backlash_diagnosis::SetRig::Request& request, backlash_diagnosis::SetRig::Response& response);
   void set_torque(const std_msgs::Float64& message);
 
   std::string name_;
@@ -64,7 +66,7 @@ class SimulatedJoint {
   ros::NodeHandle handle_;
   ros::Publisher rig_description_, true_backlash_;
   ros::Subscriber torque_command_;
-  ros::ServiceServer set_backlash_;
+  ros::ServiceServer set_backlash_, set_rig_;
   std::unique_ptr<LiveServer<Live>> live_;
 };
 

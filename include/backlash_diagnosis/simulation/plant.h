@@ -22,7 +22,7 @@ class Plant {
   Plant(const Plant&) = delete;  // the integrator refers to this object
   Plant& operator=(const Plant&) = delete;
 
-  /// Back to time 0 at rest in the middle of the gap, no external torque.
+  /// Back to time 0 at rest in the middle of the gap, no external torque, the machine as at the start.
   void reset();
 
   /// Integrates up to t [s], t >= time(). Stops and starts again at every switch of the excitation on the
@@ -37,6 +37,10 @@ class Plant {
   void set_backlash(double backlash);  // m (angular mesh: rad), total free play
   bool set_torque(double torque);      // N m; false unless the excitation is `topic`
   void set_state(const State& state);
+  /// Another machine in the same motion: as if it had broken, worn or been loaded at this moment. Throws
+  /// InvalidParameter, and changes nothing, for one with other degrees of freedom, dry friction at other
+  /// places, another ratio or another kind of contact.
+  void set_machine(const model::Rig& rig);
 
   double time() const { return time_; }
   const State& state() const { return state_; }
@@ -64,7 +68,8 @@ class Plant {
   State state_{};
   double time_ = 0;
   long segment_ = 0;
-  double initial_backlash_;
+  const model::Rig initial_;  // what reset() goes back to
+  bool other_ = false;        // set_machine() was called since
 };
 
 }  // namespace backlash::simulation

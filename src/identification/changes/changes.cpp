@@ -437,6 +437,7 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
           joined(nearest) + "): commission with more motion of this kind");
     }
   }
+  out.different = search.different();
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
                            ": that is no change within it");

@@ -48,6 +48,25 @@ EvenSamples even_samples(const record::Record& record, double interval, const Ch
   return out;
 }
 
+double median_of_three(double a, double b, double c) {
+  return std::max(std::min(a, b), std::min(std::max(a, b), c));
+}
+
+/// Takes out single values that stick out of both neighbours as noise never does: one wrong reading would
+/// outweigh an hour of right ones. What is taken out is not there.
+void take_out_spikes(std::vector<double>& values, std::vector<char>& there, const ChangeSettings& settings) {
+  const std::vector<double> raw = values;
+  const auto middle = [&](std::size_t k) { return median_of_three(raw[k - 1], raw[k], raw[k + 1]); };
+  double sum = 0;
+  for (std::size_t k = 1; k + 1 < raw.size(); ++k) sum += std::fabs(raw[k] - middle(k));
+  const double limit = settings.spike * sum / double(std::max<std::size_t>(raw.size(), 1));
+  for (std::size_t k = 1; k + 1 < raw.size(); ++k)
+    if (std::fabs(raw[k] - middle(k)) > limit) {
+      values[k] = middle(k);
+      there[k] = 0;
+    }
+}
+
 /// Samples that are there and move, and have such about them for `guard`.
 std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& there, std::size_t guard,
                          const ChangeSettings& settings) {
@@ -57,8 +76,11 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
   for (std::size_t k = 0; k < n; ++k) {
     const double speed = std::fabs(motion.moments[k].speed);
     if (there[k] && speed > slow && (fast == 0 || speed < fast)) continue;
-    const std::size_t last = std::min(n, k + guard + 1);
-    for (std::size_t i = k > guard ? k - guard : 0; i < last; ++i) good[i] = 0;
+    // Filters ring for long after a jump of the position, which no motion is.
+    const bool jump = fast > 0 && speed > settings.jump * fast;
+    const std::size_t reach = jump ? settings.jump_guard * guard : guard;
+    const std::size_t last = std::min(n, k + reach + 1);
+    for (std::size_t i = k > reach ? k - reach : 0; i < last; ++i) good[i] = 0;
   }
   return good;
 }
@@ -82,7 +104,9 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
                              const ChangeSettings& settings) {
   check_stamps(record, settings);
   const double dt = sampling.interval;
-  const EvenSamples even = even_samples(record, dt, settings);
+  EvenSamples even = even_samples(record, dt, settings);
+  take_out_spikes(even.torque, even.there, settings);
+  take_out_spikes(even.position, even.there, settings);
   const std::vector<double> position = signal::low_pass(even.position, dt, sampling.position_cutoff);
   const std::vector<double> speed = signal::derivative(position, dt);
   const std::vector<double> acceleration = signal::derivative(speed, dt);

@@ -2,6 +2,8 @@
 // What the search for changes of a machine rests on, and where each number comes from.
 #pragma once
 
+#include <cstddef>
+
 namespace backlash::identification {
 
 struct ChangeSettings {
@@ -17,9 +19,13 @@ struct ChangeSettings {
   double friction_speed = 0.02;         // - of the rms speed, over which dry friction turns. Choice
   double guard = 1.06;                  // / cutoff, about a reversal. Simulation: bristles and filter settle
   double fast = 1.2;                    // - of the fastest healthy speed: no extrapolation. Choice
-  double gap = 2.5;                     // intervals between samples that are none. Choice
-  double longest_gap = 600;             // s. Choice: the machine has another temperature then
-  double shortest = 30;                 // s, of usable motion in a record. Choice
+  double spike =
+      30;  // mean differences from the median of three: no noise. Choice: 11 is the most of a million
+  double jump = 3;             // of the fastest speed that is extrapolated to: no motion. Choice
+  std::size_t jump_guard = 6;  // guards about it. Theory: filters have rung out to 1e-10 of it
+  double gap = 2.5;            // intervals between samples that are none. Choice
+  double longest_gap = 600;    // s. Choice: the machine has another temperature then
+  double shortest = 30;        // s, of usable motion in a record. Choice
 
   // The healthy machine
   double least_share = 0.03;  // - of the squares of the residual that a further column explains. Choice

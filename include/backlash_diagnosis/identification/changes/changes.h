@@ -40,6 +40,7 @@ struct Changes {
   double threshold = 0;                    // of the gain, for an effect with one value
   double noise = 0;                        // N m, rms of the residual of the healthy records
   std::vector<std::string> healthy_terms;  // what the healthy machine shows beside friction and gravity
+  std::vector<std::string> different;      // effects that the record has from its beginning: no change in it
   std::vector<std::string> warnings;
 };
 

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What has changed of a joint, told once: looks at overlapping stretches of its record find the same change
+// again and again, sharper or less sharp, and no look sees one that began before its stretch. Knows stretches
+// and what was found in them, not how.
+//
+// How often a healthy joint is called changed. A look at `length` seconds may find something by chance with
+// rate * length; looks each `interval` seconds therefore get the rate that rate_of_look() says, and the sum
+// over all looks is the rate that was asked for, however much they overlap (Bonferroni). That a change counts
+// only when a second look finds it again makes it less.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/not_a_number.h"
+
+namespace backlash::diagnosis {
+
+struct FoundSize {
+  std::string name, unit;
+  double value = kNaN, standard_error = kNaN;  // of what was added at the onset
+};
+
+/// Times are seconds since 1970, as the stamps.
+struct FoundChange {
+  std::string effect;                        // id of an effect, name of a declared value, or "unknown"
+  double since = 0;                          // s
+  double since_from = 0, since_to = 0;       // s, 95 % interval
+  std::optional<double> until;               // s; absent: it goes on
+  std::vector<FoundSize> size;               // empty where unknown
+  std::vector<std::string> equivalent_to;    // effects that explain the same
+  double gain = 0;                           // twice the log likelihood ratio
+  double error_before = 0, error_after = 0;  // N m, rms after the onset without and with it
+};
+
+/// What a look at a stretch of the record has found.
+struct ChangeLook {
+  double from = 0, to = 0;             // s, the stretch
+  std::vector<FoundChange> changes;    // by onset
+  std::vector<std::string> different;  // effects that are there from the beginning of the stretch
+  long windows = 0;                    // of motion that could be judged
+  std::vector<std::string> warnings;
+};
+
+enum class ChangeState {
+  suspected,  // found by one look
+  standing,
+  ended,
+  withdrawn,  // later looks at the same time found none
+};
+
+const char* to_string(ChangeState state);
+std::optional<ChangeState> change_state_from(const std::string& name);
+
+struct KnownChange {
+  long id = 0;  // counted from 1 in the order in which they are told; 0: not told
+  ChangeState state = ChangeState::suspected;
+  FoundChange found;  // the sharpest so far
+  double seen = 0;    // s, end of the last stretch in which it was found
+  int missed = 0;     // looks in a row that should have found it
+  long key = 0;       // of the ledger
+  long ends = 0;      // the change that this one undoes, by id; 0: none. Not told by itself
+  bool told() const { return id > 0; }
+};
+
+class ChangeLedger {
+ public:
+  /// Takes a look; ids of changes that are to be told, as they are new or known better.
+  std::vector<long> take(const ChangeLook& look);
+
+  /// The clock was set: what only one look has found is forgotten.
+  void restart();
+
+  /// Continues from what was told before a restart of the program.
+  void restore(const std::vector<KnownChange>& told);
+
+  /// All that were told, the oldest first; at most kMostKnown.
+  std::vector<KnownChange> told() const;
+  const KnownChange& change(long id) const;
+
+  /// Effects that the last looks had from the beginning of their stretch, while no standing change explains
+  /// it: the machine is another one since an unknown time. Empty before kLooksOfDifference such looks.
+  std::vector<std::string> unexplained_difference() const;
+
+  static constexpr std::size_t kMostKnown = 200;
+  static constexpr int kLooksOfDifference = 3;
+
+ private:
+  KnownChange* match(const FoundChange& found, std::vector<long>& keys_taken);
+  long undone_by(const FoundChange& found) const;
+  bool confirm(KnownChange& known);
+  void miss(const ChangeLook& look, const std::vector<long>& keys_taken, std::vector<long>& news);
+  void note_difference(const ChangeLook& look);
+
+  std::vector<KnownChange> known_;
+  std::vector<std::string> different_;
+  int different_looks_ = 0;
+  long last_id_ = 0, last_key_ = 0;
+};
+
+/// 1/h for one look at `window` seconds each `interval` seconds, of one of `joints` joints, so that all looks
+/// at all joints together have `rate` [1/h].
+double rate_of_look(double rate, double window, double interval, std::size_t joints);
+
+}  // namespace backlash::diagnosis

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which joints a node watches, and by which rig files: ~rig, ~rig_folder, ~joints, ~JOINT/rig and their
+// channels.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/record/channel_map.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
+#include "backlash_diagnosis/ros/parameters.h"
+
+namespace backlash::ros_bridge {
+
+struct JointRig {
+  std::string joint;
+  rig_file::RigFile rig;  // with the channels of the parameters, where there are some
+
+  /// Where the robot publishes the joint: as declared, or by the names of this package.
+  record::ChannelMap channels() const;
+};
+
+/// Throws InvalidParameter, BadData, MissingInput.
+std::vector<JointRig> load_joint_rigs(Parameters& parameters);
+
+/// Path of a file of a joint in a folder: a joint's name may have parts, a file's name may not.
+std::string joint_path(const std::string& folder, std::string joint, const std::string& ending);
+
+}  // namespace backlash::ros_bridge

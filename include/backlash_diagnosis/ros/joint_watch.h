@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One joint as the change watch sees it: its newest samples, the healthy machine that it learns or is given,
+// and what looks at the samples have found. Samples come from one thread, looks are done in another; what a
+// look computes, the command detect_changes computes in a process of its own.
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/base/progress.h"
+#include "backlash_diagnosis/diagnosis/change_ledger.h"
+#include "backlash_diagnosis/record/sample_ring.h"
+#include "backlash_diagnosis/ros/job.h"
+#include "backlash_diagnosis/ros/joint_rigs.h"
+#include "backlash_diagnosis/ros/joint_state.h"
+
+namespace backlash::ros_bridge {
+
+struct WatchSettings {
+  JointRig joint;
+  std::vector<std::string> healthy;  // records of the healthy machine; empty: it is learned
+  std::string learned;               // record that is written where it is learned, and taken where it exists
+  std::string log;                   // of diagnosis/change_log.h; empty: none
+  double learn = 600;                // s of samples that the healthy machine is learned from, > 0
+  double window = 300;               // s that a look sees, > 0
+  double check_interval = 60;        // s from one look to the next, > 0
+  double rate = 1.0 / 720;           // 1/h, of one look (diagnosis::rate_of_look)
+  double job_memory = kJobMemory;    // GB
+};
+
+struct WatchState {
+  record::RingCounters counters;
+  long bad_messages = 0;
+  std::string last_problem;  // with a message
+  bool any_sample = false;
+  ros::WallTime last_arrival;
+  std::string healthy;         // where the healthy machine is from; empty: it is not known yet
+  double learning = 0;         // s of samples kept for it
+  long looks = 0, judged = 0;  // done, and those that could tell
+  long left_out = 0;           // looks that were due while one ran
+  std::string why_not;         // why the last look could not tell; empty: it could
+  std::string log_problem;     // why what was told is not in the log
+  double from = 0, to = 0;     // s since 1970, of the last look that could tell
+  long windows = 0;            // of motion, in it
+  std::vector<diagnosis::KnownChange> changes;
+  std::vector<std::string> different;  // since an unknown time
+};
+
+class JointWatch {
+ public:
+  /// Throws BadData for a log that is none, MissingInput for healthy records that are not there.
+  explicit JointWatch(WatchSettings settings);
+
+  const std::string& joint() const { return settings_.joint.joint; }
+  const WatchSettings& settings() const { return settings_; }
+
+  /// Takes a sample, or what is wrong with a message. True where a look is due from now on.
+  bool take(const ros::Time& stamp, const record::ChannelValues& values, const std::string& problem,
+            const std::string& topic);
+
+  /// Looks, where a look is due: learns the healthy machine, or holds the newest samples against it. Changes
+  /// that are new or better known. Ends with Cancelled where `go_on` says so.
+  std::vector<diagnosis::KnownChange> look(const Progress& go_on);
+
+  WatchState state() const;
+
+ private:
+  struct Task {
+    record::Record record;
+    double origin = 0;  // s since 1970
+    long run = 0;       // of the clock
+    std::vector<std::string> healthy;
+  };
+
+  double look_length() const { return healthy_.empty() ? settings_.learn : settings_.window; }
+  std::optional<Task> begin_look();
+  /// What the command finds in a task's record. Throws what it could not do.
+  diagnosis::ChangeLook found(const Task& task, const Progress& go_on) const;
+  void learn(const Task& task, const Progress& go_on);
+  std::vector<diagnosis::KnownChange> judge(const Task& task, const diagnosis::ChangeLook& look);
+  void cannot_tell(const std::string& why);
+
+  WatchSettings settings_;
+  mutable std::mutex mutex_;
+  StampClock clock_;
+  record::SampleRing ring_;
+  std::vector<std::string> healthy_;
+  diagnosis::ChangeLedger ledger_;
+  WatchState state_;
+  std::string impossible_;      // why this joint cannot be watched at all; empty: it can
+  std::optional<double> next_;  // s of clock_, when the next look is due
+  bool due_ = false, looking_ = false;
+};
+
+}  // namespace backlash::ros_bridge

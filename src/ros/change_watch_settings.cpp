@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Parameters of the node `change_watch`.
+#include <utility>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/file_folder.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/ros/change_watch_node.h"
+#include "backlash_diagnosis/ros/node_folders.h"
+
+namespace backlash::ros_bridge {
+namespace {
+
+constexpr std::pair<const char*, double> kHours[] = {
+    {"hour", 1}, {"day", 24}, {"week", 168}, {"month", 720}, {"year", 8760}};
+constexpr double kShortest = 60;  // s, of a window or of what is learned from: twice what can be judged
+
+}  // namespace
+
+double false_alarm_rate(const std::string& text) {
+  const auto wrong = [&] {
+    return InvalidParameter("~false_alarms", printable(text),
+                            "must be as '1 per month' (hour, day, week, month, year), > 0");
+  };
+  const std::size_t per = text.find(" per ");
+  if (per == std::string::npos) throw wrong();
+  const ParsedNumber count = parse_number(trimmed(text.substr(0, per)));
+  const std::string unit(trimmed(text.substr(per + 5)));
+  for (const auto& [name, hours] : kHours)
+    if (unit == name && count && count.value > 0) return count.value / hours;
+  throw wrong();
+}
+
+const char* change_watch_help() {
+  return R"(change_watch: tells since when joints differ from what they were when they were commissioned
+
+usage: rosrun backlash_diagnosis change_watch [_PARAMETER:=VALUE ...] [NAME:=REMAPPED ...]
+
+parameters (private)
+  rig       path of the rig file of a joint of one inertia (mesh: rigid); or
+  rig_folder  folder with a rig file for each joint of a robot; of those with another mesh it says that it
+            cannot tell
+  joints    list of joint names; default: the joint of the rig file, or all of rig_folder
+  channels/CHANNEL/...   topic, name, field, scale, offset: where the robot publishes that channel, as
+            `channels` of the rig file, and instead of them
+  healthy   list (in a launch file: <rosparam>) of records (.csv, .bag, .mcap) of the healthy machine;
+            default: the record of an earlier start in folder, else the machine is learned from what it
+            does first
+  learn     s of samples that the healthy machine is learned from; default 600, at least 60. They should
+            hold all of its tasks, and the way from cold to warm
+  false_alarms   how often healthy joints may be called changed, all joints together; default
+            '1 per month' (also hour, day, week, year)
+  window    s that a look sees; default 300, at least 60
+  check_interval   s of stamps from one look to the next; default 60
+  JOINT/rig, JOINT/channels, JOINT/healthy   the same for one of several joints
+  folder    where JOINT_healthy.csv is kept, the record that was learned from: delete it to learn anew;
+            default: backlash_diagnosis in ROS_HOME (~/.ros)
+  history   folder, which must exist, for a file JOINT_changes.csv with all that was told; default: none
+  queue     messages waiting at most; default 20000
+  stale     s of wall time without a message before /diagnostics says so; default 2
+  job_memory   GB that the process of a look may use; default 4
+
+subscribes
+  joint_states   sensor_msgs/JointState: JOINT_motor with position and effort; other topics and names where
+                 the rig file's `channels` say so
+publishes
+  changes        backlash_diagnosis/ChangeReport, latched: when a change is new, known better, over or
+                 withdrawn
+  /diagnostics   diagnostic_msgs/DiagnosticArray: "JOINT: model", OK, WARN (changed), STALE (cannot tell)
+)";
+}
+
+ChangeWatchSettings load_change_watch_settings(const ros::NodeHandle& private_handle) {
+  Parameters parameters(private_handle);
+  ChangeWatchSettings settings;
+  if (!parameters.has("rig") && !parameters.has("rig_folder"))
+    throw InvalidParameter("~rig", "''", "or ~rig_folder must be given");
+  WatchSettings common;
+  const Range lengths = Range::between(kShortest, 1e6);
+  common.learn = parameters.number("learn", common.learn, lengths);
+  common.window = parameters.number("window", common.window, lengths);
+  common.check_interval = parameters.number("check_interval", common.check_interval, Range::positive());
+  common.job_memory = parameters.number("job_memory", common.job_memory, Range::positive());
+  common.healthy = parameters.texts("healthy", {});
+  const double rate = false_alarm_rate(parameters.text("false_alarms", "1 per month"));
+  const FileFolder folder("~folder", parameters.text("folder", default_folder()));
+  const std::string history = read_history_folder(parameters);
+  settings.queue = static_cast<int>(parameters.integer("queue", settings.queue, 1, 10'000'000));
+  settings.stale = parameters.number("stale", settings.stale, Range::positive());
+  parameters.allow("diagnostic_period");  // of diagnostic_updater
+  const std::vector<JointRig> joints = load_joint_rigs(parameters);
+  for (const JointRig& joint : joints) {
+    WatchSettings watch = common;
+    watch.joint = joint;
+    watch.healthy = parameters.texts(joint.joint + "/healthy", common.healthy);
+    watch.learned = joint_path(folder.path(), joint.joint, "_healthy.csv");
+    if (!history.empty()) watch.log = joint_path(history, joint.joint, "_changes.csv");
+    watch.rate = diagnosis::rate_of_look(rate, watch.window, watch.check_interval, joints.size());
+    settings.joints.push_back(std::move(watch));
+  }
+  parameters.finish();
+  folder.create();
+  return settings;
+}
+
+}  // namespace backlash::ros_bridge

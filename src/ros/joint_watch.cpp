@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/ros/joint_watch.h"
+
+#include <fmt/format.h>
+#include <ros/console.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/scratch_folder.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/diagnosis/change_log.h"
+#include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/report/change_file.h"
+
+namespace backlash::ros_bridge {
+namespace {
+
+constexpr double kLeastLook = 60;  // s of samples, below which nobody looks. Choice: twice what can be judged
+constexpr double kAll = 0.99;      // - of a length that is all of it: samples come in steps
+constexpr int kNone = 0, kSome = 2;  // exit codes of the command that are answers
+
+record::RingSettings ring_settings(const WatchSettings& settings) {
+  record::RingSettings ring;
+  ring.channels = {record::Channel::motor_torque, record::Channel::motor_position};
+  ring.window = settings.learn;
+  return ring;
+}
+
+/// Why no look at such a joint can tell anything; empty: it can.
+std::string reason_against(const JointRig& joint) {
+  if (!joint.rig.rig.mesh.rigid)
+    return "changes are told of joints of one inertia only (mesh: rigid), which its rig file does not "
+           "declare";
+  const record::ChannelMap map = joint.channels();
+  for (const record::Channel wanted : {record::Channel::motor_torque, record::Channel::motor_position})
+    if (std::none_of(map.sources.begin(), map.sources.end(),
+                     [&](const record::ChannelSource& s) { return s.channel == wanted; }))
+      return "its channels have no " + record::channel_name(wanted);
+  return "";
+}
+
+double since_1970(const ros::Time& stamp) {
+  return stamp.toSec();
+}
+
+}  // namespace
+
+JointWatch::JointWatch(WatchSettings settings)
+    : settings_(std::move(settings)),
+      ring_(ring_settings(settings_)),
+      healthy_(settings_.healthy),
+      impossible_(reason_against(settings_.joint)) {
+  for (const std::string& path : healthy_)
+    if (!std::filesystem::exists(path))
+      throw MissingInput("~healthy: " + path + ": cannot be opened: No such file or directory");
+  if (healthy_.empty() && std::filesystem::exists(settings_.learned)) healthy_ = {settings_.learned};
+  ring_.set_window(look_length());
+  if (!settings_.log.empty()) ledger_.restore(diagnosis::read_change_log(settings_.log));
+}
+
+bool JointWatch::take(const ros::Time& stamp, const record::ChannelValues& values, const std::string& problem,
+                      const std::string& topic) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  state_.last_arrival = ros::WallTime::now();
+  if (!problem.empty() || stamp.isZero()) {
+    ++state_.bad_messages;
+    state_.last_problem = BadData(topic, stamp.isZero() ? "the header stamp is zero" : problem).what();
+    return false;
+  }
+  const long run = ring_.counters().restarts;
+  const double time = clock_.seconds(stamp);
+  if (!ring_.add(time, values)) return false;
+  state_.any_sample = true;
+  if (ring_.counters().restarts != run) {
+    ledger_.restart();
+    next_.reset();
+    due_ = false;
+  }
+  if (!impossible_.empty()) return false;
+  if (!next_) next_ = time + std::min(settings_.check_interval, look_length());
+  if (time < *next_) return false;
+  const double enough =
+      healthy_.empty() ? kAll * settings_.learn : std::min(kLeastLook, kAll * settings_.window);
+  if (ring_.length() < enough) return false;
+  // One look for each interval at most: that is what the rate of false alarms counts on.
+  next_ = time + settings_.check_interval;
+  if (due_ || looking_) {
+    ++state_.left_out;
+    return false;
+  }
+  return due_ = true;
+}
+
+std::optional<JointWatch::Task> JointWatch::begin_look() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!due_) return std::nullopt;
+  due_ = false;
+  looking_ = true;
+  Task task;
+  task.record = ring_.kept();
+  task.record.name = joint();
+  // The record's own time begins at 0, its name for 0 is the stamp of the first sample.
+  const double first = task.record.time.front();
+  task.origin = since_1970(clock_.stamp(first));
+  for (double& t : task.record.time) t -= first;
+  task.run = ring_.counters().restarts;
+  task.healthy = healthy_;
+  return task;
+}
+
+diagnosis::ChangeLook JointWatch::found(const Task& task, const Progress& go_on) const {
+  const ScratchFolder scratch;
+  const std::string record = scratch.path("newest.csv"), json = scratch.path("changes.json");
+  record::write_csv(task.record, record);
+  Job job;
+  job.words = {command_path("detect_changes"), "--rig", file_of(settings_.joint.rig, scratch), "--healthy"};
+  job.words.insert(job.words.end(), task.healthy.begin(), task.healthy.end());
+  job.words.insert(job.words.end(),
+                   {"--false-alarms-per-hour", to_text(settings_.rate), "--json", json, record});
+  job.done = {kNone, kSome};
+  job.memory = settings_.job_memory;
+  job.progress = go_on;
+  run_job(job);
+  diagnosis::ChangeLook look = report::read_changes(json, task.origin);
+  look.from = task.origin;
+  look.to = task.origin + task.record.time.back();
+  return look;
+}
+
+std::vector<diagnosis::KnownChange> JointWatch::look(const Progress& go_on) {
+  const std::optional<Task> task = begin_look();
+  if (!task) return {};
+  std::vector<diagnosis::KnownChange> news;
+  try {
+    if (task->healthy.empty())
+      learn(*task, go_on);
+    else
+      news = judge(*task, found(*task, go_on));
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    cannot_tell(error.what());
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++state_.looks;
+  looking_ = false;
+  return news;
+}
+
+void JointWatch::cannot_tell(const std::string& why) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  state_.why_not = why;
+}
+
+/// Takes the record for the healthy machine, unless something changes in it: either half of it, taken for
+/// healthy, must find nothing in the whole. The whole by itself would take a change for a scatter of its
+/// values.
+void JointWatch::learn(const Task& task, const Progress& go_on) {
+  const double middle = task.record.time.back() / 2;
+  for (const auto& [from, to] : {std::pair(0.0, middle), std::pair(middle, 2 * middle)}) {
+    const ScratchFolder scratch;
+    Task half = task;
+    half.healthy = {scratch.path("half_of_what_is_learned.csv")};
+    record::write_csv(task.record.slice(from, to), half.healthy.front());
+    const diagnosis::ChangeLook look = found(half, go_on);
+    if (look.changes.empty()) continue;
+    cannot_tell("the samples to learn the healthy machine from change within themselves: " +
+                report::change_text(look.changes.front()));
+    return;
+  }
+  record::write_csv(task.record, settings_.learned);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  healthy_ = {settings_.learned};
+  ring_.set_window(look_length());
+  state_.why_not.clear();
+  ROS_INFO("%s: the healthy machine is learned, from %.0f s of samples: %s", joint().c_str(),
+           task.record.time.back(), settings_.learned.c_str());
+}
+
+std::vector<diagnosis::KnownChange> JointWatch::judge(const Task& task, const diagnosis::ChangeLook& look) {
+  std::vector<diagnosis::KnownChange> news;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    // Of another run of the clock: its times mean nothing any more.
+    if (ring_.counters().restarts != task.run) return {};
+    ++state_.judged;
+    state_.why_not.clear();
+    state_.from = look.from;
+    state_.to = look.to;
+    state_.windows = look.windows;
+    for (const long id : ledger_.take(look)) news.push_back(ledger_.change(id));
+  }
+  std::string problem;
+  try {
+    if (!settings_.log.empty())
+      for (const diagnosis::KnownChange& change : news) diagnosis::append_change(settings_.log, change);
+  } catch (const Error& error) {
+    problem = error.what();
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!news.empty()) state_.log_problem = problem;
+  return news;
+}
+
+WatchState JointWatch::state() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  WatchState state = state_;
+  state.counters = ring_.counters();
+  state.healthy = joined(healthy_);
+  state.learning = ring_.length();
+  state.changes = ledger_.told();
+  state.different = ledger_.unexplained_difference();
+  if (!impossible_.empty())
+    state.why_not = impossible_;
+  else if (healthy_.empty() && ring_.length() < kAll * settings_.learn)
+    state.why_not = fmt::format("the healthy machine is being learned, {:.0f} of {:.0f} s so far",
+                                ring_.length(), settings_.learn) +
+                    (state.why_not.empty() ? "" : "; last: " + state.why_not);
+  else if (state.why_not.empty() && state.judged == 0)
+    state.why_not = "nothing was looked at yet";
+  return state;
+}
+
+}  // namespace backlash::ros_bridge
