@@ -61,6 +61,7 @@ class ChangeSearch {
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
   void find_end(FoundChange& f, const Background& b) const;
+  void unite(std::vector<FoundChange>& found) const;
   void onset_interval(const FoundChange& f, const Background& b, Change& change) const;
   double left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const;
 
@@ -252,6 +253,19 @@ bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChang
   return true;
 }
 
+/// A change that another takes back later, the same effect with the opposite value, is one with an end.
+void ChangeSearch::unite(std::vector<FoundChange>& found) const {
+  for (FoundChange& f : found)
+    for (auto later = found.begin(); later != found.end(); ++later) {
+      const bool same = f.effect.name() == later->effect.name() && !f.effect.ramp;
+      if (!same || f.from >= later->from || f.to <= later->from) continue;
+      if ((f.score.values + later->score.values).norm() > settings_.undone * f.score.values.norm()) continue;
+      f.to = later->from;
+      found.erase(later);
+      return;
+    }
+}
+
 std::vector<FoundChange> ChangeSearch::run() {
   std::vector<FoundChange> found;
   for (int k = 0; k < settings_.most_changes; ++k) {
@@ -273,6 +287,7 @@ std::vector<FoundChange> ChangeSearch::run() {
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
       refine(found[i], background(others));
     }
+    unite(found);
   }
   return found;
 }

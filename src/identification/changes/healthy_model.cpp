@@ -250,6 +250,22 @@ void add_nuisance(Whitened& out, const Eigen::VectorXd& x, double spread) {
   out.spread[out.spread.size() - 1] = std::max(spread, kLeastSpread);
 }
 
+/// Dry and viscous friction that wander: straight between knots.
+void add_wander(Whitened& out, const HealthyModel& model, const SampledMotion& motion,
+                const ChangeSettings& settings) {
+  const double length = motion.moments.back().time;
+  const int cells = std::max(1, static_cast<int>(std::lround(length / settings.wander_time)));
+  for (int k = 0; k <= cells; ++k) {
+    const auto hat = [&](const Moment& m) {
+      return std::max(0.0, 1 - std::fabs(m.time / length * cells - k));
+    };
+    add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * hat(m); }),
+                 settings.wander * std::fabs(model.values[kCoulomb]));
+    add_nuisance(out, column(motion, [&](const Moment& m) { return m.speed * hat(m); }),
+                 settings.wander * std::fabs(model.values[kViscous]));
+  }
+}
+
 }  // namespace
 
 Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
@@ -262,6 +278,7 @@ Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, con
   const double length = motion.moments.back().time;
   add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * (m.time / length - 0.5); }),
                model.drift);
+  add_wander(out, model, motion, settings);
   // At rest the machine cools down, and warms up again after; or the clock was set.
   for (const Rest& rest : rests_of(motion, settings)) {
     const auto cooled = [&](const Moment& m) {

@@ -34,7 +34,11 @@ struct ChangeSettings {
   double prior_least = 1e-3;  // - of the rms torque. Choice
   double prior_factor = 2;    // -, of the difference between records. Choice: few records
   double drift = 0.1;         // - of dry friction over a record, by temperature. Choice
-  double rest = 10;           // s without motion, after which the machine has another temperature. Choice
+  // Dry and viscous friction wander from minute to minute. Bittencourt and Axelsson (LiTH-ISY-R-3058) measure
+  // more by temperature alone. Choices.
+  double wander = 0.03;      // -, of each, standard deviation
+  double wander_time = 100;  // s, over which
+  double rest = 10;          // s without motion, after which the machine has another temperature. Choice
 
   // Changes
   double window = 4;   // s, over which scores are summed. Choice: longer than the residual remembers
@@ -43,6 +47,7 @@ struct ChangeSettings {
   double least_explained = 0.1;  // - of the squares of the residual after the onset. Choice
   double least_further =
       0.05;               // - of the first change's gain. Simulation: what a first one leaves by its shape
+  double undone = 0.3;    // - of a change's size, that one which takes it back may leave. Choice
   double same_event = 5;  // s: two that begin so close may be one whose shape is another. Choice
   double least_beside = 0.25;  // - of the gain of the other that a second one of an event has. Choice
   int most_changes = 4;        // Choice
