@@ -14,6 +14,7 @@ import tempfile
 from . import task
 from .errors import INTERRUPTED, FleetError, internal, missing, usage
 
+_KILLED = object()   # in place of a row
 _PER_CORE = 8        # tasks on their way per core: none waits for the client
 _CONNECT, _WORKERS = 10, 60  # s: until a scheduler answers, until it has a worker
 
@@ -101,9 +102,12 @@ class Engine:
 
     async def run(self, source, take):
         """Runs what `source(count)` gives (a list of tasks with a "key", awaited; empty: no more), and awaits
-        `take(pairs)` of each group of (task, row) that ended. Throws Stopped on Ctrl-C and where it is ended."""
+        `take(pairs)` of each group of (task, row) that ended. Throws Stopped on Ctrl-C and where it is ended.
+
+        A worker that dies takes what waited on it with it, and Dask blames all of that. Tasks that it gives up are
+        therefore tried once more at the end, each alone: then it is known whose fault it was."""
         most = max(32, _PER_CORE * self.cores)
-        ended, flying, dry = asyncio.Queue(), {}, False
+        ended, flying, suspects, dry = asyncio.Queue(), {}, [], False
         stop = asyncio.ensure_future(self._stop.wait())
         try:
             while True:
@@ -114,9 +118,13 @@ class Engine:
                     dry = not tasks
                     self._submit(tasks, flying, ended)
                 if not flying:
-                    return
-                group = await self._next(ended, stop)
-                await take([(flying.pop(key), row) for key, row in group])
+                    if not suspects:
+                        return
+                    alone = suspects.pop()
+                    self._submit([dict(alone, alone=True)], flying, ended)
+                group = [(flying.pop(key), row) for key, row in await self._next(ended, stop)]
+                suspects += [one for one, row in group if row is _KILLED and not one.get("alone")]
+                await take([(one, self._told(one, row)) for one, row in group if row is not _KILLED or one.get("alone")])
         finally:
             stop.cancel()
             if flying:
@@ -125,7 +133,8 @@ class Engine:
     def _submit(self, tasks, flying, ended):
         if not tasks:
             return
-        futures = self._client.map(task.run, tasks, key=["record-" + t["key"] for t in tasks], pure=False, retries=0)
+        keys = ["%s-%s" % ("alone" if t.get("alone") else "record", t["key"]) for t in tasks]
+        futures = self._client.map(task.run, tasks, key=keys, pure=False, retries=0)
         for one, future in zip(tasks, futures):
             flying[one["key"]] = one
             self._futures[one["key"]] = future
@@ -151,11 +160,17 @@ class Engine:
             rows.append((key, self._row(key, status, row)))
         return rows
 
+    @staticmethod
+    def _told(one, row):
+        if row is not _KILLED:
+            return row
+        return {"key": one["key"], "status": "crashed", "reason": "the worker died, each time that it was tried"}
+
     def _row(self, key, status, row):
         if status == "finished":
             return row
         if status == "error" and type(row).__name__ == "KilledWorker":
-            return {"key": key, "status": "crashed", "reason": "the worker died each of %d times that it was tried" % 4}
+            return _KILLED
         if status == "error":
             return {"key": key, "status": "crashed", "reason": "%s: %s" % (type(row).__name__, row)}
         raise internal("lost the scheduler; what is done is kept, the same command goes on from there")

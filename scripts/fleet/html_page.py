@@ -20,7 +20,7 @@ tbody tr + tr td { border-top: 1px solid #eee; } tbody tr:hover td { background:
 .scroll { overflow-x: auto; }
 .number { white-space: nowrap; font-variant-numeric: tabular-nums; }
 .small, .interval { color: #666; font-size: 0.87em; } .text { overflow-wrap: anywhere; min-width: 11em; }
-.joint { overflow-wrap: anywhere; min-width: 7em; font-weight: bold; }
+.joint { overflow-wrap: anywhere; min-width: 11em; font-weight: bold; }
 .grade { display: inline-block; padding: 0.05em 0.6em; border-radius: 0.8em; color: #fff; white-space: nowrap; font-size: 0.9em; }
 .grade.fault { background: #b3261e; } .grade.watch { background: #b06a00; } .grade.good { background: #2a7d3c; }
 .grade.cannot_tell, .grade.unusable { background: #6b6b6b; } .grade.ungraded { background: #51708c; }
@@ -78,7 +78,12 @@ def value(number, interval, unit):
 
 
 def ends(interval, factor):
-    return "%s to %s" % tuple("?" if end is None or not math.isfinite(end) else digits(factor * end) for end in interval)
+    """Both ends to three digits of the larger one."""
+    known = [factor * end for end in interval if end is not None and math.isfinite(end)]
+    largest = max(map(abs, known), default=0)
+    places = max(0, 2 - math.floor(math.log10(largest))) if largest > 0 else 0
+    return "%s to %s" % tuple("?" if end is None or not math.isfinite(end) else "%.*f" % (places, factor * end)
+                              for end in interval)
 
 
 def grade(level, text=None):

@@ -66,8 +66,11 @@ class State:
 
     def _lock(self, path):
         try:
-            self._locked = open(path, "w", encoding="utf-8")
+            self._locked = open(path, "a+", encoding="utf-8")
             fcntl.flock(self._locked, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._locked.truncate(0)
+            self._locked.write("%d\n" % os.getpid())
+            self._locked.flush()
         except BlockingIOError:
             raise FleetError(CANNOT_WRITE, "%s: another fleet_report is writing there" % os.path.dirname(path)) from None
         except OSError as error:

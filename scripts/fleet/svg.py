@@ -9,7 +9,7 @@ UNITS = {"m": (1e6, "µm"), "rad": (1e3, "mrad")}
 class _Scale:
     def __init__(self, values, start, end, margin):
         low, high = min(values), max(values)
-        reach = (high - low) * margin or abs(high) * 0.1 or 1.0
+        reach = (high - low) * margin if high > low else abs(high) * 0.1 or 1.0
         self._low, self._factor, self._start = low - reach, (end - start) / (high - low + 2 * reach), start
 
     def __call__(self, value):
