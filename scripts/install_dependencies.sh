@@ -19,6 +19,7 @@ run=(
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
   liburdfdom-dev liburdfdom-headers-dev                           # robots as URDF
   python3-matplotlib python3-numpy python3-yaml                   # plots
+  python3-cryptography python3-distributed                        # fleet_report: Dask, with TLS between its processes
 )
 tests=(
   catkin-lint

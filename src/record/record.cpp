@@ -85,6 +85,7 @@ Record Record::slice(double from, double to) const {
   Record part;
   part.name = name;
   part.warnings = warnings;
+  part.origin = origin;
   part.time.assign(time.begin() + first, time.begin() + last);
   for (const Channel channel : kChannels) {
     const std::vector<double>& all = column(channel);

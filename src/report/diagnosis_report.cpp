@@ -128,6 +128,12 @@ Json curve_json(const diagnosis::MonitoringCurve& curve, const std::string& sour
   return json;
 }
 
+/// Stamps of the first and the last sample: s since 1970, of a CSV as in its column.
+Json time_json(const record::Record& record) {
+  if (record.time.empty()) return nullptr;
+  return Json::array({record.origin + record.time.front(), record.origin + record.time.back()});
+}
+
 std::string with_interval(double value, double lower, double upper, double unit) {
   std::string text = four_digits(value / unit);
   if (std::isfinite(lower) || std::isfinite(upper))
@@ -157,6 +163,7 @@ Json diagnosis_data(const DiagnosisReport& report) {
   Json json;
   json["schema_version"] = 1;
   json["record"] = report.record->name;
+  json["time"] = time_json(*report.record);
   json["estimates"] = Json::array();
   for (const diagnosis::Estimate& e : report.diagnosis.estimates)
     json["estimates"].push_back(estimate_json(e));
@@ -168,6 +175,7 @@ Json diagnosis_data(const DiagnosisReport& report) {
   json["apd"] = has_apd ? apd_json(*report.diagnosis.apd, *report.apd_settings) : Json(nullptr);
   json["warnings"] = report.warnings;
   json["rig"] = report.rig.empty() ? Json(nullptr) : Json(report.rig);
+  json["rig_digest"] = report.rig_digest.empty() ? Json(nullptr) : Json(report.rig_digest);
   json["curve"] = report.curve ? curve_json(*report.curve, report.curve_source) : Json(nullptr);
   json["version"] = version();
   return json;

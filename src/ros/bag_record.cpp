@@ -107,6 +107,7 @@ class JointRun {
     if (record_.time.empty() && stamps_.accepted() == 0) {
       since_first_.seconds(stamp);
       clock_.seconds(origin_.value_or(stamp));  // time 0
+      record_.origin = origin_.value_or(stamp).toSec();
     }
     switch (stamps_.next(since_first_.seconds(stamp))) {
       case record::StampVerdict::accept:

@@ -309,7 +309,10 @@ int diagnose_record(const Arguments& arguments) {
   report.warnings.insert(report.warnings.end(), in.warnings.begin(), in.warnings.end());
   report.apd_settings = in.settings.apd;
   report.limits = in.settings.limits;
-  if (in.rig) report.rig = in.rig->rig.name;
+  if (in.rig) {
+    report.rig = in.rig->rig.name;
+    report.rig_digest = in.rig->digest;
+  }
   if (in.curve) {
     report.curve = &*in.curve;
     report.curve_source = in.curve_source;

@@ -20,19 +20,11 @@ import yaml
 from actionlib_msgs.msg import GoalStatus
 from backlash_diagnosis.msg import ExciteAction, ExciteGoal
 from sensor_msgs.msg import JointState
-from simulator_support import PACKAGE, TIMEOUT, Inbox, Simulator, default_rig
+from simulator_support import PACKAGE, TIMEOUT, Inbox, Simulator, default_rig, until
 from std_msgs.msg import Float64
 
 LIMITS = {"torque_limit": 2.0, "speed_limit": 3.0, "position_lower": -1.0, "position_upper": 1.0,
           "duration_limit": 5.0, "rest": 0.2, "ramp": 0.3, "state_age": 0.3, "still": 0.5}
-
-
-def until(condition, what):
-    deadline = time.monotonic() + TIMEOUT
-    while not condition():
-        if time.monotonic() > deadline:
-            raise AssertionError("no %s within %d s" % (what, TIMEOUT))
-        time.sleep(0.02)
 
 
 def end(process):

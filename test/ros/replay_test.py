@@ -16,7 +16,7 @@ import rospy
 import rostest
 from diagnoser_support import Diagnoser, build_curve, rig_path, run_tool
 from sensor_msgs.msg import JointState
-from simulator_support import TIMEOUT, Simulator, package_folder
+from simulator_support import TIMEOUT, Simulator, package_folder, until
 from std_srvs.srv import SetBool
 
 sys.path.append(os.path.join(package_folder(), "test", "support"))
@@ -184,6 +184,7 @@ class ReplayTest(unittest.TestCase):
             self.assertEqual(code, 0, output)
             recorder.send_signal(2)
             recorder.wait(TIMEOUT)
+            until(lambda: os.path.exists(bag), "bag")  # `rosbag` does not wait for its child, which renames the bag last
         report = offline(bag, self.folder, "--rig", rig_path(), "--curve", self.curve)
         self.assertEqual(report["estimates"][1]["status"], "ok", report)
         self.assertAlmostEqual(report["estimates"][1]["backlash"], 8e-5, delta=3e-6)

@@ -15,6 +15,14 @@ PACKAGE = "backlash_diagnosis"
 TIMEOUT = 60  # s of wall time; reached only when something is broken
 
 
+def until(condition, what):
+    deadline = time.monotonic() + TIMEOUT
+    while not condition():
+        if time.monotonic() > deadline:
+            raise AssertionError("no %s within %d s" % (what, TIMEOUT))
+        time.sleep(0.02)
+
+
 class Inbox:
     """All messages of one topic, in the order of arrival."""
 

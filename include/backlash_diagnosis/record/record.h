@@ -49,6 +49,7 @@ class Record {
   std::string name;                   ///< where it came from: file name or topic, for messages
   std::vector<double> time;           ///< s
   std::vector<std::string> warnings;  ///< what the reader saw and mended: repeated stamps dropped, gaps
+  double origin = 0;                  ///< s since 1970 of time 0; 0 where `time` is as in the file
 
   std::size_t size() const { return time.size(); }
   bool has(Channel channel) const { return !column(channel).empty(); }

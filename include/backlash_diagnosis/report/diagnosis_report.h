@@ -17,6 +17,7 @@ struct DiagnosisReport {
   std::optional<diagnosis::ApdSettings> apd_settings;
   std::optional<diagnosis::Limits> limits;            ///< that the verdict grades by
   std::string rig;                                    ///< name; empty: none
+  std::string rig_digest;                             ///< of the rig file; empty: none
   const diagnosis::MonitoringCurve* curve = nullptr;  ///< may be null
   std::string curve_source;                           ///< path, or "built for this record"
   diagnosis::Diagnosis diagnosis;
