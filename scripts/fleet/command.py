@@ -198,12 +198,14 @@ class Run:
         by_status = ", ".join("%d %s" % (count, status.replace("_", " ")) for status, count in
                               sorted(fleet["records"]["by_status"].items()))
         levels = ", ".join("%d %s" % (count, level.replace("_", " ")) for level, count in fleet["levels"].items() if count)
-        print("%d records found, %d to compute; of all: %s" % (self._found, self._computed, by_status))
-        print("%d joints: %s" % (len(fleet["joints"]), levels or "none"))
-        for joint in fleet["joints"]:
-            if joint["level"] in ("fault", "watch"):
-                print("  %s: %s" % (joint["joint"], (joint["trend"] or {}).get("message") or joint["message"]))
-        print(os.path.join(self._options.out, "fleet.html"))
+        lines = ["%d records found, %d to compute; of all: %s" % (self._found, self._computed, by_status),
+                 "%d joints: %s" % (len(fleet["joints"]), levels or "none")]
+        lines += ["  %s: %s" % (joint["joint"], (joint["trend"] or {}).get("message") or joint["message"])
+                  for joint in fleet["joints"] if joint["level"] in ("fault", "watch")]
+        try:
+            print("\n".join(lines + [os.path.join(self._options.out, "fleet.html")]), flush=True)
+        except BrokenPipeError:  # read by `head`: all is written already
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
     def close(self):
         self._state.close()

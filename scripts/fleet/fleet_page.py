@@ -124,7 +124,8 @@ def _row(joint, series):
         _cell(svg.small(series, trend), False),
         _cell(growth, rate, "number"), _cell(reached, when, "number"), _cell(count, joint["usable"], "number"),
         _cell((joint["date"] or "&ndash;")[:10], joint["time"], "number"),
-        _cell("<br>".join(escape(note) for note in notes), False, "text small")]
+        _cell("<br>".join('<span title="%s">%s</span>' % (escape(note), escape(note.partition(": ")[0])) for note in notes), False,
+              "text small")]
     return '<tr data-level="%s" data-grows="%d" data-text="%s">%s</tr>' % (joint["level"], bool(trend.get("grows")),
                                                                            escape(words), "".join(cells))
 

@@ -35,7 +35,7 @@ DROP VIEW IF EXISTS fleet;
 CREATE VIEW fleet AS SELECT record.path, record.name, record.joint, record.seen, record.settings, settings.options, record.digest AS record_digest,
   CASE record.time_from WHEN 'name' THEN record.named_time WHEN 'mtime' THEN record.mtime / 1e9
     ELSE CASE WHEN result.end >= %d THEN result.end END END AS time,
-  record.time_from, coalesce(result.status, CASE WHEN record.waits THEN 'waiting' ELSE 'unusable' END) AS status,
+  record.time_from, coalesce(result.status, CASE WHEN record.waits = 1 THEN 'waiting' ELSE 'unusable' END) AS status,
   coalesce(record.reason, result.reason) AS reason, result.key, result.exit_code, result.grade, result.backlash, result.lower,
   result.upper, result.angle, result.angle_lower, result.angle_upper, result.skewness, result.methods, result.rig,
   result.rig_digest, result.residual, result.changes, result.estimates, result.verdict, result.warnings, result.seconds,

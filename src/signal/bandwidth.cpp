@@ -17,6 +17,7 @@ namespace backlash::signal {
 namespace {
 
 constexpr double kShare = 0.99;
+constexpr double kAlmostAll = 0.999;        // choice: what is cut off is 3 % of its size
 constexpr double kNoiseFrom = 0.35;         // cycles per sample: the upper three tenths
 constexpr double kPositionNoiseFrom = 0.1;  // cycles per sample
 constexpr double kBand = 0.05;
@@ -88,6 +89,42 @@ double position_variance(const std::vector<double>& power) {
   return largest;
 }
 
+/// Power of a signal beyond that of its noise, summed up to each line; no further than where it stands out.
+struct Standing {
+  std::vector<double> up_to;
+  std::size_t end;  // line
+};
+
+Standing standing(const std::vector<double>& power, const std::vector<double>& noise) {
+  const std::size_t n = power.size();
+  const auto sum = [](const std::vector<double>& v, std::size_t from, std::size_t to) {
+    return std::accumulate(v.begin() + long(from), v.begin() + long(to), 0.0);
+  };
+  Standing s{std::vector<double>(n + 1, 0.0), 0};
+  while (s.end < n) {  // over the next tenth of an octave or eight lines
+    const std::size_t next = std::min(n, s.end + std::max<std::size_t>(8, s.end / 10));
+    if (sum(power, s.end, next) < 2 * sum(noise, s.end, next)) break;  // half of the power is noise
+    for (; s.end < next; ++s.end) s.up_to[s.end + 1] = s.up_to[s.end] + power[s.end] - noise[s.end];
+  }
+  return s;
+}
+
+Standing standing_acceleration(const std::vector<double>& position, double interval) {
+  if (!(interval > 0)) throw InvalidParameter("interval", interval, "must be > 0 s");
+  const std::vector<double> power = periodogram(position);
+  const double white = position_variance(power);
+  std::vector<double> noise(power.size());
+  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = white * gain(frequency(i, power));
+  return standing(power, noise);
+}
+
+/// Cycles per sample up to where a share of it lies.
+double reaches(const Standing& s, double share) {
+  std::size_t i = 0;
+  while (i < s.end && s.up_to[i] < share * s.up_to[s.end]) ++i;
+  return 0.5 * double(i) / double(s.up_to.size() - 1);
+}
+
 }  // namespace
 
 double white_noise(const std::vector<double>& values) {
@@ -118,27 +155,20 @@ double resolution(const std::vector<double>& position) {
 }
 
 double motion_bandwidth(const std::vector<double>& position, double interval) {
-  if (!(interval > 0)) throw InvalidParameter("interval", interval, "must be > 0 s");
-  const std::vector<double> power = periodogram(position);
-  const double white = position_variance(power);
-  const std::size_t n = power.size();
-  std::vector<double> sum(n + 1, 0.0), noise(n + 1, 0.0);  // up to line i
-  for (std::size_t i = 0; i < n; ++i) {
-    sum[i + 1] = sum[i] + power[i];
-    noise[i + 1] = noise[i] + white * gain(frequency(i, power));
-  }
-  // Up to where, over the next tenth of an octave or eight lines, noise is half of the power.
-  std::size_t end = 0;
-  while (end < n) {
-    const std::size_t next = std::min(n, end + std::max<std::size_t>(8, end / 10));
-    if (sum[next] - sum[end] < 2 * (noise[next] - noise[end])) break;
-    end = next;
-  }
-  if (end == 0) throw CannotIdentify("no motion stands out of the noise of the position");
-  const double all = sum[end] - noise[end];
-  std::size_t i = 0;
-  while (i < end && sum[i] - noise[i] < kShare * all) ++i;
-  return std::min(kHighest, 0.5 * double(i) / double(n)) / interval;
+  const Standing acceleration = standing_acceleration(position, interval);
+  if (acceleration.end == 0) throw CannotIdentify("no motion stands out of the noise of the position");
+  return std::min(kHighest, reaches(acceleration, kShare)) / interval;
+}
+
+double torque_bandwidth(const std::vector<double>& torque, const std::vector<double>& position,
+                        double interval) {
+  const Standing acceleration = standing_acceleration(position, interval);
+  std::vector<double> power = periodogram(torque);
+  for (std::size_t i = 0; i < power.size(); ++i) power[i] /= gain(frequency(i, power));
+  const std::vector<double> noise(power.size(), std::pow(white_noise(torque), 2));
+  return std::min(
+             {kHighest, reaches(standing(power, noise), kAlmostAll), reaches(acceleration, kAlmostAll)}) /
+         interval;
 }
 
 double noise_after_low_pass(double interval, double cutoff) {

@@ -34,7 +34,7 @@ Command command() {
        "folder for report.json, report.html, rig.yaml and series.json; made where it is missing", true},
       {"cutoff", "HZ",
        "low-pass of all residuals [Hz]; default: 1.36 times the mesh resonance of two inertias, else the "
-       "bandwidth of the motion"},
+       "wider of the bandwidths of motion and torque"},
       feedback_option(),
   };
   c.notes =

@@ -27,6 +27,13 @@ double resolution(const std::vector<double>& position);
 /// out of the noise, InvalidParameter for fewer than 64 values or an interval <= 0.
 double motion_bandwidth(const std::vector<double>& position, double interval);
 
+/// Frequency [Hz] below which 99.9 % of the power of a torque lie, beyond its white_noise, and not beyond
+/// that of the acceleration of `position`; 0 where nothing stands out of the noise: a slow and smooth motion
+/// may hide that the torque follows something fast, such as cogging. Throws as motion_bandwidth for sizes and
+/// intervals.
+double torque_bandwidth(const std::vector<double>& torque, const std::vector<double>& position,
+                        double interval);
+
 /// Standard deviation that low_pass (zero_phase.h) leaves of white noise of standard deviation 1.
 double noise_after_low_pass(double interval, double cutoff);
 

@@ -11,12 +11,21 @@
 namespace backlash::identification {
 namespace {
 
+constexpr double kVanished = 0.01;  // choice: of a declared value; its logarithm hardly comes back
+
 bool has(const std::vector<Effect>& effects, const std::string& id) {
   return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return e.candidate.id == id; });
 }
 
 bool has(const std::vector<Effect>& effects, bool (*is)(const std::string& id)) {
   return std::any_of(effects.begin(), effects.end(), [&](const Effect& e) { return is(e.candidate.id); });
+}
+
+bool has_vanished(const FitParameter& p, const model::Rig& rig, const model::Rig& declared) {
+  if (p.positive) return p.get(rig) < kVanished * p.get(declared);
+  const rig_file::RigParameter& friction = rig_file::servo_parameter(p.name);
+  return friction.kind == rig_file::ParameterKind::coulomb_friction && !friction.is_asymmetry() &&
+         p.get(rig) <= 0;
 }
 
 BandFit fit_with_effects(Machine machine, bool delay, const SearchContext& context) {
@@ -74,15 +83,11 @@ Machine extended(Machine machine, const Candidate& candidate, const SearchContex
                   context.settings.maps);
 }
 
-Machine with_friction_again(Machine machine, const Machine& declared) {
+Machine with_vanished_again(Machine machine, const Machine& declared) {
   for (const FitParameter& p : machine.parameters) {
     const bool known = std::any_of(declared.parameters.begin(), declared.parameters.end(),
                                    [&](const FitParameter& d) { return d.name == p.name; });
-    if (!known) continue;
-    const rig_file::RigParameter& friction = rig_file::servo_parameter(p.name);
-    if (friction.kind == rig_file::ParameterKind::coulomb_friction && !friction.is_asymmetry() &&
-        p.get(machine.rig) <= 0)
-      p.set(machine.rig, p.get(declared.rig));
+    if (known && has_vanished(p, machine.rig, declared.rig)) p.set(machine.rig, p.get(declared.rig));
   }
   return machine;
 }
@@ -94,7 +99,7 @@ Machine start_with(const Hypothesis& h, const std::vector<Effect>& effects, cons
   machine.priors = h.declared->priors;
   machine.has_map = false;
   machine.largest_delay = h.base->fit.machine.largest_delay;
-  if (!effects.empty()) machine = with_friction_again(std::move(machine), *h.declared);
+  if (!effects.empty()) machine = with_vanished_again(std::move(machine), *h.declared);
   for (const Effect& effect : effects) machine = extended(std::move(machine), effect.candidate, context);
   return machine;
 }

@@ -58,9 +58,9 @@ Hypothesis with_rejected(Hypothesis h, const std::string& effect, const std::str
 /// All effects that were rejected and are not in it after all, each with the latest reason.
 std::vector<RejectedEffect> rejected_effects(const Hypothesis& h);
 
-/// Dry friction that came out at or below 0 without an effect is where the model no longer feels it: with the
-/// effect its fit starts at the declared value again.
-Machine with_friction_again(Machine machine, const Machine& declared);
+/// A value that came out near 0 without an effect (dry friction at or below it) is where the model no longer
+/// feels it: with the effect its fit starts at the declared value again.
+Machine with_vanished_again(Machine machine, const Machine& declared);
 
 /// The machine with the terms of a candidate, whose values are fitted as well.
 Machine extended(Machine machine, const Candidate& candidate, const SearchContext& context);

@@ -47,7 +47,7 @@ std::optional<Trial> tried(const Hypothesis& h, const Candidate& candidate, cons
   const RecordSet& records = h.fitted->records;
   Trial trial{candidate, {}, {}, 0};
   const auto fit = attempted([&] {
-    trial.start = with_friction_again(extended(h.fitted->fit.machine, candidate, context), *h.declared);
+    trial.start = with_vanished_again(extended(h.fitted->fit.machine, candidate, context), *h.declared);
     if (is_delay(candidate.id)) move_delay_to_term(trial.start, context.data.front().interval);
     const bool map = trial.start.has_map;
     const MachineFit rough =

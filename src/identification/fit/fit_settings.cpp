@@ -25,8 +25,9 @@ constexpr double kPeriods = 100;  // choice: in the record: friction has more to
 double motion_cutoff(const std::vector<ServoData>& data) {
   double widest = 0;
   for (const ServoData& d : data)
-    widest = std::max(
-        {widest, signal::motion_bandwidth(d.motor, d.interval), kPeriods / (double(d.size()) * d.interval)});
+    widest = std::max({widest, signal::motion_bandwidth(d.motor, d.interval),
+                       signal::torque_bandwidth(d.torque, d.motor, d.interval),
+                       kPeriods / (double(d.size()) * d.interval)});
   return widest;
 }
 
