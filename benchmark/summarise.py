@@ -19,6 +19,7 @@ PAIRS = [  # figure, peer, which result, larger is better
     ("nodes/diagnoser/1000_Hz", "nodes/bare/1000_Hz", "us_per_message", False),
     ("nodes/diagnoser/20000_Hz", "nodes/bare/20000_Hz", "us_per_message", False),
     ("nodes/diagnoser/64_joints", "nodes/diagnoser/1_joints", "us_per_joint_sample", False),
+    ("fleet/report", "fleet/xargs", "records_per_s", True),
 ]
 
 
@@ -77,7 +78,7 @@ def pairs(results, figures):
             result = results[each]
             value = milliseconds(result, key) if key.endswith("time") else result[key]
             values.append(value)
-        unit = {"real_time": "ms", "ns_per_sample": "ns/sample", "messages_per_s": "messages/s",
+        unit = {"real_time": "ms", "ns_per_sample": "ns/sample", "messages_per_s": "messages/s", "records_per_s": "records/s",
                 "us_per_message": "us/message", "us_per_joint_sample": "us/joint"}[key]
         figures[name] = values[0] / values[1]
         print(f"  {name:30} {values[0]:12.4g} {unit:12} {values[0] / values[1]:7.2f} x {peer} ({values[1]:.4g})"

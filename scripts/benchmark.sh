@@ -43,4 +43,5 @@ measure() {
 measure scipy_lsoda
 measure nodes "${executables}" "${folder}"
 measure records "${executables}"
+measure fleet "${executables}"
 /usr/bin/python3 "${REPO}/benchmark/summarise.py" --out "${out}" ${older:+--older "${older}"} "${parts[@]}"

@@ -272,10 +272,14 @@ TEST_F(Commands, CurveOfABagIsTheCurveOfTheCsv) {
   const std::string rest = " --rig noisy.yaml --curve c.yaml";
   Json csv = report("a.csv" + rest, 0);
   EXPECT_EQ(csv["record"], "a.csv");
+  EXPECT_EQ(csv["time"], Json::array({0.0, 0.999}));
   csv.erase("record");
+  csv.erase("time");
   for (const std::string name : {"a.bag", "a.mcap"}) {
     Json other = report(name + rest, 0);
+    EXPECT_NEAR(other["time"][1].get<double>() - other["time"][0].get<double>(), 0.999, 1e-6);  // of 1e9 s
     other.erase("record");
+    other.erase("time");
     EXPECT_EQ(csv.dump(), other.dump()) << name;
   }
 }
@@ -286,8 +290,9 @@ TEST_F(Commands, ReportHasTheDocumentedShape) {
   const Json json = report("a.csv --rig rig.yaml --curve c.yaml", 0);
   std::vector<std::string> keys;
   for (const auto& item : json.items()) keys.push_back(item.key());
-  EXPECT_EQ(keys, (std::vector<std::string>{"schema_version", "record", "estimates", "verdict",
-                                            "declared_wrong", "apd", "warnings", "rig", "curve", "version"}));
+  EXPECT_EQ(keys, (std::vector<std::string>{"schema_version", "record", "time", "estimates", "verdict",
+                                            "declared_wrong", "apd", "warnings", "rig", "rig_digest", "curve",
+                                            "version"}));
   EXPECT_EQ(json["schema_version"], 1);
   EXPECT_EQ(json["estimates"][0]["method"], "apd_skewness");
   std::vector<std::string> methods;
