@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs tasks on Dask: a cluster in this machine, or one that is there. A bounded number of them is on its way at a time.
 
-One event loop holds client and, of an embedded cluster, the scheduler; tasks go out in groups, which costs a third of
-one by one. Workers are processes, so that one of them may die.
+One event loop holds client and, of an embedded cluster, the scheduler. A task on its way costs 13 ms of processor, so
+that short records travel together. Workers are processes, so that one of them may die.
 """
 import asyncio
 import logging
@@ -15,7 +15,8 @@ from . import task
 from .errors import INTERRUPTED, FleetError, internal, missing, usage
 
 _KILLED = object()   # in place of a row
-_PER_CORE = 8        # tasks on their way per core: none waits for the client
+_PER_CORE = 8        # groups on their way per core: none waits for the client
+_GROUP, _MOST = 0.5, 16  # s, records: what a group takes, and how many it has at most
 _CONNECT, _WORKERS = 10, 60  # s: until a scheduler answers, until it has a worker
 
 
@@ -53,6 +54,7 @@ class Engine:
         self._distributed = _distributed()
         self._cluster = self._client = None
         self._futures = {}
+        self._size = 1  # records of a group
         self._stop = asyncio.Event()
 
     async def __aenter__(self):
@@ -114,65 +116,78 @@ class Engine:
                 if self._stop.is_set():
                     raise Stopped()
                 while not dry and len(flying) <= most // 2:
-                    tasks = await source(most - len(flying))
+                    tasks = await source((most - len(flying)) * self._size)
                     dry = not tasks
-                    self._submit(tasks, flying, ended)
+                    self._submit([tasks[i:i + self._size] for i in range(0, len(tasks), self._size)], flying, ended)
                 if not flying:
                     if not suspects:
                         return
-                    alone = suspects.pop()
-                    self._submit([dict(alone, alone=True)], flying, ended)
-                group = [(flying.pop(key), row) for key, row in await self._next(ended, stop)]
-                suspects += [one for one, row in group if row is _KILLED and not one.get("alone")]
-                await take([(one, self._told(one, row)) for one, row in group if row is not _KILLED or one.get("alone")])
+                    self._submit([[dict(suspects.pop(), alone=True)]], flying, ended)
+                told = []
+                for key, rows in await self._next(ended, stop):
+                    group = flying.pop(key)
+                    if rows is _KILLED and not group[0].get("alone"):
+                        suspects += group
+                    else:
+                        told += self._told(group, rows)
+                await take(told)
+                self._resize([row for _, row in told])
         finally:
             stop.cancel()
             if flying:
                 await self._client.cancel(list(self._futures.values()), force=True)
 
-    def _submit(self, tasks, flying, ended):
-        if not tasks:
+    def _resize(self, rows):
+        """So many records to a group that it takes about _GROUP s."""
+        seconds = [row["seconds"] for row in rows if row.get("seconds")]
+        if seconds:
+            self._size = max(1, min(_MOST, round(_GROUP * len(seconds) / sum(seconds))))
+
+    def _submit(self, groups, flying, ended):
+        if not groups:
             return
-        keys = ["%s-%s" % ("alone" if t.get("alone") else "record", t["key"]) for t in tasks]
-        futures = self._client.map(task.run, tasks, key=keys, pure=False, retries=0)
-        for one, future in zip(tasks, futures):
-            flying[one["key"]] = one
-            self._futures[one["key"]] = future
-            asyncio.ensure_future(self._watch(one["key"], future, ended))
+        keys = ["%s-%s" % ("alone" if group[0].get("alone") else "records", group[0]["key"]) for group in groups]
+        futures = self._client.map(task.run_all, groups, key=keys, pure=False, retries=0)
+        for key, group, future in zip(keys, groups, futures):
+            flying[key] = group
+            self._futures[key] = future
+            asyncio.ensure_future(self._watch(key, future, ended))
 
     async def _watch(self, key, future, ended):
         await ended.put((key, future, await _outcome(future)))
 
     async def _next(self, ended, stop):
-        """The tasks that ended, at least one; none where the run shall stop."""
+        """The groups that ended, at least one; none where the run shall stop."""
         first = asyncio.ensure_future(ended.get())
         await asyncio.wait({first, stop}, return_when=asyncio.FIRST_COMPLETED)
         if not first.done():
             first.cancel()
             raise Stopped()
-        group = [first.result()]
+        several = [first.result()]
         while not ended.empty():
-            group.append(ended.get_nowait())
-        rows = []
-        for key, future, (status, row) in group:
+            several.append(ended.get_nowait())
+        for key, future, _ in several:
             del self._futures[key]
             future.release()  # the scheduler forgets it
-            rows.append((key, self._row(key, status, row)))
-        return rows
+        return [(key, self._rows(*outcome)) for key, _, outcome in several]
 
     @staticmethod
-    def _told(one, row):
-        if row is not _KILLED:
-            return row
-        return {"key": one["key"], "status": "crashed", "reason": "the worker died, each time that it was tried"}
+    def _told(group, rows):
+        """Each task with its row."""
+        if isinstance(rows, list):
+            return list(zip(group, rows))
+        reason = "the worker died, each time that it was tried" if rows is _KILLED else rows
+        return [(one, {"key": one["key"], "status": "crashed", "reason": reason}) for one in group]
 
-    def _row(self, key, status, row):
+    @staticmethod
+    def _rows(status, result):
+        """Those of a group, _KILLED, or why there are none."""
         if status == "finished":
-            return row
-        if status == "error" and type(row).__name__ == "KilledWorker":
+            return result
+        if status == "error" and type(result).__name__ == "KilledWorker":
             return _KILLED
         if status == "error":
-            return {"key": key, "status": "crashed", "reason": "%s: %s" % (type(row).__name__, row)}
+            return "%s: %s" % (type(result).__name__, result)
         raise internal("lost the scheduler; what is done is kept, the same command goes on from there")
 
 
