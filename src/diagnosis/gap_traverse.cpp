@@ -110,7 +110,8 @@ void refuse(const TraverseFit& fit, const TraverseData& data) {
                                       "inertia of the motor",
                                       "damping of the motor",
                                       "dry friction of the motor",
-                                      "dry friction of the load"};
+                                      "dry friction of the load",
+                                      "power of the torque of the teeth over the deflection"};
   for (int k = kTraverseStiffness; k < kTraverseEarlier; ++k)
     if (std::fabs(fit.deviation(k)) > kFar)
       throw Refusal{Status::out_of_domain,

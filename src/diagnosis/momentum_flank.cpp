@@ -126,6 +126,7 @@ Motor collect(const record::Record& record, const MomentumTransferSettings& sett
 }
 
 Pinion reconstruct(const Motor& motor, const MomentumTransferSettings& s, std::size_t half) {
+  const auto direction = [](double speed) { return speed > 0 ? 1.0 : speed < 0 ? -1.0 : 0.0; };
   Pinion pinion;
   const std::size_t n = motor.speed.size(), reach = std::max<std::size_t>(1, half / 3);
   const std::vector<double> rate = differentiated(motor.speed, motor.interval, reach);
@@ -135,8 +136,9 @@ Pinion reconstruct(const Motor& motor, const MomentumTransferSettings& s, std::s
   pinion.torque.resize(n);
   pinion.position.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    pinion.torque[i] =
-        torque[i] - s.motor_damping * motor.speed[i] - (flexible(s) ? s.motor_inertia * rate[i] : 0);
+    pinion.torque[i] = torque[i] - s.motor_damping * motor.speed[i] -
+                       s.motor_friction * direction(motor.speed[i]) -
+                       (flexible(s) ? s.motor_inertia * rate[i] : 0);
     pinion.position[i] = motor.position[i] - (flexible(s) ? pinion.torque[i] / s.coupling_stiffness : 0);
   }
   return pinion;

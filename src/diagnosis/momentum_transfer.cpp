@@ -26,8 +26,8 @@ constexpr double kTiming = 0.5;          // samples, when the impact began
 // Of the averages' half width, by which noise moves impact and release where it is as large as may be:
 // simulated servos with 20 % torque noise.
 constexpr double kNoisyTiming = 0.8;
-constexpr double kToldElasticShare = 0.2;  // simulation: the level is told to some 10 %
-constexpr double kElasticShare = 0.14;     // of the elastic deflections in the interval
+constexpr double kLeastOverFriction = 0.7;  // simulation: servos with up to twice the declared friction
+constexpr double kToldElasticShare = 0.2;   // simulation: the level is told to some 10 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid) throw InvalidParameter(std::string("momentum_transfer.") + name, value, limit);
@@ -43,6 +43,10 @@ void check(const MomentumTransferSettings& s) {
   require(s.coupling_stiffness > 0, "coupling_stiffness", s.coupling_stiffness, "must be > 0");
   require(!flexible(s) || s.pinion_inertia > 0, "pinion_inertia", s.pinion_inertia,
           "must be > 0 beyond a flexible coupling");
+  require(s.motor_friction >= 0 && std::isfinite(s.motor_friction), "motor_friction", s.motor_friction,
+          "must be >= 0");
+  require(s.elastic_uncertainty >= 0 && std::isfinite(s.elastic_uncertainty), "elastic_uncertainty",
+          s.elastic_uncertainty, "must be >= 0");
   require(s.load_ratio > 0 && std::isfinite(s.load_ratio), "load_ratio", s.load_ratio, "must be > 0");
   require(!(s.base_radius <= 0), "base_radius", s.base_radius, "must be > 0");
 }
@@ -80,65 +84,103 @@ std::vector<Crossing> free_crossings(const Flank& flank, double shortness) {
   return crossings;
 }
 
-void fill(const record::Record& record, const MomentumTransferSettings& s, Estimate& estimate) {
-  Motor motor = collect(record, s);
-  const double cycle = internal_cycle(s);
-  if (cycle > 0 && cycle < kSamplesPerCycle * motor.interval)
-    throw Refusal{Status::out_of_domain,
-                  fmt::format("sampled at {:.4g} Hz, but motor and pinion swing against each other at {:.4g} "
-                              "Hz: needed are {:.4g} samples per cycle",
-                              1 / motor.interval, 1 / cycle, kSamplesPerCycle)};
-  if (!motor.torque_measured) tell_torque(motor, s);
-  const Flank flank = calm_flank(motor, s);
-  const double shortness = shortness_of_impacts(flank, motor.interval, s);
-  const std::vector<Crossing> crossings = free_crossings(flank, shortness);
+/// Of all crossings, rad but for the speed.
+struct Travels {
+  std::vector<double> gap, timing, elastic, smear;
+  std::vector<double> impact_speed;  // rad/s
+};
+
+Travels travels_of(const Motor& motor, const Flank& flank, const std::vector<Crossing>& crossings,
+                   double shortness, const MomentumTransferSettings& s) {
   // The integral of a speed that jumps between two samples is known to half a sample too.
   const double blur = kTiming * (motor.tachometer ? 1 + shortness : 1);
-  const double elastic_share = motor.torque_measured ? kElasticShare : kToldElasticShare;
-  std::vector<double> gaps, timing, elastic, speeds, smears;
+  Travels all;
   for (const Crossing& c : crossings) {
     const auto place = [&](double index) { return at(flank.pinion.position, index) - at(motor.load, index); };
     const double deflection =
         s.flank_deflection ? s.flank_deflection(0.5 * flank.level) + s.flank_deflection(c.impact_torque) : 0;
-    gaps.push_back(c.side * (place(c.impact) - place(c.release)) - deflection);
-    timing.push_back(std::abs(place(c.impact) - place(c.impact - blur)));
-    elastic.push_back(deflection);
-    smears.push_back(std::abs(place(c.impact) - place(c.impact - double(flank.half))));
-    speeds.push_back(std::abs(at(motor.speed, c.impact)));
+    all.gap.push_back(c.side * (place(c.impact) - place(c.release)) - deflection);
+    all.timing.push_back(std::abs(place(c.impact) - place(c.impact - blur)));
+    all.elastic.push_back(deflection);
+    all.smear.push_back(std::abs(place(c.impact) - place(c.impact - double(flank.half))));
+    all.impact_speed.push_back(std::abs(at(motor.speed, c.impact)));
   }
-  const signal::RobustScale scale = signal::robust_scale(gaps, 0);
+  return all;
+}
+
+/// Half of the interval.
+double half_width(const Travels& travels, const signal::RobustScale& scale, const Motor& motor,
+                  const Flank& flank, const MomentumTransferSettings& s) {
+  const auto count = static_cast<double>(travels.gap.size());
   const double scatter =
-      signal::student_t_quantile(0.975, std::max(1.0, static_cast<double>(gaps.size()) - 1)) * 1.25 *
-      scale.deviation / std::sqrt(static_cast<double>(gaps.size()));
-  const double gap = std::max(0.0, scale.centre);
+      signal::student_t_quantile(0.975, std::max(1.0, count - 1)) * 1.25 * scale.deviation / std::sqrt(count);
   // A flexible coupling limits the averages to a part of its own cycle.
-  const double smear = flexible(s) ? 0 : signal::median(smears);
-  if (smear > gap + scatter)
+  const double smear = flexible(s) ? 0 : signal::median(travels.smear);
+  if (smear > std::max(0.0, scale.centre) + scatter)
     throw Refusal{
         Status::out_of_domain,
         fmt::format("within the +-{:.4g} s that torque and speed must be averaged over for their noise, the "
                     "motor side travels {:.4g} rad, farther than the gap",
                     static_cast<double>(flank.half) * motor.interval, smear)};
   const double noisy = kNoisyTiming * smear * std::min(1.0, 2 * kNoiseFree * flank.noise / flank.level);
-  const double half = std::sqrt(scatter * scatter + std::pow(signal::median(timing), 2) + noisy * noisy +
-                                std::pow(elastic_share * signal::median(elastic), 2));
+  const double share = std::max(s.elastic_uncertainty, motor.torque_measured ? 0 : kToldElasticShare);
+  return std::sqrt(scatter * scatter + std::pow(signal::median(travels.timing), 2) + noisy * noisy +
+                   std::pow(share * signal::median(travels.elastic), 2));
+}
+
+void require_sense(double lower, double upper, const MomentumTransferSettings& s) {
+  if (!(upper > 0))
+    throw Refusal{Status::out_of_domain,
+                  "the pinion travels less than the flanks yield elastically: the rig is not this machine"};
+  if (!s.output_locked && !(lower > 0))
+    throw Refusal{
+        Status::insufficient_data,
+        fmt::format("in flight the motor side travels no farther than the flanks yield, which the rig "
+                    "file tells within {:.0f} %",
+                    100 * s.elastic_uncertainty)};
+}
+
+void check_domain(const Motor& motor, const MomentumTransferSettings& s) {
+  const double cycle = internal_cycle(s);
+  if (cycle > 0 && cycle < kSamplesPerCycle * motor.interval)
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("sampled at {:.4g} Hz, but motor and pinion swing against each other at {:.4g} "
+                              "Hz: needed are {:.4g} samples per cycle",
+                              1 / motor.interval, 1 / cycle, kSamplesPerCycle)};
+}
+
+void check_friction(const Flank& flank, const MomentumTransferSettings& s) {
+  if (flank.level < kLeastOverFriction * s.motor_friction)
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("the flanks carry {:.4g} N m, and the dry friction of the motor, known from the rig "
+                    "file only, is {:.4g} N m",
+                    flank.level, s.motor_friction)};
+}
+
+void fill(const record::Record& record, const MomentumTransferSettings& s, Estimate& estimate) {
+  Motor motor = collect(record, s);
+  check_domain(motor, s);
+  if (!motor.torque_measured) tell_torque(motor, s);
+  const Flank flank = calm_flank(motor, s);
+  check_friction(flank, s);
+  const double shortness = shortness_of_impacts(flank, motor.interval, s);
+  const Travels travels = travels_of(motor, flank, free_crossings(flank, shortness), shortness, s);
+  const signal::RobustScale scale = signal::robust_scale(travels.gap, 0);
+  const double half = half_width(travels, scale, motor, flank, s);
+  require_sense(scale.centre - half, scale.centre + half, s);
   estimate.angle_lower = std::max(0.0, scale.centre - half);
   estimate.angle_upper = scale.centre + half;
-  if (!(estimate.angle_upper > 0)) {
-    estimate.angle_lower = estimate.angle_upper = kNaN;
-    throw Refusal{Status::out_of_domain,
-                  "the pinion travels less than the flanks yield elastically: the rig is "
-                  "not this machine"};
-  }
   if (!motor.torque_measured) check_rest(motor, s, estimate);
   estimate.status = estimate.angle_lower > 0 ? Status::ok : Status::below_range;
-  estimate.backlash_angle = gap;
-  estimate.backlash = s.base_radius * gap;
+  estimate.backlash_angle = std::max(0.0, scale.centre);
+  estimate.backlash = s.base_radius * estimate.backlash_angle;
   estimate.lower = s.base_radius * estimate.angle_lower;
   estimate.upper = s.base_radius * estimate.angle_upper;
   estimate.message =
       fmt::format("median of {} crossings, impacts at {:.4g} rad/s, momentum averaged over +-{:.4g} s",
-                  gaps.size(), signal::median(speeds), static_cast<double>(flank.half) * motor.interval);
+                  travels.gap.size(), signal::median(travels.impact_speed),
+                  static_cast<double>(flank.half) * motor.interval);
   if (!motor.torque_measured)
     estimate.message += fmt::format("; torque told from the motion, a square wave of {:.4g} N m",
                                     std::abs(motor.torque.front()));

@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 // What is known of the values: choices, two of them are the 95 % of servos declared within 40 % and more.
 constexpr double kKnownGap = 3, kKnownStiffness = 0.35, kKnownDamping = 0.7, kKnownInertia = 0.3,
-                 kKnownFriction = 0.5;
+                 kKnownFriction = 0.5, kKnownPower = 0.2;
 constexpr double kNoFriction = 0.1;              // of the level, where none is declared
 constexpr double kHeld = 0.5, kKnownHeld = 0.3;  // shares of the sample before: theory, choice
 constexpr double kStartSpread[] = {0.5, 5e-2};   // of the deflection, of the rms speed's scale: choice
@@ -50,6 +50,7 @@ TraversePriors traverse_priors(const TraverseData& data, const GapTraverseSettin
   p[kTraverseMotorDamping] = friction(s.motor_damping, speed);
   p[kTraverseMotorFriction] = friction(s.motor_friction, 1);
   p[kTraverseLoadFriction] = friction(s.load_friction, 1);
+  p[kTraversePower] = {1, kKnownPower, true};
   p[kTraverseEarlier] = {kHeld, kKnownHeld, false};
   return p;
 }

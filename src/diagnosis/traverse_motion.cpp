@@ -128,14 +128,39 @@ struct Load {
   double position, rate;
 };
 
-/// Torque through the teeth: never tensile.
-double teeth_torque(const TraverseMachine& m, const Motor& motor, const Load& load) {
-  const double x = motor.position - load.position, in = std::fabs(x) - 0.5 * m[kTraverseGap];
-  if (in <= 0) return 0;
-  const double side = x > 0 ? 1 : -1;
-  const double force = m[kTraverseStiffness] * in + m[kTraverseDamping] * side * (motor.rate - load.rate);
-  return force > 0 ? side * force : 0;
-}
+/// The teeth yield as a spring does at the usual torque `level`, and by a power of it elsewhere. Damping
+/// follows: constant for a spring and as the torque after Hertz (Hunt and Crossley 1975), between them by 3
+/// (power - 1).
+class Teeth {
+ public:
+  Teeth(const TraverseMachine& m, double level)
+      : half_gap_(0.5 * m[kTraverseGap]),
+        stiffness_(m[kTraverseStiffness]),
+        damping_(m[kTraverseDamping]),
+        power_(m[kTraversePower]),
+        level_(level) {}
+
+  /// Never tensile.
+  double torque(const Motor& motor, const Load& load) const {
+    const double x = motor.position - load.position, in = std::fabs(x) - half_gap_;
+    if (in <= 0) return 0;
+    const double side = x > 0 ? 1 : -1;
+    const double harder = std::exp((power_ - 1) * std::log(stiffness_ * in / level_));
+    const double damping = power_ > 1 ? damping_ * harder * harder * harder : damping_;
+    const double force = stiffness_ * in * harder + damping * side * (motor.rate - load.rate);
+    return force > 0 ? side * force : 0;
+  }
+
+  /// The load as far behind the motor as a torque through the teeth says that changes at this rate.
+  Load under(double torque, double torque_rate, double side, const Motor& motor) const {
+    const double in = level_ / stiffness_ * std::pow(std::fabs(torque) / level_, 1 / power_);
+    return {motor.position - side * (half_gap_ + in),
+            motor.rate - in * torque_rate / (power_ * std::fabs(torque))};
+  }
+
+ private:
+  double half_gap_, stiffness_, damping_, power_, level_;
+};
 
 }  // namespace
 
@@ -168,9 +193,11 @@ TraverseData traverse_data(const record::Record& record, const GapTraverseSettin
 void traverse_residual(const TraverseData& d, const TraverseWindow& window, const TraverseMachine& m,
                        const TraverseOwn& own, double* to) {
   const double dt = d.interval / d.steps, inertia = m[kTraverseLoadInertia];
-  const double first_in = window.side * 0.5 * m[kTraverseGap] + window.torque / m[kTraverseStiffness];
-  Load load{d.position[window.first] - first_in + own[0],
-            d.rate[window.first] - window.torque_rate / m[kTraverseStiffness] + own[1]};
+  const Teeth teeth(m, d.level);
+  Load load = teeth.under(window.torque, window.torque_rate, window.side,
+                          {d.position[window.first], d.rate[window.first]});
+  load.position += own[0];
+  load.rate += own[1];
   const auto acceleration = [&](double torque, double rate) {
     return (torque - own[3] - m[kTraverseLoadFriction] * std::clamp(rate / d.slow, -1.0, 1.0)) / inertia;
   };
@@ -182,15 +209,15 @@ void traverse_residual(const TraverseData& d, const TraverseWindow& window, cons
     mean = next, next = 0;
     for (int s = 0; s < d.steps; ++s) {
       const double u = double(s) / d.steps, half = u + 0.5 / d.steps, end = u + 1.0 / d.steps;
-      const double f = teeth_torque(m, motor.at(u), load);
+      const double f = teeth.torque(motor.at(u), load);
       mean += (1 - u) * f / d.steps, next += u * f / d.steps;
       const double a1 = acceleration(f, load.rate);
       const Load l2{load.position + 0.5 * dt * load.rate, load.rate + 0.5 * dt * a1};
-      const double a2 = acceleration(teeth_torque(m, motor.at(half), l2), l2.rate);
+      const double a2 = acceleration(teeth.torque(motor.at(half), l2), l2.rate);
       const Load l3{load.position + 0.5 * dt * l2.rate, load.rate + 0.5 * dt * a2};
-      const double a3 = acceleration(teeth_torque(m, motor.at(half), l3), l3.rate);
+      const double a3 = acceleration(teeth.torque(motor.at(half), l3), l3.rate);
       const Load l4{load.position + dt * l3.rate, load.rate + dt * a3};
-      const double a4 = acceleration(teeth_torque(m, motor.at(end), l4), l4.rate);
+      const double a4 = acceleration(teeth.torque(motor.at(end), l4), l4.rate);
       load.position += dt * (load.rate + 2 * l2.rate + 2 * l3.rate + l4.rate) / 6;
       load.rate += dt * (a1 + 2 * a2 + 2 * a3 + a4) / 6;
     }

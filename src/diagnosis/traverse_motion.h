@@ -21,6 +21,7 @@ enum TraverseValue {
   kTraverseMotorDamping,
   kTraverseMotorFriction,
   kTraverseLoadFriction,
+  kTraversePower,    // -, of the torque of the teeth over the deflection: 1 for a spring, 1.5 after Hertz
   kTraverseEarlier,  // -, share of the torque of the sample before: 0.5 where it is held between samples
   kTraverseValues
 };

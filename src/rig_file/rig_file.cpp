@@ -16,6 +16,7 @@
 namespace backlash::rig_file {
 namespace {
 
+constexpr double kFreeElastic = 1;  // simulation: servos declared within 40 %, of the deflection, 95 %
 constexpr double kNormal95 = 1.96;  // standard deviations of 95 %, both ends: theory
 
 /// Where the file does not say how well it knows the elastic deflection that lost_motion subtracts. A mesh of
@@ -109,6 +110,8 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
   diagnosis::MomentumTransferSettings& momentum = settings.momentum_transfer.emplace();
   momentum.motor_inertia = difference.motor_inertia;
   momentum.motor_damping = rig.motor.viscous_damping;
+  momentum.motor_friction = rig.motor.coulomb_friction;
+  if (!rig.link_locked) momentum.elastic_uncertainty = kFreeElastic;
   difference.output_locked = momentum.output_locked = rig.link_locked;
   momentum.flank_deflection = deflection;
   if (!coupling.rigid) {

@@ -17,10 +17,17 @@ struct Servo {
   double gap = 5e-4, stiffness = 4e5, damping = 450;  // rad, N m/rad, N m s/rad
   double motor_inertia = 7, load_inertia = 90;        // kg m^2
   double motor_viscous = 12, motor_coulomb = 50, load_coulomb = 15;
+  double hertz = 0;                 // N m; > 0: K in^1.5 (1 + chi in'), as stiff and damped at this torque
   double gravity = 0, cogging = 0;  // N m: on the load, constant; on the motor, order 36
   double amplitude = 500;           // N m
   double noise = 2, step = 8.7e-7;  // N m, rad
   double duration = 20;
+
+  double pressed(double in, double rate) const {
+    if (hertz == 0) return stiffness * in + damping * rate;
+    const double there = 1.5 * hertz / stiffness;  // slope 1.5 T / in
+    return hertz * std::pow(in / there, 1.5) * (1 + damping / hertz * rate);
+  }
 
   record::Record record(int rate = 1000) const {
     constexpr double kStep = 5e-6;
@@ -38,7 +45,7 @@ struct Servo {
         r.column(record::Channel::motor_position).push_back(step * std::round(qm / step));
       }
       const double x = qm - ql, in = std::fabs(x) - 0.5 * gap, side = x > 0 ? 1 : -1;
-      const double teeth = in > 0 ? side * std::fmax(0.0, stiffness * in + damping * side * (wm - wl)) : 0.0;
+      const double teeth = in > 0 ? side * std::fmax(0.0, pressed(in, side * (wm - wl))) : 0.0;
       wm += kStep / motor_inertia *
             (torque - teeth - motor_viscous * wm - motor_coulomb * std::tanh(wm / 1e-4) -
              cogging * std::sin(36 * qm));
@@ -78,6 +85,18 @@ TEST(GapTraverse, HoldsWithEffectsThatNobodyDeclares) {
   Servo servo;
   servo.gravity = 40, servo.cogging = 15, servo.noise = 10;
   expect_gap(servo, estimate_gap_traverse(servo.record(), declared()));
+}
+
+TEST(GapTraverse, HoldsForTeethAfterHertz) {
+  for (const double noise : {2.0, 60.0}) {
+    Servo servo;
+    servo.hertz = 300, servo.noise = noise;
+    const Estimate e = estimate_gap_traverse(servo.record(), declared());
+    ASSERT_EQ(e.status, Status::ok) << e.message;
+    EXPECT_LT(e.angle_lower, servo.gap) << e.message;
+    EXPECT_GT(e.angle_upper, servo.gap) << e.message;
+    EXPECT_LT(e.angle_upper, 2 * e.angle_lower) << e.message;  // and says something
+  }
 }
 
 TEST(GapTraverse, AngleIsPlayOverBaseRadius) {

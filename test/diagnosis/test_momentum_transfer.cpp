@@ -62,6 +62,39 @@ TEST(MomentumTransfer, TravelOfAFreeFlightFromRest) {
   }
 }
 
+// The torque that dry friction takes in flight is added to the recorded one, so that the motion is the same.
+TEST(MomentumTransfer, DryFrictionOfTheMotorIsNoTorqueOfTheTeeth) {
+  constexpr double kGap = 1e-2, kFriction = 0.5;
+  record::Record record = crossing(kGap);
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const double speed = record.column(record::Channel::motor_velocity)[i];
+    record.column(record::Channel::motor_torque)[i] += speed == 0 ? 0 : std::copysign(kFriction, speed);
+  }
+  MomentumTransferSettings s = settings();
+  EXPECT_NE(estimate_momentum_transfer(record, s).status, Status::ok);
+  s.motor_friction = kFriction;
+  const Estimate e = estimate_momentum_transfer(record, s);
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_NEAR(e.backlash_angle, kGap, std::sqrt(2 * kTorque * kGap / kInertia) / kRate);  // a sample
+  s.motor_friction = 2 * kTorque;  // more than the flanks carry
+  EXPECT_EQ(estimate_momentum_transfer(record, s).status, Status::out_of_domain);
+}
+
+// Nothing is told of a free load whose flanks, as declared, may yield by as much as was travelled.
+TEST(MomentumTransfer, OfAFreeLoadNoPlayIsNotTold) {
+  constexpr double kGap = 1e-2;
+  record::Record record = crossing(kGap);
+  record.column(record::Channel::load_position).assign(record.size(), 0.0);
+  MomentumTransferSettings s = settings();
+  s.output_locked = false;
+  s.flank_deflection = [](double torque) { return 1e-5 * torque; };
+  EXPECT_EQ(estimate_momentum_transfer(record, s).status, Status::ok);
+  s.flank_deflection = [](double torque) { return 1e-3 * torque; };
+  s.elastic_uncertainty = 1;
+  const Estimate e = estimate_momentum_transfer(record, s);
+  EXPECT_EQ(e.status, Status::insufficient_data) << e.message;
+}
+
 // The same from the motion alone, of which the level of the torque is no part: the inertia scales it.
 TEST(MomentumTransfer, TravelOfAFreeFlightWithoutATorque) {
   for (const double gap : {2e-3, 1e-2, 4e-2})

@@ -4,20 +4,21 @@
 // to touch, is the play (Nordin and Gutman 2002; Villwock and Pacas 2009). About each crossing the load is
 // moved by the recorded motor, and the torque that this needs is fitted to the recorded one:
 //
-//   Jm qm'' = tau - bm qm' - cm sign(qm') - F       F = k d + c d' > 0, d = |qm - ql| - gap / 2
+//   Jm qm'' = tau - bm qm' - cm sign(qm') - F       F = T (k d / T)^p + c d' > 0, d = |qm - ql| - gap / 2
 //   Jl ql'' = F - cl sign(ql')                      F has the sign of qm - ql
 //
-// with gap, k, c, Jl, Jm, bm, cm and cl of all crossings together, free within what is known of them, and two
-// start values of each. All at the motor_position axis; the teeth count as one linear spring.
+// with gap, k, p, c, Jl, Jm, bm, cm and cl of all crossings together, free within what is known of them, and
+// two start values of each. All at the motor_position axis. The teeth are a spring at the usual torque T, and
+// may yield by a power p of the deflection, 1 within a factor of 1.5 (1.5: Hertz), as far as the record
+// tells.
 //
 // Needs motor_torque and motor_position, evenly sampled, at least eight samples in a cycle of the motor
 // against the load, and 20 crossings that begin in contact. No period.
 //
 // Interval, 95 %: Student's t with the larger of two standard errors of the logarithm (crossings as clusters;
 // the fit's own), and 20 % besides for what these equations do not hold: set by simulated machines with
-// cogging, gravity, Stribeck friction, varying play and transmission errors that are not told to the fit.
-// Teeth after Hertz are not among them: the motor alone does not tell them from a spring, and the play comes
-// out too large by a quarter, or twice as large where the torque is noisy.
+// cogging, gravity, Stribeck friction, varying play, transmission errors and teeth after Hertz that are not
+// told to the fit.
 #pragma once
 
 #include "backlash_diagnosis/diagnosis/estimate.h"

@@ -3,10 +3,11 @@
 // the speed of the motor and its torque alone (idea: Stein and Wang, cited by Sarkar, Ellis and Moore 1997,
 // Section 2; their formula is not available here, this one follows from the momentum balance).
 //
-// Motor inertia J [kg m^2], damping c [N m s/rad] and torque tau [N m]; a pinion of inertia Jp hangs on it
-// through a torsion spring k [N m/rad] (rigid: k infinite, J the inertia of both, Jp = 0):
+// Motor inertia J [kg m^2], damping c [N m s/rad], dry friction cd [N m] and torque tau [N m]; a pinion of
+// inertia Jp hangs on it through a torsion spring k [N m/rad] (rigid: k infinite, J the inertia of both, Jp =
+// 0):
 //
-//   T  = tau - c w - J w'            torque that the motor hands on
+//   T  = tau - c w - cd sign(w) - J w'   torque that the motor hands on
 //   qp = q - T / k                   where the pinion is
 //   F  = T - Jp qp''  (rigid: F = T) torque on the flank, positive on the positive flank
 //
@@ -39,9 +40,9 @@
 //
 // Interval, 95 %, root of the sum of squares of: scatter of the median over the crossings (Student t), the
 // travel of the pinion within half a sample at the impact (a sample by tachometer on a rigid flank, where
-// speed jumps), a share of its travel within the averages as large as the noise, and a seventh of the elastic
-// deflections. Travel within the averages beyond the gap is out of the domain. About 94 % coverage in
-// simulations, see test_rig_estimators.cpp.
+// speed jumps), a share of its travel within the averages as large as the noise, and the declared uncertainty
+// of the elastic deflections. Travel within the averages beyond the gap is out of the domain. About 94 %
+// coverage in simulations, see test_rig_estimators.cpp.
 #pragma once
 
 #include <functional>
@@ -56,21 +57,25 @@ namespace backlash::diagnosis {
 struct MomentumTransferSettings {
   double motor_inertia = kNaN;  ///< kg m^2, > 0; with a rigid coupling of all that moves freely in the gap
   double motor_damping = 0;     ///< N m s/rad, >= 0
+  double motor_friction = 0;    ///< N m, >= 0, dry
   double pinion_inertia = 0;    ///< kg m^2, >= 0, beyond the coupling; > 0 where coupling_stiffness is finite
   double coupling_stiffness = std::numeric_limits<double>::infinity();  ///< N m/rad, > 0; infinite: rigid
   /// rad: elastic deflection of mesh and load side, without the coupling, under a torque [N m]; empty: none.
   std::function<double(double torque)> flank_deflection;
-  double load_ratio = 1;       ///< angle at the motor_position axis per angle of load_position, > 0
-  bool output_locked = false;  ///< else load_position is needed
-  double base_radius = kNaN;   ///< m, > 0; NaN where the rig gives none, then Estimate::backlash is NaN
+  double elastic_uncertainty = 0.14;  ///< of flank_deflection, 95 %, >= 0
+  double load_ratio = 1;              ///< angle at the motor_position axis per angle of load_position, > 0
+  bool output_locked = false;         ///< else load_position is needed
+  double base_radius = kNaN;  ///< m, > 0; NaN where the rig gives none, then Estimate::backlash is NaN
 };
 
 /// Throws InvalidParameter for settings outside the ranges above. Answers by status:
 ///   insufficient_data  a channel is missing, fewer than four crossings of the gap, or no motor_torque and a
-///                      motion that is not that under a square wave
+///                      motion that is not that under a square wave; the load is free and the interval holds
+///                      0
 ///   out_of_domain      sampling too slow for the coupling; impacts cannot be told from noise; flanks never
 ///                      change; no free flight between them: torque is left that inertia and damping do not
-///                      explain (friction, another machine); less travel than elastic deflection
+///                      explain (friction, another machine); less travel than elastic deflection; flanks that
+///                      carry less than 0.7 of the dry friction
 ///   below_range        the interval, which is given, holds 0: contact is not lost for longer than the
 ///                      averaging resolves
 Estimate estimate_momentum_transfer(const record::Record& record, const MomentumTransferSettings& settings);
