@@ -111,6 +111,39 @@ std::vector<ros::Time> stamps_of(const record::Record& record, const ros::Time& 
   return stamps;
 }
 
+/// That of all joints, whose times are the same.
+const record::Record& time_base(const std::vector<record::JointRecord>& joints) {
+  if (joints.empty()) throw InvalidParameter("joints", "none", "must be at least one");
+  const record::Record& first = joints.front().record;
+  for (const record::JointRecord& joint : joints) {
+    if (joint.joint.empty()) throw InvalidParameter("joint", "''", "must not be empty");
+    check_writable(joint.record);
+    if (joint.record.time != first.time)
+      throw BadData(joint.record.name, joint.joint + " and " + joints.front().joint + " have other times");
+  }
+  return first;
+}
+
+/// Makes the message of one sample of all joints.
+class Messages {
+ public:
+  explicit Messages(const std::vector<record::JointRecord>& joints) : joints_(joints) {
+    for (const record::JointRecord& joint : joints) names_.emplace_back(joint.joint);
+  }
+
+  sensor_msgs::JointState at(std::size_t i) const {
+    sensor_msgs::JointState message;
+    for (std::size_t j = 0; j < joints_.size(); ++j)
+      add_joint_state(joints_[j].record, i, names_[j], message);
+    empty_if_absent(message);
+    return message;
+  }
+
+ private:
+  const std::vector<record::JointRecord>& joints_;
+  std::vector<JointNames> names_;
+};
+
 std_msgs::String info_message(const record::Record& record, const ros::Time& origin) {
   std::string name;
   for (const char c : printable(record.name, 4096)) {
@@ -123,8 +156,8 @@ std_msgs::String info_message(const record::Record& record, const ros::Time& ori
   return message;
 }
 
-void write_messages(rosbag::Bag& bag, const record::Record& record, const std::vector<ros::Time>& stamps,
-                    const JointNames& names, const ros::Time& origin) {
+void write_messages(rosbag::Bag& bag, const std::vector<record::JointRecord>& joints,
+                    const std::vector<ros::Time>& stamps, const ros::Time& origin) {
   using Info = ros::message_traits::DataType<std_msgs::String>;
   const auto latched = boost::make_shared<ros::M_string>();
   (*latched)["type"] = Info::value();
@@ -132,9 +165,10 @@ void write_messages(rosbag::Bag& bag, const record::Record& record, const std::v
   (*latched)["message_definition"] = ros::message_traits::Definition<std_msgs::String>::value();
   (*latched)["latching"] = "1";
   (*latched)["callerid"] = "/backlash_diagnosis";
-  bag.write(kInfoTopic, stamps.front(), info_message(record, origin), latched);
-  for (std::size_t i = 0; i < record.size(); ++i) {
-    sensor_msgs::JointState message = make_joint_state(record, i, names);
+  bag.write(kInfoTopic, stamps.front(), info_message(joints.front().record, origin), latched);
+  const Messages messages(joints);
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    sensor_msgs::JointState message = messages.at(i);
     message.header.seq = static_cast<std::uint32_t>(i);
     message.header.stamp = stamps[i];
     bag.write(kJointTopic, stamps[i], message);
@@ -155,10 +189,9 @@ recording::JointState ros2_message(const sensor_msgs::JointState& message, const
 
 }  // namespace
 
-void write_mcap(const record::Record& record, const std::string& path, const std::string& joint,
+void write_mcap(const std::vector<record::JointRecord>& joints, const std::string& path,
                 const ros::Time& origin) {
-  if (joint.empty()) throw InvalidParameter("joint", "''", "must not be empty");
-  check_writable(record);
+  const record::Record& record = time_base(joints);
   const std::vector<ros::Time> stamps = stamps_of(record, origin);
   if (stamps.back().sec > static_cast<std::uint32_t>(std::numeric_limits<std::int32_t>::max()))
     throw BadData(record.name, fmt::format("time = {} s in the last sample: a ROS 2 stamp cannot hold it",
@@ -166,28 +199,35 @@ void write_mcap(const record::Record& record, const std::string& path, const std
   TemporaryFile file(path);
   recording::McapWriter out(file.name());
   const auto info = out.add_channel(kInfoTopic, recording::kStringType, recording::kStringDefinition);
-  const auto joints =
+  const auto states =
       out.add_channel(kJointTopic, recording::kJointStateType, recording::kJointStateDefinition);
   out.write(info, stamps.front().toNSec(), recording::to_cdr(info_message(record, origin).data));
-  const JointNames names(joint);
-  for (std::size_t i = 0; i < record.size(); ++i)
-    out.write(joints, stamps[i].toNSec(),
-              recording::to_cdr(ros2_message(make_joint_state(record, i, names), stamps[i])));
+  const Messages messages(joints);
+  for (std::size_t i = 0; i < stamps.size(); ++i)
+    out.write(states, stamps[i].toNSec(), recording::to_cdr(ros2_message(messages.at(i), stamps[i])));
   out.close();
   file.keep();
 }
 
+void write_mcap(const record::Record& record, const std::string& path, const std::string& joint,
+                const ros::Time& origin) {
+  write_mcap({{joint, record}}, path, origin);
+}
+
 void write_bag(const record::Record& record, const std::string& path, const std::string& joint,
                const ros::Time& origin) {
-  if (joint.empty()) throw InvalidParameter("joint", "''", "must not be empty");
-  check_writable(record);
-  const std::vector<ros::Time> stamps = stamps_of(record, origin);
+  write_bag({{joint, record}}, path, origin);
+}
+
+void write_bag(const std::vector<record::JointRecord>& joints, const std::string& path,
+               const ros::Time& origin) {
+  const std::vector<ros::Time> stamps = stamps_of(time_base(joints), origin);
   TemporaryFile file(path);
   auto bag = std::make_unique<rosbag::Bag>();
   try {
     bag->open(file.name(), rosbag::bagmode::Write);
     bag->setCompression(rosbag::compression::LZ4);
-    write_messages(*bag, record, stamps, JointNames(joint), origin);
+    write_messages(*bag, joints, stamps, origin);
     bag->close();
   } catch (const std::exception& e) {
     // Its destructor would try to write the rest and end the program when that fails too; so it is not

@@ -213,12 +213,11 @@ sensor_msgs::JointState make_joint_state(const model::Observation& o, const Join
   return m;
 }
 
-sensor_msgs::JointState make_joint_state(const record::Record& record, std::size_t i,
-                                         const JointNames& names) {
+void add_joint_state(const record::Record& record, std::size_t i, const JointNames& names,
+                     sensor_msgs::JointState& m) {
   const auto get = [&record, i](record::Channel channel) {
     return record.has(channel) ? record.column(channel)[i] : kAbsent;
   };
-  sensor_msgs::JointState m;
   add(m, names.motor, get(record::Channel::motor_position), get(record::Channel::motor_velocity),
       get(record::Channel::motor_torque));
   add(m, names.sensor, kAbsent, kAbsent, get(record::Channel::sensor_torque));
@@ -227,6 +226,12 @@ sensor_msgs::JointState make_joint_state(const record::Record& record, std::size
   add(m, names.reference, get(record::Channel::reference_position), kAbsent, kAbsent);
   add(m, names.current, kAbsent, kAbsent, get(record::Channel::motor_current));
   add(m, names.accelerometer, kAbsent, kAbsent, get(record::Channel::acceleration));
+}
+
+sensor_msgs::JointState make_joint_state(const record::Record& record, std::size_t i,
+                                         const JointNames& names) {
+  sensor_msgs::JointState m;
+  add_joint_state(record, i, names, m);
   empty_if_absent(m);
   return m;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs a rig without ROS and writes what its sensors measure.
 #include <cmath>
-#include <filesystem>
 #include <iostream>
 #include <limits>
 
@@ -43,9 +42,9 @@ Command command() {
                 "simulate config/yumrukcal_2013.yaml --run sine_sweep --out sweep.csv",
                 "simulate config/yumrukcal_2013.yaml --list-runs"};
   c.notes =
-      "The rig file of an arm (urdf, with simulation) gives one record of all its joints, a .csv with "
+      "The rig file of an arm (urdf, with simulation) gives one record of all its joints: a .csv with "
       "columns "
-      "JOINT/channel.";
+      "JOINT/channel, or a bag or MCAP file whose messages have JOINT_motor and JOINT_load of each.";
   c.exit_codes = "  0   done\n";
   return c;
 }
@@ -89,8 +88,7 @@ int simulate_arm(const Arguments& arguments) {
   for (const char* option : {"out", "duration"})
     if (!arguments.has(option)) throw UsageError(std::string("missing --") + option);
   const std::string out = arguments.text("out"), path = arguments.positional(0);
-  if (std::filesystem::path(out).extension() != ".csv")
-    throw UsageError("'" + out + "': the record of an arm is written as .csv");
+  check_written_path(out);
   geared_arm::GearedArm arm = geared_arm::load_geared_arm(path);
   arm.sensors.seed =
       arguments.integer("seed", arm.sensors.seed, 0, std::numeric_limits<std::uint64_t>::max());
@@ -104,7 +102,7 @@ int simulate_arm(const Arguments& arguments) {
                                       bar.progress());
     });
   }
-  record::write_joints_csv(joints, out);
+  write_joints(joints, out);
   std::cout << out << ": " << joints.front().record.size() << " samples at "
             << to_text(arm.sensors.sampling_rate) << " Hz of " << arm.rig.name << ", " << joints.size()
             << " joints\n";

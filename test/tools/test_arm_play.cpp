@@ -50,6 +50,20 @@ TEST_F(ArmPlay, FromUrdfToADiagnosisOfEachJoint) {
   expect_contains(hidden.out, "motion that passes a pose with shoulder at");
 }
 
+TEST_F(ArmPlay, ABagSaysTheSameAsTheCsv) {
+  std::vector<nlohmann::ordered_json> joints;
+  for (const std::string name : {"run.csv", "run.bag", "run.mcap"}) {
+    done("simulate rig/two_link_arm.yaml --duration 20 --seed 7 --out " + name);
+    done("diagnose_record " + name + " --rig rig/two_link_arm.yaml --json out.json");
+    joints.push_back(nlohmann::ordered_json::parse(read("out.json")).at("joints"));
+    for (nlohmann::ordered_json& joint : joints.back()) {
+      joint.erase("record");
+      joint.erase("time");  // a bag's is that of a clock
+    }
+    EXPECT_EQ(joints.back().dump(), joints.front().dump()) << name;
+  }
+}
+
 TEST_F(ArmPlay, LimitsOfAJointGradeIt) {
   changed("limits.yaml", "  - name: elbow",
           "  - name: elbow\n    limits: {backlash_angle: {watch: 1.0e-3, service: 2.0e-3, stop: 9.0e-3}}");
@@ -63,7 +77,7 @@ TEST_F(ArmPlay, WhatDoesNotServeIsRefused) {
     EXPECT_EQ(outcome.code, code) << line;
     expect_contains(outcome.err, words);
   };
-  refused("simulate rig/two_link_arm.yaml --duration 1 --out run.bag", 64, "written as .csv");
+  refused("simulate rig/two_link_arm.yaml --duration 1 --out run.txt", 64, "written as .csv, .bag or .mcap");
   refused("simulate rig/two_link_arm.yaml --duration 1 --half-gap 1e-3 --out run.csv", 64, "--half-gap");
   refused("simulate rig/two_link_arm.yaml --out run.csv", 64, "missing --duration");
   changed("bad.yaml", "stiffness: 8000", "stiffness: -1");

@@ -11,8 +11,10 @@
 #include <ros/time.h>
 
 #include <string>
+#include <vector>
 
 #include "backlash_diagnosis/record/channel_map.h"
+#include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::ros_bridge {
@@ -49,6 +51,13 @@ void write_bag(const record::Record& record, const std::string& path, const std:
 
 /// The same as a recording of ROS 2 (recording/mcap_writer.h), whose stamps end in 2038.
 void write_mcap(const record::Record& record, const std::string& path, const std::string& joint,
+                const ros::Time& origin = kBagTimeOrigin);
+
+/// Several joints with the same times, in the same messages. Throws besides InvalidParameter for no joint or
+/// one without a name, BadData where times differ.
+void write_bag(const std::vector<record::JointRecord>& joints, const std::string& path,
+               const ros::Time& origin = kBagTimeOrigin);
+void write_mcap(const std::vector<record::JointRecord>& joints, const std::string& path,
                 const ros::Time& origin = kBagTimeOrigin);
 
 }  // namespace backlash::ros_bridge

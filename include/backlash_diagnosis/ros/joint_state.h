@@ -82,6 +82,10 @@ record::ChannelValues read_joint_state(const sensor_msgs::JointState& message, c
 void add_joint_state(const model::Observation& observation, const JointNames& names,
                      sensor_msgs::JointState& message);
 
+/// The same of sample i of a record; only channels that the record has.
+void add_joint_state(const record::Record& record, std::size_t i, const JointNames& names,
+                     sensor_msgs::JointState& message);
+
 /// Empties the arrays of a message in which no name has that quantity.
 void empty_if_absent(sensor_msgs::JointState& message);
 

@@ -82,6 +82,17 @@ void write_record(const record::Record& record, const std::string& path, const s
     record::write_csv(record, path);
 }
 
+void write_joints(const std::vector<record::JointRecord>& joints, const std::string& path) {
+  check_written_path(path);
+  const SignalsBlocked blocked;
+  if (ends_in(path, ".bag"))
+    ros_bridge::write_bag(joints, path);
+  else if (ends_in(path, ".mcap"))
+    ros_bridge::write_mcap(joints, path);
+  else
+    record::write_joints_csv(joints, path);
+}
+
 void write_text(const std::string& path, const std::string& text) {
   const SignalsBlocked blocked;
   write_file(path, text);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/record/channel_map.h"
+#include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
@@ -34,6 +35,8 @@ record::Record read_record(const std::string& path, const BagPlace& place = {});
 
 /// Not interrupted by Ctrl-C: the file is written whole or not at all. Throws as write_csv and write_bag.
 void write_record(const record::Record& record, const std::string& path, const std::string& joint);
+/// The same for several joints with one time base.
+void write_joints(const std::vector<record::JointRecord>& joints, const std::string& path);
 
 /// The same for any text file.
 void write_text(const std::string& path, const std::string& text);
