@@ -134,7 +134,7 @@ const std::vector<DiagnosisMethod>& diagnosis_method_table() {
        false, by_momentum_transfer},
       {"gap_traverse", "motor_torque and motor_position; load free, moves that reverse under load", false,
        by_gap_traverse},
-      {"waveform", "motor_torque (square wave) and sensor_torque; motor_position sharpens it", false,
+      {"waveform", "motor_torque that reverses and sensor_torque; motor_position sharpens it", false,
        by_waveform},
   };
   return methods;

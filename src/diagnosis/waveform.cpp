@@ -42,12 +42,15 @@ void check(const WaveformSettings& s) {
   require("base_radius", s.base_radius);
   require("motor_inertia", s.motor_inertia);
   require("pinion_inertia", s.pinion_inertia);
-  require("gear_inertia", s.gear_inertia);
   require("motor_damping", s.motor_damping);
   require("sensor_stiffness", s.sensor_stiffness);
   require("sensor_damping", s.sensor_damping);
-  require("output_stiffness", s.output_stiffness);
-  require("output_damping", s.output_damping);
+  if (s.output != WaveformOutput::link) {
+    require("gear_inertia", s.gear_inertia);
+    require("output_stiffness", s.output_stiffness);
+    require("output_damping", s.output_damping);
+  }
+  if (s.output != WaveformOutput::locked) require("link_inertia", s.link_inertia);
   require("contact_stiffness", s.contact_stiffness);
   require("contact_loss", s.contact_loss);
   require("friction_speed", s.friction_speed);
@@ -70,12 +73,13 @@ void refuse_misfit(const WaveformSolution& s) {
   static const char* const kNames[] = {"torque", "position"};
   for (int c = 0; c < kWaveformChannels; ++c) {
     const WaveformMisfit& m = s.misfit[c];
-    if (m.structure > kMostStructure[c] * m.swing)
+    const double most = kMostStructure[c] * m.swing + m.drive;
+    if (m.structure > most)
       throw Refusal{Status::out_of_domain,
                     fmt::format("the machine of the rig file, whatever its values, does not explain the {}: "
                                 "{:.2g} % of its swing are left that are no noise",
                                 kNames[c], 100 * m.structure / m.swing)};
-    if (m.rms > kMostNoise * m.noise && m.rms > kMostStructure[c] * m.swing)
+    if (m.rms > kMostNoise * m.noise && m.rms > most)
       throw Refusal{Status::out_of_domain,
                     fmt::format("the machine of the rig file, whatever its values, does not explain the {}: "
                                 "what is left is {:.2g} times its noise",
@@ -107,6 +111,7 @@ void refuse_waveform(const WaveformSolution& s) {
 namespace {
 
 double error_of(const WaveformSolution& s, std::size_t k) {
+  if (!s.priors[k].fitted) return kNaN;
   return s.told[k] * s.priors[k].spread * (s.priors[k].factor ? s.values[k] : 1);
 }
 
@@ -132,7 +137,10 @@ std::shared_ptr<const WaveformEvidence> evidence_of(const WaveformSolution& s) {
   auto evidence = std::make_shared<WaveformEvidence>(s.evidence);
   for (const int place : kQuantityPlaces) {
     const auto k = static_cast<std::size_t>(place);
-    evidence->values.push_back({s.priors[k].value, s.priors[k].spread, s.values[k], error_of(s, k)});
+    if (s.priors[k].fitted)
+      evidence->values.push_back({s.priors[k].value, s.priors[k].spread, s.values[k], error_of(s, k)});
+    else
+      evidence->values.emplace_back();
   }
   return evidence;
 }

@@ -17,16 +17,26 @@ constexpr double kUntold = 0.9;  // of what was known, from which a record tells
 constexpr double kFinest =
     0.002;  // of a value, choice: the equations are no better, see kModelError of the fit
 
-constexpr int kCount = sizeof(kQuantityPlaces) / sizeof(*kQuantityPlaces);
+/// Those that the machine has, by their places in waveform_quantities().
+std::vector<std::size_t> quantities_of(const WaveformSettings& machine) {
+  std::vector<std::size_t> places;
+  const auto& all = waveform_quantities();
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (all[i].in(machine)) places.push_back(i);
+  return places;
+}
 
 /// What the record leaves of a machine, by the equations of waveform.h.
 WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s) {
-  Eigen::MatrixXd c(kCount, kCount);
-  Eigen::VectorXd u(kCount);
-  for (int i = 0; i < kCount; ++i) {
-    u[i] = kScalePower[kQuantityPlaces[i]];
-    for (int j = 0; j < kCount; ++j) {
-      const int a = kQuantityPlaces[i], b = kQuantityPlaces[j];
+  const std::vector<std::size_t> places = quantities_of(before);
+  const auto count = static_cast<int>(places.size());
+  const auto of_fit = [&places](int i) { return kQuantityPlaces[places[static_cast<std::size_t>(i)]]; };
+  Eigen::MatrixXd c(count, count);
+  Eigen::VectorXd u(count);
+  for (int i = 0; i < count; ++i) {
+    u[i] = kScalePower[of_fit(i)];
+    for (int j = 0; j < count; ++j) {
+      const int a = of_fit(i), b = of_fit(j);
       c(i, j) = s.covariance(a, b) * s.priors[static_cast<std::size_t>(a)].spread *
                 s.priors[static_cast<std::size_t>(b)].spread;
     }
@@ -38,15 +48,15 @@ WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s
   Eigen::MatrixXd rest = scaled - common * direction * direction.transpose();
   const Eigen::VectorXd own = rest.diagonal().cwiseMax(1e-6).cwiseSqrt();
   rest = own.cwiseInverse().asDiagonal() * rest * own.cwiseInverse().asDiagonal();
-  const double widest = std::sqrt(std::max(1.0, signal::symmetric_eigenvalues(rest)[kCount - 1]));
+  const double widest = std::sqrt(std::max(1.0, signal::symmetric_eigenvalues(rest)[count - 1]));
   WaveformSettings machine = before;
   machine.common_scale = std::sqrt(common);
-  for (int i = 0; i < kCount; ++i) {
-    const auto k = static_cast<std::size_t>(kQuantityPlaces[i]);
+  for (int i = 0; i < count; ++i) {
+    const auto k = static_cast<std::size_t>(of_fit(i));
     const WaveformPrior& prior = s.priors[k];
     const double finest = prior.factor ? kFinest : kFinest * s.values[k];
     const double spread = std::min(prior.spread, std::max(finest, widest * own[i] * unit[i]));
-    const WaveformQuantity& q = waveform_quantities()[static_cast<std::size_t>(i)];
+    const WaveformQuantity& q = waveform_quantities()[places[static_cast<std::size_t>(i)]];
     machine.*q.at = prior.factor ? s.values[k] : std::max(0.0, s.values[k]);
     machine.spread.*q.spread = spread;
   }
@@ -88,6 +98,9 @@ const std::vector<WaveformQuantity>& waveform_quantities() {
       {"contact_stiffness", "N/m^1.5", "contact stiffness", true, 1.5, &S::contact_stiffness,
        &W::contact_stiffness},
       {"contact_loss", "s/m", "contact loss", true, 1, &S::contact_loss, &W::contact_loss},
+      {"load_inertia", kInertia, "link inertia", true, 1, &S::link_inertia, &W::link_inertia},
+      {"load_viscous", kDamping, "link damping", true, 1, &S::link_damping, &W::link_damping},
+      {"load_coulomb", "N m", "dry friction of the link", false, 0, &S::link_friction, &W::link_friction},
       {"sensor_gain", "-", "sensor gain", true, 0, &S::sensor_gain, &W::sensor_gain},
       {"sensor_delay", "s", "delay of the sensor", false, 0, &S::sensor_delay, &W::sensor_delay},
       {"sensor_time_constant", "s", "time constant of the sensor", false, 0, &S::sensor_time_constant,
@@ -99,7 +112,8 @@ WaveformCommissioning commission_waveform(const std::vector<record::Record>& rec
                                           const WaveformSettings& settings, double told, double told_error) {
   WaveformCommissioning result;
   result.machine = settings;
-  std::vector<double> left(kCount, 1);  // of what was known before the first record
+  const std::vector<std::size_t> places = quantities_of(settings);
+  std::vector<double> left(places.size(), 1);  // of what was known before the first record
   for (const record::Record& record : records) {
     try {
       check_waveform(record, result.machine);
@@ -107,17 +121,16 @@ WaveformCommissioning commission_waveform(const std::vector<record::Record>& rec
       const WaveformSolution s =
           solve_waveform(record, result.machine, first ? told / 2 : kNaN, first ? told_error : kNaN);
       refuse_waveform(s);
-      for (int i = 0; i < kCount; ++i)
-        left[static_cast<std::size_t>(i)] *= s.told[static_cast<std::size_t>(kQuantityPlaces[i])];
+      for (std::size_t i = 0; i < places.size(); ++i)
+        left[i] *= s.told[static_cast<std::size_t>(kQuantityPlaces[places[i]])];
       result.machine = after(result.machine, s);
       result.states.push_back(state_of(s, record.has(record::Channel::motor_position)));
     } catch (const Refusal& refusal) {
       throw CannotIdentify(record.name + ": " + refusal.reason);
     }
   }
-  for (int i = 0; i < kCount; ++i)
-    if (left[static_cast<std::size_t>(i)] > kUntold)
-      result.untold.emplace_back(waveform_quantities()[static_cast<std::size_t>(i)].name);
+  for (std::size_t i = 0; i < places.size(); ++i)
+    if (left[i] > kUntold) result.untold.emplace_back(waveform_quantities()[places[i]].name);
   return result;
 }
 

@@ -24,9 +24,7 @@ constexpr double kEnough = 0.05;        // gain of cost below which a stage ends
 constexpr double kEnoughOfCost = 1e-5;  // the same, relative
 constexpr double kFirstStep = 1e-3;     // spreads
 constexpr double kStepPerError = 0.3;   // step of a difference per standard error with all else known
-constexpr double kShortestStep = 1e-6, kLongestStep = 1e-2;          // spreads
-constexpr double kStartStep = 1e-5;                                  // of the level
-constexpr double kStartSpread[kStartValues] = {0.4, 0.4, 0.2, 0.2};  // of the level
+constexpr double kShortestStep = 1e-6, kLongestStep = 1e-2;  // spreads
 
 }  // namespace
 
@@ -50,16 +48,7 @@ WaveformFit::WaveformFit(const WaveformData& data, const WaveformPriors& priors,
   for (int k = 0; k < kGlobalValues; ++k)
     if (priors_[static_cast<std::size_t>(k)].fitted) fitted_.push_back(k);
   point.z = VectorXd::Zero(kGlobalValues);
-  for (const WaveformWindow& window : data.windows) {
-    const auto reversal = static_cast<int>(std::lround(window.reversal / data.grid.interval));
-    double mean = 0;
-    for (int i = 0; i < reversal; ++i)
-      mean += data.torque[window.first + static_cast<std::size_t>(i)] / reversal;
-    const double load = std::max(0.0, window.side * mean);
-    guesses_.emplace_back(load, load, 0, 0);
-  }
-  point.starts = guesses_;
-  for (int k = 0; k < kStartValues; ++k) start_spread_[k] = kStartSpread[k] * data.level;
+  for (const WaveformStartGuess& guess : data.guesses) point.starts.push_back(guess.value);
 }
 
 /// The inverse of 1 + common^2 w w^T, w the symmetry in spreads (Sherman and Morrison).
@@ -101,23 +90,26 @@ void WaveformFit::residuals(std::size_t window, const WaveformMotion& motion, st
                             double* to) const {
   const auto first = static_cast<std::size_t>(data_.windows[window].first);
   const auto length = static_cast<std::size_t>(stage_.lengths[window]);
-  for (std::size_t i = 0; i < length; ++i)
-    *to++ = (data_.torque[first + i] - motion.torque[i][set]) / stage_.noise[kTorqueChannel];
+  for (std::size_t i = 0; i < length; ++i) {
+    const bool seen = i >= static_cast<std::size_t>(data_.unseen);
+    *to++ = seen ? (data_.torque[first + i] - motion.torque[i][set]) / stage_.noise[kTorqueChannel] : 0;
+  }
   if (data_.position.empty()) return;
   for (std::size_t i = 0; i < length; ++i)
     *to++ = (data_.position[first + i] - motion.position[i][set]) / stage_.noise[kPositionChannel];
 }
 
 double WaveformFit::start_cost(std::size_t window, const WaveformStart& start) const {
-  return (start - guesses_[window]).cwiseQuotient(start_spread_).squaredNorm();
+  const WaveformStartGuess& guess = data_.guesses[window];
+  return (start - guess.value).cwiseQuotient(guess.spread).squaredNorm();
 }
 
 WaveformFit::Part WaveformFit::linearise(std::size_t window) const {
-  const auto shared = static_cast<int>(moving_.size()), all = shared + kStartValues;
+  const auto shared = static_cast<int>(moving_.size()), all = shared + data_.starts;
   const int sides = stage_.central ? 2 : 1, runs = 1 + sides * all;
-  const double start_step = kStartStep * data_.level;
+  const WaveformStartGuess& guess = data_.guesses[window];
   const auto step_of = [&](int k) {
-    return k < shared ? steps_[moving_[static_cast<std::size_t>(k)]] : start_step;
+    return k < shared ? steps_[moving_[static_cast<std::size_t>(k)]] : guess.step[k - shared];
   };
   MatrixXd columns(rows(window), runs);
   WaveformSets sets;
@@ -144,14 +136,14 @@ WaveformFit::Part WaveformFit::linearise(std::size_t window) const {
   const MatrixXd normal = signal::gram(slopes);
   const VectorXd toward = -signal::transposed_product(slopes, columns.col(0));
   Part part{normal.topLeftCorner(shared, shared),
-            normal.topRightCorner(shared, kStartValues),
-            normal.bottomRightCorner(kStartValues, kStartValues),
+            normal.topRightCorner(shared, data_.starts),
+            normal.bottomRightCorner(data_.starts, data_.starts),
             toward.head(shared),
-            toward.tail(kStartValues),
+            toward.tail(data_.starts),
             columns.col(0).squaredNorm() + start_cost(window, point.starts[window])};
-  const WaveformStart weight = start_spread_.cwiseAbs2().cwiseInverse();
-  part.own.diagonal() += weight;
-  part.own_toward -= weight.cwiseProduct(point.starts[window] - guesses_[window]);
+  const WaveformStart weight = guess.spread.cwiseAbs2().cwiseInverse();
+  part.own.diagonal() += weight.head(data_.starts);
+  part.own_toward -= weight.cwiseProduct(point.starts[window] - guess.value).head(data_.starts);
   return part;
 }
 
@@ -169,7 +161,7 @@ WaveformFit::Trial WaveformFit::trial(const std::vector<Part>& parts, double dam
     if (!used(w)) continue;
     own[w] = parts[w].own;
     own[w].diagonal() *= 1 + damping;
-    MatrixXd right(kStartValues, shared + 1);
+    MatrixXd right(data_.starts, shared + 1);
     right << parts[w].mixed.transpose(), parts[w].own_toward;
     const MatrixXd solved = signal::solve_symmetric(own[w], right);
     normal -= parts[w].mixed * solved.leftCols(shared);
@@ -181,7 +173,7 @@ WaveformFit::Trial WaveformFit::trial(const std::vector<Part>& parts, double dam
   for (Eigen::Index k = 0; k < shared; ++k) result.point.z[moving_[static_cast<std::size_t>(k)]] += move[k];
   for (std::size_t w = 0; w < parts.size(); ++w)
     if (used(w))
-      result.point.starts[w] +=
+      result.point.starts[w].head(data_.starts) +=
           signal::solve_symmetric(own[w], parts[w].own_toward - parts[w].mixed.transpose() * move).col(0);
   return result;
 }
@@ -189,10 +181,10 @@ WaveformFit::Trial WaveformFit::trial(const std::vector<Part>& parts, double dam
 /// The start values of a window for each trial, one step of Gauss and Newton nearer to their best for its
 /// shared values, where that is better; the costs.
 std::vector<double> WaveformFit::settle(std::size_t window, std::vector<Trial>& trials) const {
-  constexpr std::size_t kRuns = 1 + kStartValues;
-  const double step = kStartStep * data_.level;
+  const auto starts = static_cast<std::size_t>(data_.starts), each = 1 + starts;
+  const WaveformStartGuess& guess = data_.guesses[window];
   const std::size_t count = trials.size();
-  MatrixXd r(rows(window), count * kRuns), better(rows(window), count);
+  MatrixXd r(rows(window), count * each), better(rows(window), count);
   const auto move = [&](const auto& start_of, MatrixXd& to) {
     WaveformSets sets;
     WaveformMotion motion;
@@ -209,23 +201,26 @@ std::vector<double> WaveformFit::settle(std::size_t window, std::vector<Trial>& 
   };
   move(
       [&](std::size_t run) {
-        WaveformStart start = trials[run / kRuns].point.starts[window];
-        if (run % kRuns > 0) start[static_cast<Eigen::Index>(run % kRuns - 1)] += step;
+        WaveformStart start = trials[run / each].point.starts[window];
+        const auto k = static_cast<Eigen::Index>(run % each) - 1;
+        if (k >= 0) start[k] += guess.step[k];
         return start;
       },
       r);
-  const WaveformStart weight = start_spread_.cwiseAbs2().cwiseInverse();
+  const WaveformStart weight = guess.spread.cwiseAbs2().cwiseInverse();
   std::vector<WaveformStart> next;
   std::vector<double> costs;
   for (std::size_t i = 0; i < count; ++i) {
-    const auto base = static_cast<Eigen::Index>(i * kRuns);
+    const auto base = static_cast<Eigen::Index>(i * each);
     const WaveformStart& start = trials[i].point.starts[window];
-    const MatrixXd slopes = (r.middleCols(base + 1, kStartValues).colwise() - r.col(base)) / step;
+    const MatrixXd slopes = (r.middleCols(base + 1, data_.starts).colwise() - r.col(base)) *
+                            guess.step.head(data_.starts).cwiseInverse().asDiagonal();
     MatrixXd normal = signal::gram(slopes);
-    normal.diagonal() += weight;
-    const VectorXd toward =
-        -signal::transposed_product(slopes, r.col(base)) - weight.cwiseProduct(start - guesses_[window]);
-    next.emplace_back(start + WaveformStart(signal::solve_symmetric(normal, toward).col(0)));
+    normal.diagonal() += weight.head(data_.starts);
+    const VectorXd toward = -signal::transposed_product(slopes, r.col(base)) -
+                            weight.cwiseProduct(start - guess.value).head(data_.starts);
+    next.push_back(start);
+    next.back().head(data_.starts) += signal::solve_symmetric(normal, toward).col(0);
     costs.push_back(r.col(base).squaredNorm() + start_cost(window, start));
   }
   move([&](std::size_t run) { return next[run]; }, better);
@@ -316,7 +311,9 @@ std::vector<double> WaveformFit::residual(std::size_t window, WaveformChannel ch
   const auto& moved = channel == kTorqueChannel ? motion.torque : motion.position;
   std::vector<double> r;
   for (std::size_t i = 0; i < static_cast<std::size_t>(length); ++i)
-    r.push_back(measured[static_cast<std::size_t>(w.first) + i] - moved[i][0]);
+    r.push_back(channel == kTorqueChannel && i < static_cast<std::size_t>(data_.unseen)
+                    ? 0
+                    : measured[static_cast<std::size_t>(w.first) + i] - moved[i][0]);
   return r;
 }
 

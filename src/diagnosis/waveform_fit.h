@@ -3,7 +3,7 @@
 //
 //   sum over samples ((measured - moved) / noise)^2 + sum over values ((value - declared) / spread)^2,
 //
-// over the values that all windows share and four start values of each window, by Levenberg and Marquardt's
+// over the values that all windows share and the start values of each window, by Levenberg and Marquardt's
 // method. The start values are eliminated (Schur complement), so that a step costs one small system per
 // window.
 #pragma once
@@ -24,23 +24,32 @@ struct WaveformPrior {
 };
 using WaveformPriors = std::array<WaveformPrior, kGlobalValues>;
 /// Powers in the factor c of the symmetry of waveform.h. Theory.
-constexpr double kScalePower[kGlobalValues] = {-1, 1, 0, -1, 1, 1, 1, 1, 1, 1, 1, 1.5, 1};
+constexpr double kScalePower[kGlobalValues] = {-1, 1, 0, -1, 1, 1, 1, 1, 1, 1, 1, 1.5, 1, 1, 1};
 
 /// Of the fit, in the order of waveform_quantities().
-constexpr int kQuantityPlaces[] = {kMotorDamping,    kDryFriction,   kFrictionSpeed,    kSensorStiffness,
-                                   kSensorDamping,   kMotorInertia,  kPinionInertia,    kGearInertia,
-                                   kOutputStiffness, kOutputDamping, kContactStiffness, kContactLoss,
-                                   kSensorGain,      kSensorLag,     kSensorTime};
+constexpr int kQuantityPlaces[] = {
+    kMotorDamping,  kDryFriction, kFrictionSpeed,   kSensorStiffness, kSensorDamping,    kMotorInertia,
+    kPinionInertia, kGearInertia, kOutputStiffness, kOutputDamping,   kContactStiffness, kContactLoss,
+    kLinkInertia,   kLinkDamping, kLinkFriction,    kSensorGain,      kSensorLag,        kSensorTime};
 
 using WaveformStart = Eigen::Matrix<double, kStartValues, 1>;
 
 enum WaveformChannel { kTorqueChannel, kPositionChannel, kWaveformChannels };
 
+/// What is known of how a window starts, before the fit.
+struct WaveformStartGuess {
+  WaveformStart value, spread, step;  ///< the step is that of differences
+};
+
 /// What is fitted to.
 struct WaveformData {
   std::vector<double> torque, position;  // N m, rad; no position: torque alone
   std::vector<WaveformWindow> windows;
+  std::vector<WaveformStartGuess> guesses;  // one per window
+  int starts = kStartValues;                // how many of the start values are fitted, the first ones
   WaveformGrid grid;
+  int unseen =
+      0;  // first samples of a window whose torque does not count: what a late sensor shows is before
   double level = 0;  // N m, of the torque of the motor: scale of the start values
 };
 
@@ -107,8 +116,6 @@ class WaveformFit {
   WaveformPriors priors_;
   Eigen::MatrixXd precision_;  // of what was known, in spreads, all values
   std::vector<int> fitted_, moving_;
-  std::vector<WaveformStart> guesses_;
-  WaveformStart start_spread_;
   Eigen::VectorXd steps_;  // of the differences, in spreads
   Stage stage_;
   Eigen::MatrixXd information_;

@@ -13,9 +13,7 @@ namespace {
 using Lanes = double __attribute__((vector_size(8 * kWaveformSets)));
 #define WAVEFORM_INLINE inline __attribute__((always_inline))
 
-constexpr double kRateTime = 1e-3;    // s, of the start values that are rates: choice
-constexpr double kSaturated = 4.9;    // -, where the fraction below reaches 1
-constexpr double kStiffestBrake = 2;  // -, friction within one step: the method is stable to 2.78
+constexpr double kRateTime = 1e-3;  // s, of the start values that are rates: choice
 
 WAVEFORM_INLINE Lanes positive(const Lanes& a) {
   return a > 0 ? a : Lanes{};
@@ -36,39 +34,53 @@ WAVEFORM_INLINE Lanes root(const Lanes& a) {
   return r;
 }
 
-/// tanh to 1e-4 by its continued fraction (Lambert).
-WAVEFORM_INLINE Lanes soft_sign(const Lanes& a) {
-  const Lanes end = Lanes{} + kSaturated;
-  const Lanes x = a > end ? end : a < -end ? -end : a;
-  const Lanes s = x * x;
-  return x * (135135 + s * (17325 + s * (378 + s))) / (135135 + s * (62370 + s * (3150 + s * 28)));
-}
-
 struct State {
-  Lanes qm, wm, qp, wp, qg, wg;
+  Lanes qm, wm, qp, wp, qg, wg, ql, wl;
 };
 
+/// v where the machine has it.
+Lanes per_inertia(const Lanes& v) {
+  return v > 0 ? 1 / v : Lanes{};
+}
+
+template <WaveformOutput kOutput>
 struct Train {
-  Lanes half_gap, motor_damping, dry, per_speed, ki, ci, per_jm, per_jp, per_jg, ko, co, contact, loss, slope;
+  Lanes half_gap, motor_damping, dry, slow, ki, ci, per_jm, per_jp, per_jg, ko, co, contact, loss, slope;
+  Lanes per_jl, link_damping, link_dry;
   double lever;
 
   explicit Train(const Lanes* v, const WaveformGrid& grid)
       : half_gap(v[kHalfGap]),
         motor_damping(v[kMotorDamping]),
         dry(positive(v[kDryFriction])),
+        slow(v[kFrictionSpeed]),
         ki(v[kSensorStiffness]),
         ci(v[kSensorDamping]),
         per_jm(1 / v[kMotorInertia]),
         per_jp(1 / v[kPinionInertia]),
-        per_jg(1 / v[kGearInertia]),
+        per_jg(per_inertia(v[kGearInertia])),
         ko(v[kOutputStiffness]),
         co(v[kOutputDamping]),
         contact(v[kContactStiffness]),
         loss(1.5 * v[kContactLoss]),
         slope(v[kDriveSlope]),
-        lever(grid.base_radius) {
-    const Lanes slowest = dry * per_jm * (grid.interval / grid.steps / kStiffestBrake);
-    per_speed = 1 / (v[kFrictionSpeed] > slowest ? v[kFrictionSpeed] : slowest);
+        per_jl(per_inertia(v[kLinkInertia])),
+        link_damping(v[kLinkDamping]),
+        link_dry(positive(v[kLinkFriction])),
+        lever(grid.base_radius) {}
+
+  /// Of the gear and of the link, rad/s^2.
+  WAVEFORM_INLINE void output(const State& s, const Lanes& teeth, State& rate) const {
+    if constexpr (kOutput == WaveformOutput::locked) {
+      rate.wg = (teeth - ko * s.qg - co * s.wg) * per_jg;
+    } else if constexpr (kOutput == WaveformOutput::link) {
+      rate.wg = (teeth - link_damping * s.wg) * per_jl;
+    } else {
+      const Lanes out = ko * (s.qg - s.ql) + co * (s.wg - s.wl);
+      rate.wg = (teeth - out) * per_jg;
+      rate.ql = s.wl;
+      rate.wl = (out - link_damping * s.wl) * per_jl;
+    }
   }
 
   WAVEFORM_INLINE State rate(const State& s, const Lanes& drive) const {
@@ -77,25 +89,47 @@ struct Train {
     const Lanes push = lever * contact * depth * root(depth) * positive(1 + loss * (x < 0 ? -v : v));
     const Lanes teeth = x < 0 ? -push : push;
     const Lanes sensor = ki * (s.qm - s.qp) + ci * (s.wm - s.wp);
-    const Lanes brake = motor_damping * s.wm + dry * soft_sign(s.wm * per_speed);
-    return {s.wm, (drive + slope * s.qm - brake - sensor) * per_jm, s.wp, (sensor - teeth) * per_jp,
-            s.wg, (teeth - ko * s.qg - co * s.wg) * per_jg};
+    State rate;
+    rate.qm = s.wm, rate.wm = (drive + slope * s.qm - motor_damping * s.wm - sensor) * per_jm;
+    rate.qp = s.wp, rate.wp = (sensor - teeth) * per_jp;
+    rate.qg = s.wg;
+    output(s, teeth, rate);
+    return rate;
+  }
+
+  WAVEFORM_INLINE static State along(const State& s, const State& r, double h) {
+    State next;
+    next.qm = s.qm + h * r.qm, next.wm = s.wm + h * r.wm;
+    next.qp = s.qp + h * r.qp, next.wp = s.wp + h * r.wp;
+    next.qg = s.qg + h * r.qg, next.wg = s.wg + h * r.wg;
+    if constexpr (kOutput == WaveformOutput::coupled_link)
+      next.ql = s.ql + h * r.ql, next.wl = s.wl + h * r.wl;
+    return next;
+  }
+
+  WAVEFORM_INLINE void step(const Lanes& drive, double h, State& s) const {
+    const State a = rate(s, drive), b = rate(along(s, a, h / 2), drive);
+    const State c = rate(along(s, b, h / 2), drive), d = rate(along(s, c, h), drive);
+    s = along(along(along(along(s, a, h / 6), b, h / 3), c, h / 3), d, h / 6);
+    brake(dry * per_jm * h, h, s.qm, s.wm);
+    if constexpr (kOutput == WaveformOutput::link) brake(link_dry * per_jl * h, h, s.qg, s.wg);
+    if constexpr (kOutput == WaveformOutput::coupled_link) brake(link_dry * per_jl * h, h, s.ql, s.wl);
+  }
+
+  /// Dry friction of one step, implicitly, so that what sticks stays: `most` is the speed that it takes at
+  /// most.
+  WAVEFORM_INLINE void brake(const Lanes& most, double h, Lanes& angle, Lanes& speed) const {
+    const Lanes slips = speed < 0 ? speed + most : speed - most;
+    const Lanes next = magnitude(speed) > slow + most ? slips : speed * slow / (slow + most);
+    angle -= 0.5 * h * (speed - next);
+    speed = next;
   }
 };
 
-WAVEFORM_INLINE State along(const State& s, const State& r, double h) {
-  return {s.qm + h * r.qm, s.wm + h * r.wm, s.qp + h * r.qp,
-          s.wp + h * r.wp, s.qg + h * r.qg, s.wg + h * r.wg};
-}
-
-WAVEFORM_INLINE void step(const Train& train, const Lanes& drive, double h, State& s) {
-  const State a = train.rate(s, drive), b = train.rate(along(s, a, h / 2), drive);
-  const State c = train.rate(along(s, b, h / 2), drive), d = train.rate(along(s, c, h), drive);
-  s = along(along(along(along(s, a, h / 6), b, h / 3), c, h / 3), d, h / 6);
-}
-
-/// The gear follows the pinion on its flank: 5 ms before a reversal nothing else moves.
-State start(const Train& train, const WaveformWindow& window, const Lanes* v) {
+/// 5 ms before a reversal nothing else moves: the gear of a locked output follows the pinion on its flank; a
+/// free link is driven by it.
+template <WaveformOutput kOutput>
+State start(const Train<kOutput>& train, const WaveformWindow& window, const Lanes* v) {
   const Lanes load = positive(v[kStartFlank]);
   Lanes depth = {}, share = {};
   for (int i = 0; i < kWaveformSets; ++i) {
@@ -103,16 +137,22 @@ State start(const Train& train, const WaveformWindow& window, const Lanes* v) {
     const double force = load[i] / train.lever;
     depth[i] = std::cbrt(force / train.contact[i] * force / train.contact[i]);
     const double stiffness = 1.5 * train.contact[i] * std::sqrt(depth[i]) * train.lever * train.lever;
-    share[i] = stiffness / (stiffness + train.ko[i]);
+    share[i] = kOutput == WaveformOutput::locked ? stiffness / (stiffness + train.ko[i]) : 1;
   }
   const Lanes off = v[kStartFlank] < 0 ? v[kStartFlank] / train.ki : Lanes{};
-  State s;
-  s.qg = window.side * load / train.ko;
+  State s{};
+  if constexpr (kOutput == WaveformOutput::locked) s.qg = window.side * load / train.ko;
   s.qp = s.qg + window.side * ((train.half_gap + depth) / train.lever + off);
   s.qm = s.qp + window.side * v[kStartTwist] / train.ki;
   s.wp = window.side * v[kStartPinionRate] / (kRateTime * train.ki);
   s.wm = s.wp + window.side * v[kStartTwistRate] / (kRateTime * train.ki);
   s.wg = s.wp * share;
+  if constexpr (kOutput != WaveformOutput::locked)
+    s.wg = s.wp + window.side * v[kStartGearRate] / (kRateTime * train.ki);
+  if constexpr (kOutput == WaveformOutput::coupled_link) {
+    s.ql = -window.side * load / train.ko * train.per_jg / (train.per_jg + train.per_jl);
+    s.wl = s.wg;
+  }
   return s;
 }
 
@@ -120,44 +160,70 @@ void put(const Lanes& from, std::array<double, kWaveformSets>& to) {
   for (int i = 0; i < kWaveformSets; ++i) to[static_cast<std::size_t>(i)] = from[i];
 }
 
-/// Torque `lag` ago, by the cubic through values and rates at either end of the interval (Hermite).
-double lagged(const std::vector<Lanes>& torque, const std::vector<Lanes>& rate, int sample, int set,
-              double lag, double interval) {
-  const double x = sample - lag / interval;
+/// Torque `lag` ago, by the cubic through values and rates at either end of a step of the integration
+/// (Hermite). Between samples it would miss some per cent of the ring.
+double lagged(const std::vector<Lanes>& torque, const std::vector<Lanes>& rate, int step, int set, double lag,
+              double interval) {
+  const double x = step - lag / interval;
   const int last = static_cast<int>(torque.size()) - 2;
   const int k = std::clamp(static_cast<int>(std::floor(x)), 0, last);
   const std::size_t i = static_cast<std::size_t>(k);
   const double u = x - k, p = torque[i][set], q = torque[i + 1][set];
   const double r = rate[i][set] * interval, s = rate[i + 1][set] * interval;
+  if (u < 0) return p + u * r;
+  if (u > 1) return q + (u - 1) * s;
   return p + u * (r + u * (3 * (q - p) - 2 * r - s + u * (2 * (p - q) + r + s)));
 }
 
+/// Torque of the motor over one step, N m.
+class Drive {
+ public:
+  Drive(const WaveformWindow& window, const WaveformGrid& grid, const Lanes& delay)
+      : window_(window), grid_(grid), delay_(delay), change_(window.reversal + delay) {}
+
+  WAVEFORM_INLINE Lanes at(std::size_t sample, int j) const {
+    const double h = grid_.interval / grid_.steps;
+    if (window_.drive.empty()) {
+      const Lanes part = (change_ - (static_cast<double>(sample) * grid_.interval + j * h)) / h;
+      const Lanes share = part < 0 ? Lanes{} : part > 1 ? Lanes{} + 1 : part;  // of it before the reversal
+      return share * window_.before + (1 - share) * window_.after;
+    }
+    const double here = window_.drive[sample], next = window_.drive[sample + 1];
+    return here + ((j + 0.5) * h - delay_) / grid_.interval * (next - here);
+  }
+
+ private:
+  const WaveformWindow& window_;
+  const WaveformGrid& grid_;
+  Lanes delay_, change_;
+};
+
+template <WaveformOutput kOutput>
 WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   Lanes v[kAllValues];
   for (std::size_t k = 0; k < kAllValues; ++k)
     for (std::size_t i = 0; i < kWaveformSets; ++i) v[k][static_cast<int>(i)] = sets[k][i];
-  const Train train(v, grid);
+  const Train<kOutput> train(v, grid);
   State s = start(train, window, v);
   const double h = grid.interval / grid.steps;
-  const Lanes change = window.reversal + v[kSwitchDelay];
+  const Drive drive(window, grid, v[kSwitchDelay]);
+  const Lanes zero = v[kPositionZero] + v[kStartZero];
   const auto count = static_cast<std::size_t>(samples);
   static thread_local std::vector<Lanes> torque, rate;
-  torque.resize(count), rate.resize(count);
+  const auto steps = static_cast<std::size_t>(grid.steps), all = (count - 1) * steps + 1;
+  torque.resize(all), rate.resize(all);
   motion.torque.resize(count), motion.position.resize(count);
   const Lanes damper = grid.sensor_with_damper ? train.ci : Lanes{};
   const Lanes follow = h / (h + positive(v[kSensorTime]));  // of a step, by the sensor: implicit Euler
   Lanes shown = train.ki * (s.qm - s.qp) + damper * (s.wm - s.wp), shown_rate = train.ki * (s.wm - s.wp);
   for (std::size_t k = 0; k < count; ++k) {
-    torque[k] = v[kSensorGain] * shown + v[kSensorBias];
-    rate[k] = v[kSensorGain] * shown_rate;
-    put(s.qm + v[kPositionZero], motion.position[k]);
-    if (k + 1 == count) break;
-    for (int j = 0; j < grid.steps; ++j) {
-      const Lanes part =
-          (change - (static_cast<double>(k) * grid.interval + j * h)) / h;  // before the reversal
-      const Lanes share = part < 0 ? Lanes{} : part > 1 ? Lanes{} + 1 : part;
-      step(train, share * window.before + (1 - share) * window.after + v[kDriveOffset], h, s);
+    put(s.qm + zero, motion.position[k]);
+    for (std::size_t j = 0; j < steps; ++j) {
+      torque[k * steps + j] = v[kSensorGain] * shown + v[kSensorBias];
+      rate[k * steps + j] = v[kSensorGain] * shown_rate;
+      if (k + 1 == count) break;
+      train.step(drive.at(k, static_cast<int>(j)) + v[kDriveOffset], h, s);
       shown += follow * (train.ki * (s.qm - s.qp) + damper * (s.wm - s.wp) - shown);
       shown_rate += follow * (train.ki * (s.wm - s.wp) - shown_rate);
     }
@@ -165,14 +231,26 @@ WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& 
   for (std::size_t k = 0; k < count; ++k)
     for (std::size_t i = 0; i < kWaveformSets; ++i)
       motion.torque[k][i] =
-          lagged(torque, rate, static_cast<int>(k), static_cast<int>(i), sets[kSensorLag][i], grid.interval);
+          lagged(torque, rate, static_cast<int>(k * steps), static_cast<int>(i), sets[kSensorLag][i], h);
+}
+
+WAVEFORM_INLINE void move_any(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+                              const WaveformSets& sets, WaveformMotion& motion) {
+  switch (grid.output) {
+    case WaveformOutput::locked:
+      return move_all<WaveformOutput::locked>(window, grid, samples, sets, motion);
+    case WaveformOutput::link:
+      return move_all<WaveformOutput::link>(window, grid, samples, sets, motion);
+    case WaveformOutput::coupled_link:
+      return move_all<WaveformOutput::coupled_link>(window, grid, samples, sets, motion);
+  }
 }
 
 #if defined(__x86_64__)
 __attribute__((target("avx2"))) void move_avx2(const WaveformWindow& window, const WaveformGrid& grid,
                                                int samples, const WaveformSets& sets,
                                                WaveformMotion& motion) {
-  move_all(window, grid, samples, sets, motion);
+  move_any(window, grid, samples, sets, motion);
 }
 #endif
 
@@ -184,7 +262,7 @@ void move_waveform(const WaveformWindow& window, const WaveformGrid& grid, int s
   static const bool has_avx2 = __builtin_cpu_supports("avx2");
   if (has_avx2) return move_avx2(window, grid, samples, sets, motion);
 #endif
-  move_all(window, grid, samples, sets, motion);
+  move_any(window, grid, samples, sets, motion);
 }
 
 }  // namespace backlash::diagnosis

@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How a gear train with a torque sensor and a locked output moves about one reversal of its torque, for
-// several sets of values at once:
+// How a gear train with a torque sensor moves about one reversal of its torque, for several sets of values at
+// once:
 //
-//   Jm qm'' = tau + offset + slope qm - cm qm' - dry tanh(qm' / friction_speed) - T
+//   Jm qm'' = tau + offset + slope qm - cm qm' - dry sat(qm' / friction_speed) - T     sat(x): x within +-1
 //   Jp qp'' = T - F rb                       T = Ki (qm - qp) + Ci (qm' - qp')
 //   Jg qg'' = F rb - Ko qg - Co qg'          F = K d^1.5 max(0, 1 + 3/2 alpha d'),  d = |rb (qp - qg)| - gap
+//
+// with a free link instead of the locked output as in waveform.h.
 //
 // F has the sign of qp - qg (Hunt and Crossley 1975; Sarkar, Ellis and Moore 1997, Eqs. 8 to 12). `offset`
 // and `slope` stand for cogging and gravity within the small travel. The sensors:
 //
 //   torque = gain Ki (qm - qp) + bias, a first-order lag and a delay later        position = qm + zero
+//
+// A free link has no place of its own: each window has its zero, and the gear is at 0 when it starts.
 //
 // The classical Runge-Kutta method with a fixed step: every set of values makes the same steps, so that
 // differences between sets are smooth.
@@ -17,6 +21,8 @@
 
 #include <array>
 #include <vector>
+
+#include "backlash_diagnosis/diagnosis/waveform.h"
 
 namespace backlash::diagnosis {
 
@@ -35,6 +41,9 @@ enum WaveformValue {
   kOutputDamping,     // Co, N m s/rad
   kContactStiffness,  // K, N/m^1.5
   kContactLoss,       // alpha, s/m
+  kLinkInertia,       // Jl, kg m^2
+  kLinkDamping,       // cl, N m s/rad
+  kLinkFriction,      // N m, < 0 counts as 0
   kSensorGain,        // -
   kSensorBias,        // N m
   kSensorLag,         // s
@@ -48,6 +57,8 @@ enum WaveformValue {
   kStartFlank,                  // N m: torque on that flank; < 0: off it by -kStartFlank / Ki
   kStartTwistRate,              // N m per ms: Ki (qm' - qp')
   kStartPinionRate,             // N m per ms: Ki qp'
+  kStartGearRate,               // N m per ms: Ki (qg' - qp'), of a free link
+  kStartZero,                   // rad: of the position, of a free link
   kAllValues,
   kStartValues = kAllValues - kGlobalValues
 };
@@ -61,6 +72,7 @@ struct WaveformWindow {
   double before = 0, after = 0;  // N m, torque of the motor
   double reversal = 0;           // s after the first sample
   int first = 0, samples = 0;    // in the record
+  std::vector<double> drive;     // N m, torque of the motor at each sample; none: a step from before to after
 };
 
 struct WaveformGrid {
@@ -68,6 +80,7 @@ struct WaveformGrid {
   int steps = 1;                    // of the integration per sample
   double base_radius = 0;           // m
   bool sensor_with_damper = false;  // the sensor shows T and not the spring's share
+  WaveformOutput output = WaveformOutput::locked;
 };
 
 /// One column per set; all have `samples` rows.

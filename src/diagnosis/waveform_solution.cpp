@@ -12,6 +12,8 @@
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
+#include "waveform_priors.h"
+#include "waveform_start.h"
 #include "waveform_windows.h"
 
 namespace backlash::diagnosis {
@@ -20,75 +22,23 @@ namespace {
 // All choices, tried on simulated machines, but where another origin is given.
 constexpr int kMostWindows = 12;       // beyond them the errors do not shrink: priors and equations limit
 constexpr int kSearchWindows = 4;      // for the first guesses
-constexpr double kStepsPerRing = 155;  // of the integration
-constexpr double kStepPerTime = 1;     // step times fastest frequency: Runge and Kutta's is stable to 2.8
-constexpr double kStiffer = 3;         // the output may be so much stiffer than declared
 constexpr double kCoarse = 0.01;       // of the swing, noise above which a coarse integration will do
 constexpr double kModelError = 0.002;  // of the swing: no model is better
-constexpr double kWideGap = 3;         // spread of the logarithm of the gap: next to nothing is known
 constexpr double kGuesses[] = {0.1, 0.3, 0.8, 2,
                                4.5};  // half gaps per twist of the sensor, along the line of action
 constexpr double kFirstLoss = 0.2;    // spreads, of what cannot be below 0: from there its slope is not seen
 constexpr double kHopeless = 4;       // times the noise, or this share of the swing: far from any fit
 constexpr double kHopelessSwing = 0.02;
+constexpr double kFreeLink =
+    1.8;  // errors of a free link: simulation, some windows settle beside their best start
+// Of a sampled torque that drives, per level: beyond it an answer was wrong and sure. What it leaves of the
+// swing of each channel. Simulation.
+constexpr double kMostDriveNoise = 0.03;
+constexpr double kDriveNoise[kWaveformChannels] = {1, 0.4};
+constexpr double kLatest = 3;   // spreads, of the delay of the sensor
 constexpr double kSure = 3;     // standard deviations of the correlation of white noise
 constexpr double kLeftOut = 4;  // times the median misfit of the windows
-
-double twist_length(const WaveformSettings& s, double level) {
-  return s.base_radius * level / s.sensor_stiffness;
-}
-
-double ring_of(const WaveformSettings& s) {
-  return 2 * M_PI / std::sqrt(s.sensor_stiffness * (1 / s.motor_inertia + 1 / s.pinion_inertia));
-}
-
-WaveformGrid grid_of(const WaveformSettings& s, double interval) {
-  const double fastest = std::sqrt(kStiffer * s.output_stiffness / s.gear_inertia);
-  const double step = std::min(ring_of(s) / kStepsPerRing, kStepPerTime / fastest);
-  return {interval, static_cast<int>(std::ceil(interval / step - 1e-6)), s.base_radius, s.sensor_with_damper};
-}
-
-double half_swing(const std::vector<double>& values) {
-  return values.empty() ? 1 : signal::quantile_range(values, 0.001) / 2;
-}
-
-WaveformPriors priors_of(const WaveformSettings& s, const WaveformData& data) {
-  using Spread = WaveformSpread;
-  const double position = data.position.empty() ? 1 : half_swing(data.position);
-  const double middle = data.position.empty() ? 0 : signal::median(data.position);
-  WaveformPriors p;
-  p[kHalfGap] = {twist_length(s, data.level), kWideGap, true};
-  p[kMotorDamping] = {s.motor_damping, s.spread.motor_damping, true};
-  p[kDryFriction] = {s.dry_friction, std::isnan(s.spread.dry_friction) ? Spread::kDryFriction * data.level
-                                                                       : s.spread.dry_friction};
-  p[kFrictionSpeed] = {s.friction_speed, s.spread.friction_speed, true};
-  p[kSensorStiffness] = {s.sensor_stiffness, s.spread.sensor_stiffness, true};
-  p[kSensorDamping] = {s.sensor_damping, s.spread.sensor_damping, true};
-  p[kMotorInertia] = {s.motor_inertia, s.spread.motor_inertia, true};
-  p[kPinionInertia] = {s.pinion_inertia, s.spread.pinion_inertia, true};
-  p[kGearInertia] = {s.gear_inertia, s.spread.gear_inertia, true};
-  p[kOutputStiffness] = {s.output_stiffness, s.spread.output_stiffness, true};
-  p[kOutputDamping] = {s.output_damping, s.spread.output_damping, true};
-  p[kContactStiffness] = {s.contact_stiffness, s.spread.contact_stiffness, true};
-  p[kContactLoss] = {s.contact_loss, s.spread.contact_loss, true};
-  p[kSensorGain] = {s.sensor_gain, s.spread.sensor_gain, true};
-  p[kSensorBias] = {0, Spread::kBias * data.level};
-  p[kSensorLag] = {s.sensor_delay, s.spread.sensor_delay};
-  p[kSensorTime] = {s.sensor_time_constant, s.spread.sensor_time_constant};
-  p[kSwitchDelay] = {0, data.grid.interval / 2};  // theory: it is seen a sample late at most
-  p[kDriveOffset] = {0, Spread::kDrive * data.level};
-  p[kDriveSlope] = {0, Spread::kDriveSlope * s.sensor_stiffness};
-  p[kPositionZero] = {middle, position, false, !data.position.empty()};
-  return p;
-}
-
-/// Least standard error of the logarithm of the gap from torque alone: by the symmetry of waveform.h the
-/// torque says nothing of the factor c, so that the priors alone hold it. Theory.
-double symmetry_error(const WaveformPriors& priors, double common) {
-  Eigen::VectorXd w = Eigen::VectorXd::Zero(kGlobalValues);
-  for (int k = 0; k < kGlobalValues; ++k) w[k] = kScalePower[k] / priors[static_cast<std::size_t>(k)].spread;
-  return 1 / std::sqrt(w.dot(waveform_precision(priors, common) * w));
-}
+constexpr double kLeftOutFree[kWaveformChannels] = {2, 9};  // of a free link, whose windows start anyhow
 
 /// How far a stage looks, in cycles of the ring, and how much of the swing it takes as noise.
 struct Look {
@@ -103,23 +53,30 @@ constexpr Look kLast = {12, 0, 15, true};
 class Solver {
  public:
   Solver(const record::Record& record, const WaveformSettings& settings, double told, double told_error)
-      : settings_(settings), ring_(ring_of(settings)), told_gap_(told), told_error_(told_error) {
-    data_.windows = waveform_windows(record, ring_, kMostWindows);
+      : settings_(settings), ring_(waveform_ring(settings)), told_gap_(told), told_error_(told_error) {
+    const bool free = settings.output != WaveformOutput::locked;
+    data_.windows = waveform_windows(record, ring_, kMostWindows, free);
     data_.torque = record.column(record::Channel::sensor_torque);
     data_.position = record.column(record::Channel::motor_position);
-    data_.grid = grid_of(settings, record.sampling_interval());
+    data_.grid = waveform_grid(settings, record.sampling_interval());
+    const double latest = settings.sensor_delay + kLatest * settings.spread.sensor_delay;
+    data_.unseen = std::min(static_cast<int>(std::ceil(latest / data_.grid.interval)),
+                            waveform_lead(ring_, data_.grid.interval) / 2);
     time_ = record.time;
     for (const WaveformWindow& w : data_.windows)
       data_.level +=
           (std::fabs(w.before) + std::fabs(w.after)) / 2 / static_cast<double>(data_.windows.size());
-    swing_[kTorqueChannel] = half_swing(data_.torque);
-    swing_[kPositionChannel] = half_swing(data_.position);
+    swing_[kTorqueChannel] = waveform_swing(data_.torque);
+    swing_[kPositionChannel] = waveform_position_swing(data_);
+    data_.guesses = waveform_starts(data_, settings);
+    data_.starts = waveform_start_count(data_, settings);
+    drive_noise_ = drive_noise(record);
     for (double& noise : noise_) noise = 0;
     used_.assign(data_.windows.size(), true);
   }
 
   WaveformSolution solve() {
-    WaveformPriors priors = priors_of(settings_, data_);
+    WaveformPriors priors = waveform_priors(settings_, data_);
     if (!std::isnan(told_gap_)) priors[kHalfGap] = {told_gap_, told_error_, true};
     WaveformFit fit = searched(priors);
     for (const Look& look : kMiddle) {
@@ -176,8 +133,9 @@ class Solver {
       const WaveformPrior& gap = priors[kHalfGap];
       const bool known = !std::isnan(told_gap_);
       fits.back().point.z[kHalfGap] =
-          known ? 0 : std::log(guess * twist_length(settings_, data_.level) / gap.value) / gap.spread;
+          known ? 0 : std::log(guess * waveform_twist(settings_, data_.level) / gap.value) / gap.spread;
       if (settings_.dry_friction == 0) fits.back().point.z[kDryFriction] = kFirstLoss;
+      if (settings_.link_friction == 0) fits.back().point.z[kLinkFriction] = kFirstLoss;
       if (settings_.sensor_time_constant == 0) fits.back().point.z[kSensorTime] = kFirstLoss;
       double cost = 0;
       for (const Look& look : kSearch) cost = fits.back().run(stage(look, search_set()));
@@ -199,6 +157,20 @@ class Solver {
       return second < first ? fits[i] : best;
     }
     return best;
+  }
+
+  /// Of the level. A square wave is known by its levels, whatever their noise.
+  double drive_noise(const record::Record& record) const {
+    if (data_.windows[0].drive.empty()) return 0;
+    const double noise =
+        signal::noise_from_differences(record.column(record::Channel::motor_torque), 3) / data_.level;
+    if (!(noise <= kMostDriveNoise))
+      throw Refusal{
+          Status::out_of_domain,
+          fmt::format("motor_torque is no square wave, and its noise of {:.2g} % moves the machine that "
+                      "it is taken to drive: at most {:.2g} %",
+                      100 * noise, 100 * kMostDriveNoise)};
+    return noise;
   }
 
   double window_rms(const WaveformFit& fit, std::size_t window, WaveformChannel channel) const {
@@ -248,7 +220,10 @@ class Solver {
       std::vector<double> rms;
       for (std::size_t w = 0; w < used_.size(); ++w)
         rms.push_back(window_rms(fit, w, static_cast<WaveformChannel>(c)));
-      const double most = std::max(signal::median(rms), kModelError * swing_[c]) * std::sqrt(kLeftOut);
+      const double middle = signal::median(rms);
+      const double most = data_.grid.output == WaveformOutput::locked
+                              ? std::max(middle, kModelError * swing_[c]) * std::sqrt(kLeftOut)
+                              : middle * std::sqrt(kLeftOutFree[c]);
       for (std::size_t w = 0; w < used_.size(); ++w)
         if (!(rms[w] <= most)) used_[w] = false;
     }
@@ -266,7 +241,7 @@ class Solver {
     }
     const double variance = squares / count, chance = kSure * variance / std::sqrt(2 * count);
     return {std::sqrt(variance), std::sqrt(std::max(0.0, neighbours / count - chance)), signal_noise(channel),
-            swing_[channel]};
+            swing_[channel], kDriveNoise[channel] * drive_noise_ * swing_[channel]};
   }
 
   WaveformEvidence::Trace trace(const WaveformFit& fit, std::size_t window, WaveformChannel channel) const {
@@ -307,17 +282,18 @@ class Solver {
   WaveformSolution told(const WaveformFit& fit, const WaveformPriors& priors) const {
     WaveformSolution s;
     s.half_gap = fit.value(kHalfGap);
-    const Eigen::MatrixXd covariance = fit.covariance();
+    const double wider = settings_.output == WaveformOutput::locked ? 1 : kFreeLink * kFreeLink;
+    const Eigen::MatrixXd covariance = wider * fit.covariance();
     s.z.assign(fit.point.z.data(), fit.point.z.data() + kGlobalValues);
     s.told.assign(kGlobalValues, 1);
     for (std::size_t i = 0; i < fit.fitted().size(); ++i) {
       const auto k = static_cast<Eigen::Index>(i);
-      s.told[static_cast<std::size_t>(fit.fitted()[i])] = std::sqrt(covariance(k, k));
+      s.told[static_cast<std::size_t>(fit.fitted()[i])] = std::min(1.0, std::sqrt(covariance(k, k)));
     }
     for (int k = 0; k < kGlobalValues; ++k) s.values.push_back(fit.value(k));
     s.log_error = priors[kHalfGap].spread * s.told[kHalfGap];
     if (data_.position.empty())
-      s.log_error = std::max(s.log_error, symmetry_error(priors, settings_.common_scale));
+      s.log_error = std::max(s.log_error, waveform_symmetry_error(priors, settings_.common_scale));
     Eigen::VectorXd machine = fit.point.z;
     machine[kHalfGap] = 0;
     s.prior_cost = fit.prior_cost(machine);
@@ -341,6 +317,7 @@ class Solver {
   double told_gap_, told_error_;
   double swing_[kWaveformChannels], noise_[kWaveformChannels];
   std::vector<bool> used_;
+  double drive_noise_ = 0;
   double rival_ = kNaN, rival_cost_ = kNaN;
 };
 
@@ -360,6 +337,9 @@ const char* waveform_value_name(int which) {
                                                    "output damping",
                                                    "contact stiffness",
                                                    "contact loss",
+                                                   "link inertia",
+                                                   "link damping",
+                                                   "dry friction of the link",
                                                    "sensor gain",
                                                    "sensor bias",
                                                    "delay of the sensor",

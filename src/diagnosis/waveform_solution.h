@@ -16,6 +16,7 @@ struct WaveformMisfit {
   double structure = 0;  // the same of its part that is surely no white noise
   double noise = 0;      // of the channel by itself, at most
   double swing = 0;      // of the channel
+  double drive = 0;      // what noise of the torque that drives may leave
 };
 
 struct WaveformSolution {

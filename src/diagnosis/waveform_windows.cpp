@@ -18,6 +18,7 @@ constexpr double kShortestRings = 5;     // of a half period: choice, the first 
 constexpr double kSamplesPerRing = 3;    // fewest: choice, 2 are the least in theory
 constexpr double kUneven = 0.02;         // of an interval, largest error of a stamp: choice
 constexpr double kBetween = 0.5;         // of the level; what is below is on its way
+constexpr double kTurned = 0.3;          // of the middle size of a smooth torque: choice
 constexpr double kMostBetween = 0.05;    // share of samples: a sine has 0.23, noise of a fifth 0.006
 constexpr double kLargestSpread = 0.25;  // of the level, standard deviation about it: choice; a sine has 0.3
 constexpr std::size_t kFewest = 4;       // windows: choice
@@ -33,31 +34,62 @@ void check_even(const record::Record& record) {
     throw Refusal{Status::out_of_domain, "the samples are not evenly spaced in time"};
 }
 
-struct Square {
+struct Torque {
   double level[2];             // N m, backward and forward
   std::vector<int> reversals;  // first sample after each
+  bool square = true;          // else its samples count
 };
 
-Square square_of(const std::vector<double>& torque) {
+/// Mean over `reach` samples to either side, so that a tooth that rebounds does not count as a turn.
+std::vector<double> averaged(const std::vector<double>& values, std::size_t reach) {
+  std::vector<double> sums{0}, means;
+  for (const double v : values) sums.push_back(sums.back() + v);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t first = i - std::min(i, reach), last = std::min(values.size(), i + reach + 1);
+    means.push_back((sums[last] - sums[first]) / static_cast<double>(last - first));
+  }
+  return means;
+}
+
+/// Where a smooth torque turns: first sample that is no longer clearly on the side of before.
+std::vector<int> turns(const std::vector<double>& torque, double least) {
+  std::vector<int> found;
+  int state = 0, last = 0;
+  for (std::size_t i = 0; i < torque.size(); ++i) {
+    const int now = torque[i] > least ? 1 : torque[i] < -least ? -1 : 0;
+    if (now == 0) continue;
+    if (state != 0 && now != state) found.push_back(last + 1);
+    state = now, last = static_cast<int>(i);
+  }
+  return found;
+}
+
+Torque torque_of(const std::vector<double>& torque) {
   std::vector<double> half[2], size;
   for (const double t : torque) half[t > 0].push_back(t), size.push_back(std::fabs(t));
   if (half[0].size() < kFewest || half[1].size() < kFewest)
     throw Refusal{Status::insufficient_data, "the torque never reverses"};
   const double level = signal::median(size);
-  Square square{{signal::median(half[0]), signal::median(half[1])}, {}};
+  Torque found{{signal::median(half[0]), signal::median(half[1])}, {}};
   int state = torque[0] > 0 ? 1 : 0;
   double between = 0, squares = 0;
   for (std::size_t i = 0; i < torque.size(); ++i) {
     const int now = torque[i] > kBetween * level ? 1 : torque[i] < -kBetween * level ? 0 : state;
-    if (now != state) square.reversals.push_back(static_cast<int>(i));
+    if (now != state) found.reversals.push_back(static_cast<int>(i));
     state = now;
     between += std::fabs(torque[i]) < kBetween * level;
-    squares += std::pow(torque[i] - square.level[state], 2);
+    squares += std::pow(torque[i] - found.level[state], 2);
   }
   const auto count = static_cast<double>(torque.size());
-  if (!(level > 0) || between > kMostBetween * count || std::sqrt(squares / count) > kLargestSpread * level)
-    throw Refusal{Status::out_of_domain, "the torque of the motor is no square wave, which the method needs"};
-  return square;
+  if (!(level > 0)) throw Refusal{Status::insufficient_data, "the torque never reverses"};
+  found.square = between <= kMostBetween * count && std::sqrt(squares / count) <= kLargestSpread * level;
+  return found;
+}
+
+double middle_size(const std::vector<double>& values) {
+  std::vector<double> size;
+  for (const double v : values) size.push_back(std::fabs(v));
+  return signal::median(size);
 }
 
 /// Where each reversal was, in samples, from a line through them all: a steady period that is no whole number
@@ -90,29 +122,36 @@ int waveform_length(const WaveformWindow& window, double rings, double ring, dou
   return std::min(window.samples, wanted);
 }
 
-std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most) {
+std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free) {
   const double dt = record.sampling_interval();
   if (!(dt * kSamplesPerRing < ring))
     throw Refusal{Status::out_of_domain,
                   fmt::format("a sample each {:.3g} s does not resolve the ring of {:.3g} s", dt, ring)};
   check_even(record);
-  const Square square = square_of(record.column(record::Channel::motor_torque));
-  if (square.reversals.size() < kFewest)
+  const std::vector<double>& values = record.column(record::Channel::motor_torque);
+  Torque torque = torque_of(values);
+  const std::vector<double> turning =
+      free ? averaged(record.column(record::Channel::sensor_torque), static_cast<std::size_t>(ring / dt))
+           : values;
+  if (!torque.square) torque.reversals = turns(turning, kTurned * middle_size(turning));
+  if (torque.reversals.size() < kFewest)
     throw Refusal{Status::insufficient_data, "fewer than four reversals of the torque"};
-  const std::vector<double> at = steady(square.reversals);
+  const std::vector<double> at = steady(torque.reversals);
   const int lead = waveform_lead(ring, dt), tail = static_cast<int>(std::lround(kTailRings * ring / dt));
   std::vector<WaveformWindow> all;
   for (std::size_t k = 0; k < at.size(); ++k) {
-    const int r = square.reversals[k];
-    const int end = k + 1 < at.size() ? square.reversals[k + 1] : static_cast<int>(record.size());
+    const int r = torque.reversals[k];
+    const int end = k + 1 < at.size() ? torque.reversals[k + 1] : static_cast<int>(record.size());
     WaveformWindow w;
     w.first = r - lead;
     w.samples = std::min(lead + tail, end - w.first);
     if (w.first < 0 || w.samples < lead + kShortestRings * ring / dt) continue;
-    const bool forward = record.column(record::Channel::motor_torque)[static_cast<std::size_t>(r)] > 0;
+    const bool forward = torque.square ? values[static_cast<std::size_t>(r)] > 0
+                                       : turning[static_cast<std::size_t>(r) - 1] < 0;
     w.side = forward ? -1 : 1;
-    w.before = square.level[!forward], w.after = square.level[forward];
+    w.before = torque.level[!forward], w.after = torque.level[forward];
     w.reversal = (at[k] - w.first) * dt;
+    if (!torque.square) w.drive.assign(values.begin() + w.first, values.begin() + w.first + w.samples);
     all.push_back(w);
   }
   if (all.size() < kFewest)

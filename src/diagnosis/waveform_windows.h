@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The reversals of a square-wave torque in a record, and the windows about them.
+// The reversals of the motor's torque in a record, and the windows about them.
 #pragma once
 
 #include <vector>
@@ -9,10 +9,13 @@
 
 namespace backlash::diagnosis {
 
-/// Throws Refusal where the torque is no square wave, or the samples are uneven or too few.
+/// Of a torque that is no square wave, windows have its samples (`drive`). Throws Refusal where the samples
+/// are uneven or too few.
 ///   ring     s, cycle of the motor against the pinion: sets the scale of all times
 ///   longest  the most windows to return, spread evenly over the record
-std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most);
+///   free     whether the link is, so that a smooth torque turns on the teeth at another time than at the
+///   motor
+std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free);
 
 /// Samples before the reversal, and after it for a stage of the fit that looks `rings` cycles far.
 int waveform_lead(double ring, double interval);

@@ -12,6 +12,7 @@ namespace {
 
 void put_parameters(Identification& result, const diagnosis::WaveformCommissioning& found) {
   for (const diagnosis::WaveformQuantity& q : diagnosis::waveform_quantities()) {
+    if (!q.in(found.machine)) continue;
     const double value = found.machine.*q.at, spread = found.machine.spread.*q.spread;
     const double error = q.factor ? value * std::hypot(spread, q.power * found.machine.common_scale) : spread;
     result.parameters[q.name] = {value, error};

@@ -128,8 +128,8 @@ void require_servo(const model::Rig& rig) {
   if (!rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.link_locked)
     throw CannotIdentify(
         std::string("identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
-                    "link), and of a torque sensor with a locked output (elastic couplings, Hunt-Crossley "
-                    "mesh); this rig has ") +
+                    "link), and with a torque sensor (elastic input coupling, Hunt-Crossley mesh of exponent "
+                    "1.5, damping > 0 of motor and couplings, no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
         (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
         (rig.link_locked ? "locked" : "free") + " link");

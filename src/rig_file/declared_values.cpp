@@ -89,9 +89,9 @@ class Listing {
   void fill_quantity(DeclaredValue& v, std::size_t q) {
     const diagnosis::WaveformQuantity& quantity = diagnosis::waveform_quantities()[q];
     v.unit = quantity.unit;
-    v.share = half_inertia(known_places()[q], file_.rig);
+    v.share = shared_inertia(known_places()[q], file_.rig);
     if (!v.uncertainty.empty() && v.uncertainty.back() != '%') v.uncertainty += " " + v.unit;
-    if (!file_.diagnosis.waveform) return;
+    if (!file_.diagnosis.waveform || !quantity.in(*file_.diagnosis.waveform)) return;
     v.quantity = static_cast<int>(q);
     if (v.uncertainty.empty()) v.uncertainty = default_text(quantity);
   }
@@ -105,6 +105,7 @@ class Listing {
   }
 
   void add_default(std::size_t q) {
+    if (!diagnosis::waveform_quantities()[q].in(*file_.diagnosis.waveform)) return;
     if (std::any_of(values.begin(), values.end(),
                     [q](const DeclaredValue& v) { return v.quantity == static_cast<int>(q); }))
       return;

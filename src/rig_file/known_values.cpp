@@ -37,6 +37,7 @@ double spread_of(const YamlReader& yaml, const std::string& key, const Uncertain
 
 void read_value(const YamlReader& yaml, RigFile& file, std::size_t index) {
   const diagnosis::WaveformQuantity& q = diagnosis::waveform_quantities()[index];
+  if (file.diagnosis.waveform && !q.in(*file.diagnosis.waveform)) return;
   const KnownPlace& place = known_places()[index];
   const std::string& key = place.path.back();
   const auto map = holder(yaml, place.path);
@@ -48,7 +49,7 @@ void read_value(const YamlReader& yaml, RigFile& file, std::size_t index) {
     (*file.diagnosis.waveform).*q.at = map->number(key, q.factor ? Range::positive() : Range::not_negative());
   if (!u || !file.diagnosis.waveform) return;
   diagnosis::WaveformSettings& s = *file.diagnosis.waveform;
-  const double part = s.*q.at - half_inertia(place, file.rig);
+  const double part = s.*q.at - shared_inertia(place, file.rig);
   s.spread.*q.spread = spread_of(*map, key, *u, part, q.factor) * (q.factor ? part / s.*q.at : 1);
 }
 
@@ -79,26 +80,32 @@ void set_backlash_of(RigDocument& document, const RigFile& file, double backlash
 
 const std::vector<KnownPlace>& known_places() {
   using model::Rig;
-  static const std::vector<KnownPlace> table = {{{"gear_train", "motor", "viscous_damping"}},
-                                                {{"gear_train", "motor", "coulomb_friction"}},
-                                                {{"commissioned", "friction_speed"}},
-                                                {{"gear_train", "input_coupling", "stiffness"}},
-                                                {{"gear_train", "input_coupling", "damping"}},
-                                                {{"gear_train", "motor", "inertia"}, &Rig::input_coupling},
-                                                {{"gear_train", "pinion", "inertia"}, &Rig::input_coupling},
-                                                {{"gear_train", "gear", "inertia"}, &Rig::output_coupling},
-                                                {{"gear_train", "output_coupling", "stiffness"}},
-                                                {{"gear_train", "output_coupling", "damping"}},
-                                                {{"gear_train", "mesh", "contact", "stiffness"}},
-                                                {{"gear_train", "mesh", "contact", "alpha"}},
-                                                {{"commissioned", "sensor_gain"}},
-                                                {{"commissioned", "sensor_delay"}},
-                                                {{"commissioned", "sensor_time_constant"}}};
+  static const std::vector<KnownPlace> table = {
+      {{"gear_train", "motor", "viscous_damping"}},
+      {{"gear_train", "motor", "coulomb_friction"}},
+      {{"commissioned", "friction_speed"}},
+      {{"gear_train", "input_coupling", "stiffness"}},
+      {{"gear_train", "input_coupling", "damping"}},
+      {{"gear_train", "motor", "inertia"}, &Rig::input_coupling},
+      {{"gear_train", "pinion", "inertia"}, &Rig::input_coupling},
+      {{"gear_train", "gear", "inertia"}, &Rig::output_coupling},
+      {{"gear_train", "output_coupling", "stiffness"}},
+      {{"gear_train", "output_coupling", "damping"}},
+      {{"gear_train", "mesh", "contact", "stiffness"}},
+      {{"gear_train", "mesh", "contact", "alpha"}},
+      {{"gear_train", "link", "inertia"}, &Rig::output_coupling, &Rig::gear},
+      {{"gear_train", "link", "viscous_damping"}},
+      {{"gear_train", "link", "coulomb_friction"}},
+      {{"commissioned", "sensor_gain"}},
+      {{"commissioned", "sensor_delay"}},
+      {{"commissioned", "sensor_time_constant"}}};
   return table;
 }
 
-double half_inertia(const KnownPlace& place, const model::Rig& rig) {
-  return place.half == nullptr ? 0 : 0.5 * (rig.*place.half).inertia;
+double shared_inertia(const KnownPlace& place, const model::Rig& rig) {
+  if (place.half == nullptr) return 0;
+  const model::Coupling& coupling = rig.*place.half;
+  return coupling.rigid && place.body != nullptr ? (rig.*place.body).inertia : 0.5 * coupling.inertia;
 }
 
 void read_known_values(const YamlReader& yaml, RigFile& file) {
@@ -124,11 +131,12 @@ std::string commissioned_text(const RigFile& file, const diagnosis::WaveformComm
   for (std::size_t i = 0; i < known_places().size(); ++i) {
     const diagnosis::WaveformQuantity& q = diagnosis::waveform_quantities()[i];
     const KnownPlace& place = known_places()[i];
+    if (!q.in(found.machine)) continue;
     if (std::count(found.untold.begin(), found.untold.end(), q.name) > 0) continue;
-    const double whole = found.machine.*q.at, value = whole - half_inertia(place, file.rig);
+    const double whole = found.machine.*q.at, value = whole - shared_inertia(place, file.rig);
     if (q.factor && !(value > 0))
       throw CannotIdentify(
-          fmt::format("{} {:.4g} {} is less than the share of its coupling", q.name, whole, q.unit));
+          fmt::format("{} {:.4g} {} is less than the share of what moves along", q.name, whole, q.unit));
     const double spread = found.machine.spread.*q.spread * (q.factor ? whole / value : 1);
     const bool extra = place.path.front() == "commissioned";
     const std::string text = known_text(value, spread, q.factor, extra ? "" : source);

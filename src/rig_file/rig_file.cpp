@@ -31,33 +31,43 @@ double default_uncertainty(const model::Rig& rig, const model::GearTrain& train,
   return elastic_uncertainty(coupling, std::fmax(0, all - coupling));
 }
 
+void fill_link(const model::Rig& rig, diagnosis::WaveformSettings& s) {
+  using diagnosis::WaveformOutput;
+  const model::Coupling& out = rig.output_coupling;
+  s.output = out.rigid ? WaveformOutput::link : WaveformOutput::coupled_link;
+  s.link_inertia = rig.link.inertia + (out.rigid ? rig.gear.inertia : 0.5 * out.inertia);
+  if (rig.link.viscous_damping > 0) s.link_damping = rig.link.viscous_damping;
+  s.link_friction = rig.link.coulomb_friction;
+}
+
 /// Of a rig that the estimator's equations describe; nothing of any other.
 std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   const model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
-  if (in.rigid || out.rigid || !rig.link_locked || rig.mesh.rigid || rig.mesh.angular() ||
-      rig.mesh.variation || rig.mesh.pairs || rig.reduction_ratio != 1 || rig.linear || !rig.terms.empty() ||
-      rig.coupled)
+  if (in.rigid || (out.rigid && rig.link_locked) || rig.mesh.rigid || rig.mesh.angular() ||
+      rig.mesh.variation || rig.mesh.pairs || rig.motor_axis_ratio() != 1 || rig.linear ||
+      !rig.terms.empty() || rig.coupled)
     return std::nullopt;
   if (rig.mesh.contact_spec().law != "hunt_crossley" || rig.mesh.contact_spec().values.at("exponent") != 1.5)
     return std::nullopt;
   if (rig.pinion.viscous_damping != 0 || rig.gear.viscous_damping != 0 || rig.motor.viscous_asymmetry != 0 ||
-      rig.motor.coulomb_asymmetry != 0)
+      rig.motor.coulomb_asymmetry != 0 || rig.link.viscous_asymmetry != 0 || rig.link.coulomb_asymmetry != 0)
     return std::nullopt;
   diagnosis::WaveformSettings s;
   s.base_radius = rig.mesh.base_radius;
   s.motor_inertia = rig.motor.inertia + 0.5 * in.inertia;
   s.pinion_inertia = rig.pinion.inertia + 0.5 * in.inertia;
-  s.gear_inertia = rig.gear.inertia + 0.5 * out.inertia;
+  if (!out.rigid) s.gear_inertia = rig.gear.inertia + 0.5 * out.inertia;
   s.motor_damping = rig.motor.viscous_damping;
   s.dry_friction = rig.motor.coulomb_friction;
   s.sensor_stiffness = in.stiffness, s.sensor_damping = in.damping;
-  s.output_stiffness = out.stiffness, s.output_damping = out.damping;
+  if (!out.rigid) s.output_stiffness = out.stiffness, s.output_damping = out.damping;
+  if (!rig.link_locked) fill_link(rig, s);
   s.contact_stiffness = rig.mesh.contact_spec().values.at("stiffness");
   s.contact_loss = rig.mesh.contact_spec().values.at("alpha");
   s.sensor_with_damper = rig.sensor_with_damper;
   for (const double value : {s.motor_inertia, s.pinion_inertia, s.gear_inertia, s.motor_damping,
-                             s.sensor_damping, s.output_damping, s.contact_loss})
-    if (!(value > 0)) return std::nullopt;  // a factor of nothing is nothing
+                             s.sensor_damping, s.output_damping, s.contact_loss, s.link_inertia})
+    if (value <= 0) return std::nullopt;  // a factor of nothing is nothing
   return s;
 }
 
@@ -152,11 +162,20 @@ model::Rig with_machine(model::Rig rig, const diagnosis::WaveformSettings& machi
   model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
   rig.motor.inertia = std::fmax(0, machine.motor_inertia - 0.5 * in.inertia);
   rig.pinion.inertia = std::fmax(0, machine.pinion_inertia - 0.5 * in.inertia);
-  rig.gear.inertia = std::fmax(0, machine.gear_inertia - 0.5 * out.inertia);
   rig.motor.viscous_damping = machine.motor_damping;
   rig.motor.coulomb_friction = machine.dry_friction;
   in.stiffness = machine.sensor_stiffness, in.damping = machine.sensor_damping;
-  out.stiffness = machine.output_stiffness, out.damping = machine.output_damping;
+  using diagnosis::WaveformOutput;
+  if (machine.output != WaveformOutput::link) {
+    rig.gear.inertia = std::fmax(0, machine.gear_inertia - 0.5 * out.inertia);
+    out.stiffness = machine.output_stiffness, out.damping = machine.output_damping;
+  }
+  if (machine.output != WaveformOutput::locked) {
+    const double moves_along = out.rigid ? rig.gear.inertia : 0.5 * out.inertia;
+    rig.link.inertia = std::fmax(0, machine.link_inertia - moves_along);
+    if (machine.link_damping > 0) rig.link.viscous_damping = machine.link_damping;
+    rig.link.coulomb_friction = machine.link_friction;
+  }
   model::ContactSpec contact = rig.mesh.contact_spec();
   contact.values["stiffness"] = machine.contact_stiffness, contact.values["alpha"] = machine.contact_loss;
   rig.mesh.contact = model::make_contact_law(contact.law, contact.values);

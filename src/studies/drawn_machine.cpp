@@ -61,7 +61,7 @@ Machine draw_machine(const rig_file::RigFile& file, std::uint64_t seed) {
   Random random(seed);
   const double scale = values.common_scale * drawn(random);
   for (const diagnosis::WaveformQuantity& q : diagnosis::waveform_quantities())
-    move(file, q, drawn(random), scale, values);
+    if (q.in(values)) move(file, q, drawn(random), scale, values);
   return machine_of(file, values);
 }
 
@@ -79,7 +79,8 @@ Machine machine_off(const rig_file::RigFile& file, std::size_t quantity, double 
   if (quantity < all.size())
     move(file, all[quantity], spreads, 0, values);
   else
-    for (const diagnosis::WaveformQuantity& q : all) move(file, q, 0, spreads * values.common_scale, values);
+    for (const diagnosis::WaveformQuantity& q : all)
+      if (q.in(values)) move(file, q, 0, spreads * values.common_scale, values);
   return machine_of(file, values);
 }
 

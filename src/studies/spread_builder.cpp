@@ -160,26 +160,31 @@ double skewness_of(const CurvePlan& plan, const FineRun& run) {
 std::string limit_of(const CurvePlan& plan, Ticker& ticker) {
   const double middle = plan.request.max_backlash / 2;
   std::vector<Machine> machines = {with_backlash(declared_machine(plan.file), middle)};
-  const std::size_t count = diagnosis::waveform_quantities().size();
-  for (std::size_t q = 0; q <= count; ++q)
-    machines.push_back(with_backlash(machine_off(plan.file, q, 1), middle));
+  const auto& all = diagnosis::waveform_quantities();
+  std::vector<std::size_t> places;
+  for (std::size_t q = 0; q <= all.size(); ++q)
+    if (q == all.size() || all[q].in(*plan.file.diagnosis.waveform)) places.push_back(q);
+  for (const std::size_t q : places) machines.push_back(with_backlash(machine_off(plan.file, q, 1), middle));
   const std::vector<FineRun> runs = run_fine(plan, machines, ticker);
   const double declared = skewness_of(plan, runs[0]);
   std::size_t most = 0;
   double change = -1;
-  for (std::size_t q = 0; q <= count; ++q) {
-    const double by = std::fabs(skewness_of(plan, runs[q + 1]) - declared);
-    if (by > change) change = by, most = q;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double by = std::fabs(skewness_of(plan, runs[i + 1]) - declared);
+    if (by > change) change = by, most = places[i];
   }
-  return most < count ? diagnosis::waveform_quantities()[most].words : "scale that all values have in common";
+  return most < all.size() ? all[most].words : "scale that all values have in common";
 }
 
 }  // namespace
 
 long spread_runs(const CurvePlan& plan) {
   if (!plan.file.diagnosis.waveform || plan.request.machines == 0) return 0;
-  return static_cast<long>(plan.request.machines) * kPlaces +
-         static_cast<long>(diagnosis::waveform_quantities().size()) + 2;
+  const auto& all = diagnosis::waveform_quantities();
+  const auto has = [&plan](const diagnosis::WaveformQuantity& q) {
+    return q.in(*plan.file.diagnosis.waveform);
+  };
+  return static_cast<long>(plan.request.machines) * kPlaces + std::count_if(all.begin(), all.end(), has) + 2;
 }
 
 DeclaredSpread learn_spread(const CurvePlan& plan, const diagnosis::MonitoringCurve& curve, Ticker& ticker) {

@@ -150,8 +150,9 @@ rig_file::RigFile known_to(rig_file::RigFile file, double share) {
   if (!(share > 0 && std::isfinite(share))) throw InvalidParameter("known", share, "must be > 0 and finite");
   if (!file.diagnosis.waveform) throw InvalidParameter("known", share, file.diagnosis.no_waveform);
   diagnosis::WaveformSpread& spread = file.diagnosis.waveform->spread;
-  if (std::isnan(spread.dry_friction))
-    spread.dry_friction = diagnosis::WaveformSpread::kDryFriction * file.simulation.excitation.amplitude;
+  for (double* friction : {&spread.dry_friction, &spread.link_friction})
+    if (std::isnan(*friction))
+      *friction = diagnosis::WaveformSpread::kDryFriction * file.simulation.excitation.amplitude;
   for (const diagnosis::WaveformQuantity& q : diagnosis::waveform_quantities()) spread.*q.spread *= share;
   file.diagnosis.waveform->common_scale *= share;
   return file;

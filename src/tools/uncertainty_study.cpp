@@ -128,11 +128,13 @@ Json trials_json(const std::vector<studies::StudyTrial>& trials) {
                  {"noise", trial.noise},
                  {"periods", trial.periods},
                  {"position", trial.position}};
-    for (const diagnosis::Estimate& e : trial.estimates)
-      json["estimates"][e.method] = {
-          {"status", diagnosis::to_string(e.status)},
-          {"backlash", report::json_number(e.backlash)},
-          {"interval", {report::json_number(e.lower), report::json_number(e.upper)}}};
+    for (const diagnosis::Estimate& e : trial.estimates) {
+      report::Json& row = json["estimates"][e.method];
+      row = {{"status", diagnosis::to_string(e.status)},
+             {"backlash", report::json_number(e.backlash)},
+             {"interval", {report::json_number(e.lower), report::json_number(e.upper)}}};
+      if (e.status != diagnosis::Status::ok) row["message"] = e.message;
+    }
     all.push_back(std::move(json));
   }
   return all;

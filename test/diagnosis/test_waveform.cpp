@@ -59,11 +59,12 @@ TEST(Waveform, NoReversals) {
   expect_refused(test::make_record(recipe()).slice(0, 0.12), Status::insufficient_data, "fewer than four");
 }
 
-TEST(Waveform, NoSquareWave) {
+/// The sensor of this record answers a square wave.
+TEST(Waveform, AnotherTorqueThanTheOneThatDrove) {
   record::Record r = test::make_record(recipe());
   for (std::size_t i = 0; i < r.size(); ++i)
     r.column(Channel::motor_torque)[i] = 0.05 * std::sin(20 * M_PI * r.time[i]);
-  expect_refused(r, Status::out_of_domain, "no square wave");
+  expect_refused(r, Status::out_of_domain, "does not explain the torque");
 }
 
 TEST(Waveform, Sampling) {
@@ -94,6 +95,7 @@ TEST(Waveform, SettingsOutOfRange) {
     refuses([&](WaveformSettings& s) { s.output_damping = bad; });
     refuses([&](WaveformSettings& s) { s.contact_stiffness = bad; });
     refuses([&](WaveformSettings& s) { s.contact_loss = bad; });
+    refuses([&](WaveformSettings& s) { s.output = WaveformOutput::link, s.link_inertia = bad; });
   }
   refuses([](WaveformSettings& s) { s.dry_friction = -0.1; });
 }

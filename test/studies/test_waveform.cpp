@@ -90,6 +90,67 @@ TEST(Waveform, MachinesWithAllValuesOff) {
   }
 }
 
+/// Sampled torque instead of levels and moments: a sine, and a sum of sines without a period in the record.
+TEST(Waveform, AnyTorqueThatReverses) {
+  for (const char* type : {"sine", "random"}) {
+    rig_file::RigFile file = drawn(111, 70e-6);
+    simulation::ExcitationSettings& torque = file.simulation.excitation;
+    torque.type = type;
+    torque.start_frequency = 2, torque.end_frequency = 20, torque.line_count = 60, torque.seed = 3;
+    const record::Record record = record_of(file);
+    const Estimate both = diagnosis::estimate_waveform(record, declared());
+    expect_holds(both, 70e-6);
+    EXPECT_NEAR(both.backlash, 70e-6, 0.6e-6) << type;  // what the interval promises at least
+    expect_holds(diagnosis::estimate_waveform(without_position(record), declared()), 70e-6);
+    file.simulation.sensors.of(Channel::motor_torque).noise = 0.1 * torque.amplitude;
+    const Estimate noisy = diagnosis::estimate_waveform(record_of(file), declared());
+    EXPECT_EQ(noisy.status, Status::out_of_domain);
+    EXPECT_NE(noisy.message.find("motor_torque is no square wave, and its noise"), std::string::npos);
+  }
+}
+
+/// The link turns, as one body with the gear or behind a spring.
+rig_file::RigFile with_free_link(rig_file::RigFile file, bool rigid, double off) {
+  file.rig.link_locked = false;
+  file.rig.link.inertia = 8e-5 * off, file.rig.link.viscous_damping = 0.002 / off;
+  if (rigid) file.rig.output_coupling = model::Coupling();
+  return file;
+}
+
+WaveformSettings declared_free(bool rigid) {
+  rig_file::RigFile file = rig_file::default_rig_file();
+  std::string text = file.text;
+  const auto replace = [&text](const char* from, const char* before, const char* by) {
+    const auto at = text.find(from);
+    text.replace(at, text.find(before, at) - at, by);
+  };
+  replace("  link: locked", "\nexcitation:", "  link: {inertia: 8.0e-5, viscous_damping: 0.002}\n");
+  if (rigid) replace("  output_coupling:", "  link:", "  output_coupling: rigid\n");
+  replace("  lost_motion:", "  limits:", "");
+  return *rig_file::rig_file_from_text(text, "free.yaml").diagnosis.waveform;
+}
+
+TEST(Waveform, FreeLink) {
+  std::uint64_t seed = 120;
+  for (const bool rigid : {true, false}) {
+    const WaveformSettings settings = declared_free(rigid);
+    const double backlash = rigid ? 40e-6 : 90e-6;
+    const rig_file::RigFile file = with_free_link(drawn(++seed, backlash), rigid, 1.15);
+    const record::Record record = record_of(file);
+    const Estimate both = diagnosis::estimate_waveform(record, settings);
+    expect_holds(both, backlash);
+    EXPECT_NEAR(both.backlash, backlash, 0.02 * backlash);  // a sixth of what torque alone tells
+    const Estimate alone = diagnosis::estimate_waveform(without_position(record), settings);
+    expect_holds(alone, backlash);
+    EXPECT_LT(alone.upper - alone.lower, 0.6 * alone.backlash);  // of a locked output: 0.26
+    const auto found = diagnosis::commission_waveform({record}, settings);
+    const double inertia = file.rig.link.inertia + (rigid ? file.rig.gear.inertia : 0);
+    const double error = std::hypot(found.machine.spread.link_inertia, found.machine.common_scale);
+    EXPECT_NEAR(found.machine.link_inertia, inertia, 3 * error * inertia);
+    EXPECT_LT(error, 0.13);  // known before: 0.15
+  }
+}
+
 /// The file says 1.9 times the damping that was simulated, and 1.25 times the stiffness of the sensor.
 TEST(Waveform, NamesWhatTheRecordContradicts) {
   rig_file::RigFile file = rig_file::default_rig_file();

@@ -1,22 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Play from the waveform itself: the machine's equations of motion, with the play and all uncertain values of
 // the machine and its sensors free within what is known of them, are fitted to the sensor's torque, and to
-// the motor's position where that is recorded, about the reversals of a square-wave torque:
+// the motor's position where that is recorded, about the reversals of the motor's torque:
 //
 //   Jm qm'' = tau - cm qm' - dry(qm') - T        T = Ki (qm - qp) + Ci (qm' - qp')
 //   Jp qp'' = T - F rb                           F = K d^1.5 max(0, 1 + 3/2 alpha d')
 //   Jg qg'' = F rb - Ko qg - Co qg'              d = |rb (qp - qg)| - backlash / 2
 //
-// (Sarkar, Ellis and Moore 1997, Eqs. 1 to 12; the output is locked). No declared value has to be right, only
-// its spread. What the spreads below are where the rig file does not say them is a choice: what data sheets
-// and drawings are good for.
+// (Sarkar, Ellis and Moore 1997, Eqs. 1 to 12, whose output is locked). Where the link is free, its inertia
+// stands for spring and damper of the output, or behind them:
+//
+//   Jl ql'' = F rb - cl ql' - dry(ql')                               qg = ql
+//   Jg qg'' = F rb - T_O,  Jl ql'' = T_O - cl ql' - dry(ql')         T_O = Ko (qg - ql) + Co (qg' - ql')
+//
+// No declared value has to be right, only its spread. What the spreads below are where the rig file does not
+// say them is a choice: what data sheets and drawings are good for.
 //
 // Symmetry of torque alone: with inertias, damping and stiffnesses times c, the contact's K times c^1.5 and
 // its alpha times c, and the backlash divided by c, the torque is the same. From torque alone the play is
 // known no better than one of these scales, mostly the stiffness of the torque sensor. An angle ends that.
 //
-// Needs motor_torque (square wave) and sensor_torque, evenly sampled, at least three samples in a cycle of
-// the motor against the pinion; uses motor_position.
+// Needs motor_torque that reverses and sensor_torque, evenly sampled, at least three samples in a cycle of
+// the motor against the pinion; uses motor_position. Of a square wave only levels and moments of reversal are
+// taken from motor_torque; of any other torque its samples, joined by straight lines.
 //
 // Interval, 95 %: two standard errors of the fit with its priors, on the logarithm of the play, widened by
 // what the residual has of structure, and not below what equations of rigid flanks can tell (kFinest).
@@ -40,6 +46,9 @@ struct WaveformSpread {
   double sensor_damping = 1.3;                              ///< factor: 13 at 95 %, no data sheet has it
   double output_stiffness = 0.46, output_damping = 0.46;    ///< factor: 2.5 at 95 %
   double contact_stiffness = 0.46, contact_loss = 0.46;     ///< factor: 2.5 at 95 %
+  double link_inertia = 0.15;                               ///< factor: 30 % at 95 %, by a drawing
+  double link_damping = 0.5;                                ///< factor: 2.7 at 95 %
+  double link_friction = kNaN;                              ///< N m; NaN: kDryFriction of the torque's level
   double dry_friction = kNaN;                               ///< N m; NaN: kDryFriction of the torque's level
   double friction_speed = 1.5;                              ///< factor
   double sensor_gain = 0.04;                                ///< factor
@@ -52,17 +61,28 @@ struct WaveformSpread {
   static constexpr double kDriveSlope = 0.002;  ///< of Ki: cogging within the small travel
 };
 
-/// The declared machine. All at the motor_position axis, as the rig file gives them.
+/// What the gear drives.
+enum class WaveformOutput {
+  locked,       ///< spring and damper to the frame
+  link,         ///< it is one body with a free link
+  coupled_link  ///< spring and damper to a free link
+};
+
+/// The declared machine. All at the motor_position axis, as the rig file gives them. What it has not is NaN.
 struct WaveformSettings {
+  WaveformOutput output = WaveformOutput::locked;
   double base_radius = kNaN;                              ///< rb, m, > 0
   double motor_inertia = kNaN;                            ///< Jm, kg m^2, > 0, with its share of the sensor
-  double pinion_inertia = kNaN, gear_inertia = kNaN;      ///< Jp, Jg, kg m^2, > 0
+  double pinion_inertia = kNaN, gear_inertia = kNaN;      ///< Jp, Jg, kg m^2, > 0; no Jg: part of the link
   double motor_damping = kNaN;                            ///< cm, N m s/rad, > 0
   double dry_friction = 0;                                ///< N m, of the motor, >= 0
   double sensor_stiffness = kNaN, sensor_damping = kNaN;  ///< Ki, N m/rad, Ci, N m s/rad, > 0
   double output_stiffness = kNaN, output_damping = kNaN;  ///< Ko, N m/rad, Co, N m s/rad, > 0
   double contact_stiffness = kNaN;                        ///< K, N/m^1.5, > 0
   double contact_loss = kNaN;                             ///< alpha, s/m, > 0
+  double link_inertia = kNaN;                             ///< Jl, kg m^2, > 0, with its share of the output
+  double link_damping = kNaN;                             ///< cl, N m s/rad, > 0; NaN: none
+  double link_friction = kNaN;                            ///< N m, >= 0, dry friction of the link
   bool sensor_with_damper = false;                        ///< the sensor shows T and not Ki (qm - qp)
   double friction_speed = 0.02;                       ///< rad/s, > 0, at which dry friction changes its sign
   double sensor_gain = 1;                             ///< -, > 0, of the torque sensor
@@ -92,13 +112,14 @@ struct WaveformEvidence {
   double torque_noise = 0, position_noise = 0;  ///< standard deviations that the fit takes, N m, rad
   int left_out = 0;                             ///< windows that are not here, as the fit did not catch them
   std::vector<Window> windows;
-  std::vector<Value> values;  ///< in the order of waveform_quantities()
+  std::vector<Value> values;  ///< in the order of waveform_quantities(), NaN: none of this machine
 };
 
 /// Throws InvalidParameter for settings outside the ranges above. Answers by status:
 ///   insufficient_data  a channel is missing; too few reversals
-///   out_of_domain      no square wave, uneven or too coarse samples; the equations do not fit the record, or
-///                      only with values far from the declared ones
+///   out_of_domain      uneven or too coarse samples; the equations do not fit the record, or only with
+///   values
+///                      far from the declared ones
 ///   ambiguous          two plays fit alike
 ///   below_range        the interval, which is given, holds 0
 Estimate estimate_waveform(const record::Record& record, const WaveformSettings& settings);
@@ -110,6 +131,9 @@ struct WaveformQuantity {
   double power;                     ///< in the factor c of the symmetry
   double WaveformSettings::*at;
   double WaveformSpread::*spread;
+
+  /// Whether this machine has it.
+  bool in(const WaveformSettings& settings) const { return settings.*at == settings.*at; }
 };
 const std::vector<WaveformQuantity>& waveform_quantities();
 
