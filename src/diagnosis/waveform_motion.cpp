@@ -43,7 +43,7 @@ Lanes per_inertia(const Lanes& v) {
   return v > 0 ? 1 / v : Lanes{};
 }
 
-template <WaveformOutput kOutput>
+template <WaveformOutput Output>
 struct Train {
   Lanes half_gap, motor_damping, dry, slow, ki, ci, per_jm, per_jp, per_jg, ko, co, contact, loss, slope;
   Lanes per_jl, link_damping, link_dry;
@@ -71,9 +71,9 @@ struct Train {
 
   /// Of the gear and of the link, rad/s^2.
   WAVEFORM_INLINE void output(const State& s, const Lanes& teeth, State& rate) const {
-    if constexpr (kOutput == WaveformOutput::locked) {
+    if constexpr (Output == WaveformOutput::locked) {
       rate.wg = (teeth - ko * s.qg - co * s.wg) * per_jg;
-    } else if constexpr (kOutput == WaveformOutput::link) {
+    } else if constexpr (Output == WaveformOutput::link) {
       rate.wg = (teeth - link_damping * s.wg) * per_jl;
     } else {
       const Lanes out = ko * (s.qg - s.ql) + co * (s.wg - s.wl);
@@ -102,7 +102,7 @@ struct Train {
     next.qm = s.qm + h * r.qm, next.wm = s.wm + h * r.wm;
     next.qp = s.qp + h * r.qp, next.wp = s.wp + h * r.wp;
     next.qg = s.qg + h * r.qg, next.wg = s.wg + h * r.wg;
-    if constexpr (kOutput == WaveformOutput::coupled_link)
+    if constexpr (Output == WaveformOutput::coupled_link)
       next.ql = s.ql + h * r.ql, next.wl = s.wl + h * r.wl;
     return next;
   }
@@ -112,8 +112,8 @@ struct Train {
     const State c = rate(along(s, b, h / 2), drive), d = rate(along(s, c, h), drive);
     s = along(along(along(along(s, a, h / 6), b, h / 3), c, h / 3), d, h / 6);
     brake(dry * per_jm * h, h, s.qm, s.wm);
-    if constexpr (kOutput == WaveformOutput::link) brake(link_dry * per_jl * h, h, s.qg, s.wg);
-    if constexpr (kOutput == WaveformOutput::coupled_link) brake(link_dry * per_jl * h, h, s.ql, s.wl);
+    if constexpr (Output == WaveformOutput::link) brake(link_dry * per_jl * h, h, s.qg, s.wg);
+    if constexpr (Output == WaveformOutput::coupled_link) brake(link_dry * per_jl * h, h, s.ql, s.wl);
   }
 
   /// Dry friction of one step, implicitly, so that what sticks stays: `most` is the speed that it takes at
@@ -128,8 +128,8 @@ struct Train {
 
 /// 5 ms before a reversal nothing else moves: the gear of a locked output follows the pinion on its flank; a
 /// free link is driven by it.
-template <WaveformOutput kOutput>
-State start(const Train<kOutput>& train, const WaveformWindow& window, const Lanes* v) {
+template <WaveformOutput Output>
+State start(const Train<Output>& train, const WaveformWindow& window, const Lanes* v) {
   const Lanes load = positive(v[kStartFlank]);
   Lanes depth = {}, share = {};
   for (int i = 0; i < kWaveformSets; ++i) {
@@ -137,19 +137,19 @@ State start(const Train<kOutput>& train, const WaveformWindow& window, const Lan
     const double force = load[i] / train.lever;
     depth[i] = std::cbrt(force / train.contact[i] * force / train.contact[i]);
     const double stiffness = 1.5 * train.contact[i] * std::sqrt(depth[i]) * train.lever * train.lever;
-    share[i] = kOutput == WaveformOutput::locked ? stiffness / (stiffness + train.ko[i]) : 1;
+    share[i] = Output == WaveformOutput::locked ? stiffness / (stiffness + train.ko[i]) : 1;
   }
   const Lanes off = v[kStartFlank] < 0 ? v[kStartFlank] / train.ki : Lanes{};
   State s{};
-  if constexpr (kOutput == WaveformOutput::locked) s.qg = window.side * load / train.ko;
+  if constexpr (Output == WaveformOutput::locked) s.qg = window.side * load / train.ko;
   s.qp = s.qg + window.side * ((train.half_gap + depth) / train.lever + off);
   s.qm = s.qp + window.side * v[kStartTwist] / train.ki;
   s.wp = window.side * v[kStartPinionRate] / (kRateTime * train.ki);
   s.wm = s.wp + window.side * v[kStartTwistRate] / (kRateTime * train.ki);
   s.wg = s.wp * share;
-  if constexpr (kOutput != WaveformOutput::locked)
+  if constexpr (Output != WaveformOutput::locked)
     s.wg = s.wp + window.side * v[kStartGearRate] / (kRateTime * train.ki);
-  if constexpr (kOutput == WaveformOutput::coupled_link) {
+  if constexpr (Output == WaveformOutput::coupled_link) {
     s.ql = -window.side * load / train.ko * train.per_jg / (train.per_jg + train.per_jl);
     s.wl = s.wg;
   }
@@ -198,13 +198,13 @@ class Drive {
   Lanes delay_, change_;
 };
 
-template <WaveformOutput kOutput>
+template <WaveformOutput Output>
 WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   Lanes v[kAllValues];
   for (std::size_t k = 0; k < kAllValues; ++k)
     for (std::size_t i = 0; i < kWaveformSets; ++i) v[k][static_cast<int>(i)] = sets[k][i];
-  const Train<kOutput> train(v, grid);
+  const Train<Output> train(v, grid);
   State s = start(train, window, v);
   const double h = grid.interval / grid.steps;
   const Drive drive(window, grid, v[kSwitchDelay]);

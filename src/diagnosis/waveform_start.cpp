@@ -40,7 +40,7 @@ double first_speed(const WaveformData& data, const WaveformWindow& window) {
   Eigen::VectorXd position(count);
   for (int i = 0; i < count; ++i) {
     basis.row(i) << 1, i, i * i;
-    position[i] = data.position[static_cast<std::size_t>(window.first + i)];
+    position[i] = data.position[static_cast<std::size_t>(window.first) + static_cast<std::size_t>(i)];
   }
   return signal::solve_symmetric(signal::gram(basis), signal::transposed_product(basis, position))(1, 0) / dt;
 }
