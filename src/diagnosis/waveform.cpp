@@ -50,7 +50,12 @@ void check(const WaveformSettings& s) {
     require("output_stiffness", s.output_stiffness);
     require("output_damping", s.output_damping);
   }
-  if (s.output != WaveformOutput::locked) require("link_inertia", s.link_inertia);
+  if (s.output != WaveformOutput::locked) {
+    require("link_inertia", s.link_inertia);
+    if (!std::isnan(s.link_damping)) require("link_damping", s.link_damping);
+    if (!(s.link_friction >= 0))
+      throw InvalidParameter("waveform.link_friction", s.link_friction, "must be >= 0");
+  }
   require("contact_stiffness", s.contact_stiffness);
   require("contact_loss", s.contact_loss);
   require("friction_speed", s.friction_speed);

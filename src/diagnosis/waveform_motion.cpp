@@ -13,8 +13,6 @@ namespace {
 using Lanes = double __attribute__((vector_size(8 * kWaveformSets)));
 #define WAVEFORM_INLINE inline __attribute__((always_inline))
 
-constexpr double kRateTime = 1e-3;  // s, of the start values that are rates: choice
-
 WAVEFORM_INLINE Lanes positive(const Lanes& a) {
   return a > 0 ? a : Lanes{};
 }
@@ -144,11 +142,11 @@ State start(const Train<Output>& train, const WaveformWindow& window, const Lane
   if constexpr (Output == WaveformOutput::locked) s.qg = window.side * load / train.ko;
   s.qp = s.qg + window.side * ((train.half_gap + depth) / train.lever + off);
   s.qm = s.qp + window.side * v[kStartTwist] / train.ki;
-  s.wp = window.side * v[kStartPinionRate] / (kRateTime * train.ki);
-  s.wm = s.wp + window.side * v[kStartTwistRate] / (kRateTime * train.ki);
+  s.wp = window.side * v[kStartPinionRate] / (kWaveformRateTime * train.ki);
+  s.wm = s.wp + window.side * v[kStartTwistRate] / (kWaveformRateTime * train.ki);
   s.wg = s.wp * share;
   if constexpr (Output != WaveformOutput::locked)
-    s.wg = s.wp + window.side * v[kStartGearRate] / (kRateTime * train.ki);
+    s.wg = s.wp + window.side * v[kStartGearRate] / (kWaveformRateTime * train.ki);
   if constexpr (Output == WaveformOutput::coupled_link) {
     s.ql = -window.side * load / train.ko * train.per_jg / (train.per_jg + train.per_jl);
     s.wl = s.wg;

@@ -63,6 +63,7 @@ enum WaveformValue {
   kStartValues = kAllValues - kGlobalValues
 };
 
+constexpr double kWaveformRateTime = 1e-3;  // s, of the start values that are rates: choice
 constexpr int kWaveformSets = 8;  // moved at once: two registers of AVX2, so that their waits overlap
 using WaveformSets = std::array<std::array<double, kWaveformSets>, kAllValues>;
 

@@ -13,7 +13,6 @@ namespace {
 constexpr double kStep = 1e-5;                                       // of the level
 constexpr double kSpread[kStartValues] = {0.4, 0.4, 0.2, 0.2, 0.4};  // of the level
 constexpr double kGaps = 6;         // twists of the sensor, how far off the position's zero may be
-constexpr double kRateTime = 1e-3;  // s, unit of rates
 constexpr int kFewestForSpeed = 4;  // samples
 
 /// Of the sensor, N m towards the flank that is loaded before the reversal: their mean where that does not
@@ -48,7 +47,7 @@ double first_speed(const WaveformData& data, const WaveformWindow& window) {
 /// A link that moves: rates by the record's position or, without one, by the time between two reversals.
 void guess_motion(const WaveformData& data, const WaveformSettings& settings, const WaveformWindow& window,
                   WaveformStartGuess& guess) {
-  const double unit = kRateTime * settings.sensor_stiffness;
+  const double unit = kWaveformRateTime * settings.sensor_stiffness;
   const double acceleration = data.level / moved_inertia(settings);
   const double lead = window.reversal, whole = window.samples * data.grid.interval;
   const bool seen = !data.position.empty();

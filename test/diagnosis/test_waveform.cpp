@@ -95,9 +95,14 @@ TEST(Waveform, SettingsOutOfRange) {
     refuses([&](WaveformSettings& s) { s.output_damping = bad; });
     refuses([&](WaveformSettings& s) { s.contact_stiffness = bad; });
     refuses([&](WaveformSettings& s) { s.contact_loss = bad; });
-    refuses([&](WaveformSettings& s) { s.output = WaveformOutput::link, s.link_inertia = bad; });
+    refuses([&](WaveformSettings& s) {
+      s.output = WaveformOutput::link, s.link_friction = 0, s.link_inertia = bad;
+    });
   }
   refuses([](WaveformSettings& s) { s.dry_friction = -0.1; });
+  refuses([](WaveformSettings& s) {
+    s.output = WaveformOutput::link, s.link_inertia = 1e-4, s.link_friction = -0.1;
+  });
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/rig_file/known_values.h"
+#include "support/data.h"
 
 namespace backlash::rig_file {
 namespace {
@@ -87,6 +88,31 @@ TEST(KnownValues, WrittenAndReadBack) {
     EXPECT_DOUBLE_EQ(s.common_scale, 0.05);
     EXPECT_DOUBLE_EQ(s.spread.gear_inertia, diagnosis::WaveformSpread().gear_inertia);
   }
+}
+
+/// Behind a rigid coupling the link's value has the gear in it; a locked link has none that anybody uses.
+TEST(KnownValues, OfAFreeLink) {
+  const RigFile file = load_rig_file(test::package_file("config/sarkar_1997_free.yaml"));
+  diagnosis::WaveformCommissioning found;
+  found.machine = *file.diagnosis.waveform;
+  const double gear = file.rig.gear.inertia;
+  found.machine.common_scale = 0.05;
+  EXPECT_DOUBLE_EQ(found.machine.link_inertia, gear + file.rig.link.inertia);
+  found.machine.link_inertia = gear + 9e-5, found.machine.spread.link_inertia = 0.01;
+  found.machine.link_damping = 0.003, found.machine.spread.link_damping = 0.02;
+  found.machine.link_friction = 0.001, found.machine.spread.link_friction = 0.0002;
+  found.machine.dry_friction = 0.001, found.machine.spread.dry_friction = 0.0002;
+  found.states.push_back({});
+  found.states[0].backlash = 5e-5, found.states[0].log_error = 0.06;
+  const RigFile read = rig_file_from_text(commissioned_text(file, found, "identified"), "rig.yaml");
+  EXPECT_DOUBLE_EQ(read.rig.gear.inertia, gear);
+  EXPECT_DOUBLE_EQ(read.rig.link.inertia, 9e-5);
+  EXPECT_DOUBLE_EQ(read.rig.link.viscous_damping, 0.003);
+  EXPECT_DOUBLE_EQ(read.rig.link.coulomb_friction, 0.001);
+  const diagnosis::WaveformSpread& spread = read.diagnosis.waveform->spread;
+  EXPECT_NEAR(spread.link_inertia, 0.01, 1e-4);  // three digits are written
+  EXPECT_DOUBLE_EQ(spread.link_damping, 0.02);
+  EXPECT_DOUBLE_EQ(spread.link_friction, 0.0002);
 }
 
 }  // namespace

@@ -151,6 +151,31 @@ TEST(Waveform, FreeLink) {
   }
 }
 
+/// Of a sensor that shows the torque 0.4 ms late, on a motor whose dry friction holds it at the end of each
+/// half period. The oracle is a record 16 times finer, of which every 16th sample is taken, 6.4 of them late.
+TEST(Waveform, LateSensorAndAMotorThatSticks) {
+  constexpr std::size_t kFiner = 16;
+  rig_file::RigFile file = drawn(140, 70e-6);
+  file.rig.motor.coulomb_friction = 0.018;  // a third of the torque
+  file.simulation.sensors = rig_file::default_rig_file().simulation.sensors;
+  file.simulation.sensors.sampling_rate = 1000.0 * kFiner;
+  const record::Record fine = simulation::simulate_record(file.rig, file.simulation, 0.9);
+  record::Record record;
+  record.name = "late";
+  Random random(140);
+  for (std::size_t i = 200 * kFiner; i < fine.size(); i += kFiner) {
+    record.time.push_back(fine.time[i]);
+    for (const Channel channel : {Channel::motor_torque, Channel::motor_position})
+      record.column(channel).push_back(fine.column(channel)[i]);
+    const std::vector<double>& torque = fine.column(Channel::sensor_torque);
+    record.column(Channel::sensor_torque)
+        .push_back(0.6 * torque[i - 6] + 0.4 * torque[i - 7] + 0.0005 * random.normal());
+  }
+  const Estimate e = diagnosis::estimate_waveform(record, declared());
+  expect_holds(e, 70e-6);
+  EXPECT_NEAR(e.backlash, 70e-6, 0.6e-6);  // what the interval promises at least
+}
+
 /// The file says 1.9 times the damping that was simulated, and 1.25 times the stiffness of the sensor.
 TEST(Waveform, NamesWhatTheRecordContradicts) {
   rig_file::RigFile file = rig_file::default_rig_file();
