@@ -64,6 +64,7 @@ std::string change_json(const identification::Changes& found, const ChangeInputs
       {"false_alarms_per_hour", inputs.false_alarms_per_hour},
       {"threshold", report::json_number(found.threshold)},
       {"healthy_residual", report::json_number(found.noise)},
+      {"healthy_deflection_residual", report::json_number(found.deflection_noise)},
       {"healthy_terms", found.healthy_terms},
       {"different_from_beginning", found.different},
       {"warnings", found.warnings},

@@ -125,7 +125,7 @@ void warn_of_misfit(Identification& result) {
 }
 
 void require_servo(const model::Rig& rig) {
-  if (!rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.link_locked)
+  if (!model::has_two_inertias(rig))
     throw CannotIdentify(
         std::string("identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
                     "link), and with a torque sensor (elastic input coupling, Hunt-Crossley mesh of exponent "

@@ -149,6 +149,10 @@ Rig read_rig(const YamlReader& yaml) {
   return rig;
 }
 
+bool has_two_inertias(const Rig& rig) {
+  return !rig.mesh.rigid && rig.input_coupling.rigid && rig.output_coupling.rigid && !rig.link_locked;
+}
+
 Rig load_side(const Rig& rig) {
   Rig out = rig;
   const double ratio = rig.motor_axis_ratio(), square = ratio * ratio;

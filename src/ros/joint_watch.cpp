@@ -23,23 +23,30 @@ constexpr double kLeastLook = 60;  // s of samples, below which nobody looks. Ch
 constexpr double kAll = 0.99;      // - of a length that is all of it: samples come in steps
 constexpr int kNone = 0, kSome = 2;  // exit codes of the command that are answers
 
+bool has(const record::ChannelMap& map, record::Channel channel) {
+  return std::any_of(map.sources.begin(), map.sources.end(),
+                     [&](const record::ChannelSource& s) { return s.channel == channel; });
+}
+
 record::RingSettings ring_settings(const WatchSettings& settings) {
   record::RingSettings ring;
   ring.channels = {record::Channel::motor_torque, record::Channel::motor_position};
+  const bool rigid = settings.joint.rig.rig.mesh.rigid;
+  if (!rigid && has(settings.joint.channels(), record::Channel::load_position))
+    ring.channels.push_back(record::Channel::load_position);
   ring.window = settings.learn;
   return ring;
 }
 
 /// Why no look at such a joint can tell anything; empty: it can.
 std::string reason_against(const JointRig& joint) {
-  if (!joint.rig.rig.mesh.rigid)
-    return "changes are told of joints of one inertia only (mesh: rigid), which its rig file does not "
-           "declare";
-  const record::ChannelMap map = joint.channels();
+  const model::Rig& rig = joint.rig.rig;
+  if (!rig.mesh.rigid && !model::has_two_inertias(rig))
+    return "changes are told of joints of one inertia (mesh: rigid) and of two (rigid couplings, a free "
+           "link), "
+           "which its rig file does not declare";
   for (const record::Channel wanted : {record::Channel::motor_torque, record::Channel::motor_position})
-    if (std::none_of(map.sources.begin(), map.sources.end(),
-                     [&](const record::ChannelSource& s) { return s.channel == wanted; }))
-      return "its channels have no " + record::channel_name(wanted);
+    if (!has(joint.channels(), wanted)) return "its channels have no " + record::channel_name(wanted);
   return "";
 }
 

@@ -18,12 +18,11 @@ Command command() {
   Command c;
   c.name = "detect_changes";
   c.summary =
-      "Says whether a joint of one inertia has changed since healthy records of it were made, by which "
-      "effect, "
-      "how much and since when.";
+      "Says whether a joint has changed since healthy records of it were made, by which effect, how much and "
+      "since when.";
   c.positional = {"RECORD"};
   c.options = {
-      {"rig", "RIG.yaml", "the machine as declared (mesh: rigid)", true},
+      {"rig", "RIG.yaml", "the machine as declared: one inertia (mesh: rigid) or two", true},
       {"healthy", "RECORD...", "records (.csv or .bag) of the healthy machine, better two tasks than one",
        true},
       {"json", "OUT.json", "changes with size, onset and intervals", true},
@@ -31,9 +30,8 @@ Command command() {
        "how often a healthy machine may be called changed; default: 1/720, once a month"},
   };
   c.notes =
-      "Records need motor_torque and motor_position; ordinary motion will do, but must be no faster than in "
-      "the "
-      "healthy records. Warm-up as in the healthy records, and slow drift of friction by up to 10 %, is no "
+      "Records need motor_torque and motor_position, of two inertias also load_position where the backlash "
+      "is asked; ordinary motion will do, but must be no faster than in the healthy records. Warm-up as in the healthy records, and slow drift of friction by up to 10 %, is no "
       "change. Sizes are what was added at the onset. A change that no effect explains is called unknown.";
   c.examples = {
       "detect_changes --rig config/ur5_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
@@ -41,7 +39,7 @@ Command command() {
   c.exit_codes =
       "  0   nothing has changed\n"
       "  2   something has\n"
-      "  3   the records cannot tell (too little motion, more than one inertia)\n";
+      "  3   the records cannot tell (too little motion, another gear train)\n";
   return c;
 }
 

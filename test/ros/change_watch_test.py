@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""simulated_robot.launch with changes:=true: the healthy robot is learned from its own topics, then one joint changes."""
+"""simulated_robot.launch with changes:=true: the healthy robot is learned from its own topics, then joints change."""
 import os
 import shutil
 import subprocess
@@ -12,11 +12,12 @@ import roslib.packages
 import rospy
 import rostest
 from backlash_diagnosis.msg import Change, ChangeReport
-from backlash_diagnosis.srv import SetRig
+from backlash_diagnosis.srv import SetBacklash, SetRig
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from simulator_support import PACKAGE, TIMEOUT, Inbox
 
 ADDED = 0.8  # N m of dry friction, of 4
+BACKLASH, WEAR = 5.4e-4, 2e-4  # rad, of the shoulder, and what is added to it
 
 
 class Statuses:
@@ -66,6 +67,7 @@ class ChangeWatchTest(unittest.TestCase):
         cls.reports = Inbox("/changes", ChangeReport)
         rospy.wait_for_service("/simulator/wrist/set_rig", TIMEOUT)
         cls.set_rig = rospy.ServiceProxy("/simulator/wrist/set_rig", SetRig)
+        cls.set_backlash = rospy.ServiceProxy("/simulator/shoulder/set_backlash", SetBacklash)
 
     @classmethod
     def tearDownClass(cls):
@@ -87,7 +89,7 @@ class ChangeWatchTest(unittest.TestCase):
     def test_1_says_why_it_cannot_tell(self):
         status = self.statuses.wait_for("wrist: model", lambda s: "learned" in s.message, "learning")
         self.assertEqual(status.level, DiagnosticStatus.STALE)
-        status = self.statuses.wait_for("shoulder: model", lambda s: "one inertia" in s.message, "reason")
+        status = self.statuses.wait_for("shoulder: model", lambda s: "learned" in s.message, "learning")
         self.assertEqual(status.level, DiagnosticStatus.STALE)
 
     def test_2_a_healthy_robot_has_not_changed(self):
@@ -126,13 +128,29 @@ class ChangeWatchTest(unittest.TestCase):
         self.assertTrue(before.to_sec() - 5 < until < after.to_sec() + 5, (before, until, after))
         self.statuses.wait_for("wrist: model", lambda s: s.level == DiagnosticStatus.OK, "OK")
 
-    def test_5_a_machine_that_cannot_go_on_is_refused(self):
+    def test_5_a_joint_with_two_encoders_wears(self):
+        self.statuses.wait_for("shoulder: model", lambda s: s.level == DiagnosticStatus.OK, "OK")
+        before = rospy.Time.now()
+        answer = self.set_backlash(BACKLASH + WEAR)
+        self.assertTrue(answer.success, answer.message)
+        after = rospy.Time.now()
+        report = self.reports.wait_for(lambda all_of: all_of[-1].news[0].joint == "shoulder" and all_of[-1], "report")
+        change = report.news[0]
+        rospy.loginfo(change.text)
+        self.assertEqual((change.effect, change.state), ("backlash", Change.STANDING))
+        self.assertLessEqual(change.since_from, after)
+        self.assertGreaterEqual(change.since_to, before)
+        self.assertEqual((change.size[0].name, change.size[0].unit), ("angle", "rad"))
+        self.assertLessEqual(change.size[0].lower, WEAR)
+        self.assertGreaterEqual(change.size[0].upper, WEAR)
+
+    def test_6_a_machine_that_cannot_go_on_is_refused(self):
         for text, reason in (("name: x", "schema_version"), (rig_text(-4), "friction")):
             answer = self.set_rig(text)
             self.assertFalse(answer.success)
             self.assertIn(reason, answer.message)
 
-    def test_6_wrong_parameters_end_the_node_with_their_name(self):
+    def test_7_wrong_parameters_end_the_node_with_their_name(self):
         rig = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), "config", "ur5_joint.yaml")
         for words, code, shown in (([], 64, ("~rig", "must be given")),
                                    (["_rig:=" + rig, "_windw:=100"], 64, ("~windw",)),

@@ -261,11 +261,15 @@ class FleetReportTest(unittest.TestCase):
         self.assertEqual(bad[0]["status"], "crashed")
         self.assertIn("the worker died", bad[0]["reason"])
 
+    def once_after(self, calls, signal_name):
+        """Words of a stand-in that send a signal to the client. Two stand-ins may count the same calls: one sends it."""
+        return "(( $(wc -l <{0}) >= {1} )) && mkdir {2} 2>/dev/null && kill -{3} $(cat {4})".format(
+            self.path("calls"), calls, self.path("sent"), signal_name, self.path("out/fleet.lock"))
+
     def test_a_killed_client_goes_on_where_it_was(self):
         count = self.records(6)
         after = 8
-        kill = "(( $(wc -l <{0}) == {1} )) && kill -9 $(cat {2})".format(self.path("calls"), after, self.path("out/fleet.lock"))
-        ended = self.run_fleet(*self.stand_in(kill))
+        ended = self.run_fleet(*self.stand_in(self.once_after(after, "KILL")))
         self.assertEqual(ended.returncode, -signal.SIGKILL)
         self.assertFalse(os.path.exists(self.path("out/fleet.json")))
         kept = {row["name"] for row in self.rows("name", "status = 'done'")}
@@ -280,8 +284,7 @@ class FleetReportTest(unittest.TestCase):
 
     def test_ctrl_c_ends_it_and_it_goes_on(self):
         count = self.records(4)
-        stop = "(( $(wc -l <{0}) == 4 )) && kill -INT $(cat {1})".format(self.path("calls"), self.path("out/fleet.lock"))
-        ended = self.run_fleet(*self.stand_in(stop), code=130)
+        ended = self.run_fleet(*self.stand_in(self.once_after(4, "INT")), code=130)
         self.assertIn("the same command goes on from there", ended.stderr)
         self.assertNotIn("Traceback", ended.stderr)
         kept = {row["name"] for row in self.rows("name", "status = 'done'")}

@@ -97,6 +97,9 @@ bool operator==(const Coupling& a, const Coupling& b);
 bool operator==(const Mesh& a, const Mesh& b);
 bool operator==(const Rig& a, const Rig& b);
 
+/// Whether it is a motor, a gap and a free link with nothing elastic beside the teeth.
+bool has_two_inertias(const Rig& rig);
+
 /// The same machine with all values at the load side of the reduction.
 Rig load_side(const Rig& rig);
 

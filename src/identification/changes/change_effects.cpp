@@ -11,12 +11,14 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kLeastOrder = 2;                    // 1/rad, of cogging: below is gravity. Choice
+constexpr double kLeastOrder = 2;  // 1/rad, of waves: below are gravity and eccentric encoders. Choice
 constexpr double kLeastFrictionOrder = 1;            // 1/rad, of position-dependent friction. Choice
 constexpr double kMostOrder = 80, kOrderStep = 0.5;  // 1/rad. Choice
 constexpr double kMostFrictionOrder = 12;            // 1/rad. Choice
 constexpr double kFluctuationSpeeds[] = {0.4, 0.7, 1, 1.4, 1.8, 2.3};  // - of the rms speed. Choice
 constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};                  // - of the rms speed. Choice
+
+constexpr double kMostKnown = 1e7;  // rows of columns that are kept, 160 MB at most. Choice
 
 double direction(const Moment& m, double) {
   return m.direction;
@@ -63,11 +65,39 @@ double drift(const Moment& m, double) {
   return m.direction * m.time;
 }
 
+double half_side(const Moment& m, double) {
+  return 0.5 * m.side();
+}
+double half_side_drift(const Moment& m, double) {
+  return 0.5 * m.side() * m.time;
+}
+double mesh_load(const Moment& m, double) {
+  return m.mesh;
+}
+/// A load encoder that shows more makes the deflection less; so does a transmission that runs ahead.
+double less_position(const Moment& m, double) {
+  return -m.position;
+}
+double less_one(const Moment&, double) {
+  return -1;
+}
+double less_cosine(const Moment& m, double n) {
+  return -std::cos(n * m.position);
+}
+double less_sine(const Moment& m, double n) {
+  return -std::sin(n * m.position);
+}
+
 struct Declared {
-  const char *name, *unit;
+  const char *name, *unit, *value;
 };
-constexpr Declared kDeclared[] = {
-    {"motor_coulomb", "N m"}, {"motor_viscous", "N m s/rad"}, {"motor_inertia", "kg m^2"}};
+constexpr Declared kDeclared[] = {{"motor_coulomb", "N m", "motor_coulomb"},
+                                  {"motor_viscous", "N m s/rad", "motor_viscous"},
+                                  {"motor_inertia", "kg m^2", "motor_inertia"},
+                                  {"load_inertia", "kg m^2", "load_inertia"},
+                                  {"mesh_stiffness", "rad/(N m)", "compliance"},
+                                  {"encoder_skew", "s", "encoder_skew"},
+                                  {"encoder_slip", "rad", "offset"}};
 
 std::string unit_of(const std::string& id, const std::string& parameter) {
   for (const Declared& d : kDeclared)
@@ -80,18 +110,29 @@ std::string unit_of(const std::string& id, const std::string& parameter) {
 /// Name of the value of an effect with one column.
 std::string value_name(const std::string& id) {
   for (const Declared& d : kDeclared)
-    if (id == d.name) return id;
+    if (id == d.name) return d.value;
   return model::term_type(id).search->strength;
+}
+
+/// Of the deflection: motor ahead of load.
+std::vector<ChangeEffect> deflection_effects() {
+  std::vector<ChangeEffect> all = {
+      {"backlash", 0, {half_side}},          {"mesh_stiffness", 0, {mesh_load}},
+      {"encoder_slip", 0, {less_one}},       {"encoder_skew", 0, {speed}},
+      {"encoder_scale", 0, {less_position}}, {"backlash", 0, {half_side, half_side_drift}, true}};
+  for (double n = kLeastOrder; n <= kMostOrder; n += kOrderStep)
+    all.push_back({"transmission_error", n, {less_cosine, less_sine}});
+  return all;
 }
 
 }  // namespace
 
 bool ChangeEffect::has_order() const {
-  return id == "cogging" || id == "position_dependent_friction";
+  return id == "cogging" || id == "position_dependent_friction" || id == "transmission_error";
 }
 
 double ChangeEffect::least_order() const {
-  return id == "cogging" ? kLeastOrder : kLeastFrictionOrder;
+  return id == "position_dependent_friction" ? kLeastFrictionOrder : kLeastOrder;
 }
 
 std::string ChangeEffect::name() const {
@@ -99,9 +140,11 @@ std::string ChangeEffect::name() const {
 }
 
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
+  if (sampling.channel == ChangeChannel::deflection) return deflection_effects();
+  // What is carried or dropped moves with the load.
   std::vector<ChangeEffect> all = {{"motor_coulomb", 0, {direction}},
                                    {"motor_viscous", 0, {speed}},
-                                   {"motor_inertia", 0, {acceleration}},
+                                   {sampling.mesh ? "load_inertia" : "motor_inertia", 0, {acceleration}},
                                    {"asymmetric_coulomb", 0, {one}},
                                    {"gravity", 1, {cosine, sine}},
                                    {"load_dependent_friction", 0, {load_rub}},
@@ -118,12 +161,28 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
   return all;
 }
 
-Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect) {
+namespace {
+
+Eigen::MatrixXd filtered_columns(const SampledMotion& motion, const ChangeEffect& effect) {
   Eigen::MatrixXd out(motion.size(), static_cast<Eigen::Index>(effect.columns.size()));
   for (std::size_t i = 0; i < effect.columns.size(); ++i)
     out.col(static_cast<Eigen::Index>(i)) =
         column(motion, [&](const Moment& m) { return effect.columns[i](m, effect.shape); });
   return out;
+}
+
+}  // namespace
+
+Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect) {
+  // That of the load changes with what the machine is taken for.
+  if (effect.id == "load_dependent_friction") return filtered_columns(motion, effect);
+  const std::string name = effect.name() + (effect.ramp ? " ramp" : "");
+  const auto known = motion.known_columns.find(name);
+  if (known != motion.known_columns.end()) return known->second;
+  Eigen::MatrixXd columns = filtered_columns(motion, effect);
+  if (double(motion.known_columns.size()) * double(motion.size()) < kMostKnown)
+    motion.known_columns.emplace(name, columns);
+  return columns;
 }
 
 std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::VectorXd& values,

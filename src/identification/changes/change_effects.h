@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The effects of one inertia that a record of torque and position can tell, as columns: the motor torque that
-// one unit of each value takes.
+// The effects that a record can tell, as columns: the motor torque, or the deflection, that one unit of each
+// value takes.
 #pragma once
 
 #include <string>
@@ -14,10 +14,9 @@ namespace backlash::identification {
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
   double shape = 0;  // order [1/rad] or speed [rad/s], where the effect has one
-  /// Columns of one moment. Two: cosine and sine of a wave; friction_drift: dry friction and that times time.
+  /// Columns of one moment. Two: cosine and sine of a wave; of a ramp something and that times time.
   std::vector<double (*)(const Moment&, double shape)> columns;
-  /// friction_drift: the second column grows from the onset on.
-  bool ramp = false;
+  bool ramp = false;  // the second column grows from the onset on
 
   bool has_order() const;
   double least_order() const;  // that is tried, of one that has one

@@ -27,19 +27,27 @@ struct ScannedEffect {
   double inflation = 1;
 };
 
-/// One record against a healthy machine.
+/// One channel of a record against a healthy machine.
 class ChangeSearch {
  public:
+  /// `beside`: changes that another channel shows, of which this one may show any share.
   ChangeSearch(const HealthyModel& model, const SampledMotion& motion, std::vector<ScannedEffect> candidates,
-               const ChangeSettings& settings, const Progress& progress)
+               const std::vector<FoundChange>& beside, const ChangeSettings& settings,
+               const Progress& progress)
       : model_(model),
         motion_(motion),
         candidates_(std::move(candidates)),
         settings_(settings),
         progress_(progress),
+        beside_(beside),
         first_(residual_of(model, motion, settings)),
         margin_(static_cast<std::size_t>(settings.margin / settings.block)),
-        blocks_(static_cast<std::size_t>(motion.moments.back().time / settings.block) + 1) {}
+        blocks_(static_cast<std::size_t>(motion.moments.back().time / settings.block) + 1) {
+    beside_column_ = first_.nuisances.cols();
+    const Background with = background(beside_);
+    first_.nuisances = with.columns;
+    first_.spread = with.spread;
+  }
 
   std::vector<FoundChange> run();
   double threshold(Eigen::Index values) const;
@@ -48,6 +56,8 @@ class ChangeSearch {
   bool explained(const std::vector<FoundChange>& all) const;
   std::optional<Change> louder() const;
   const std::vector<std::string>& different() const { return different_; }
+  /// Values of the columns that stand beside, `found` being so.
+  std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
 
  private:
   Background background(const std::vector<FoundChange>& others) const;
@@ -70,7 +80,9 @@ class ChangeSearch {
   const std::vector<ScannedEffect> candidates_;
   const ChangeSettings& settings_;
   const Progress& progress_;
+  const std::vector<FoundChange> beside_;
   Whitened first_;
+  Eigen::Index beside_column_ = 0;      // the first of what stands beside
   std::vector<std::string> different_;  // effects that the record has from its beginning
   const std::size_t margin_, blocks_;
 };
@@ -100,6 +112,15 @@ Background ChangeSearch::background(const std::vector<FoundChange>& others) cons
   b.variance = model_.noise * model_.noise;
   b.solve();
   return b;
+}
+
+std::vector<signal::Measured> ChangeSearch::beside(const std::vector<FoundChange>& found) const {
+  const Background b = background(found);
+  const double noisier = std::max(1.0, b.left().squaredNorm() / double(motion_.size()) / b.variance);
+  std::vector<signal::Measured> all;
+  for (Eigen::Index i = beside_column_; i < b.estimate.size(); ++i)
+    all.push_back({b.estimate[i], std::sqrt(noisier * b.inverse(i, i))});
+  return all;
 }
 
 std::size_t ChangeSearch::windows() const {
@@ -158,9 +179,16 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
     return x.score.gain < y.score.gain;
   });
   if (most == all.end() || most->score.values.size() == 0) return std::nullopt;
-  FoundChange found = *most;
+  // Of those that explain it alike one with fewer values.
+  const double alike = settings_.alike * most->score.gain;
+  const FoundChange* simplest = &*most;
   for (const FoundChange& f : all)
-    if (f.score.gain >= settings_.alike * found.score.gain && f.effect.id != found.effect.id) {
+    if (f.score.gain >= alike && f.score.values.size() > 0 &&
+        f.score.values.size() < simplest->score.values.size())
+      simplest = &f;
+  FoundChange found = *simplest;
+  for (const FoundChange& f : all)
+    if (f.score.gain >= alike && f.effect.id != found.effect.id) {
       const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
       if (!told) found.alike.push_back(f.effect.id);
     }
@@ -171,6 +199,7 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   double rows = 0;
   const double squares = left_after(b, f.from, f.to, rows), explained = f.score.gain * b.variance;
   if (explained < settings_.least_explained * squares) return false;
+  if (explained < rows * model_.least_change * model_.least_change) return false;
   // More noise than in the healthy records counts against it.
   const double all = b.left().squaredNorm(), left = std::max(all - explained, 0.0);
   const double noisier = std::max(1.0, left / double(motion_.size()) / b.variance);
@@ -250,7 +279,10 @@ bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChang
     const double least = apart < settings_.same_event ? settings_.least_beside : settings_.least_further;
     if (next.gain < least * f.gain) return false;
   }
-  return true;
+  return std::none_of(beside_.begin(), beside_.end(), [&](const FoundChange& f) {
+    const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
+    return apart < settings_.same_event && next.gain < settings_.least_with_other * f.gain;
+  });
 }
 
 /// A change that another takes back later, the same effect with the opposite value, is one with an end.
@@ -401,6 +433,13 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   return change;
 }
 
+/// What one channel shows.
+struct ChannelChanges {
+  std::vector<FoundChange> found;
+  std::vector<signal::Measured> beside;  // columns of what stood beside
+  Changes told;
+};
+
 std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
                                          const std::vector<record::Record>& healthy,
                                          const ChangeSettings& settings) {
@@ -416,27 +455,38 @@ std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
   return all;
 }
 
-}  // namespace
+/// What the load of the teeth may be other by: what the motor's torque shows, on whichever side of the gap.
+std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
+  if (changes.empty()) return {};
+  return [changes, block](const Moment& m) {
+    double sum = 0;
+    for (const FoundChange& f : changes) {
+      if (m.time < block * double(f.from) || m.time >= block * double(f.to)) continue;
+      if (f.effect.ramp)
+        sum += f.score.values[0] * f.effect.columns[0](m, f.effect.shape) * (m.time - block * double(f.from));
+      for (std::size_t i = 0; !f.effect.ramp && i < f.effect.columns.size(); ++i)
+        sum += f.score.values[static_cast<Eigen::Index>(i)] * f.effect.columns[i](m, f.effect.shape);
+    }
+    return sum;
+  };
+}
 
-Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>& healthy,
-                       const record::Record& record, const ChangeSettings& settings,
-                       const Progress& progress) {
-  if (!rig.mesh.rigid)
-    throw CannotIdentify("changes are told of machines of one inertia only (mesh: rigid) as yet");
-  std::vector<const record::Record*> all = {&record};
-  for (const record::Record& r : healthy) all.push_back(&r);
-  const HealthyModel model = commission_healthy(healthy, sampling_of(all, settings), settings);
-  const SampledMotion motion = motion_by(model, record, settings);
-  ChangeSearch search(model, motion, candidates_of(model, healthy, settings), settings, progress);
-  const std::vector<FoundChange> found = search.run();
-  Changes out;
+ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::Record>& healthy,
+                          const record::Record& record, const std::vector<FoundChange>& beside, bool linear,
+                          const ChangeSettings& settings, const Progress& progress) {
+  HealthyModel of_record = model;
+  of_record.sampling.other_load = other_load(beside, settings.block);
+  const SampledMotion motion = motion_by(of_record, record, settings);
+  ChangeSearch search(model, motion, candidates_of(model, healthy, settings), beside, settings, progress);
+  ChannelChanges result;
+  const std::vector<FoundChange>& found = result.found = search.run();
+  result.beside = search.beside(found);
+  Changes& out = result.told;
   out.windows = search.windows();
   out.threshold = search.threshold(1);
   out.noise = model.noise;
   for (const ChangeEffect& e : model.further) out.healthy_terms.push_back(e.name());
-  for (const FoundChange& f : found) out.changes.push_back(search.told(f, found, rig.linear));
-  std::sort(out.changes.begin(), out.changes.end(),
-            [](const Change& a, const Change& b) { return a.since < b.since; });
+  for (const FoundChange& f : found) out.changes.push_back(search.told(f, found, linear));
   if (found.empty())
     if (const auto change = search.louder()) out.changes.push_back(*change);
   if (!search.explained(found)) {
@@ -456,6 +506,120 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
                            ": that is no change within it");
+  return result;
+}
+
+/// The share of its inertia that is behind the gap. Throws CannotIdentify for what is not of two inertias.
+double share_behind(const model::Rig& rig) {
+  if (!model::has_two_inertias(rig))
+    throw CannotIdentify(
+        "changes are told of machines of one inertia (mesh: rigid) and of two (rigid couplings, a free "
+        "link)");
+  if (rig.motor_side && rig.reduction_ratio != 1)
+    throw CannotIdentify("changes of two inertias are told from records at the load's side of the reduction");
+  const double behind = rig.gear.inertia + rig.output_coupling.inertia + rig.link.inertia;
+  return behind / (rig.motor.inertia + rig.input_coupling.inertia + rig.pinion.inertia + behind);
+}
+
+/// On which side of the gap friction is that the motor's torque shows as another: behind it, it loads the
+/// teeth and deflects them by `compliance`. 1: behind, 0: before; NaN: not told.
+double side_of(const signal::Measured& torque, const signal::Measured& deflection, double compliance,
+               const ChangeSettings& settings) {
+  const double all = compliance * torque.value, share = deflection.value / all;
+  const double error = settings.errors_of_side * std::fabs(deflection.standard_error / all);
+  const double side = share > 0.5 ? 1 : 0;
+  return std::fabs(share - side) + error < settings.worst_side ? side : kNaN;
+}
+
+/// Names friction by its side of the gap; where that is not told, both are named.
+void tell_sides(const ChannelChanges& torque, const ChannelChanges* deflection, double compliance,
+                const ChangeSettings& settings, Changes& told) {
+  constexpr std::pair<const char*, const char*> kSides[] = {{"motor_coulomb", "load_coulomb"},
+                                                            {"motor_viscous", "load_viscous"}};
+  std::size_t column = 0;
+  for (const FoundChange& f : torque.found) {
+    const std::size_t at = column;
+    column += f.effect.ramp ? 1 : f.effect.columns.size();
+    for (const auto& [before, behind] : kSides)
+      for (Change& c : told.changes) {
+        if (f.effect.id != before || c.effect != before || c.size.empty() || c.gain != f.gain) continue;
+        const double side =
+            deflection ? side_of(c.size[0].measured, deflection->beside[at], compliance, settings) : kNaN;
+        if (std::isnan(side)) c.alike.emplace_back(behind);
+        if (side == 1) c.effect = c.size[0].name = behind;
+      }
+  }
+}
+
+/// What follows no effect in either channel is told once.
+void add_deflection(const Changes& more, const ChangeSettings& settings, Changes& all) {
+  const std::vector<Change> torque = all.changes;
+  for (const Change& c : more.changes) {
+    const bool told = std::any_of(torque.begin(), torque.end(), [&](const Change& t) {
+      return c.effect == "unknown" && t.effect == c.effect &&
+             std::fabs(t.since - c.since) < 2 * settings.window;
+    });
+    if (!told) all.changes.push_back(c);
+  }
+  all.healthy_terms.insert(all.healthy_terms.end(), more.healthy_terms.begin(), more.healthy_terms.end());
+  all.different.insert(all.different.end(), more.different.begin(), more.different.end());
+  all.warnings.insert(all.warnings.end(), more.warnings.begin(), more.warnings.end());
+  all.deflection_noise = more.noise;
+}
+
+/// Two inertias: the torque first, whose changes may load the teeth otherwise; then the deflection.
+Changes changes_of_two(const model::Rig& rig, const std::vector<record::Record>& healthy,
+                       const record::Record& record, MotionSampling sampling, ChangeSettings settings,
+                       const Progress& progress) {
+  const double behind = share_behind(rig);
+  bool load = record.has(record::Channel::load_position);
+  for (const record::Record& r : healthy) load = load && r.has(record::Channel::load_position);
+  if (load) {
+    sampling.behind = behind;
+    settings.false_alarms_per_hour /= 2;  // two channels may be wrong
+  }
+  const HealthyModel whole = commission_healthy(healthy, sampling, settings);
+  sampling.mesh = mesh_load(whole, rig.link, behind, healthy, settings);
+  const auto search = [&](const HealthyModel& model, const std::vector<FoundChange>& beside) {
+    return changes_in(model, healthy, record, beside, rig.linear, settings, progress);
+  };
+  const ChannelChanges torque = search(commission_healthy(healthy, sampling, settings), {});
+  Changes all = torque.told;
+  if (!load) {
+    tell_sides(torque, nullptr, kNaN, settings, all);
+    all.warnings.emplace_back("without load_position changes of the backlash cannot be told");
+    return all;
+  }
+  sampling.channel = ChangeChannel::deflection;
+  try {
+    const HealthyModel model = commission_healthy(healthy, sampling, settings);
+    const ChannelChanges deflection = search(model, torque.found);
+    tell_sides(torque, &deflection, compliance_of(model), settings, all);
+    add_deflection(deflection.told, settings, all);
+  } catch (const CannotIdentify& error) {
+    tell_sides(torque, nullptr, kNaN, settings, all);
+    all.warnings.push_back("changes of the backlash cannot be told: " + std::string(error.what()));
+  }
+  return all;
+}
+
+}  // namespace
+
+Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>& healthy,
+                       const record::Record& record, const ChangeSettings& settings,
+                       const Progress& progress) {
+  std::vector<const record::Record*> all = {&record};
+  for (const record::Record& r : healthy) all.push_back(&r);
+  const MotionSampling sampling = sampling_of(all, settings);
+  Changes out;
+  if (rig.mesh.rigid)
+    out = changes_in(commission_healthy(healthy, sampling, settings), healthy, record, {}, rig.linear,
+                     settings, progress)
+              .told;
+  else
+    out = changes_of_two(rig, healthy, record, sampling, settings, progress);
+  std::sort(out.changes.begin(), out.changes.end(),
+            [](const Change& a, const Change& b) { return a.since < b.since; });
   return out;
 }
 

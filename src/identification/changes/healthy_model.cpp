@@ -18,8 +18,10 @@ constexpr double kWarmUps[] = {20, 40, 60, 80, 110, 150, 220, 300, 400};  // s, 
 constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
 constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
 
-// Columns of the equation of motion, in this order.
-enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kWarmViscous, kWarmCoulomb, kBaseColumns };
+// Columns in this order: of the equation of motion; of the deflection, that under the same load.
+enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kCommonColumns };
+enum TorqueBase { kWarmViscous = kCommonColumns, kWarmCoulomb, kBaseColumns };
+enum DeflectionBase { kHalfGap = kCommonColumns, kScale };
 
 Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
   Eigen::MatrixXd x(motion.size(), kBaseColumns);
@@ -29,6 +31,11 @@ Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
   x.col(kOffset).setOnes();
   x.col(kCosine) = column(motion, [](const Moment& m) { return std::cos(m.position); });
   x.col(kSine) = column(motion, [](const Moment& m) { return std::sin(m.position); });
+  if (motion.sampling.channel == ChangeChannel::deflection) {
+    x.col(kHalfGap) = column(motion, [](const Moment& m) { return m.side(); });
+    x.col(kScale) = column(motion, [](const Moment& m) { return m.position; });
+    return x;
+  }
   x.col(kWarmViscous) =
       column(motion, [&](const Moment& m) { return m.speed * std::exp(-m.time / warm_up); });
   x.col(kWarmCoulomb) =
@@ -68,7 +75,7 @@ PooledFit pooled(const HealthyData& data) {
   PooledFit fit;
   for (std::size_t r = 0; r < data.motions.size(); ++r) {
     gram += data.columns[r].transpose() * data.columns[r];
-    moment += data.columns[r].transpose() * data.motions[r].torque;
+    moment += data.columns[r].transpose() * data.motions[r].target;
     fit.rows += data.motions[r].size();
   }
   // Columns of any size; what the motion does not tell stays 0.
@@ -78,12 +85,13 @@ PooledFit pooled(const HealthyData& data) {
   scaled.diagonal().array() += 1e-9;
   fit.values = inverse.cwiseProduct(Eigen::VectorXd(scaled.ldlt().solve(inverse.cwiseProduct(moment))));
   for (std::size_t r = 0; r < data.motions.size(); ++r)
-    fit.squares += (data.motions[r].torque - data.columns[r] * fit.values).squaredNorm();
+    fit.squares += (data.motions[r].target - data.columns[r] * fit.values).squaredNorm();
   return fit;
 }
 
 void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
-  const double torque = motion.torque.norm() / std::sqrt(double(std::max<Eigen::Index>(1, motion.size())));
+  if (motion.sampling.channel == ChangeChannel::deflection) return;
+  const double torque = motion.target.norm() / std::sqrt(double(std::max<Eigen::Index>(1, motion.size())));
   for (Moment& m : motion.moments) {
     m.fluctuation = kFluctuation * torque / motion.sampling.speed;
     m.load = values[kInertia] * m.acceleration + values[kCosine] * std::cos(m.position) +
@@ -137,7 +145,7 @@ void add_further(HealthyData& data, HealthyModel& model, const ChangeSettings& s
         1e-9 * Eigen::MatrixXd::Identity(data.columns.front().cols(), data.columns.front().cols());
     for (std::size_t r = 0; r < data.motions.size(); ++r) {
       set_loads(fit.values, data.motions[r]);
-      residuals.emplace_back(data.motions[r].torque - data.columns[r] * fit.values);
+      residuals.emplace_back(data.motions[r].target - data.columns[r] * fit.values);
       gram += data.columns[r].transpose() * data.columns[r];
     }
     const Eigen::LDLT<Eigen::MatrixXd> solver(gram);
@@ -160,13 +168,13 @@ void add_further(HealthyData& data, HealthyModel& model, const ChangeSettings& s
 /// What a value differs by from record to record (of one record: from half to half), and some more.
 Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const ChangeSettings& settings) {
   const double variance = fit.squares / double(fit.rows);
-  double torque = 0;
+  double target = 0;
   Eigen::VectorXd size = Eigen::VectorXd::Zero(fit.values.size());
   std::vector<Eigen::VectorXd> fits;
   for (std::size_t r = 0; r < data.motions.size(); ++r) {
     const Eigen::MatrixXd& x = data.columns[r];
-    const Eigen::VectorXd& u = data.motions[r].torque;
-    torque += u.squaredNorm();
+    const Eigen::VectorXd& u = data.motions[r].target;
+    target += u.squaredNorm();
     size += x.colwise().squaredNorm().transpose();
     const Eigen::VectorXd sd = fit.values.cwiseAbs().array() + 1e-3;
     const Eigen::Index parts = data.motions.size() > 1 ? 1 : 2, length = u.size() / parts;
@@ -182,12 +190,21 @@ Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const C
     high = high.cwiseMax(f);
   }
   const Eigen::VectorXd least =
-      (settings.prior_least * std::sqrt(torque) * size.cwiseMax(1e-12).cwiseSqrt().cwiseInverse());
+      (settings.prior_least * std::sqrt(target) * size.cwiseMax(1e-12).cwiseSqrt().cwiseInverse());
   Eigen::VectorXd spread =
       settings.prior_factor * (high - low).cwiseMax(settings.prior_share * fit.values.cwiseAbs() + least);
   // A record may begin warm, or colder than before.
-  for (const int k : {kWarmViscous, kWarmCoulomb}) spread[k] = std::max(spread[k], std::fabs(fit.values[k]));
+  if (data.motions.front().sampling.channel == ChangeChannel::torque)
+    for (const int k : {kWarmViscous, kWarmCoulomb})
+      spread[k] = std::max(spread[k], std::fabs(fit.values[k]));
   return spread;
+}
+
+double rms_about_offset(const HealthyData& data, const PooledFit& fit) {
+  double squares = 0;
+  for (const SampledMotion& m : data.motions)
+    squares += (m.target.array() - fit.values[kOffset]).matrix().squaredNorm();
+  return std::sqrt(squares / double(fit.rows));
 }
 
 }  // namespace
@@ -215,8 +232,27 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   model.values = fit.values;
   model.spread = spread_of(data, fit, settings);
   model.noise = std::sqrt(fit.squares / double(fit.rows));
+  if (sampling.mesh) model.least_change = settings.least_of_two * rms_about_offset(data, fit);
   model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
   return model;
+}
+
+MeshLoad mesh_load(const HealthyModel& model, const model::Body& link, double behind,
+                   const std::vector<record::Record>& healthy, const ChangeSettings& settings) {
+  MeshLoad load = {behind * model.values[kInertia], link.viscous_damping, link.coulomb_friction,
+                   model.values[kCosine], model.values[kSine]};
+  MotionSampling sampling = model.sampling;
+  sampling.mesh = load;
+  double largest = 0;
+  for (const record::Record& r : healthy)
+    for (const Moment& m : sampled_motion(r, sampling, settings).moments)
+      largest = std::max(largest, std::fabs(m.mesh));
+  load.least = settings.least_load * largest;
+  return load;
+}
+
+double compliance_of(const HealthyModel& model) {
+  return model.values[kInertia] / model.sampling.mesh->inertia;
 }
 
 SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
@@ -250,19 +286,24 @@ void add_nuisance(Whitened& out, const Eigen::VectorXd& x, double spread) {
   out.spread[out.spread.size() - 1] = std::max(spread, kLeastSpread);
 }
 
-/// Dry and viscous friction that wander: straight between knots.
+/// What wanders, straight between knots: dry and viscous friction; both flanks and the gap between them.
 void add_wander(Whitened& out, const HealthyModel& model, const SampledMotion& motion,
                 const ChangeSettings& settings) {
+  const bool torque = model.sampling.channel == ChangeChannel::torque;
+  const auto share = [&](int k) { return settings.wander * std::fabs(model.values[k]); };
+  const double first = torque ? share(kCoulomb) : share(kHalfGap);
+  const double second = torque ? share(kViscous) : first;
   const double length = motion.moments.back().time;
   const int cells = std::max(1, static_cast<int>(std::lround(length / settings.wander_time)));
   for (int k = 0; k <= cells; ++k) {
     const auto hat = [&](const Moment& m) {
       return std::max(0.0, 1 - std::fabs(m.time / length * cells - k));
     };
-    add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * hat(m); }),
-                 settings.wander * std::fabs(model.values[kCoulomb]));
-    add_nuisance(out, column(motion, [&](const Moment& m) { return m.speed * hat(m); }),
-                 settings.wander * std::fabs(model.values[kViscous]));
+    add_nuisance(out,
+                 column(motion, [&](const Moment& m) { return (torque ? m.direction : m.side()) * hat(m); }),
+                 first);
+    add_nuisance(out, column(motion, [&](const Moment& m) { return (torque ? m.speed : 1) * hat(m); }),
+                 second);
   }
 }
 
@@ -273,12 +314,13 @@ Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, con
   out.nuisances = base_columns(motion, model.warm_up);
   for (const ChangeEffect& e : model.further)
     out.nuisances = beside(out.nuisances, effect_columns(motion, e));
-  out.residual = motion.torque - out.nuisances * model.values;
+  out.residual = motion.target - out.nuisances * model.values;
   out.spread = model.spread;
+  add_wander(out, model, motion, settings);
+  if (motion.sampling.channel == ChangeChannel::deflection) return out;
   const double length = motion.moments.back().time;
   add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * (m.time / length - 0.5); }),
                model.drift);
-  add_wander(out, model, motion, settings);
   // At rest the machine cools down, and warms up again after; or the clock was set.
   for (const Rest& rest : rests_of(motion, settings)) {
     const auto cooled = [&](const Moment& m) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Commissioning: the equation of motion of the healthy machine, with the spread of its values.
+// Commissioning: the equation of motion of the healthy machine, or its deflection, with the spread of its
+// values.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/model/rig.h"
 #include "change_effects.h"
 #include "sampled_motion.h"
 
@@ -15,22 +17,31 @@ struct HealthyModel {
   double warm_up = 0;                 // s, time constant
   std::vector<ChangeEffect> further;  // that the healthy machine shows, columns after kBaseColumns
   Eigen::VectorXd values;
-  Eigen::VectorXd spread;  // standard deviation from record to record
-  double noise = 0;        // N m, rms of the residual
-  double drift = 0;        // N m, spread of a linear drift of dry friction over a record
+  Eigen::VectorXd spread;   // standard deviation from record to record
+  double noise = 0;         // N m or rad, rms of the residual
+  double drift = 0;         // N m, spread of a linear drift of dry friction over a record
+  double least_change = 0;  // N m or rad, rms of what a change has to explain
 };
 
 /// Throws CannotIdentify.
 HealthyModel commission_healthy(const std::vector<record::Record>& records, const MotionSampling& sampling,
                                 const ChangeSettings& settings);
 
+/// Load of the teeth of two inertias by the model of the torque; the share `behind` of the inertia is the
+/// link's.
+MeshLoad mesh_load(const HealthyModel& model, const model::Body& link, double behind,
+                   const std::vector<record::Record>& healthy, const ChangeSettings& settings);
+
+/// rad/(N m), of the teeth: what the inertia behind them deflects them by. Of a model of the deflection.
+double compliance_of(const HealthyModel& model);
+
 /// With `load` of each moment by the model.
 SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
                         const ChangeSettings& settings);
 
-/// Residual of the model and its nuisances: columns of its values and a drift of friction.
+/// Residual of the model and its nuisances: columns of its values and what drifts.
 struct Whitened {
-  Eigen::VectorXd residual;  // N m
+  Eigen::VectorXd residual;  // N m or rad
   Eigen::MatrixXd nuisances;
   Eigen::VectorXd spread;  // standard deviation of each
 };

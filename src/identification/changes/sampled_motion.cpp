@@ -11,13 +11,17 @@
 namespace backlash::identification {
 namespace {
 
+constexpr double kThinned = 0.25;  // - of the rate that is kept, where its filter ends. Theory: below a half
+
 struct EvenSamples {
-  std::vector<double> torque, position;
+  std::vector<double> torque, position, deflection;
   std::vector<char> there;
 };
 
-void check_stamps(const record::Record& record, const ChangeSettings& settings) {
-  for (const record::Channel channel : {record::Channel::motor_torque, record::Channel::motor_position})
+void check_record(const record::Record& record, bool load, const ChangeSettings& settings) {
+  std::vector<record::Channel> channels = {record::Channel::motor_torque, record::Channel::motor_position};
+  if (load) channels.push_back(record::Channel::load_position);
+  for (const record::Channel channel : channels)
     if (!record.has(channel)) throw BadData(record.name, "has no " + record::channel_name(channel));
   for (std::size_t k = 1; k < record.size(); ++k)
     if (const double step = record.time[k] - record.time[k - 1]; !(step > 0) || step > settings.longest_gap)
@@ -27,9 +31,16 @@ void check_stamps(const record::Record& record, const ChangeSettings& settings) 
                                      " s; give the parts as records of their own");
 }
 
-EvenSamples even_samples(const record::Record& record, double interval, const ChangeSettings& settings) {
+/// The value before, where there is none.
+void hold(std::vector<double>& values, double next) {
+  values.push_back(std::isfinite(next) ? next : values.empty() ? 0 : values.back());
+}
+
+EvenSamples even_samples(const record::Record& record, double interval, bool load,
+                         const ChangeSettings& settings) {
   const auto& torque = record.column(record::Channel::motor_torque);
   const auto& position = record.column(record::Channel::motor_position);
+  const auto& load_position = load ? record.column(record::Channel::load_position) : position;
   const double gap = settings.gap * std::max(interval, record.sampling_interval());
   EvenSamples out;
   std::size_t j = 0;
@@ -40,10 +51,11 @@ EvenSamples even_samples(const record::Record& record, double interval, const Ch
     const double step = record.time[j + 1] - record.time[j], u = (t - record.time[j]) / step;
     const double x = (1 - u) * torque[j] + u * torque[j + 1];
     const double q = (1 - u) * position[j] + u * position[j + 1];
-    const bool there = step <= gap && std::isfinite(x) && std::isfinite(q);
-    out.torque.push_back(std::isfinite(x) ? x : out.torque.empty() ? 0 : out.torque.back());
-    out.position.push_back(std::isfinite(q) ? q : out.position.empty() ? 0 : out.position.back());
-    out.there.push_back(there);
+    const double d = q - (1 - u) * load_position[j] - u * load_position[j + 1];
+    hold(out.torque, x);
+    hold(out.position, q);
+    hold(out.deflection, d);
+    out.there.push_back(step <= gap && std::isfinite(x) && std::isfinite(q) && std::isfinite(d));
   }
   return out;
 }
@@ -67,7 +79,18 @@ void take_out_spikes(std::vector<double>& values, std::vector<char>& there, cons
     }
 }
 
-/// Samples that are there and move, and have such about them for `guard`.
+/// Whether the teeth rest on the flank that they rested on before.
+bool rests_on_flank(const SampledMotion& motion, std::size_t k) {
+  if (!motion.sampling.mesh || k == 0) return true;
+  const Moment &now = motion.moments[k], &before = motion.moments[k - 1];
+  if (now.side() != before.side()) return false;
+  if (motion.sampling.channel == ChangeChannel::torque) return true;
+  const double least = motion.sampling.mesh->least;
+  const double other = now.mesh + (motion.sampling.other_load ? motion.sampling.other_load(now) : 0);
+  return std::min(std::fabs(now.mesh), now.side() * other) > least;
+}
+
+/// Samples that are there, move and rest on a flank, and have such about them for `guard`.
 std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& there, std::size_t guard,
                          const ChangeSettings& settings) {
   const std::size_t n = there.size();
@@ -75,7 +98,7 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
   std::vector<char> good(n, 1);
   for (std::size_t k = 0; k < n; ++k) {
     const double speed = std::fabs(motion.moments[k].speed);
-    if (there[k] && speed > slow && (fast == 0 || speed < fast)) continue;
+    if (there[k] && speed > slow && (fast == 0 || speed < fast) && rests_on_flank(motion, k)) continue;
     // Filters ring for long after a jump of the position, which no motion is.
     const bool jump = fast > 0 && speed > settings.jump * fast;
     const std::size_t reach = jump ? settings.jump_guard * guard : guard;
@@ -83,6 +106,52 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
     for (std::size_t i = k > reach ? k - reach : 0; i < last; ++i) good[i] = 0;
   }
   return good;
+}
+
+/// Every n-th sample, after a filter that takes away what those could not tell from slower motion.
+void thin(std::vector<double>& values, std::size_t n, double interval) {
+  const std::vector<double> slow = signal::low_pass(values, interval, kThinned / (double(n) * interval));
+  values.clear();
+  for (std::size_t k = 0; k < slow.size(); k += n) values.push_back(slow[k]);
+}
+
+void thin(EvenSamples& even, std::size_t n, double interval) {
+  if (n == 1) return;
+  for (std::vector<double>* values : {&even.torque, &even.position, &even.deflection})
+    thin(*values, n, interval);
+  std::vector<char> there;
+  for (std::size_t k = 0; k < even.there.size(); k += n) {
+    const std::size_t from = k > n ? k - n : 0, to = std::min(even.there.size(), k + n);
+    there.push_back(std::all_of(&even.there[from], &even.there[0] + to, [](char c) { return c != 0; }));
+  }
+  even.there = there;
+}
+
+void add_moments(const EvenSamples& even, const ChangeSettings& settings, SampledMotion& motion) {
+  const MotionSampling& sampling = motion.sampling;
+  const double dt = sampling.interval, turn = settings.friction_speed * sampling.speed;
+  const auto filtered = [&](const std::vector<double>& values) {
+    return signal::low_pass(values, dt, sampling.position_cutoff);
+  };
+  const std::vector<double> position = filtered(even.position), speed = signal::derivative(position, dt),
+                            acceleration = signal::derivative(speed, dt);
+  const std::vector<double> parting =
+      signal::derivative(signal::derivative(filtered(even.deflection), dt), dt);
+  for (std::size_t k = 0; k < position.size(); ++k) {
+    Moment m = {double(k) * dt,
+                position[k],
+                speed[k],
+                acceleration[k] - sampling.behind * parting[k],
+                std::tanh(speed[k] / turn),
+                0,
+                0,
+                0};
+    if (const auto& mesh = sampling.mesh)
+      m.mesh = mesh->inertia * (acceleration[k] - parting[k]) + mesh->viscous * m.speed +
+               mesh->coulomb * m.direction + mesh->cosine * std::cos(m.position) +
+               mesh->sine * std::sin(m.position);
+    motion.moments.push_back(m);
+  }
 }
 
 }  // namespace
@@ -95,6 +164,8 @@ MotionSampling sampling_of(const std::vector<const record::Record*>& records,
       throw CannotIdentify(r->name + " has only " + std::to_string(r->size()) + " samples");
     s.interval = std::max(s.interval, r->sampling_interval());
   }
+  s.thinned = static_cast<std::size_t>(std::max(1.0, std::floor(1 / (s.interval * settings.most_rate))));
+  s.interval *= double(s.thinned);
   s.cutoff = std::min(settings.cutoff, settings.cutoff_share / s.interval);
   s.position_cutoff = std::min(settings.position_cutoff, settings.position_cutoff_share / s.interval);
   return s;
@@ -102,36 +173,37 @@ MotionSampling sampling_of(const std::vector<const record::Record*>& records,
 
 SampledMotion sampled_motion(const record::Record& record, const MotionSampling& sampling,
                              const ChangeSettings& settings) {
-  check_stamps(record, settings);
+  const bool load = sampling.behind > 0;
+  check_record(record, load, settings);
   const double dt = sampling.interval;
-  EvenSamples even = even_samples(record, dt, settings);
+  const double own = dt / double(sampling.thinned);
+  EvenSamples even = even_samples(record, own, load, settings);
   take_out_spikes(even.torque, even.there, settings);
   take_out_spikes(even.position, even.there, settings);
-  const std::vector<double> position = signal::low_pass(even.position, dt, sampling.position_cutoff);
-  const std::vector<double> speed = signal::derivative(position, dt);
-  const std::vector<double> acceleration = signal::derivative(speed, dt);
+  if (load) take_out_spikes(even.deflection, even.there, settings);
+  thin(even, sampling.thinned, own);
   SampledMotion motion;
   motion.sampling = sampling;
   motion.start = record.time.front();
-  const double turn = settings.friction_speed * sampling.speed;
-  for (std::size_t k = 0; k < position.size(); ++k)
-    motion.moments.push_back(
-        {double(k) * dt, position[k], speed[k], acceleration[k], std::tanh(speed[k] / turn), 0});
+  add_moments(even, settings, motion);
   const auto guard = static_cast<std::size_t>(std::ceil(settings.guard / sampling.cutoff / dt));
   const std::vector<char> good = usable(motion, even.there, guard, settings);
   const auto stride =
       static_cast<std::size_t>(std::max(1.0, 1 / (dt * settings.rate_share * sampling.cutoff)));
-  for (std::size_t k = 2; k + 2 < good.size(); k += stride)
+  for (std::size_t k = guard; k + guard < good.size(); k += stride)
     if (good[k]) motion.rows.push_back(k);
   motion.row_interval = dt * double(stride);
-  if (double(motion.rows.size()) * motion.row_interval < settings.shortest)
-    throw CannotIdentify(record.name + " moves for " +
-                         to_text(double(motion.rows.size()) * motion.row_interval) +
-                         " s in a way that can be judged; " + to_text(settings.shortest) + " s are needed");
-  const std::vector<double> torque = signal::low_pass(even.torque, dt, sampling.cutoff);
-  motion.torque.resize(motion.size());
+  const bool torque = sampling.channel == ChangeChannel::torque;
+  const double usable_time = double(motion.rows.size()) * motion.row_interval;
+  const double shortest = torque ? settings.shortest : settings.shortest_pressed;
+  if (usable_time < shortest)
+    throw CannotIdentify(
+        record.name + " moves for " + to_text(usable_time) + " s in a way that can be judged" +
+        (torque ? "" : ", its teeth pressed for certain") + "; " + to_text(shortest) + " s are needed");
+  const auto target = signal::low_pass(torque ? even.torque : even.deflection, dt, sampling.cutoff);
+  motion.target.resize(motion.size());
   for (Eigen::Index i = 0; i < motion.size(); ++i)
-    motion.torque[i] = torque[motion.rows[static_cast<std::size_t>(i)]];
+    motion.target[i] = target[motion.rows[static_cast<std::size_t>(i)]];
   return motion;
 }
 

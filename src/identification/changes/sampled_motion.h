@@ -4,6 +4,9 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <map>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "backlash_diagnosis/identification/changes/change_settings.h"
@@ -11,9 +14,26 @@
 
 namespace backlash::identification {
 
+/// What is predicted: the motor's torque, or by how much its position is ahead of the load's.
+enum class ChangeChannel { torque, deflection };
+
+/// What loads the teeth between two inertias, all by the link: J a + c w + F sign(w) + g_c cos q + g_s sin q.
+struct MeshLoad {
+  double inertia = 0, viscous = 0, coulomb = 0, cosine = 0, sine = 0;
+  double least = 0;  // N m: less presses no flank for certain
+};
+
+struct Moment;
+
 /// Common to all records of a machine.
 struct MotionSampling {
-  double interval = 0;         // s
+  ChangeChannel channel = ChangeChannel::torque;
+  double behind = 0;             // - of the inertia that moves with the load's encoder; 0: there is none
+  std::optional<MeshLoad> mesh;  // none: one inertia, or not known yet
+  /// N m, that the teeth may bear beside; a flank counts that is pressed with it and without. Empty: nothing.
+  std::function<double(const Moment&)> other_load;
+  double interval = 0;         // s, of what is looked at
+  std::size_t thinned = 1;     // samples of the record in one of these
   double cutoff = 0;           // Hz
   double position_cutoff = 0;  // Hz
   double speed = 1;            // rad/s, rms of the healthy machine
@@ -24,10 +44,13 @@ struct Moment {
   double time;          // s, since the record began
   double position;      // rad
   double speed;         // rad/s
-  double acceleration;  // rad/s^2
+  double acceleration;  // rad/s^2, the mean of both inertias by their weight
   double direction;     // -1..1
   double load;          // N m, that the healthy machine's load takes
   double fluctuation;   // N m s/rad, by which that may fluctuate per speed, faster than the record shows
+  double mesh;          // N m, that the teeth bear; 0: one inertia
+
+  double side() const { return mesh < 0 ? -1 : 1; }  // flank that bears it
 };
 
 struct SampledMotion {
@@ -35,8 +58,10 @@ struct SampledMotion {
   double start = 0;  // s, the record's first stamp
   std::vector<Moment> moments;
   std::vector<std::size_t> rows;  // that count, few enough for the cutoff
-  Eigen::VectorXd torque;         // N m, filtered, of the rows
+  Eigen::VectorXd target;         // N m or rad, of the channel, filtered, of the rows
   double row_interval = 0;        // s
+  mutable std::map<std::string, Eigen::MatrixXd>
+      known_columns;  // of effect_columns(), so far as there is room
 
   double time(Eigen::Index row) const { return moments[rows[static_cast<std::size_t>(row)]].time; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(rows.size()); }

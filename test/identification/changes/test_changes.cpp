@@ -102,9 +102,10 @@ TEST_P(ChangesOf, AreNamedWithSizeAndTime) {
   EXPECT_LT(c.since_to - c.since_from, 4);  // a reversal each 1 to 3 s hides the onset for that long
   EXPECT_FALSE(c.until);
   for (const ChangeSize& s : c.size)
-    if (s.name == GetParam().value)
+    if (s.name == GetParam().value) {
       // 3 standard errors: one of the cases in 60 would miss by chance
       EXPECT_NEAR(s.measured.value, GetParam().size, 3 * s.measured.standard_error);
+    }
 }
 
 constexpr double kOnset = 120;  // s
@@ -153,15 +154,11 @@ TEST(Changes, ARecordThatBeginsWarmOrPausesHasNone) {
   EXPECT_TRUE(changes_of(pause).changes.empty());
 }
 
-TEST(Changes, StampsThatMakeNoSenseAndOtherMachinesAreRefused) {
+TEST(Changes, StampsThatMakeNoSenseAreRefused) {
   record::Record jump = made(62, 200, nothing);
   for (double& t : jump.time)
     if (t > 100) t += 3600;
   EXPECT_THROW(changes_of(jump), BadData);
-  model::Rig two = one_inertia();
-  two.mesh.rigid = false;
-  const record::Record r = made(1, 200, nothing);
-  EXPECT_THROW(detect_changes(two, {r}, r), CannotIdentify);
   EXPECT_THROW(changes_of(made(1, 20, nothing)), CannotIdentify);
 }
 

@@ -14,6 +14,7 @@ struct ChangeSettings {
   double cutoff_share = 0.125;          // - of the sampling rate at most. Choice
   double position_cutoff = 20;          // Hz, before it is differentiated. Choice
   double position_cutoff_share = 0.16;  // - of the sampling rate at most. Choice
+  double most_rate = 160;               // Hz, that is looked at: faster records are thinned. Choice
   double rate_share = 4.5;              // -, sampling rate that is kept over the cutoff. Theory: above 2
   double slow = 0.05;                   // - of the rms speed: slower counts for nothing. Choice
   double friction_speed = 0.02;         // - of the rms speed, over which dry friction turns. Choice
@@ -21,11 +22,14 @@ struct ChangeSettings {
   double fast = 1.2;                    // - of the fastest healthy speed: no extrapolation. Choice
   double spike =
       30;  // mean differences from the median of three: no noise. Choice: 11 is the most of a million
-  double jump = 3;             // of the fastest speed that is extrapolated to: no motion. Choice
-  std::size_t jump_guard = 6;  // guards about it. Theory: filters have rung out to 1e-10 of it
-  double gap = 2.5;            // intervals between samples that are none. Choice
-  double longest_gap = 600;    // s. Choice: the machine has another temperature then
-  double shortest = 30;        // s, of usable motion in a record. Choice
+  double jump = 3;              // of the fastest speed that is extrapolated to: no motion. Choice
+  std::size_t jump_guard = 6;   // guards about it. Theory: filters have rung out to 1e-10 of it
+  double gap = 2.5;             // intervals between samples that are none. Choice
+  double longest_gap = 600;     // s. Choice: the machine has another temperature then
+  double shortest = 30;         // s, of usable motion in a record. Choice
+  double shortest_pressed = 8;  // s, the same with a flank pressed for certain, for the deflection. Choice
+
+  double least_load = 0.05;  // - of the largest load of the teeth: less presses no flank for certain. Choice
 
   // The healthy machine
   double least_share = 0.03;  // - of the squares of the residual that a further column explains. Choice
@@ -45,15 +49,20 @@ struct ChangeSettings {
   double block = 0.2;  // s, resolution of the onset. Choice
   double margin = 8;   // s at either end in which no change begins. Choice
   double least_explained = 0.1;  // - of the squares of the residual after the onset. Choice
+  double least_of_two = 0.003;   // - of the rms target of two inertias, that it explains at least: teeth that
+                                 // ring and cross the gap leave as much. Choice
+  double errors_of_side = 4;     // standard errors of the share of friction that loads the teeth. Choice
+  double worst_side = 0.4;       // -, of that share from 0 or 1, with its errors. Choice: 0.5 is neither
   double least_further =
       0.05;               // - of the first change's gain. Simulation: what a first one leaves by its shape
   double undone = 0.3;    // - of a change's size, that one which takes it back may leave. Choice
   double same_event = 5;  // s: two that begin so close may be one whose shape is another. Choice
-  double least_beside = 0.25;  // - of the gain of the other that a second one of an event has. Choice
-  int most_changes = 4;        // Choice
-  double onset_drop = 8;       // of twice the log likelihood, as wide as the onset is uncertain. Simulation
-  double onset_least = 0.1;    // s, half of the narrowest interval. Choice
-  double unknown_left = 0.4;   // - of the squares after the onset that may be left. Choice
+  double least_with_other = 1e-3;  // - of the gain of the other channel's change of the same event. Choice
+  double least_beside = 0.25;      // - of the gain of the other that a second one of an event has. Choice
+  int most_changes = 4;            // Choice
+  double onset_drop = 8;      // of twice the log likelihood, as wide as the onset is uncertain. Simulation
+  double onset_least = 0.1;   // s, half of the narrowest interval. Choice
+  double unknown_left = 0.4;  // - of the squares after the onset that may be left. Choice
   double unknown_louder =
       4;                // -, squares of the residual after over before, of what no effect explains. Choice
   double alike = 0.97;  // - of the best gain: effects that fit alike. Choice

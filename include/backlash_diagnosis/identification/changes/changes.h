@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/identification/changes/change_settings.h"
 #include "backlash_diagnosis/model/rig.h"
@@ -39,6 +40,7 @@ struct Changes {
   std::size_t windows = 0;                 // of ChangeSettings::window that could be judged
   double threshold = 0;                    // of the gain, for an effect with one value
   double noise = 0;                        // N m, rms of the residual of the healthy records
+  double deflection_noise = kNaN;          // rad, the same of the deflection; NaN: not looked at
   std::vector<std::string> healthy_terms;  // what the healthy machine shows beside friction and gravity
   std::vector<std::string> different;      // effects that the record has from its beginning: no change in it
   std::vector<std::string> warnings;
