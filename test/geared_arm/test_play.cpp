@@ -5,8 +5,8 @@
 #include <iostream>
 
 #include "backlash_diagnosis/base/random.h"
-#include "backlash_diagnosis/geared_arm/plant.h"
 #include "backlash_diagnosis/geared_arm/play.h"
+#include "backlash_diagnosis/geared_arm/simulation.h"
 #include "support/data.h"
 
 namespace backlash::geared_arm {
