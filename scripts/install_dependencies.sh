@@ -24,6 +24,7 @@ run=(
 tests=(
   catkin-lint
   libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
+  ros-robot-state-publisher python3-tf2-msgs                      # arm.launch, and what it tells tf
   chromium chromium-driver python3-selenium                       # tests that look at the pages in a browser
   liborocos-kdl-dev                                               # oracle of the arm's dynamics
   clang-format clang-tidy doxygen                                 # what scripts/check_style.sh and api_doc.sh call

@@ -118,8 +118,12 @@ Chain chain_of_urdf(const std::string& text, const std::string& name,
   return Reader(*model, name).chain(joints);
 }
 
+std::string read_urdf(const std::string& path) {
+  return read_start(path, kLargestUrdf);
+}
+
 Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints) {
-  return chain_of_urdf(read_start(urdf_path, kLargestUrdf), urdf_path, joints);
+  return chain_of_urdf(read_urdf(urdf_path), urdf_path, joints);
 }
 
 }  // namespace backlash::arm

@@ -138,7 +138,11 @@ void ArmPlant::begin_segments() {
     any = true;
   }
   begun_ = true;
-  if (!any || !arm_.gravity_compensation) return;
+  if (any) compensate_gravity();
+}
+
+void ArmPlant::compensate_gravity() {
+  if (!arm_.gravity_compensation) return;
   const arm::Joints rest = arm::Joints::Zero(links_);
   const arm::Joints gravity = arm::inverse_dynamics(chain_, motor_positions(), rest, rest);
   for (std::size_t j = 0; j < drives_.size(); ++j) drives_[j].compensation = gravity[Eigen::Index(j)];
@@ -176,6 +180,27 @@ model::Observation ArmPlant::observe(std::size_t joint) const {
                         : kNaN;
   o.acceleration = kNaN;
   return o;
+}
+
+double ArmPlant::backlash(std::size_t joint) const {
+  return drives_[joint].motor >= 0 ? arm_.joints[joint].gear->backlash : 0;
+}
+
+void ArmPlant::set_backlash(std::size_t joint, double backlash) {
+  if (!std::isfinite(backlash) || backlash < 0)
+    throw InvalidParameter("backlash", backlash, "must be finite and >= 0");
+  if (drives_[joint].motor < 0)
+    throw InvalidParameter(
+        "backlash", backlash,
+        "joint '" + arm_.rig.joints[joint].name + "' has no gap: it has no gear or is held");
+  arm_.joints[joint].gear->backlash = backlash;
+}
+
+bool ArmPlant::set_torque(std::size_t joint, double torque) {
+  Drive& drive = drives_[joint];
+  if (!drive.excitation || !drive.excitation->set_torque(torque)) return false;
+  compensate_gravity();
+  return true;
 }
 
 double ArmPlant::energy() const {

@@ -180,7 +180,23 @@ class Reader {
 
   record::Record read(const record::ChannelMap& map) {
     read_origin();
-    if (origin_) return with_own_names(map.joint);
+    return origin_ ? with_own_names(map.joint) : with_map(map);
+  }
+
+  record::Record read_of_robot(const record::ChannelMap& stock) {
+    read_origin();
+    joint_ = stock.joint;
+    const std::vector<std::string> topics = candidate_topics(wanted_topic_);
+    read_messages(topics);
+    if (origin_ || any_has(JointNames(joint_).motor)) return finished(topics);
+    topics_.clear();
+    return with_map(stock);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
+
+  record::Record with_map(const record::ChannelMap& map) {
     std::vector<std::string> topics;
     for (const std::string& wanted : map.topics()) {
       const std::vector<std::string> found = candidate_topics(wanted);
@@ -195,17 +211,23 @@ class Reader {
     return told(joined_parts(map, topics));
   }
 
- private:
-  [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
-
   /// By the names of this package.
   record::Record with_own_names(const std::string& joint) {
     joint_ = joint;
     const std::vector<std::string> topics = candidate_topics(wanted_topic_);
     read_messages(topics);
+    return finished(topics);
+  }
+
+  record::Record finished(const std::vector<std::string>& topics) {
     JointRun& run = chosen(topics);
     if (run.wrong) std::rethrow_exception(run.wrong);
     return told(run.finished());
+  }
+
+  bool any_has(const std::string& name) const {
+    return std::any_of(topics_.begin(), topics_.end(),
+                       [&name](const auto& topic) { return topic.second.names.count(name) > 0; });
   }
 
   record::Record told(record::Record record) const {
@@ -362,6 +384,10 @@ record::Record read_bag(const std::string& path, const std::string& joint, const
 
 record::Record read_bag(const std::string& path, const record::ChannelMap& channels) {
   return channels.declared ? Reader(path, "", "joint_states").read(channels) : read_bag(path, channels.joint);
+}
+
+record::Record read_robot_bag(const std::string& path, const record::ChannelMap& stock) {
+  return Reader(path, "", "joint_states").read_of_robot(stock);
 }
 
 }  // namespace backlash::ros_bridge

@@ -87,7 +87,8 @@ void empty_if_absent(sensor_msgs::JointState& m) {
 }
 
 JointNames::JointNames(const std::string& joint)
-    : motor(joint + "_motor"),
+    : robot(joint),
+      motor(joint + "_motor"),
       sensor(joint + "_sensor"),
       load(joint + "_load"),
       reference(joint + "_reference"),
@@ -183,6 +184,10 @@ void add_joint_state(const model::Observation& o, const JointNames& names, senso
   add(m, names.load, o.load_position, o.load_velocity, o.output_torque);
   add(m, names.current, kAbsent, kAbsent, o.motor_current);
   add(m, names.accelerometer, kAbsent, kAbsent, o.acceleration);
+}
+
+void add_robot_joint(const model::Observation& o, const std::string& joint, sensor_msgs::JointState& m) {
+  add(m, joint, o.load_position, o.load_velocity, o.motor_torque);
 }
 
 JointStateWriter::JointStateWriter(const record::ChannelMap& sources) {

@@ -44,7 +44,6 @@ MonitorSettings load_monitor(Parameters& parameters, const JointRig& rig, const 
   const std::string& joint = rig.joint;
   monitor.joint = joint;
   monitor.rig = rig.rig;
-  parameters.allow(joint + "/live");
   use_curve(monitor, parameters.text(joint + "/curve", common.curve));
   use_limits(monitor, parameters.text(joint + "/limits", common.limits));
   use_baseline(monitor, parameters.text(joint + "/baseline", common.baseline));

@@ -13,6 +13,9 @@
 namespace backlash::ros_bridge {
 namespace {
 
+// What dynamic_reconfigure left of joints that this node had before.
+constexpr const char* kLiveBelow = "/live/";
+
 std::string shown(XmlRpc::XmlRpcValue value) {
   if (value.getType() == XmlRpc::XmlRpcValue::TypeString) return static_cast<std::string>(value);
   std::ostringstream text;
@@ -109,7 +112,7 @@ void Parameters::finish() const {
   for (const std::string& full : all) {
     if (full.compare(0, prefix.size(), prefix) != 0) continue;
     const std::string name = full.substr(prefix.size());
-    bool known = false;
+    bool known = name.find(kLiveBelow) != std::string::npos;
     for (const std::string& k : known_)
       known = known || name == k || name.compare(0, k.size() + 1, k + "/") == 0;
     if (!known)

@@ -4,12 +4,13 @@
 namespace backlash::ros_bridge {
 
 const char* simulator_help() {
-  return R"(Simulates a gear train with backlash and publishes what its sensors measure.
+  return R"(Simulates a gear train with backlash, or an arm of them, and publishes what its sensors measure.
 
 Usage: rosrun backlash_diagnosis simulator [_PARAMETER:=VALUE ...] [NAME:=NEW_NAME ...]
 
 Private parameters; unknown ones are refused. In brackets: units of values that override the rig file
-  rig                   path of a rig file; without it the built-in rig of Sarkar et al. (1997)
+  rig                   path of a rig file; without it the built-in rig of Sarkar et al. (1997). One with urdf is an
+                        arm, see below
   rig_folder            folder with a rig file for each joint of a robot, instead of rig: all are simulated (see joints)
   run                   [text] one of the rig file's test_runs: its excitation replaces that of the rig file
   joint                 [text] prefix of the names in joint_states: JOINT_motor, JOINT_sensor, JOINT_load, and
@@ -31,6 +32,7 @@ Private parameters; unknown ones are refused. In brackets: units of values that 
   wait_for_subscriber   false; true: the simulation starts when joint_states has a subscriber
   live                  where dynamic_reconfigure keeps what is in force; overwritten at the start
   diagnostic_period     1 s; wall time between two messages on /diagnostics
+  set_robot_description true; an arm's URDF becomes the parameter robot_description where there is none
 
 Publishes
   joint_states          sensor_msgs/JointState, every sample; stamps exactly 1/sampling_rate apart, always. A joint whose
@@ -48,6 +50,12 @@ Services
   ~set_rig              backlash_diagnosis/SetRig; gear train and terms of another rig file from the last sample on
   ~reset                std_srvs/Trigger; at rest in the middle of the gap, backlash as at start; stamps go on
   ~live, ~JOINT/live    dynamic_reconfigure: backlash, noise of each sensor; what is wrong is refused
+
+An arm: all joints in each message of joint_states, as JOINT, the name in the URDF (position and velocity of the
+link, torque of the motor, for robot_state_publisher), JOINT_motor and JOINT_load. Other topics are below JOINT/,
+services and live parameters below ~JOINT/; backlash is in rad, set_rig is not there. Parameters that are for one
+joint (run, joint, joints, rig_folder, backlash, half_gap, excitation_...) are refused; noise has the seed plus the
+joint's place.
 
 Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the
 simulation follows that clock, otherwise wall time. Exit code 0 when done, 64 for a wrong parameter, 65 for a

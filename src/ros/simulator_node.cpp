@@ -10,6 +10,8 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/ros/simulated_arm.h"
+#include "backlash_diagnosis/ros/simulated_joint.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -59,8 +61,7 @@ std::uint32_t queue_length(double sampling_rate) {
 
 SimulatorNode::SimulatorNode(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle)
     : settings_(read_simulator_settings(private_handle)),
-      sampling_rate_(settings_.joints.front().file.simulation.sensors.sampling_rate),
-      pacer_(settings_.real_time_factor * sampling_rate_),
+      pacer_(settings_.real_time_factor * settings_.sampling_rate),
       follows_ros_time_(ros::Time::isSimTime() && !settings_.publish_clock &&
                         settings_.real_time_factor == 1),
       clock_step_(clock_step(settings_.real_time_factor)),
@@ -68,21 +69,24 @@ SimulatorNode::SimulatorNode(const ros::NodeHandle& handle, const ros::NodeHandl
       private_handle_(private_handle),
       updater_(handle, private_handle) {
   advertise();
-  updater_.setHardwareID(settings_.joints.front().file.rig.name);
+  updater_.setHardwareID(settings_.rig);
   updater_.add("simulation", this, &SimulatorNode::diagnose);
   last_report_ = next_report_ = next_warning_ = WallClock::now();
 }
 
 void SimulatorNode::advertise() {
+  if (settings_.arm)
+    machines_.push_back(std::make_unique<SimulatedArm>(*settings_.arm, handle_, private_handle_));
   for (const JointSettings& joint : settings_.joints) {
     const std::string scope = settings_.named_joints ? joint.file.rig.joint : "";
-    joints_.push_back(std::make_unique<SimulatedJoint>(joint, ros::NodeHandle(handle_, scope),
-                                                       ros::NodeHandle(private_handle_, scope)));
-    for (const std::string& topic : joints_.back()->topics())
+    machines_.push_back(std::make_unique<SimulatedJoint>(joint, ros::NodeHandle(handle_, scope),
+                                                         ros::NodeHandle(private_handle_, scope)));
+  }
+  for (const auto& machine : machines_)
+    for (const std::string& topic : machine->topics())
       if (joint_states_.count(topic) == 0)
         joint_states_[topic] =
-            handle_.advertise<sensor_msgs::JointState>(topic, queue_length(sampling_rate_));
-  }
+            handle_.advertise<sensor_msgs::JointState>(topic, queue_length(settings_.sampling_rate));
   if (settings_.publish_clock) {  // latched: who comes before the first sample sees a valid time
     clock_ = handle_.advertise<rosgraph_msgs::Clock>("/clock", 1000, true);
     origin_ = wall_time();
@@ -139,12 +143,9 @@ void SimulatorNode::start() {
   const std::string pace = follows_ros_time_ ? "at the pace of /clock"
                            : factor == 0     ? "as fast as possible"
                                              : to_text(factor) + " times real time";
-  for (std::size_t i = 0; i < joints_.size(); ++i) {
-    const rig_file::RigFile& file = settings_.joints[i].file;
-    ROS_INFO_STREAM(file.rig.joint << ": simulating " << file.rig.name << " (" << file.source << ") at "
-                                   << sampling_rate_ << " Hz with a backlash of "
-                                   << joints_[i]->true_backlash() << ", " << pace);
-  }
+  for (const auto& machine : machines_)
+    ROS_INFO_STREAM(machine->title() << " at " << settings_.sampling_rate << " Hz with a backlash of "
+                                     << machine->true_backlash() << ", " << pace);
 }
 
 nanoseconds SimulatorNode::elapsed() const {
@@ -154,7 +155,8 @@ nanoseconds SimulatorNode::elapsed() const {
 
 ros::Time SimulatorNode::stamp(long sample) const {
   ros::Time time;
-  time.fromNSec(origin_.toNSec() + static_cast<std::uint64_t>(sample_time(sample, sampling_rate_).count()));
+  time.fromNSec(origin_.toNSec() +
+                static_cast<std::uint64_t>(sample_time(sample, settings_.sampling_rate).count()));
   return time;
 }
 
@@ -170,7 +172,7 @@ void SimulatorNode::publish_burst() {
 
 void SimulatorNode::publish_sample() {
   std::map<std::string, sensor_msgs::JointState> messages;
-  for (const auto& joint : joints_) joint->step(messages);
+  for (const auto& machine : machines_) machine->step(messages);
   const ros::Time now = stamp(published_);
   if (settings_.publish_clock && now >= next_clock_) {
     publish_clock(now);
@@ -191,7 +193,7 @@ void SimulatorNode::publish_clock(const ros::Time& now) {
 }
 
 bool SimulatorNode::ros_time_went_back() const {
-  const nanoseconds interval = sample_time(1, sampling_rate_);
+  const nanoseconds interval = sample_time(1, settings_.sampling_rate);
   return follows_ros_time_ && pacer_.wait(published_, elapsed()) > interval + kTolerableLag;
 }
 
@@ -225,10 +227,10 @@ void SimulatorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
     status.summary(DiagnosticStatus::OK, "running");
   const auto now = WallClock::now();
   const double wall = seconds(now - last_report_);
-  const double simulated = (published_ - reported_) / sampling_rate_;
+  const double simulated = (published_ - reported_) / settings_.sampling_rate;
   simulation::IntegratorStatistics statistics;
-  for (const auto& joint : joints_) {
-    const simulation::IntegratorStatistics one = joint->simulation().plant().statistics();
+  for (const auto& machine : machines_) {
+    const simulation::IntegratorStatistics one = machine->statistics();
     statistics.steps += one.steps;
     statistics.evaluations += one.evaluations;
     statistics.error_test_failures += one.error_test_failures;
@@ -247,9 +249,9 @@ void SimulatorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
 bool SimulatorNode::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
   response.success = true;
   response.message = "at rest; backlash is ";
-  for (const auto& joint : joints_) {
-    joint->reset();
-    response.message += (joint == joints_.front() ? "" : ", ") + joint->true_backlash();
+  for (const auto& machine : machines_) {
+    machine->reset();
+    response.message += (machine == machines_.front() ? "" : ", ") + machine->true_backlash();
   }
   ROS_INFO_STREAM("reset: " << response.message);
   return true;

@@ -10,10 +10,12 @@
 #include <set>
 #include <utility>
 
+#include "arm_settings.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/ros/parameters.h"
 #include "backlash_diagnosis/ros/rig_folder.h"
+#include "given_parameters.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -23,17 +25,17 @@ constexpr double kFastest = 1e3;
 constexpr double kLongestHold = 1e3;  // s, of a torque_command
 constexpr double kLongest = 1e9;      // s, keeps sample numbers and nanoseconds far within 64 bits
 
-/// Reads the parameters that override the rig file and remembers which were given: those below a scope ("" or
-/// "JOINT/") of one joint.
+/// Reads the parameters that override the rig file of one joint.
 class Overrides {
  public:
-  Overrides(Parameters& parameters, rig_file::RigFile& file) : parameters_(parameters), file_(file) {}
+  Overrides(Parameters& parameters, rig_file::RigFile& file)
+      : parameters_(parameters), file_(file), given_(parameters) {}
 
   void apply(const std::string& scope) {
-    scope_ = scope;
+    given_.set_scope(scope);
     run();
     backlash();
-    sensors();
+    given_.sensors(file_.simulation.sensors);
     excitation("excitation_amplitude", Range::not_negative(), file_.simulation.excitation.amplitude);
     excitation("excitation_frequency", Range::positive(), file_.simulation.excitation.frequency);
   }
@@ -42,7 +44,7 @@ class Overrides {
     std::string& joint = file_.rig.joint;
     joint = parameters_.text("joint", joint);
     if (joint.empty()) throw InvalidParameter("~joint", "''", "must not be empty");
-    if (parameters_.has("joint")) given_.push_back("joint = " + printable(joint));
+    if (parameters_.has("joint")) given_.add("joint = " + printable(joint));
   }
 
   /// The n-th joint of a list; noise of several joints must not be the same.
@@ -51,78 +53,50 @@ class Overrides {
       throw InvalidParameter("~joints", name,
                              "shares a rig file whose channels are of joint " + file_.rig.joint);
     file_.rig.joint = name;
-    given_.push_back("joint = " + printable(name));
+    given_.add("joint = " + printable(name));
     if (parameters_.has(name + "/seed") || n == 0) return;
     file_.simulation.sensors.seed += n;
-    given_.push_back(fmt::format("seed = {}", file_.simulation.sensors.seed));
+    given_.add(fmt::format("seed = {}", file_.simulation.sensors.seed));
   }
 
-  std::string description() const {
-    std::string source = "# source: " + printable(file_.source, 1000);
-    if (!given_.empty()) source += "; changed by parameters: " + joined(given_);
-    return source + "\n" + file_.text;
-  }
+  std::string description() const { return given_.description(file_.source, file_.text); }
 
  private:
-  bool given(const std::string& name) {
-    if (!parameters_.has(scope_ + name)) parameters_.allow(scope_ + name);
-    return parameters_.has(scope_ + name);
-  }
-
-  void number(const std::string& name, const Range& range, double& value) {
-    if (!given(name)) return;
-    value = parameters_.number(scope_ + name, value, range);
-    given_.push_back(name + " = " + to_text(value));
-  }
-
   void run() {
-    if (!given("run")) return;
-    const std::string name = parameters_.text(scope_ + "run", "");
+    if (!given_.has("run")) return;
+    const std::string name = parameters_.text(given_.scope() + "run", "");
     try {
       rig_file::apply_test_run(rig_file::find_test_run(file_.test_runs, name), file_);
     } catch (const InvalidParameter& e) {
-      throw InvalidParameter("~" + scope_ + "run", e.value(), e.limit());
+      throw InvalidParameter("~" + given_.scope() + "run", e.value(), e.limit());
     }
-    given_.push_back("run = " + name);
+    given_.add("run = " + name);
   }
 
   void backlash() {
-    const bool half = given("half_gap");
-    if (given("backlash") && half)
-      throw InvalidParameter("~" + scope_ + "half_gap", "given",
-                             "cannot be given together with ~" + scope_ + "backlash");
+    const bool half = given_.has("half_gap");
+    if (given_.has("backlash") && half)
+      throw InvalidParameter("~" + given_.scope() + "half_gap", "given",
+                             "cannot be given together with ~" + given_.scope() + "backlash");
     double& backlash = file_.rig.mesh.backlash;
     double half_gap = backlash / 2;
-    number("backlash", Range::not_negative(), backlash);
-    number("half_gap", Range::not_negative(), half_gap);
+    given_.number("backlash", Range::not_negative(), backlash);
+    given_.number("half_gap", Range::not_negative(), half_gap);
     if (half) backlash = 2 * half_gap;
-  }
-
-  void sensors() {
-    simulation::SensorsSettings& sensors = file_.simulation.sensors;
-    const Range rates = Range::between(1e-3, 1e6);
-    if (scope_.empty())
-      number("sampling_rate", rates, sensors.sampling_rate);  // one message holds all joints
-    if (!rates.contains(sensors.sampling_rate))
-      throw InvalidParameter("sensors.sampling_rate", sensors.sampling_rate, rates.text());
-    if (!given("seed")) return;
-    sensors.seed = parameters_.integer(scope_ + "seed", 0, 0, std::numeric_limits<int>::max());
-    given_.push_back(fmt::format("seed = {}", sensors.seed));
   }
 
   void excitation(const std::string& name, const Range& range, double& value) {
     const std::string& type = file_.simulation.excitation.type;
     const bool applies = type == "square" || type == "sine";
-    if (given(name) && !applies)
-      throw InvalidParameter("~" + scope_ + name, "given",
+    if (given_.has(name) && !applies)
+      throw InvalidParameter("~" + given_.scope() + name, "given",
                              "is for square and sine excitation, not for " + type);
-    number(name, range, value);
+    given_.number(name, range, value);
   }
 
   Parameters& parameters_;
   rig_file::RigFile& file_;
-  std::string scope_;
-  std::vector<std::string> given_;
+  GivenParameters given_;
 };
 
 rig_file::RigFile read_rig_parameter(Parameters& parameters, const std::string& name,
@@ -132,13 +106,7 @@ rig_file::RigFile read_rig_parameter(Parameters& parameters, const std::string& 
     return absent;
   }
   const std::string path = parameters.text(name, "");
-  try {
-    return rig_file::load_rig_file(path);
-  } catch (const MissingInput& e) {
-    throw MissingInput("~" + name + ": " + e.what());
-  } catch (const Error& e) {
-    throw BadData("~" + name, e.what());
-  }
+  return of_parameter(name, [&path] { return rig_file::load_rig_file(path); });
 }
 
 JointSettings read_joint(Parameters& parameters, const rig_file::RigFile& common) {
@@ -148,12 +116,6 @@ JointSettings read_joint(Parameters& parameters, const rig_file::RigFile& common
   overrides.joint();
   joint.description = overrides.description();
   return joint;
-}
-
-void require_topic_name(const std::string& joint) {
-  std::string why;
-  if (joint.empty() || joint.find('/') != std::string::npos || !ros::names::validate(joint, why))
-    throw InvalidParameter("~joints", printable(joint), "must be names of topics, without '/'");
 }
 
 using RigFiles = std::map<std::string, rig_file::RigFile>;
@@ -176,14 +138,14 @@ std::vector<JointSettings> read_joints(Parameters& parameters, const RigFiles& b
   std::vector<JointSettings> joints;
   std::set<std::string> names;
   for (const std::string& name : parameters.texts("joints", wanted)) {
-    require_topic_name(name);
+    if (!is_topic_name(name))
+      throw InvalidParameter("~joints", printable(name), "must be names of topics, without '/'");
     if (!names.insert(name).second) throw InvalidParameter("~joints", name, "is named twice");
     JointSettings joint{read_rig_parameter(parameters, name + "/rig", rig_of(name, by_joint, common)), {}};
     Overrides overrides(parameters, joint.file);
     overrides.apply("");
     overrides.joint(name, int(joints.size()));
     overrides.apply(name + "/");
-    parameters.allow(name + "/live");
     joint.description = overrides.description();
     const double rate = joint.file.simulation.sensors.sampling_rate;
     if (!joints.empty() && rate != joints.front().file.simulation.sensors.sampling_rate)
@@ -209,12 +171,7 @@ long read_samples(Parameters& parameters, double sampling_rate) {
   return samples;
 }
 
-}  // namespace
-
-SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle) {
-  Parameters parameters(private_handle);
-  parameters.allow("live");
-  SimulatorSettings settings;
+void read_rigs_of_joints(Parameters& parameters, SimulatorSettings& settings) {
   const rig_file::RigFile common = read_rig_parameter(parameters, "rig", rig_file::default_rig_file());
   const std::string folder = parameters.text("rig_folder", "");
   if (!folder.empty() && parameters.has("rig"))
@@ -226,10 +183,39 @@ SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle)
     settings.joints = read_joints(parameters, by_joint, common);
   else
     settings.joints = {read_joint(parameters, common)};
+  settings.rig = settings.joints.front().file.rig.name;
+  settings.sampling_rate = settings.joints.front().file.simulation.sensors.sampling_rate;
+}
+
+bool is_arm(Parameters& parameters) {
+  if (!parameters.has("rig")) return false;
+  const std::string path = parameters.text("rig", "");
+  return of_parameter("rig", [&path] { return arm::is_arm_rig(path); });
+}
+
+}  // namespace
+
+bool is_topic_name(const std::string& joint) {
+  std::string why;
+  return !joint.empty() && joint.find('/') == std::string::npos && ros::names::validate(joint, why);
+}
+
+SimulatorSettings read_simulator_settings(const ros::NodeHandle& private_handle) {
+  Parameters parameters(private_handle);
+  parameters.allow("live");
+  SimulatorSettings settings;
   const double timeout = parameters.number("torque_timeout", 0, Range::between(0, kLongestHold));
-  for (JointSettings& joint : settings.joints) joint.torque_timeout = timeout;
+  if (is_arm(parameters)) {
+    settings.arm = read_arm_settings(parameters);
+    settings.arm->torque_timeout = timeout;
+    settings.rig = settings.arm->arm.rig.name;
+    settings.sampling_rate = settings.arm->arm.sensors.sampling_rate;
+  } else {
+    read_rigs_of_joints(parameters, settings);
+    for (JointSettings& joint : settings.joints) joint.torque_timeout = timeout;
+  }
   settings.real_time_factor = read_real_time_factor(parameters);
-  settings.samples = read_samples(parameters, settings.joints.front().file.simulation.sensors.sampling_rate);
+  settings.samples = read_samples(parameters, settings.sampling_rate);
   settings.publish_clock = parameters.boolean("publish_clock", settings.real_time_factor != 1);
   settings.wait_for_subscriber = parameters.boolean("wait_for_subscriber", false);
   settings.diagnostic_period = parameters.number("diagnostic_period", 1, Range::positive());

@@ -6,7 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/geared_arm/plant.h"
+#include "backlash_diagnosis/geared_arm/simulation.h"
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"

@@ -7,7 +7,7 @@
 #include "arm/arm_machines.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
-#include "backlash_diagnosis/geared_arm/plant.h"
+#include "backlash_diagnosis/geared_arm/simulation.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/simulation/simulation.h"
 #include "support/data.h"
@@ -175,6 +175,77 @@ TEST(GearedArm, TheSameSeedGivesTheSameRecord) {
   EXPECT_NE(a[0].record.column(record::Channel::motor_position),
             a[1].record.column(record::Channel::motor_position));
   EXPECT_THROW(simulate_arm(arm, -1), InvalidParameter);
+}
+
+TEST(GearedArm, AnotherBacklashFromTheBeginningIsAnotherArm) {
+  GearedArm wide = two_links(), arm = wide;
+  wide.joints[1].gear->backlash = 8e-3;
+  ArmPlant declared(wide), changed(arm);
+  changed.set_backlash(1, 8e-3);
+  EXPECT_EQ(changed.backlash(1), 8e-3);
+  EXPECT_EQ(changed.backlash(0), arm.joints[0].gear->backlash);
+  declared.advance_to(0.5), changed.advance_to(0.5);
+  EXPECT_EQ(changed.observe(1).motor_position, declared.observe(1).motor_position);
+  EXPECT_THROW(changed.set_backlash(1, -1e-3), InvalidParameter);
+  EXPECT_THROW(changed.set_backlash(1, std::nan("")), InvalidParameter);
+}
+
+TEST(GearedArm, AJointWithoutGapHasNoBacklash) {
+  GearedArm arm = two_links();
+  arm.joints[0].gear.reset();
+  arm.joints[1].held = 0.3;
+  ArmPlant plant(arm);
+  for (const std::size_t joint : {0, 1}) {
+    EXPECT_EQ(plant.backlash(joint), 0);
+    EXPECT_THROW(plant.set_backlash(joint, 1e-3), InvalidParameter);
+  }
+  EXPECT_FALSE(plant.set_torque(1, 1)) << "held";
+}
+
+/// A torque from outside that never changes is the constant one; gravity is compensated beside it.
+TEST(GearedArm, ATorqueFromOutsideIsThatOfTheMotor) {
+  GearedArm constant = free_arm(), topic = constant;
+  constant.joints[0].excitation.amplitude = 2.5;
+  topic.joints[0].excitation.type = "topic";
+  ArmPlant a(constant), b(topic);
+  EXPECT_FALSE(b.set_torque(1, 1)) << "of an excitation of its own";
+  EXPECT_TRUE(b.set_torque(0, 2.5));
+  a.advance_to(0.3), b.advance_to(0.3);
+  EXPECT_EQ(b.observe(0).motor_torque, 2.5);
+  EXPECT_EQ(b.observe(0).motor_position, a.observe(0).motor_position);
+  EXPECT_THROW(b.set_torque(0, std::nan("")), InvalidParameter);
+
+  topic.gravity_compensation = true;
+  ArmPlant held(topic);
+  held.set_state(arm::Joints::Constant(2, 0.4), arm::Joints::Zero(2), arm::Joints::Constant(2, 0.4),
+                 arm::Joints::Zero(2));
+  held.set_torque(0, 0);
+  const double g = 9.80665;  // the rods and where they are, as above
+  EXPECT_NEAR(held.observe(0).motor_torque,
+              (2.0 * 0.15 + 1.0 * 0.3) * g * std::cos(0.4) + 1.0 * 0.15 * g * std::cos(0.8), 1e-9);
+}
+
+TEST(ArmSimulation, AResetIsTheBeginning) {
+  const GearedArm arm = load_geared_arm(test::package_file("config/two_link_arm/two_link_arm.yaml"));
+  ArmSimulation simulation(arm);
+  std::vector<double> first, again;
+  for (int i = 0; i < 100; ++i) first.push_back(simulation.step()[1].motor_position);
+  simulation.plant().set_backlash(1, 0.01);
+  simulation.step();
+  simulation.reset();
+  EXPECT_EQ(simulation.index(), 0);
+  EXPECT_EQ(simulation.plant().backlash(1), 3e-3);
+  for (int i = 0; i < 100; ++i) again.push_back(simulation.step()[1].motor_position);
+  EXPECT_EQ(again, first);
+}
+
+TEST(ArmSimulation, ShowsWhatTheFileDeclares) {
+  GearedArm arm = load_geared_arm(test::package_file("config/two_link_arm/two_link_arm.yaml"));
+  EXPECT_TRUE(std::isnan(ArmSimulation(arm).step()[0].load_velocity));
+  arm.sensors.of(record::Channel::load_velocity).declared = true;
+  EXPECT_EQ(ArmSimulation(arm).step()[0].load_velocity, 0);
+  arm.simulated = false;
+  EXPECT_THROW(ArmSimulation{arm}, BadData);
 }
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include <iostream>
 
 #include "backlash_diagnosis/base/random.h"
-#include "backlash_diagnosis/geared_arm/plant.h"
 #include "backlash_diagnosis/geared_arm/play.h"
+#include "backlash_diagnosis/geared_arm/simulation.h"
 #include "support/data.h"
 
 namespace backlash::geared_arm {
@@ -93,7 +93,7 @@ TEST(ArmPlay, DrawnArmsAreRightOrUnknown) {
     GearedArm machine = declared;
     const double centre = i % 3 == 0 ? 0 : -M_PI / 2, plays[] = {0, 2e-4, 1e-3, 4e-3};
     double truth[2];
-    machine.sensors.seed = std::uint64_t(10 * i);
+    machine.sensors.seed = 10 * std::uint64_t(i);
     for (std::size_t j = 0; j < 2; ++j) {
       GearedJoint& joint = machine.joints[j];
       for (double& position : joint.excitation.moves.positions)

@@ -438,5 +438,35 @@ TEST_F(BagRecord, SymbolicLinkStaysALink) {
   EXPECT_EQ(read_bag(file("target.bag")).size(), 5u);
 }
 
+/// A robot's own names, and beside them those of this package: the latter say more.
+TEST_F(BagRecord, ARobotIsReadByTheNamesThatSayWhichEndTheyAre) {
+  record::ChannelMap stock;
+  stock.joint = "elbow";
+  stock.declared = true;
+  stock.sources.resize(1);
+  stock.sources[0].name = "elbow";
+  const auto written = [this](const std::string& name, bool own) {
+    rosbag::Bag bag(file(name), rosbag::bagmode::Write);
+    for (unsigned i = 1; i <= 3; ++i) {
+      sensor_msgs::JointState m;
+      m.header.stamp = ros::Time(i, 0);
+      m.name = {"elbow"}, m.position = {1.0 * i};
+      if (own) m.name.insert(m.name.end(), {"elbow_motor", "elbow_load"});
+      if (own) m.position.insert(m.position.end(), {10.0 * i, 20.0 * i});
+      bag.write("/robot/joint_states", m.header.stamp, m);
+    }
+    bag.close();
+    return file(name);
+  };
+  const record::Record own = read_robot_bag(written("own.bag", true), stock);
+  EXPECT_EQ(own.column(record::Channel::motor_position), (std::vector<double>{10, 20, 30}));
+  EXPECT_EQ(own.column(record::Channel::load_position), (std::vector<double>{20, 40, 60}));
+  const record::Record robot = read_robot_bag(written("stock.bag", false), stock);
+  EXPECT_EQ(robot.column(record::Channel::motor_position), (std::vector<double>{1, 2, 3}));
+  EXPECT_FALSE(robot.has(record::Channel::load_position));
+  stock.joint = stock.sources[0].name = "wrist";
+  expect_contains(message_of<BadData>([&] { read_robot_bag(file("own.bag"), stock); }), "no 'wrist' on");
+}
+
 }  // namespace
 }  // namespace backlash::ros_bridge

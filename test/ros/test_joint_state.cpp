@@ -132,5 +132,17 @@ TEST(JointStateReader, AProblemOfOneJointIsNotTheOthers) {
   EXPECT_EQ(reader.problem(1), "");
 }
 
+/// Others than a robot's own name say which end is meant; who looks at a robot sees its links.
+TEST(JointState, ARobotsOwnNameIsTheLinkAndTheTorqueOfItsMotor) {
+  model::Observation o{};
+  o.motor_position = 1, o.load_position = 2, o.load_velocity = 3, o.motor_torque = 4, o.output_torque = 5;
+  sensor_msgs::JointState m;
+  add_robot_joint(o, "elbow", m);
+  EXPECT_EQ(m.name, std::vector<std::string>{"elbow"});
+  EXPECT_EQ(m.position, std::vector<double>{2});
+  EXPECT_EQ(m.velocity, std::vector<double>{3});
+  EXPECT_EQ(m.effort, std::vector<double>{4});
+}
+
 }  // namespace
 }  // namespace backlash::ros_bridge

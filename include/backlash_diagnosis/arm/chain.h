@@ -54,6 +54,9 @@ struct Chain {
 /// Body `b` given in a frame at `position` and turned by `rotation`, said in the frame outside.
 Body moved(const Body& b, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& position);
 
+/// The text of a URDF. Throws MissingInput.
+std::string read_urdf(const std::string& path);
+
 /// The chain through the joints of these names in a URDF. Links behind fixed joints belong to the link that
 /// carries them. Throws MissingInput, BadData where the file is no URDF, a joint is not there or not revolute
 /// or continuous, the joints are not one chain in this order, or another moving joint branches off from it.

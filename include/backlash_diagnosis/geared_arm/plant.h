@@ -6,9 +6,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/arm/dynamics.h"
-#include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/geared_arm/geared_arm.h"
-#include "backlash_diagnosis/record/csv.h"
 
 namespace backlash::geared_arm {
 
@@ -25,6 +23,14 @@ class ArmPlant {
 
   /// What exact sensors would show of a joint now; sensor_torque is NaN, output_torque that of the mesh.
   model::Observation observe(std::size_t joint) const;
+
+  /// Total play [rad] of a joint; 0 of one without gear and of one that is held.
+  double backlash(std::size_t joint) const;
+  /// From now on. Throws InvalidParameter unless >= 0 and finite, and for a joint that has no gap.
+  void set_backlash(std::size_t joint, double backlash);
+  /// Motor torque [N m] from now on of a joint with `topic` excitation, false of all others. Gravity
+  /// compensation, which is added, is renewed. Throws InvalidParameter unless finite.
+  bool set_torque(std::size_t joint, double torque);
 
   /// Kinetic, potential and elastic energy of all parts [J].
   double energy() const;
@@ -43,6 +49,7 @@ class ArmPlant {
     Eigen::Index motor = -1;  // place among the angles; -1: turns with the link
   };
   void begin_segments();
+  void compensate_gravity();
   void derivative(double t, const double* state, double* rate) const;
   double mesh_torque(std::size_t joint, const double* state) const;
   double motor_friction(std::size_t joint, double speed) const;
@@ -59,11 +66,5 @@ class ArmPlant {
   bool begun_ = false;
   std::unique_ptr<simulation::Integrator> integrator_;
 };
-
-/// What the declared sensors of all joints measure, from rest, for `duration` [s]: motor_torque,
-/// motor_position, load_position, and what else `sensors` declares. Deterministic for a seed. Throws
-/// InvalidParameter, IntegrationError; Cancelled when `progress` returns false.
-std::vector<record::JointRecord> simulate_arm(const GearedArm& arm, double duration,
-                                              const Progress& progress = nullptr);
 
 }  // namespace backlash::geared_arm

@@ -42,6 +42,10 @@ record::Record read_bag(const std::string& path, const std::string& joint = "",
 /// the map says, naming what it has.
 record::Record read_bag(const std::string& path, const record::ChannelMap& channels);
 
+/// One joint of a robot: by the names of this package where the bag has JOINT_motor, as one of a simulated
+/// arm does beside the robot's own names; else by the map, which is of the robot's names.
+record::Record read_robot_bag(const std::string& path, const record::ChannelMap& stock);
+
 /// Writes a record as messages of `joint` on /joint_states, stamped `origin` + time (rounded to 1 ns), whole
 /// or not at all. Throws CannotWrite when the file cannot be written, BadData when read_bag would not read it
 /// back: no samples or channels, columns of unequal length, values that are not finite, times that do not

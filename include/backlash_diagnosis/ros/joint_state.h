@@ -22,7 +22,7 @@ namespace backlash::ros_bridge {
 
 struct JointNames {
   explicit JointNames(const std::string& joint);
-  std::string motor, sensor, load, reference, current, accelerometer;
+  std::string robot, motor, sensor, load, reference, current, accelerometer;
 };
 
 /// Stamps to seconds since the first one, exact to the nanosecond.
@@ -84,6 +84,11 @@ void add_joint_state(const model::Observation& observation, const JointNames& na
 
 /// The same of sample i of a record; only channels that the record has.
 void add_joint_state(const record::Record& record, std::size_t i, const JointNames& names,
+                     sensor_msgs::JointState& message);
+
+/// Adds a simulated sample as a robot publishes a joint, under the name of its URDF: position and velocity of
+/// the link, effort = motor torque. Only for those who look at a robot; the names above say which end it is.
+void add_robot_joint(const model::Observation& observation, const std::string& joint,
                      sensor_msgs::JointState& message);
 
 /// Empties the arrays of a message in which no name has that quantity.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The simulator as a ROS node: simulated joints, paced by a clock.
+// The simulator as a ROS node: simulated joints or an arm, paced by a clock.
 //
 // One thread: bursts of samples that are due, then the callbacks, then the next burst. So a service or a
 // torque acts at a sample boundary: from the time of the last published sample on.
@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/ros/pacer.h"
-#include "backlash_diagnosis/ros/simulated_joint.h"
+#include "backlash_diagnosis/ros/simulated_machine.h"
 #include "backlash_diagnosis/ros/simulator_settings.h"
 
 namespace backlash::ros_bridge {
@@ -54,7 +54,6 @@ class SimulatorNode {
   bool reset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
 
   SimulatorSettings settings_;
-  double sampling_rate_;
   Pacer pacer_;
   bool follows_ros_time_;  // an external /clock sets the pace
   bool started_ = false;
@@ -69,7 +68,7 @@ class SimulatorNode {
   long reported_ = 0;  // samples at the last report
 
   ros::NodeHandle handle_, private_handle_;
-  std::vector<std::unique_ptr<SimulatedJoint>> joints_;
+  std::vector<std::unique_ptr<SimulatedMachine>> machines_;
   std::map<std::string, ros::Publisher> joint_states_;  // by topic
   ros::Publisher clock_;
   ros::ServiceServer reset_;

@@ -4,9 +4,11 @@
 
 #include <ros/node_handle.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/geared_arm/geared_arm.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 
 namespace backlash::ros_bridge {
@@ -18,11 +20,23 @@ struct JointSettings {
   double torque_timeout = 0;  // s, simulated, after which a torque_command is zero again; 0: held for ever
 };
 
+/// A simulated arm.
+struct ArmSettings {
+  geared_arm::GearedArm arm;  // with the parameters that override its file
+  std::string description;    // as of a joint
+  std::string urdf;           // text
+  bool set_robot_description = true;
+  double torque_timeout = 0;  // as of a joint
+};
+
 struct SimulatorSettings {
-  std::vector<JointSettings> joints;  // at least one, all with the same sampling rate
-  bool named_joints;        // several, or a list of one: each has topics and services below its own name
-  double real_time_factor;  // simulated per wall time; 0: as fast as possible
-  long samples;             // to publish before the node ends; 0: endless
+  std::optional<ArmSettings> arm;
+  std::vector<JointSettings> joints;  // without arm at least one, all with the same sampling rate
+  bool named_joints = false;  // several, or a list of one: each has topics and services below its own name
+  std::string rig;            // name of the (first) rig
+  double sampling_rate;       // Hz
+  double real_time_factor;    // simulated per wall time; 0: as fast as possible
+  long samples;               // to publish before the node ends; 0: endless
   bool publish_clock;
   bool wait_for_subscriber;
   double diagnostic_period;  // s, wall time

@@ -99,7 +99,8 @@ arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) 
   std::vector<record::JointRecord> joints;
   if (fs::path(path).extension() != ".csv") {
     for (const arm::JointDrive& joint : rig.joints)
-      joints.push_back({joint.name, ros_bridge::read_bag(path, stock_channels(joint.name, rig.channel))});
+      joints.push_back(
+          {joint.name, ros_bridge::read_robot_bag(path, stock_channels(joint.name, rig.channel))});
   } else {
     joints = record::read_joints_csv(path);
   }

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/ros/simulated_arm.h"
+
+#include <ros/console.h>
+
+namespace backlash::ros_bridge {
+namespace {
+
+/// What stands there already may be wanted, with meshes or of a whole cell: it is left.
+void set_robot_description(const ros::NodeHandle& handle, const std::string& urdf) {
+  std::string present;
+  if (!handle.getParam("robot_description", present))
+    handle.setParam("robot_description", urdf);
+  else if (present != urdf)
+    ROS_WARN_STREAM(handle.resolveName("robot_description")
+                    << " is not the URDF of the simulated arm; it is left as it is");
+}
+
+}  // namespace
+
+SimulatedArm::SimulatedArm(const ArmSettings& settings, const ros::NodeHandle& handle,
+                           const ros::NodeHandle& private_handle)
+    : title_("simulating " + settings.arm.rig.name + " (" + settings.arm.rig.source + ")"),
+      simulation_(settings.arm),
+      rig_description_(publish_rig_description(handle, settings.description)) {
+  for (std::size_t j = 0; j < settings.arm.joints.size(); ++j) {
+    const std::string& joint = settings.arm.rig.joints[j].name;
+    const geared_arm::GearedJoint& drive = settings.arm.joints[j];
+    names_.emplace_back(joint);
+    controls_.emplace_back(
+        JointControls::Settings{joint, "rad", !drive.held && drive.excitation.type == "topic",
+                                settings.torque_timeout, simulation_.sampling_rate()},
+        access(j), ros::NodeHandle(handle, joint), ros::NodeHandle(private_handle, joint));
+  }
+  if (settings.set_robot_description) set_robot_description(handle, settings.urdf);
+}
+
+JointAccess SimulatedArm::access(std::size_t joint) {
+  return {[this, joint] { return simulation_.plant().backlash(joint); },
+          [this, joint](double backlash) { simulation_.plant().set_backlash(joint, backlash); },
+          [this, joint](double torque) { simulation_.plant().set_torque(joint, torque); },
+          [this, joint]() -> simulation::SensorModel& { return simulation_.sensors(joint); }};
+}
+
+void SimulatedArm::step(std::map<std::string, sensor_msgs::JointState>& messages) {
+  for (JointControls& joint : controls_) joint.age_torque();
+  const std::vector<model::Observation> samples = simulation_.step();
+  sensor_msgs::JointState& message = messages[kJointStates];
+  for (std::size_t j = 0; j < samples.size(); ++j) add_robot_joint(samples[j], names_[j].robot, message);
+  for (std::size_t j = 0; j < samples.size(); ++j) add_joint_state(samples[j], names_[j], message);
+}
+
+void SimulatedArm::reset() {
+  simulation_.reset();
+  for (JointControls& joint : controls_) joint.tell();
+}
+
+std::string SimulatedArm::true_backlash() const {
+  std::string text;
+  for (const JointControls& joint : controls_) text += (text.empty() ? "" : ", ") + joint.true_backlash();
+  return text;
+}
+
+}  // namespace backlash::ros_bridge
