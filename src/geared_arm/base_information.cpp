@@ -74,22 +74,37 @@ BaseInformation::BaseInformation(const arm::ArmRig& rig, const std::vector<Motio
   const Eigen::MatrixXd basis = signal::orthonormal_basis(y);
   for (Eigen::Index c = 0; c < columns; ++c)
     if (size[c] > least && basis.col(c).squaredNorm() > 0.5) columns_.push_back(c);
-  scale_.resize(Eigen::Index(columns_.size()));
-  for (std::size_t i = 0; i < columns_.size(); ++i) scale_[Eigen::Index(i)] = size[columns_[i]];
+  for (Eigen::Index j = 0; j < n; ++j)
+    if (limits[std::size_t(j)].lower < limits[std::size_t(j)].upper) moving_.push_back(j);
+  scale_.resize(Eigen::Index(unknowns()));
+  Eigen::Index next = 0;
+  for (const Eigen::Index c : columns_) scale_[next++] = size[c];
+  for (const Eigen::Index j : moving_) scale_[next++] = limits[std::size_t(j)].torque;
 }
 
-MotionInformation BaseInformation::of(const JointMotions& m, Eigen::Index step) const {
+Eigen::MatrixXd BaseInformation::rows_of(const JointMotions& m, const Eigen::MatrixXd& torque_rate,
+                                         Eigen::Index step) const {
   const Eigen::Index n = m.q.cols(), rows = (m.q.rows() + step - 1) / step;
   const auto columns = Eigen::Index(columns_.size());
-  Eigen::MatrixXd y(rows * n, columns);
+  Eigen::MatrixXd y = Eigen::MatrixXd::Zero(rows * n, Eigen::Index(unknowns()));
   for (Eigen::Index i = 0; i < rows; ++i) {
     const Eigen::MatrixXd full =
         full_regressor(rig_, m.q.row(i * step), m.v.row(i * step), m.a.row(i * step));
     for (Eigen::Index j = 0; j < n; ++j)
       for (Eigen::Index c = 0; c < columns; ++c)
         y(i * n + j, c) = full(j, columns_[std::size_t(c)]) / (noise_[std::size_t(j)] * scale_[c]);
+    for (std::size_t k = 0; k < moving_.size(); ++k) {
+      const Eigen::Index j = moving_[k], c = columns + Eigen::Index(k);
+      y(i * n + j, c) = torque_rate(i * step, j) / (noise_[std::size_t(j)] * scale_[c]);
+    }
   }
-  const Eigen::MatrixXd information = signal::gram(y);
+  return y;
+}
+
+MotionInformation BaseInformation::of(const JointMotions& m, const Eigen::MatrixXd& torque_rate,
+                                      Eigen::Index step) const {
+  const Eigen::MatrixXd information = signal::gram(rows_of(m, torque_rate, step));
+  const Eigen::Index columns = information.cols();
   MotionInformation out;
   const Eigen::VectorXd length = information.diagonal().cwiseSqrt();
   if (!(length.minCoeff() > 0)) return {std::numeric_limits<double>::infinity(), -1e3 * double(columns)};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a motion of an arm tells of its base parameters.
+// What a motion of an arm tells of its base parameters, and of how late the torques of its joints are
+// recorded, which every fit must know as well: dtau/dt is the column of joint j's delay, in its rows.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,16 +30,23 @@ class BaseInformation {
                   std::uint64_t seed);
 
   std::size_t parameters() const { return columns_.size(); }
-  const std::vector<Eigen::Index>& columns() const { return columns_; }  // of the full regressor
+  std::size_t unknowns() const { return columns_.size() + moving_.size(); }  // with the delays
+  const std::vector<Eigen::Index>& columns() const { return columns_; }      // of the full regressor
 
-  /// By every `step`-th row.
-  MotionInformation of(const JointMotions& motion, Eigen::Index step) const;
+  /// By every `step`-th row of a period. `torque_rate` [N m/s]: of the motors, a column per joint.
+  MotionInformation of(const JointMotions& motion, const Eigen::MatrixXd& torque_rate,
+                       Eigen::Index step) const;
 
  private:
+  Eigen::MatrixXd rows_of(const JointMotions& motion, const Eigen::MatrixXd& torque_rate,
+                          Eigen::Index step) const;
+
   const arm::ArmRig& rig_;
   std::vector<double> noise_;
   std::vector<Eigen::Index> columns_;
-  Eigen::VectorXd scale_;  // of these columns: their size in drawn motions
+  std::vector<Eigen::Index> moving_;  // joints
+  Eigen::VectorXd scale_;  // of these columns: their size in drawn motions, and the torque limits of moving
+                           // joints [N m/s]
 };
 
 }  // namespace backlash::geared_arm

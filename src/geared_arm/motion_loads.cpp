@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/random.h"
-#include "flank_stays.h"
 
 namespace backlash::geared_arm {
 namespace {
@@ -87,28 +86,6 @@ class Reach {
   arm::Joints rest_;
 };
 
-/// The longest stays beyond `least` on one side, as shares of `wanted` [samples], over how many are needed.
-/// The load is that of a period: its end and its begin are one stay.
-double share_of_stays(const Eigen::Ref<const Eigen::VectorXd>& load, int side, double least, double wanted,
-                      std::size_t count) {
-  const Eigen::Index n = load.size();
-  Eigen::Index begin = 0;
-  while (begin < n && side * load[begin] > least) ++begin;
-  std::vector<double> stays;
-  double length = begin == n ? double(n) : 0;
-  for (Eigen::Index k = 1; k <= n; ++k) {
-    const bool inside = begin < n && side * load[(begin + k) % n] > least;
-    if (inside) length += 1;
-    if (inside || length == 0) continue;
-    stays.push_back(std::fmin(1, (length - 1) / wanted));
-    length = 0;
-  }
-  std::sort(stays.rbegin(), stays.rend());
-  double sum = 0;
-  for (std::size_t i = 0; i < std::min(count, stays.size()); ++i) sum += stays[i];
-  return sum / double(count);
-}
-
 }  // namespace
 
 JointMotions sampled_motion(const std::vector<simulation::FourierMotion>& series, double from, double to,
@@ -142,25 +119,6 @@ MotionTorques torques_of(const GearedArm& arm, const arm::Chain& chain, const Jo
     }
   }
   return out;
-}
-
-double hold_time(const arm::ArmRig& rig, const PlaySettings& settings) {
-  return 2 * double(guard_rows(settings)) / (kRowsPerCycle * rig.identification.torque_cutoff);
-}
-
-GapScore gap_score(const Eigen::Ref<const Eigen::VectorXd>& load, double interval, double hold,
-                   const JointLoad& friction, const PlanSettings& settings) {
-  const double most = load.cwiseAbs().maxCoeff(), wanted = settings.margin * hold / interval;
-  GapScore score;
-  score.certain = certain_load(friction, most, settings.play);
-  const double least = friction.link_coulomb + settings.margin * (score.certain - friction.link_coulomb);
-  for (const int side : {-1, 1}) {
-    const double largest = (side * load).maxCoeff();
-    score.lacking += largest > least
-                         ? 1 - share_of_stays(load, side, least, wanted, settings.play.least_stays)
-                         : 1 + std::fmin(1, (least - largest) / std::fmax(most, 1e-300));
-  }
-  return score;
 }
 
 std::vector<std::array<double, 2>> reachable_loads(const GearedArm& arm, const arm::Chain& chain,

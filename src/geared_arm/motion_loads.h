@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Torques of an arm along a motion, and whether they would show the gap of each joint.
+// Torques of an arm along a motion, and the loads that its limits and gravity allow.
 #pragma once
 
 #include <array>
@@ -21,18 +21,6 @@ struct MotionTorques {
   Eigen::MatrixXd motor;  // what the motor gives for it
 };
 MotionTorques torques_of(const GearedArm& arm, const arm::Chain& chain, const JointMotions& motion);
-
-/// How near a joint's load comes to enough stays on both flanks.
-struct GapScore {
-  double lacking = 0;  // 0: enough, `margin` and all; 2 per flank that is never loaded
-  double certain = 0;  // N m
-};
-/// Of a load with one value per `interval` [s]; `hold` [s]: how long a load must stay.
-GapScore gap_score(const Eigen::Ref<const Eigen::VectorXd>& load, double interval, double hold,
-                   const JointLoad& friction, const PlanSettings& settings);
-
-/// How long a load must stay on a flank to count [s].
-double hold_time(const arm::ArmRig& rig, const PlaySettings& settings);
 
 /// reach[j][0, 1]: the largest -T and T of joint j that poses and motions within the limits were found to
 /// give.

@@ -10,8 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/random.h"
-#include "flank_stays.h"
-#include "motion_loads.h"
+#include "gap_view.h"
 #include "motion_shape.h"
 
 namespace backlash::geared_arm {
@@ -29,11 +28,20 @@ constexpr double kTorqueShare = 0.98;     // of the limit at the grid; choice: w
 constexpr double kFirstChange = 0.3;      // of the present size; choice
 constexpr double kSmallestChange = 0.01;  // choice
 
+/// Of values at even times of a period.
+Eigen::MatrixXd rate_of(const Eigen::MatrixXd& values, double interval) {
+  const Eigen::Index n = values.rows();
+  Eigen::MatrixXd rate(n, values.cols());
+  for (Eigen::Index i = 0; i < n; ++i)
+    rate.row(i) = (values.row((i + 1) % n) - values.row((i + n - 1) % n)) / (2 * interval);
+  return rate;
+}
+
 struct Rated {
   Shape shape;
   double value = -INFINITY;     // the larger, the better
   double over = 0;              // of the torque limits, relative
-  std::vector<double> lacking;  // of each joint, see GapScore
+  std::vector<double> lacking;  // of each joint, see GapViews
   MotionInformation information;
 };
 
@@ -48,19 +56,17 @@ class Planner {
         settings_(settings),
         chain_(arm::loaded_chain(arm.rig)),
         shaper_(limits, settings),
-        information_(arm.rig, limits, noise(), settings.seed) {
-    for (std::size_t j = 0; j < limits.size(); ++j) {
-      const GearedJoint& joint = arm.joints[j];
-      friction_.push_back({joint.link_coulomb, joint.link_viscous});
-      gap_.push_back(!joint.held && (joint.gear || !arm.simulated));
+        noise_known_(arm.simulated && arm.sensors.of(arm.rig.channel).noise > 0),
+        information_(arm.rig, limits, noise(true), settings.seed),
+        gaps_(arm, chain_, limits, settings, noise(false)) {
+    for (std::size_t j = 0; j < limits.size(); ++j)
       if (limits[j].lower < limits[j].upper) moving_.push_back(Eigen::Index(j));
-    }
   }
 
   MotionPlan run(const Progress& progress);
 
  private:
-  std::vector<double> noise();
+  std::vector<double> noise(bool for_weights) const;
   Rated rated(const Shape& shape, const Sought& sought) const;
   std::pair<long, double> rank(const Rated& r) const;
   Rated found(const Progress& progress);
@@ -68,39 +74,35 @@ class Planner {
   Shape changed(const Shape& from, double size, Random& random) const;
   Rated bettered(Rated best, const Sought& sought, Random& random, const Progress& progress) const;
   bool holds_torques(const Shape& shape) const;
-  double least_reach(std::size_t joint) const;
   double worth_of(const MotionInformation& information) const;
   std::vector<JointPlan> joints_of(const Shape& shape) const;
-  void set_gap(JointPlan& plan, std::size_t joint, const arm::Joints& offsets,
-               const Eigen::MatrixXd& mesh) const;
 
   const GearedArm& arm_;
   const std::vector<MotionLimits>& limits_;
   const PlanSettings& settings_;
   arm::Chain chain_;
   MotionShaper shaper_;
-  bool noise_known_ = true;
+  bool noise_known_;
   BaseInformation information_;
-  std::vector<JointLoad> friction_;
-  std::vector<char> gap_;
+  GapViews gaps_;
   Sought sought_;  // without those whose gap no motion can show
   MotionInformation reference_;
   std::vector<Eigen::Index> moving_;
-  std::vector<std::array<double, 2>> reach_;
 };
 
-std::vector<double> Planner::noise() {
-  const double declared = arm_.sensors.of(arm_.rig.channel).noise;
-  noise_known_ = arm_.simulated && declared > 0;
+/// Of the torques [N m]. Where the file says nothing: 0, and as a weight in proportion to the torque limits.
+std::vector<double> Planner::noise(bool for_weights) const {
   std::vector<double> noise;
   for (std::size_t j = 0; j < limits_.size(); ++j)
-    noise.push_back(noise_known_ ? declared * arm_.rig.joints[j].constant : limits_[j].torque);
+    noise.push_back(noise_known_  ? arm_.sensors.of(arm_.rig.channel).noise * arm_.rig.joints[j].constant
+                    : for_weights ? limits_[j].torque
+                                  : 0);
   return noise;
 }
 
 /// Volume for the mean of the parameters, condition so that none is left out.
 double Planner::worth_of(const MotionInformation& information) const {
-  return information.log_volume / double(information_.parameters()) -
+  return information.log_volume / double(information_.unknowns()) -
          kConditionWeight * std::log(std::fmin(information.condition, kWorstCondition));
 }
 
@@ -110,17 +112,15 @@ Rated Planner::rated(const Shape& shape, const Sought& sought) const {
   const JointMotions motion = shaper_.motion(shape);
   const MotionTorques torques = torques_of(arm_, chain_, motion);
   const double interval = settings_.period / double(shaper_.grid_size());
-  const double hold = hold_time(arm_.rig, settings_.play);
   double lacking = 0;
   for (std::size_t j = 0; j < limits_.size(); ++j) {
     const auto c = Eigen::Index(j);
     const double share = torques.motor.col(c).cwiseAbs().maxCoeff() / limits_[j].torque;
     r.over += std::fmax(0, share - kTorqueShare);
-    r.lacking.push_back(
-        sought[j] ? gap_score(torques.mesh.col(c), interval, hold, friction_[j], settings_).lacking : 0);
+    r.lacking.push_back(sought[j] ? gaps_.lacking(j, torques, interval) : 0);
     lacking += r.lacking.back();
   }
-  r.information = information_.of(motion, kInformationStep);
+  r.information = information_.of(motion, rate_of(torques.motor, interval), kInformationStep);
   r.value = worth_of(r.information) - kGapWeight * lacking - kTorqueWeight * r.over;
   return r;
 }
@@ -183,12 +183,12 @@ Rated Planner::bettered(Rated best, const Sought& sought, Random& random, const 
 /// As often as the diagnosis looks, from rest at the start to the end of a period.
 std::vector<JointPlan> Planner::joints_of(const Shape& shape) const {
   const std::vector<simulation::FourierMotion> series = shaper_.series(shape);
-  const double step = 1 / (kRowsPerCycle * arm_.rig.identification.torque_cutoff);
+  const double step = gaps_.row_interval();
   const double begin = series.front().approach, end = begin + settings_.period;
   const JointMotions all = sampled_motion(series, 0, end, step),
                      period = sampled_motion(series, begin, end, step);
-  const Eigen::MatrixXd motor = torques_of(arm_, chain_, all).motor,
-                        mesh = torques_of(arm_, chain_, period).mesh;
+  const Eigen::MatrixXd motor = torques_of(arm_, chain_, all).motor;
+  const MotionTorques torques = torques_of(arm_, chain_, period);
   std::vector<JointPlan> plans;
   for (std::size_t j = 0; j < series.size(); ++j) {
     const auto c = Eigen::Index(j);
@@ -199,101 +199,10 @@ std::vector<JointPlan> Planner::joints_of(const Shape& shape) const {
     plan.speed = all.v.col(c).cwiseAbs().maxCoeff();
     plan.acceleration = all.a.col(c).cwiseAbs().maxCoeff();
     plan.torque = motor.col(c).cwiseAbs().maxCoeff();
-    plan.least_load = mesh.col(c).minCoeff(), plan.largest_load = mesh.col(c).maxCoeff();
-    plan.gap = gap_[j] != 0;
-    if (plan.gap) set_gap(plan, j, shape.offsets, mesh);
+    gaps_.describe(plan, j, shape.offsets, torques);
     plans.push_back(std::move(plan));
   }
   return plans;
-}
-
-std::string flank_text(int flank) {
-  return flank > 0 ? "positive" : "negative";
-}
-
-std::string hidden_text(const JointPlan& plan) {
-  std::string text;
-  for (const HiddenRange& range : plan.hidden)
-    text += fmt::format("{}{:.2f} to {:.2f} rad on the {} flank", text.empty() ? "" : ", ", range.lower,
-                        range.upper, flank_text(range.flank));
-  return text.empty() ? "gravity holds it on a flank nowhere"
-                      : "gravity holds it from " + text + " (other joints at their offsets)";
-}
-
-/// Of a flank that at most `reach` [N m] presses.
-std::string missing_text(int flank, double reach, double needed) {
-  const std::string which = flank_text(flank);
-  if (reach < 0)
-    return fmt::format(
-        "no pose and motion that was looked at takes the load off the {} flank, {:.3g} N m stay",
-        flank_text(-flank), -reach);
-  if (reach == 0) return "no pose and motion loads the " + which + " flank";
-  return fmt::format(
-      "no pose and motion that was looked at presses the {} flank with more than {:.3g} N m, and "
-      "friction behind the gap hides what is below {:.3g} N m",
-      which, reach, needed);
-}
-
-std::string gap_text(const JointPlan& plan, const std::vector<std::string>& missing, double hold,
-                     std::size_t wanted) {
-  if (plan.view == GapView::shown)
-    return fmt::format("shown: {} and {} stays on the two flanks in each period; {}", plan.stays[1],
-                       plan.stays[0], hidden_text(plan));
-  if (plan.view == GapView::not_found)
-    return fmt::format(
-        "cannot be shown by any motion that was tried: {} and {} stays of {:.2g} s beyond {:.3g} N m on the "
-        "two "
-        "flanks in each period, {} on each are needed, and no motion within the limits gives more than "
-        "{:.3g} and "
-        "{:.3g} N m; {}",
-        plan.stays[1], plan.stays[0], hold, plan.certain, wanted, plan.reach[1], plan.reach[0],
-        hidden_text(plan));
-  std::string text = "cannot be shown within the limits: ";
-  for (const std::string& each : missing) text += each + "; ";
-  return text + hidden_text(plan);
-}
-
-/// In each of many periods; the load's last value is its first. A stay that lasts from one to the next counts
-/// once.
-void count_stays(const Eigen::VectorXd& load, double certain, std::size_t guard, std::size_t count[2]) {
-  std::vector<double> rows(load.data(), load.data() + load.size() - 1);
-  const auto counted = [&](std::size_t into[2]) {
-    std::vector<bool> first(rows.size(), false);
-    first.front() = true;
-    stays_of(sides_of(rows, first, certain, guard), into);
-  };
-  std::size_t once[2], twice[2];
-  counted(once);
-  rows.insert(rows.end(), load.data(), load.data() + load.size() - 1);
-  counted(twice);
-  for (const int side : {0, 1})
-    count[side] =
-        std::max(twice[side] - std::min(twice[side], once[side]), std::min<std::size_t>(1, once[side]));
-}
-
-void Planner::set_gap(JointPlan& plan, std::size_t joint, const arm::Joints& offsets,
-                      const Eigen::MatrixXd& mesh) const {
-  const Eigen::VectorXd load = mesh.col(Eigen::Index(joint));
-  plan.certain = certain_load(friction_[joint], load.cwiseAbs().maxCoeff(), settings_.play);
-  count_stays(load, plan.certain, guard_rows(settings_.play), plan.stays);
-  plan.hidden = hidden_ranges(chain_, limits_, offsets, joint, plan.certain - friction_[joint].link_coulomb);
-  std::vector<std::string> missing;
-  for (const int side : {0, 1}) {
-    plan.reach[side] = reach_[joint][std::size_t(side)];
-    const double needed = least_reach(joint);
-    if (plan.reach[side] > needed) continue;
-    missing.push_back(missing_text(2 * side - 1, plan.reach[side], needed));
-  }
-  const std::size_t wanted = settings_.play.least_stays;
-  plan.view = std::min(plan.stays[0], plan.stays[1]) >= wanted ? GapView::shown
-              : missing.empty()                                ? GapView::not_found
-                                                               : GapView::impossible;
-  plan.message = gap_text(plan, missing, hold_time(arm_.rig, settings_.play), wanted);
-}
-
-/// What a flank must be pressed with to be told for certain, where the other flank is pressed no more.
-double Planner::least_reach(std::size_t joint) const {
-  return friction_[joint].link_coulomb / (1 - settings_.play.least_load);
 }
 
 /// At all times that are looked at, the approach among them.
@@ -334,9 +243,7 @@ Rated Planner::found(const Progress& progress) {
 
 MotionPlan Planner::run(const Progress& progress) {
   if (moving_.empty()) throw BadData(arm_.rig.source, "all joints are held: nothing can move");
-  reach_ = reachable_loads(arm_, chain_, limits_, settings_.seed);
-  for (std::size_t j = 0; j < limits_.size(); ++j)
-    sought_.push_back(gap_[j] && std::min(reach_[j][0], reach_[j][1]) > least_reach(j));
+  for (std::size_t j = 0; j < limits_.size(); ++j) sought_.push_back(gaps_.possible(j));
   const Rated best = found(progress);
   MotionPlan plan;
   plan.rig = arm_.rig.name;
@@ -345,9 +252,10 @@ MotionPlan Planner::run(const Progress& progress) {
   plan.noise_known = noise_known_;
   plan.planned = best.information;
   plan.reference = reference_;
-  plan.gain = std::isfinite(reference_.log_volume)
-                  ? std::exp((plan.planned.log_volume - reference_.log_volume) / double(plan.base_parameters))
-                  : kNaN;
+  plan.gain =
+      std::isfinite(reference_.log_volume)
+          ? std::exp((plan.planned.log_volume - reference_.log_volume) / double(information_.unknowns()))
+          : kNaN;
   plan.joints = joints_of(best.shape);
   return plan;
 }
@@ -357,6 +265,7 @@ void check(const PlanSettings& s) {
     if (!range.contains(value)) throw InvalidParameter(name, value, range.text());
   };
   require("period", s.period, Range::positive());
+  require("periods", s.periods, Range::between(1, 1e6));
   require("harmonics", s.harmonics, Range::between(2, 20));
   require("motions", s.motions, Range::between(1, 1e6));
   require("bettered", s.bettered, Range::between(1, s.motions));

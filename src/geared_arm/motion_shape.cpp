@@ -10,7 +10,8 @@ namespace backlash::geared_arm {
 namespace {
 
 constexpr Eigen::Index kGrid = 256;  // times per period; choice: 12 per cycle of the highest of 20 harmonics
-constexpr double kInside = 0.98;     // of the half range: the farthest offset from its middle; choice
+constexpr double kInside =
+    0.99;  // of half the range that the grid allows: the farthest offset from its middle; choice
 constexpr double kApproachSpeed = 1.875;  // theory: largest slope of 10 x^3 - 15 x^4 + 6 x^5,
 const double kApproachAcceleration = 10 / std::sqrt(3.0);  // and largest curvature
 constexpr double kRounding = 1 - 1e-12;                    // of the limits
@@ -58,13 +59,13 @@ Shape MotionShaper::within_limits(Shape shape) const {
   const Eigen::VectorXd k2 = k.cwiseAbs2();
   for (Eigen::Index j = 0; j < shape.offsets.size(); ++j) {
     const MotionLimits& l = limits_[std::size_t(j)];
-    const double half = (l.upper - l.lower) / 2, middle = (l.lower + l.upper) / 2;
-    shape.offsets[j] = std::clamp(shape.offsets[j], middle - kInside * half, middle + kInside * half);
+    const double middle = (l.lower + l.upper) / 2, room = kInside * between_ * (l.upper - l.lower) / 2;
+    shape.offsets[j] = std::clamp(shape.offsets[j], middle - room, middle + room);
     auto cosines = shape.coefficients.col(j).head(harmonics_);
     auto sines = shape.coefficients.col(j).tail(harmonics_);
     cosines -= k2 * (k2.dot(cosines) / k2.squaredNorm());
     sines -= k * (k.dot(sines) / k.squaredNorm());
-    shape.coefficients.col(j) *= half > 0 ? largest_scale(shape, j) : 0;
+    shape.coefficients.col(j) *= room > 0 ? largest_scale(shape, j) : 0;
   }
   return shape;
 }

@@ -31,7 +31,7 @@ Command command() {
       {"rate", "HZ", "of --csv"},
       {"acceleration", "RAD/S^2", "limit of the joints whose motion_limits in the rig file have none"},
       {"period", "S", "of the motion; default: 20"},
-      {"harmonics", "N", "of the series, 2 to 20; default: 5"},
+      {"harmonics", "N", "of the series, 2 to 20; default: 10"},
       {"seed", "N", "of the search; default: 1. The same seed gives the same motion"},
   };
   c.notes =

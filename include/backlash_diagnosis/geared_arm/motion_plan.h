@@ -6,9 +6,9 @@
 // rest. A gap is visible where the load on the mesh, T of geared_arm/play.h, stays on either flank often and
 // long enough for the diagnosis to be certain, by its own rule. Among such motions the search takes the one
 // that tells most of the base parameters: the largest log det of Y^T Y, Y: the columns of the regressor of
-// links and drives that do not depend on others, each row over the noise of its joint's torque (D-optimal;
-// Swevers et al. 1997, IEEE T-RA 13:730). Random motions first, then small changes of the best ones that are
-// kept where they are better.
+// links and drives that do not depend on others and those of the delays of the torques, each row over the
+// noise of its joint's torque (D-optimal; Swevers et al. 1997, IEEE T-RA 13:730). Random motions first, then
+// small changes of the best ones that are kept where they are better.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +24,12 @@ namespace backlash::geared_arm {
 
 struct PlanSettings {
   double period = 20;      // s; choice: Swevers' 10 s, twice as long for joints that are slow
-  int harmonics = 5;       // choice: Swevers'
+  int harmonics = 10;      // choice: speed and acceleration of most arms are near their limits together so
+  int periods = 3;         // of the record that is to show the gaps; choice
   std::uint64_t seed = 1;  // choice
   int motions = 60;        // random ones; choice (time)
   int bettered = 3;        // the best of them; choice (time)
-  int steps = 4000;        // of each; choice (time)
+  int steps = 8000;        // of each; choice (time)
   double margin = 1.2;  // times the load and the time that the diagnosis needs; choice: a controller's error
   PlaySettings play;
 };
@@ -50,7 +51,7 @@ struct HiddenRange {
 enum class GapView {
   shown,      // stays enough on both flanks
   not_found,  // none of the motions that were tried has
-  impossible  // no pose and motion within the limits that was looked at loads the other flank for certain
+  impossible  // no pose and motion within the limits that was looked at gives a load that tells
 };
 
 struct JointPlan {
