@@ -68,7 +68,7 @@ void check_outputs(const Arguments& arguments, const std::vector<std::string>& i
 }
 
 int plan(const Arguments& arguments) {
-  const std::string path = arguments.positional(0);
+  const std::string& path = arguments.positional(0);
   const geared_arm::PlanSettings settings = settings_of(arguments);
   const double rate = arguments.number("rate", 0, Range::between(1, 1e5));
   std::optional<double> acceleration;
