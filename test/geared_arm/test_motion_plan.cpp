@@ -191,15 +191,14 @@ TEST(MotionPlan, InformationIsThatOfTheSingularValues) {
     for (double& each : noise) each /= 2;
     EXPECT_NEAR(BaseInformation(arm.rig, limits, noise, 1).of(motion, rate, 1).log_volume - found.log_volume,
                 double(base.cols()) * std::log(2.0), 1e-6);
-    // And a motion of a part of the rows tells less by what the singular values say.
-    const Eigen::MatrixXd half = base.topRows(base.rows() / 2);
-    const JointMotions first{motion.q.topRows(rows / 2), motion.v.topRows(rows / 2),
-                             motion.a.topRows(rows / 2)};
+    // Every other row tells less by what the singular values say.
+    Eigen::MatrixXd even(base.rows() / 2, base.cols());
+    for (Eigen::Index i = 0; i < rows / 2; ++i) even.middleRows(i * n, n) = base.middleRows(2 * i * n, n);
     const auto volume = [](const Eigen::MatrixXd& y) {
       return Eigen::BDCSVD<Eigen::MatrixXd>(y).singularValues().array().log().sum();
     };
     for (double& each : noise) each *= 2;
-    EXPECT_NEAR(found.log_volume - information.of(first, rate, 1).log_volume, volume(base) - volume(half),
+    EXPECT_NEAR(found.log_volume - information.of(motion, rate, 2).log_volume, volume(base) - volume(even),
                 1e-5 * double(base.cols()))
         << name;
   }
@@ -264,21 +263,22 @@ TEST_F(OneLink, GravityThatNoMotionTurnsHidesTheGap) {
 }
 
 TEST_F(OneLink, PosesThatHideTheGapEndWhereTheirClosedFormDoes) {
-  const GearedArm a = arm("{acceleration: 5}");
-  const MotionPlan plan = planned(a, quick());
-  const JointPlan& joint = plan.joints[0];
-  EXPECT_EQ(joint.view, GapView::shown) << joint.message;
-  // Held where |m g d cos q| > I a - certain and > certain.
-  const double held = std::fmax(joint.certain, kInertia * 5 - joint.certain),
-               edge = std::acos(held / kGravity);
-  ASSERT_EQ(joint.hidden.size(), 3u);
-  const double fine = M_PI / 180;  // the step of the ranges
-  EXPECT_NEAR(joint.hidden[0].upper, edge - M_PI, fine);
-  EXPECT_EQ(joint.hidden[0].flank, -1);
-  EXPECT_NEAR(joint.hidden[1].lower, -edge, fine);
-  EXPECT_NEAR(joint.hidden[1].upper, edge, fine);
-  EXPECT_EQ(joint.hidden[1].flank, 1);
-  EXPECT_NEAR(joint.hidden[2].lower, M_PI - edge, fine);
+  for (const double acceleration : {5.0, 20.0}) {  // gravity must be certain; acceleration must not turn it
+    const JointPlan joint =
+        planned(arm("{acceleration: " + std::to_string(acceleration) + "}"), quick()).joints[0];
+    EXPECT_EQ(joint.view, GapView::shown) << joint.message;
+    const double turned = kInertia * acceleration - joint.certain;
+    EXPECT_EQ(turned > joint.certain, acceleration > 10);
+    const double edge = std::acos(std::fmax(joint.certain, turned) / kGravity);
+    ASSERT_EQ(joint.hidden.size(), 3u);
+    const double fine = M_PI / 180;  // the step of the ranges
+    EXPECT_NEAR(joint.hidden[0].upper, edge - M_PI, fine);
+    EXPECT_EQ(joint.hidden[0].flank, -1);
+    EXPECT_NEAR(joint.hidden[1].lower, -edge, fine);
+    EXPECT_NEAR(joint.hidden[1].upper, edge, fine);
+    EXPECT_EQ(joint.hidden[1].flank, 1);
+    EXPECT_NEAR(joint.hidden[2].lower, M_PI - edge, fine);
+  }
 }
 
 TEST_F(OneLink, WhereAccelerationTurnsTheLoadNothingIsHidden) {
