@@ -13,7 +13,7 @@ import plotting  # noqa: E402
 
 plt = plotting.page_pyplot()
 FLANKS = {-1: "tab:orange", 1: "tab:blue"}
-STATUS = {"shown": "shown", "not_found": "no motion found", "impossible": "cannot be shown"}
+STATUS = {"shown": "shown", "unconfirmed": "not confirmed", "not_found": "no motion found", "impossible": "cannot be shown"}
 
 
 def load(path):

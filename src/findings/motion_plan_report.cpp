@@ -11,21 +11,9 @@
 namespace backlash::findings {
 namespace {
 
-const char* name_of(geared_arm::GapView view) {
-  switch (view) {
-    case geared_arm::GapView::shown:
-      return "shown";
-    case geared_arm::GapView::not_found:
-      return "not_found";
-    case geared_arm::GapView::impossible:
-      break;
-  }
-  return "impossible";
-}
-
 report::Json gap_json(const geared_arm::JointPlan& joint) {
   if (!joint.gap) return nullptr;
-  report::Json json = {{"status", name_of(joint.view)},
+  report::Json json = {{"status", geared_arm::to_string(joint.view)},
                        {"mesh_torque", {joint.least_load, joint.largest_load}},
                        {"certain", joint.certain},
                        {"stays", {joint.stays[0], joint.stays[1]}},

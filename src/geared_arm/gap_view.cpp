@@ -121,6 +121,12 @@ double GapViews::unconfirmed(std::size_t joint, double own) const {
   return std::hypot(kOwnTorque * own, noise * std::pow(2 / rows, 0.25)) / settings_.play.disagreement;
 }
 
+/// Whether the file says anything of the motor's own torque.
+bool GapViews::knows_drive(std::size_t joint) const {
+  const auto& terms = arm_.rig.joints[joint].terms;
+  return std::any_of(terms.begin(), terms.end(), [](double each) { return each != 0; });
+}
+
 /// Why no motion can show a gap; empty: one may.
 std::vector<std::string> GapViews::obstacles(std::size_t joint) const {
   std::vector<std::string> found;
@@ -189,6 +195,14 @@ void GapViews::describe(JointPlan& plan, std::size_t joint, const arm::Joints& o
   } else {
     plan.message =
         fmt::format("shown: {} and {} stays on the two flanks in each period", plan.stays[1], plan.stays[0]);
+    if (!knows_drive(joint)) {
+      plan.view = GapView::unconfirmed;
+      plan.message = fmt::format(
+          "{}, unless the drive's own torque hides a load of {:.3g} N m (rms): the rig file states neither "
+          "its rotor "
+          "nor its friction; identify, and plan again with the fitted file",
+          plan.message, rms(load));
+    }
   }
   plan.message += "; " + hidden_text(plan);
 }

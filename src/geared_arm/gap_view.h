@@ -33,6 +33,7 @@ class GapViews {
 
  private:
   std::vector<std::string> obstacles(std::size_t joint) const;
+  bool knows_drive(std::size_t joint) const;
   double least_reach(std::size_t joint) const;
   double unconfirmed(std::size_t joint, double own) const;
 

@@ -34,10 +34,7 @@ std::string gap_text(const JointPlan& joint) {
       "    stays: [{}, {}]    # per period, on the negative and the positive flank\n"
       "    reach: [{:.5g}, {:.5g}]    # N m, the most that the limits allow\n    gap: {}\n    hidden: [",
       joint.least_load, joint.largest_load, joint.certain, joint.stays[0], joint.stays[1], -joint.reach[0],
-      joint.reach[1],
-      joint.view == GapView::shown       ? "shown"
-      : joint.view == GapView::not_found ? "not_found"
-                                         : "impossible");
+      joint.reach[1], to_string(joint.view));
   std::vector<std::string> ranges;
   for (const HiddenRange& range : joint.hidden)
     ranges.push_back(fmt::format("[{:.4f}, {:.4f}, {}]", range.lower, range.upper, range.flank));

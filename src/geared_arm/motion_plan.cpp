@@ -275,9 +275,24 @@ void check(const PlanSettings& s) {
 
 }  // namespace
 
-bool MotionPlan::all_shown() const {
-  return std::all_of(joints.begin(), joints.end(),
-                     [](const JointPlan& joint) { return joint.view == GapView::shown; });
+const char* to_string(GapView view) {
+  switch (view) {
+    case GapView::shown:
+      return "shown";
+    case GapView::unconfirmed:
+      return "unconfirmed";
+    case GapView::not_found:
+      return "not_found";
+    case GapView::impossible:
+      break;
+  }
+  return "impossible";
+}
+
+bool MotionPlan::none_hidden() const {
+  return std::all_of(joints.begin(), joints.end(), [](const JointPlan& joint) {
+    return joint.view == GapView::shown || joint.view == GapView::unconfirmed;
+  });
 }
 
 MotionPlan plan_motion(const GearedArm& arm, const std::vector<MotionLimits>& limits,

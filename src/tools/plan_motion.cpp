@@ -91,7 +91,7 @@ int plan(const Arguments& arguments) {
   if (arguments.has("json")) write_text(arguments.text("json"), findings::motion_plan_json(plan));
   if (arguments.has("csv")) write_text(arguments.text("csv"), geared_arm::trajectory_csv(arm, plan, rate));
   findings::print_motion_plan(plan, std::cout);
-  return plan.all_shown() ? kHealthy : kInconclusive;
+  return plan.none_hidden() ? kHealthy : kInconclusive;
 }
 
 }  // namespace

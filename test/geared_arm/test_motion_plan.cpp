@@ -227,12 +227,13 @@ class OneLink : public testing::Test {
     std::ofstream(folder_ / name) << text;
   }
 
-  GearedArm arm(const std::string& limits) const {
+  GearedArm arm(const std::string& limits,
+                const std::string& drive = "rotor_inertia: 0.1, coulomb: 0.2, ") const {
     write("rig.yaml",
           "schema_version: 1\nname: one\nurdf: link.urdf\ngravity: [0, 0, -9.80665]\n"
           "drives: {channel: motor_torque, terms: [rotor_inertia, coulomb]}\n"
-          "joints:\n  - {name: hinge, rotor_inertia: 0.1, coulomb: 0.2, motion_limits: " +
-              limits +
+          "joints:\n  - {name: hinge, " +
+              drive + "motion_limits: " + limits +
               "}\nidentification: {kinematics_cutoff: 20, torque_cutoff: 10, slowest: 0.02, friction_speed: "
               "0.02}\n");
     return load_geared_arm((folder_ / "rig.yaml").string());
@@ -246,7 +247,7 @@ TEST_F(OneLink, GravityThatNoMotionTurnsHidesTheGap) {
   const MotionPlan plan = planned(a, quick());
   const JointPlan& joint = plan.joints[0];
   EXPECT_EQ(joint.view, GapView::impossible);
-  EXPECT_FALSE(plan.all_shown());
+  EXPECT_FALSE(plan.none_hidden());
   // The least load: at the end of the range, with all of the acceleration.
   const double least = kGravity * std::cos(0.6) - kInertia * 5, most = kGravity + kInertia * 5;
   ASSERT_GT(least, 0);
@@ -286,6 +287,13 @@ TEST_F(OneLink, WhereAccelerationTurnsTheLoadNothingIsHidden) {
   EXPECT_GT(plan.joints[0].reach[0], 0);
   EXPECT_NE(plan.joints[0].view, GapView::impossible);
   EXPECT_TRUE(plan.joints[0].hidden.empty());
+}
+
+TEST_F(OneLink, ALoadThatADriveOfWhichNothingIsKnownMayHideIsNotCalledShown) {
+  const MotionPlan plan = planned(arm("{acceleration: 5}", ""), quick());
+  EXPECT_EQ(plan.joints[0].view, GapView::unconfirmed);
+  EXPECT_TRUE(plan.none_hidden());
+  EXPECT_NE(plan.joints[0].message.find("states neither its rotor nor its friction"), std::string::npos);
 }
 
 TEST_F(OneLink, LimitsThatAreMissingOrDoNotFitAreRefused) {
@@ -354,7 +362,7 @@ TEST_F(OneLink, TheTrajectoryEndsAtRest) {
 TEST(MotionPlan, TellsThePlaysThatTheMotionOfTheFileHides) {
   const GearedArm declared = arm_of("two_link_arm/two_link_arm_hidden");
   const MotionPlan plan = planned(declared, quick());
-  ASSERT_TRUE(plan.all_shown());
+  ASSERT_TRUE(plan.none_hidden());
   const std::string path = (std::filesystem::path(testing::TempDir()) / "plan_of_two_links.yaml").string();
   std::ofstream(path) << motion_text(plan);
   GearedArm machine = declared;

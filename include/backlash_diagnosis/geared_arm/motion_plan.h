@@ -49,10 +49,14 @@ struct HiddenRange {
 };
 
 enum class GapView {
-  shown,      // stays enough on both flanks
-  not_found,  // none of the motions that were tried has
-  impossible  // no pose and motion within the limits that was looked at gives a load that tells
+  shown,        // stays enough on both flanks
+  unconfirmed,  // the same, but the file says nothing of the drive's own torque, which may hide the load
+  not_found,    // none of the motions that were tried has
+  impossible    // no pose and motion within the limits that was looked at gives a load that tells
 };
+
+/// As files and reports have it.
+const char* to_string(GapView view);
 
 struct JointPlan {
   std::string joint;
@@ -80,7 +84,7 @@ struct MotionPlan {
                              // to the torque limits
   MotionInformation planned, reference;  // reference: the best of the random motions
   double gain = 1;  // how much smaller standard errors are than by the reference, in the geometric mean
-  bool all_shown() const;
+  bool none_hidden() const;  // every gap is shown or unconfirmed
 };
 
 /// Deterministic for a seed. Throws InvalidParameter for settings, BadData where no joint can move or no
