@@ -73,7 +73,8 @@ JointDrive read_joint(const YamlReader& yaml) {
   joint.delay = yaml.number_or("delay", 0, Range::between(-kLongestDelay, kLongestDelay));
   yaml.uncertainty("delay");
   // of the room geared_arm
-  for (const char* key : {"gear", "limits", "link_coulomb", "link_viscous", "held", "excitation"})
+  for (const char* key :
+       {"gear", "limits", "link_coulomb", "link_viscous", "held", "excitation", "motion_limits"})
     yaml.ignore(key);
   joint.training_error = yaml.number_or("training_error", 0, Range::not_negative());
   return joint;

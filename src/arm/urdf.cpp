@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/arm/chain.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/text.h"
 
 namespace backlash::arm {
@@ -47,8 +48,19 @@ class Reader {
     return chain;
   }
 
+  JointLimits limits(const std::string& name) const {
+    const urdf::Joint& j = known(name);
+    JointLimits out{kNaN, kNaN, kNaN, kNaN};
+    if (!j.limits) return out;
+    if (j.type == urdf::Joint::REVOLUTE && j.limits->lower < j.limits->upper)
+      out.lower = j.limits->lower, out.upper = j.limits->upper;
+    if (j.limits->velocity > 0) out.velocity = j.limits->velocity;
+    if (j.limits->effort > 0) out.effort = j.limits->effort;
+    return out;
+  }
+
  private:
-  Joint joint(const std::string& name) const {
+  const urdf::Joint& known(const std::string& name) const {
     const auto j = model_.getJoint(name);
     if (!j) {
       std::vector<std::string> there;
@@ -57,11 +69,16 @@ class Reader {
     }
     if (j->type != urdf::Joint::REVOLUTE && j->type != urdf::Joint::CONTINUOUS)
       throw BadData(name_, "joint '" + name + "' is neither revolute nor continuous: only those are known");
-    const Eigen::Vector3d axis = vector(j->axis);
+    return *j;
+  }
+
+  Joint joint(const std::string& name) const {
+    const urdf::Joint& j = known(name);
+    const Eigen::Vector3d axis = vector(j.axis);
     if (!(std::fabs(axis.norm() - 1) < kUnitAxis))
       throw BadData(name_, "joint '" + name + "': axis is no unit vector");
-    return {name, j->child_link_name, matrix(j->parent_to_joint_origin_transform.rotation),
-            vector(j->parent_to_joint_origin_transform.position), axis};
+    return {name, j.child_link_name, matrix(j.parent_to_joint_origin_transform.rotation),
+            vector(j.parent_to_joint_origin_transform.position), axis};
   }
 
   /// The joint's frame in that of `carrier` (empty: the base, the frame of the root), from which only fixed
@@ -111,11 +128,19 @@ class Reader {
 
 }  // namespace
 
-Chain chain_of_urdf(const std::string& text, const std::string& name,
-                    const std::vector<std::string>& joints) {
+namespace {
+
+urdf::ModelInterfaceSharedPtr model_of(const std::string& text, const std::string& name) {
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text);
   if (!model) throw BadData(name, "cannot be read as a URDF");
-  return Reader(*model, name).chain(joints);
+  return model;
+}
+
+}  // namespace
+
+Chain chain_of_urdf(const std::string& text, const std::string& name,
+                    const std::vector<std::string>& joints) {
+  return Reader(*model_of(text, name), name).chain(joints);
 }
 
 std::string read_urdf(const std::string& path) {
@@ -124,6 +149,13 @@ std::string read_urdf(const std::string& path) {
 
 Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints) {
   return chain_of_urdf(read_urdf(urdf_path), urdf_path, joints);
+}
+
+std::vector<JointLimits> read_limits(const std::string& urdf_path, const std::vector<std::string>& joints) {
+  const urdf::ModelInterfaceSharedPtr model = model_of(read_start(urdf_path, kLargestUrdf), urdf_path);
+  std::vector<JointLimits> all;
+  for (const std::string& name : joints) all.push_back(Reader(*model, urdf_path).limits(name));
+  return all;
 }
 
 }  // namespace backlash::arm

@@ -48,7 +48,10 @@ ArmPlant::ArmPlant(const GearedArm& arm)
     drives_.push_back(std::move(drive));
   }
   state_.assign(std::size_t(2 * angles_), 0.0);
-  for (std::size_t j = 0; j < arm_.joints.size(); ++j) state_[j] = arm_.joints[j].held.value_or(0);
+  for (std::size_t j = 0; j < arm_.joints.size(); ++j) {
+    state_[j] = arm_.joints[j].held.value_or(arm_.joints[j].start);
+    if (drives_[j].motor >= 0) state_[std::size_t(drives_[j].motor)] = state_[j];
+  }
   integrator_ = std::make_unique<simulation::Integrator>(
       [this](double t, const double* state, double* rate) { derivative(t, state, rate); },
       tolerances(angles_, arm_.solver), arm_.solver);

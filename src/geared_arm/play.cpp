@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "flank_stays.h"
 
 namespace backlash::geared_arm {
 namespace {
@@ -94,32 +95,6 @@ double disagreement(const Rows& rows) {
   const Eigen::Map<const Eigen::VectorXd> y(rows.lacking.data(), n);
   const Eigen::VectorXd left = y - x * x.completeOrthogonalDecomposition().solve(y);
   return load > 0 ? std::sqrt(std::fmax(0, left.squaredNorm() - rows.noise) / load) : 0;
-}
-
-/// Per row 1, -1, or 0 where the flank is not certain: the load small, or small within `guard` rows.
-std::vector<int> sides_of(const Rows& rows, double least, std::size_t guard) {
-  std::vector<int> sides(rows.size(), 0);
-  std::size_t since = 0;  // rows on the same side without a break
-  int last = 0;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const int side = rows.torque[k] > least ? 1 : rows.torque[k] < -least ? -1 : 0;
-    since = side != 0 && side == last && !rows.first[k] ? since + 1 : 0;
-    last = side;
-    if (since >= 2 * guard) sides[k - guard] = side;
-  }
-  return sides;
-}
-
-/// Number of the stay per row that counts; `count` per side.
-std::vector<std::size_t> stays_of(const std::vector<int>& sides, std::size_t count[2]) {
-  std::vector<std::size_t> stay(sides.size(), 0);
-  count[0] = count[1] = 0;
-  for (std::size_t k = 0; k < sides.size(); ++k) {
-    if (sides[k] == 0) continue;
-    if (k == 0 || sides[k - 1] != sides[k]) ++count[sides[k] > 0];
-    stay[k] = count[0] + count[1] - 1;
-  }
-  return stay;
 }
 
 Eigen::MatrixXd columns_of(const Rows& rows, const std::vector<int>& sides,
@@ -205,7 +180,9 @@ void judge(JointPlay& play, const Rows& rows, const std::vector<int>& sides,
   const bool told_apart = other.residual > settings.same_fit * best.residual;
   diagnosis::Estimate& e = play.estimate;
   e.components = diagnosis::PlayComponents{best.play, best.compliance, kNaN, kNaN};
-  if (best.residual > settings.worst_residual * std::fabs(best.play) && best.play > 3 * best.error) {
+  // What friction behind the gap does to the deflection is in the interval, and no teeth that float.
+  if (best.residual > settings.worst_residual * std::fabs(best.play) && best.play > 3 * best.error &&
+      best.residual > friction * std::fabs(best.compliance)) {
     e.status = diagnosis::Status::ambiguous;
     e.message = fmt::format(
         "cannot tell: the teeth do not rest on their flanks, {:.2g} rad are left of the fit", best.residual);
@@ -259,11 +236,9 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
     for (const double speed : rows.speed) play.fastest = std::fmax(play.fastest, std::fabs(speed));
     play.disagreement = disagreement(rows);
     const double most = std::fmax(std::fabs(*least), std::fabs(*largest));
-    const double certain = loads[j].link_coulomb + settings.least_load * most;
+    const double certain = certain_load(loads[j], most, settings);
     const double friction = std::fmax(loads[j].link_coulomb, settings.least_friction * most);
-    // Rows follow each other by a fifth of a cycle or less, see ArmMotion.
-    const auto guard = std::size_t(std::ceil(settings.settle * 5));
-    const std::vector<int> sides = sides_of(rows, certain, guard);
+    const std::vector<int> sides = sides_of(rows.torque, rows.first, certain, guard_rows(settings));
     const std::vector<std::size_t> stay = stays_of(sides, play.stays);
     if (!two_encoders) {
       play.estimate.message = "needs load_position";

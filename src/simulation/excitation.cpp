@@ -123,6 +123,7 @@ std::unique_ptr<Excitation> ExcitationSettings::create() const {
   if (type == "constant_speed") return constant_speed_excitation(controller, speeds, hold, ramp);
   if (type == "sine_speed") return sine_speed_excitation(controller, bias, amplitude, frequency, ramp);
   if (type == "moves") return moves_excitation(controller, moves);
+  if (type == "fourier") return fourier_excitation(controller, fourier, moves.position_gain);
   throw InvalidParameter("excitation.type", type, "must be one of " + joined(kTypes));
 }
 

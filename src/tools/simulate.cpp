@@ -6,6 +6,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/geared_arm/motion_file.h"
 #include "backlash_diagnosis/geared_arm/simulation.h"
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
@@ -37,6 +38,7 @@ Command command() {
       {"half-gap", "M", "half of that, instead of --backlash"},
       {"seed", "N", "of all sensor noise, instead of the rig file's; the same seed gives the same record"},
       {"sample-rate", "HZ", "instead of the rig file's"},
+      {"motion", "MOTION.yaml", "of an arm: its position loops follow what plan_motion has planned"},
   };
   c.examples = {"simulate config/sarkar_1997.yaml --duration 2 --backlash 60e-6 --out run.csv",
                 "simulate config/yumrukcal_2013.yaml --run sine_sweep --out sweep.csv",
@@ -93,7 +95,12 @@ int simulate_arm(const Arguments& arguments) {
   arm.sensors.seed =
       arguments.integer("seed", arm.sensors.seed, 0, std::numeric_limits<std::uint64_t>::max());
   arm.sensors.sampling_rate = arguments.number("sample-rate", arm.sensors.sampling_rate, Range::positive());
-  check_output(out, {path, arm.rig.urdf});
+  std::vector<std::string> inputs = {path, arm.rig.urdf};
+  if (arguments.has("motion")) {
+    inputs.push_back(arguments.text("motion"));
+    geared_arm::follow(arm, geared_arm::read_motion(inputs.back()));
+  }
+  check_output(out, inputs);
   std::vector<record::JointRecord> joints;
   {
     ProgressBar bar;
@@ -111,6 +118,7 @@ int simulate_arm(const Arguments& arguments) {
 
 int simulate(const Arguments& arguments) {
   if (arm::is_arm_rig(arguments.positional(0))) return simulate_arm(arguments);
+  if (arguments.has("motion")) throw UsageError("--motion is for the rig file of an arm");
   if (arguments.has("list-runs")) return list_runs(arguments);
   for (const char* option : {"out", "duration"})
     if (!arguments.has(option) && !(arguments.has("run") && std::string(option) == "duration"))

@@ -63,4 +63,15 @@ std::string read_urdf(const std::string& path);
 Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints);
 Chain chain_of_urdf(const std::string& text, const std::string& name, const std::vector<std::string>& joints);
 
+/// What <limit> of a joint says; NaN where it does not: a revolute joint without lower < upper, a continuous
+/// one (which has no such limits), velocity or effort that are not > 0.
+struct JointLimits {
+  double lower, upper;  // rad
+  double velocity;      // rad/s
+  double effort;        // N m
+};
+
+/// Of the joints of these names. Throws MissingInput, BadData as read_chain().
+std::vector<JointLimits> read_limits(const std::string& urdf_path, const std::vector<std::string>& joints);
+
 }  // namespace backlash::arm

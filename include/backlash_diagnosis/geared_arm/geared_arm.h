@@ -29,10 +29,11 @@ struct Gear {
 };
 
 struct GearedJoint {
-  std::optional<Gear> gear;                   // none: motor and link turn together
-  std::optional<double> held;                 // rad: the link is held there
-  double link_coulomb = 0;                    // N m, >= 0, friction behind the gap
-  double link_viscous = 0;                    // N m s/rad, >= 0
+  std::optional<Gear> gear;    // none: motor and link turn together
+  std::optional<double> held;  // rad: the link is held there
+  double start = 0;            // rad: where a joint that is not held begins; of a planned motion
+  double link_coulomb = 0;     // N m, >= 0, friction behind the gap
+  double link_viscous = 0;     // N m s/rad, >= 0
   simulation::ExcitationSettings excitation;  // of the motor; means nothing where the joint is held
   std::optional<diagnosis::Limits> limits;    // rad, of its play
 };

@@ -12,7 +12,7 @@ namespace backlash::geared_arm {
 
 class ArmPlant {
  public:
-  /// At rest at time 0: every joint at 0 or where it is held, every motor in the middle of its gap.
+  /// At rest at time 0: every joint at its start or where it is held, every motor in the middle of its gap.
   explicit ArmPlant(const GearedArm& arm);
   ArmPlant(const ArmPlant&) = delete;  // the integrator calls it back
   ArmPlant& operator=(const ArmPlant&) = delete;

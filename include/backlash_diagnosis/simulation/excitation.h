@@ -13,6 +13,7 @@
 
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/simulation/fourier_motion.h"
 
 namespace backlash::simulation {
 
@@ -105,9 +106,14 @@ struct MoveSettings {
 };
 std::unique_ptr<Excitation> moves_excitation(const SpeedController& controller, const MoveSettings& moves);
 
+/// The same loop along a planned motion.
+std::unique_ptr<Excitation> fourier_excitation(const SpeedController& controller, const FourierMotion& motion,
+                                               double position_gain);
+
 /// What a rig file says under `excitation`; a recipe, so that copies of it can run side by side.
 struct ExcitationSettings {
-  // square, sine, chirp, multi_sine, random, constant, topic, stepped_sine, constant_speed, sine_speed, moves
+  // square, sine, chirp, multi_sine, random, constant, topic, stepped_sine, constant_speed, sine_speed,
+  // moves; fourier, which no rig file has: a motion that was planned for `moves`
   std::string type = "square";
   double amplitude =
       0;  // N m; the torque itself for `constant`, its rms for `random`; rad/s for `sine_speed`
@@ -122,6 +128,7 @@ struct ExcitationSettings {
   std::uint64_t seed = 0;       // random
   SpeedController controller;   // constant_speed, sine_speed and moves
   MoveSettings moves;
+  FourierMotion fourier;       // with the controller and the position_gain of moves
   std::vector<double> speeds;  // rad/s, constant_speed
   double hold = 0, ramp = 0;   // s, constant_speed; sine_speed has a ramp
   bool at_load = false;        // the torque acts on the load, not on the motor

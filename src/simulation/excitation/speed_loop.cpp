@@ -158,4 +158,15 @@ std::unique_ptr<Excitation> moves_excitation(const SpeedController& controller, 
       });
 }
 
+std::unique_ptr<Excitation> fourier_excitation(const SpeedController& controller, const FourierMotion& motion,
+                                               double position_gain) {
+  check(controller);
+  check(motion);
+  require("position_gain", position_gain, Range::positive());
+  return std::make_unique<SpeedLoop>(controller, [=](double t, double position) {
+    const Kinematics wanted = kinematics(motion, t);
+    return wanted.velocity + position_gain * (wanted.position - position);
+  });
+}
+
 }  // namespace backlash::simulation
