@@ -11,7 +11,7 @@
 #include "arm/arm_machines.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/geared_arm/motion_file.h"
-#include "backlash_diagnosis/geared_arm/plant.h"
+#include "backlash_diagnosis/geared_arm/simulation.h"
 #include "geared_arm/base_information.h"
 #include "support/data.h"
 
