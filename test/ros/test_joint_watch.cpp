@@ -151,9 +151,9 @@ TEST(JointWatch, SaysWhyItCannotTell) {
   EXPECT_NE(changing.watch.state().why_not.find("change within themselves: motor_coulomb"), std::string::npos)
       << changing.watch.state().why_not;
   EXPECT_FALSE(std::filesystem::exists(folder.path("joint_healthy.csv")));
-  WatchSettings play = settings(folder);
-  play.joint.rig = rig_file::default_rig_file();
-  EXPECT_NE(Robot(play).watch.state().why_not.find("one inertia only"), std::string::npos);
+  WatchSettings sensor = settings(folder);
+  sensor.joint.rig = rig_file::default_rig_file();
+  EXPECT_NE(Robot(sensor).watch.state().why_not.find("does not declare"), std::string::npos);
   WatchSettings missing = settings(folder);
   missing.healthy = {"/nowhere/monday.csv"};
   EXPECT_THROW(JointWatch{missing}, MissingInput);

@@ -2,6 +2,7 @@
 // detect_changes as a user calls it, on records of a joint with known changes.
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "support/data.h"
 #include "tools/command_runner.h"
@@ -43,12 +44,39 @@ TEST_F(DetectChanges, TellsEachChangeOfTheSharedRecordsAndNothingElse) {
   }
 }
 
-TEST_F(DetectChanges, RefusesMoreThanOneInertia) {
+TEST_F(DetectChanges, TellsSinceWhenAJointOfTwoInertiasHasMorePlay) {
+  const std::string rig = package_file("config/simulated_robot/shoulder.yaml");
+  const auto simulate = [&](const std::string& more) { return run("simulate " + rig + " " + more).code; };
+  ASSERT_EQ(simulate("--duration 200 --seed 1 --out healthy.csv"), 0);
+  ASSERT_EQ(simulate("--duration 90 --seed 2 --out before.csv"), 0);
+  ASSERT_EQ(simulate("--duration 60 --seed 3 --backlash 7e-4 --out after.csv"), 0);
+  // 1 s is missing between them.
+  std::istringstream before(read("before.csv")), after(read("after.csv"));
+  std::string line, text;
+  while (std::getline(before, line)) text += line + "\n";
+  for (std::getline(after, line); std::getline(after, line);)
+    text += std::to_string(std::stod(line) + 91) + line.substr(line.find(',')) + "\n";
+  write("record.csv", text);
+  const Outcome outcome =
+      run("detect_changes --rig " + rig + " --healthy healthy.csv --json out.json record.csv");
+  ASSERT_EQ(outcome.code, 2) << outcome.err;
+  const Json report = Json::parse(read("out.json"));
+  ASSERT_EQ(report["changes"].size(), 1u) << report["changes"];
+  const Json& change = report["changes"][0];
+  EXPECT_EQ(change["effect"], "backlash");
+  EXPECT_LE(change["since_interval"][0], 91);
+  EXPECT_GE(change["since_interval"][1], 90);
+  const Json& angle = change["size"]["angle"];
+  EXPECT_NEAR(angle["value"].get<double>(), 1.6e-4, 3 * angle["standard_error"].get<double>());
+  EXPECT_GT(report["healthy_deflection_residual"], 0);
+}
+
+TEST_F(DetectChanges, RefusesOtherGearTrains) {
   write("record.csv", "time,motor_torque,motor_position\n0,0,0\n0.1,0,0\n0.2,0,0\n");
-  const Outcome outcome = run("detect_changes --rig " + package_file("config/two_inertia_servo.yaml") +
+  const Outcome outcome = run("detect_changes --rig " + package_file("config/sarkar_1997.yaml") +
                               " --healthy record.csv --json out.json record.csv");
   EXPECT_EQ(outcome.code, 3);
-  expect_contains(outcome.err, "one inertia");
+  expect_contains(outcome.err, "of one inertia (mesh: rigid) and of two");
   EXPECT_FALSE(exists("out.json"));
 }
 

@@ -568,10 +568,9 @@ void add_deflection(const Changes& more, const ChangeSettings& settings, Changes
 }
 
 /// Two inertias: the torque first, whose changes may load the teeth otherwise; then the deflection.
-Changes changes_of_two(const model::Rig& rig, const std::vector<record::Record>& healthy,
+Changes changes_of_two(const model::Rig& rig, double behind, const std::vector<record::Record>& healthy,
                        const record::Record& record, MotionSampling sampling, ChangeSettings settings,
                        const Progress& progress) {
-  const double behind = share_behind(rig);
   bool load = record.has(record::Channel::load_position);
   for (const record::Record& r : healthy) load = load && r.has(record::Channel::load_position);
   if (load) {
@@ -608,6 +607,7 @@ Changes changes_of_two(const model::Rig& rig, const std::vector<record::Record>&
 Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>& healthy,
                        const record::Record& record, const ChangeSettings& settings,
                        const Progress& progress) {
+  const double behind = rig.mesh.rigid ? 0 : share_behind(rig);
   std::vector<const record::Record*> all = {&record};
   for (const record::Record& r : healthy) all.push_back(&r);
   const MotionSampling sampling = sampling_of(all, settings);
@@ -617,7 +617,7 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
                      settings, progress)
               .told;
   else
-    out = changes_of_two(rig, healthy, record, sampling, settings, progress);
+    out = changes_of_two(rig, behind, healthy, record, sampling, settings, progress);
   std::sort(out.changes.begin(), out.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });
   return out;

@@ -11,8 +11,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/changes/changes.h"
 
-namespace backlash::identification {
-namespace changes_of_two {
+namespace backlash::identification::changes_of_two {
 
 constexpr double kRate = 100;                      // Hz
 constexpr double kOnset = 120, kDuration = 200;    // s
@@ -235,5 +234,4 @@ TEST(ChangesOfTwo, OtherGearTrainsAreRefused) {
   EXPECT_THROW(changes_of(made(1, nothing), sensor), CannotIdentify);
 }
 
-}  // namespace changes_of_two
-}  // namespace backlash::identification
+}  // namespace backlash::identification::changes_of_two

@@ -249,7 +249,7 @@ void onsets(const Options& options) {
   double width = 0;
   for (int i = 0; i < options.onsets; ++i) {
     const Joint joint(random, options);
-    const std::string effect = effects[static_cast<std::size_t>(i) % effects.size()];
+    const std::string& effect = effects[static_cast<std::size_t>(i) % effects.size()];
     const Added added{effect, uniform(random, 60, 240), joint.value(effect) * uniform(random, 0.15, 0.4)};
     const std::vector<record::Record> learned = {joint.record(random, kLearn, options.sampling, true, false)};
     const record::Record record = joint.record(random, kWindow, options.sampling, false, false, added);
