@@ -27,6 +27,7 @@ extern const char* const kWarningsTemplate;
 extern const char* const kTraceTemplate;
 extern const char* const kDiagnosisTemplate;
 extern const char* const kArmTraceTemplate;
+extern const char* const kDayTemplate;
 
 /// Throws Error for a tag that does not end, or a text that the data does not have.
 std::string filled(const std::string& html_template, const Json& data);

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One page of a day of a robot, from what its monitors kept: how much play each joint had, when that could be
+// told, and what has changed.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/change_ledger.h"
+#include "backlash_diagnosis/diagnosis/history.h"
+#include "backlash_diagnosis/report/report_page.h"
+
+namespace backlash::report {
+
+/// Of one joint what falls into the day.
+struct JointDay {
+  std::string joint;
+  std::vector<diagnosis::HistoryEntry> estimates;  // told or not, the oldest first
+  std::vector<diagnosis::KnownChange> changes;     // that were so at some time of it, none withdrawn
+};
+
+struct Day {
+  double from = 0, to = 0;  // s since 1970
+  std::vector<JointDay> joints;
+  std::vector<std::string> warnings;
+};
+
+/// Whether an estimate says how much play there is.
+bool tells(const diagnosis::HistoryEntry& entry);
+
+/// The files of a folder that `~history` of diagnoser and change_watch filled: JOINT.csv, JOINT_changes.csv.
+/// `to` NaN: the day ends with the last entry of all. Throws MissingInput, BadData for a folder without any
+/// and for a file that is none.
+Day read_day(const std::string& folder, double to, double hours);
+
+/// "3 joints, 2 changes: wrist motor_coulomb since ...", one line.
+std::string day_summary(const Day& day);
+
+std::string day_json(const Day& day);
+std::string day_page(const Day& day, const Provenance& provenance);
+
+}  // namespace backlash::report

@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draws the figures of a day, as JSON with the pictures inside; day_report calls it.
+
+usage: day_report.py DAY.json --out FIGURES.json
+"""
+import datetime
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import plotting  # noqa: E402
+
+plt = plotting.page_pyplot()
+import matplotlib.dates  # noqa: E402
+
+TOLD, CHANGE, SILENT = "#1f6fb4", "#b3261e", "#9aa7b5"
+EPOCH = datetime.datetime(1970, 1, 1)
+
+
+def date(seconds):
+    return EPOCH + datetime.timedelta(seconds=seconds)
+
+
+def draw(joint, day):
+    """Estimates with their intervals over the day; changes, and estimates that told nothing, at its foot."""
+    figure, axes = plt.subplots(figsize=plotting.PAGE_FIGURE, constrained_layout=True)
+    lengths = any(e["backlash"] is not None for e in joint["series"])
+    value, ends = ("backlash", "interval") if lengths else ("backlash_angle", "angle_interval")
+    scale, unit = (1e6, "µm") if lengths else (1e3, "mrad")
+    told = [e for e in joint["series"] if e[ends] is not None and e[ends][1] is not None]
+    times = [date(e["time"]) for e in told]
+    axes.vlines(times, [scale * (e[ends][0] or 0) for e in told], [scale * e[ends][1] for e in told], color=TOLD,
+                alpha=0.3, linewidth=1, label="95 %")
+    points = [(t, scale * e[value]) for t, e in zip(times, told) if e[value] is not None]
+    axes.plot([t for t, _ in points], [v for _, v in points], ".", color=TOLD, markersize=3, label="play")
+    silent = [date(e["time"]) for e in joint["series"] if e not in told]
+    axes.plot(silent, [0.02] * len(silent), "|", color=SILENT, markersize=5, transform=axes.get_xaxis_transform(),
+              label="cannot tell")
+    for change in joint["changes"]:
+        axes.axvspan(date(change["since_interval"][0]), date(change["since_interval"][1]), color=CHANGE, alpha=0.25)
+        axes.axvline(date(change["since"]), color=CHANGE, linewidth=1.2, label=change["effect"] + ", since")
+        if change["until"] is not None:
+            axes.axvline(date(change["until"]), color=CHANGE, linewidth=1.2, linestyle=":", label=change["effect"] + ", until")
+    axes.set_xlim(date(day["from"]), date(day["to"]))
+    axes.xaxis.set_major_formatter(matplotlib.dates.ConciseDateFormatter(axes.xaxis.get_major_locator()))
+    if told:
+        axes.set_ylim(bottom=0)
+    axes.set_ylabel("play [%s]" % unit)
+    if not told:
+        axes.set_yticks([])
+        axes.set_ylabel("no estimate tells the play")
+    axes.set_xlabel("UTC")
+    axes.legend(fontsize=7, loc="best")
+    return plotting.picture(figure, joint["joint"])
+
+
+def main():
+    parser = plotting.Parser(__doc__.splitlines()[0])
+    parser.add_argument("day", metavar="DAY.json", help="written by day_report")
+    parser.add_argument("--out", required=True, metavar="FIGURES.json", help="figures for the page")
+    arguments = parser.parse_args()
+    day = plotting.load_json(arguments.day, "a day")
+    try:
+        pictures = [draw(joint, day) for joint in day["joints"] if joint["series"] or joint["changes"]]
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        plotting.fail(65, "%s: not a day: %r" % (arguments.day, error))
+    plotting.save_sections([plotting.section("", pictures)], arguments.out)
+
+
+if __name__ == "__main__":
+    plotting.run(main)

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/report/day_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/file.h"
+#include "backlash_diagnosis/base/scratch_folder.h"
+#include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/base/utc.h"
+#include "backlash_diagnosis/base/version.h"
+#include "backlash_diagnosis/diagnosis/change_log.h"
+#include "backlash_diagnosis/report/change_file.h"
+#include "diagnosis_data.h"
+#include "html_template.h"
+
+namespace backlash::report {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kChanges = "_changes";
+
+/// Of a joint all that its files hold.
+std::map<std::string, JointDay> read_files(const std::string& folder, std::vector<std::string>& warnings) {
+  std::map<std::string, JointDay> joints;
+  std::error_code failed;
+  for (const fs::directory_entry& file : fs::directory_iterator(folder, failed)) {
+    if (file.path().extension() != ".csv") continue;
+    std::string name = file.path().stem().string();
+    const bool changes = name.size() > kChanges.size() &&
+                         name.compare(name.size() - kChanges.size(), kChanges.size(), kChanges) == 0;
+    if (changes) name.resize(name.size() - kChanges.size());
+    JointDay& joint = joints[name];
+    joint.joint = name;
+    if (changes) {
+      joint.changes = diagnosis::read_change_log(file.path());
+      continue;
+    }
+    diagnosis::HistoryFile history = diagnosis::read_history(file.path());
+    for (const diagnosis::HistoryEntry& e : history.entries)
+      if (e.event == diagnosis::kEstimateEvent) joint.estimates.push_back(e);
+    warnings.insert(warnings.end(), history.warnings.begin(), history.warnings.end());
+  }
+  if (failed) throw MissingInput(folder + ": cannot be read: " + failed.message());
+  if (joints.empty()) throw BadData(folder, "holds no JOINT.csv or JOINT_changes.csv of a monitor");
+  return joints;
+}
+
+double last_time(const std::map<std::string, JointDay>& joints) {
+  double last = -INFINITY;
+  for (const auto& [name, joint] : joints) {
+    for (const diagnosis::HistoryEntry& e : joint.estimates) last = std::max(last, e.time);
+    for (const diagnosis::KnownChange& c : joint.changes) last = std::max(last, c.seen);
+  }
+  return last;
+}
+
+JointDay within(JointDay joint, double from, double to) {
+  const auto drop = [](auto& all, const auto& outside) {
+    all.erase(std::remove_if(all.begin(), all.end(), outside), all.end());
+  };
+  drop(joint.estimates, [&](const diagnosis::HistoryEntry& e) { return e.time < from || e.time > to; });
+  drop(joint.changes, [&](const diagnosis::KnownChange& c) {
+    return c.state == diagnosis::ChangeState::withdrawn || c.found.since > to ||
+           c.found.until.value_or(to) < from;
+  });
+  std::stable_sort(joint.estimates.begin(), joint.estimates.end(),
+                   [](const auto& a, const auto& b) { return a.time < b.time; });
+  return joint;
+}
+
+bool lengths(const diagnosis::HistoryEntry& e) {
+  return std::isfinite(e.backlash) || std::isfinite(e.upper);
+}
+
+/// "80.0 [78.2, 81.9] um", "< 5.1 um"; empty: none.
+std::string play_text(const diagnosis::HistoryEntry* e) {
+  if (!e) return "";
+  const bool length = lengths(*e);
+  const double unit = length ? 1e-6 : 1e-3, value = length ? e->backlash : e->backlash_angle;
+  const double lower = length ? e->lower : e->angle_lower, upper = length ? e->upper : e->angle_upper;
+  const char* const name = length ? "\u00b5m" : "mrad";
+  if (!std::isfinite(value)) return "< " + four_digits(upper / unit) + " " + name;
+  return fmt::format("{} [{}, {}] {}", four_digits(value / unit), four_digits(lower / unit),
+                     four_digits(upper / unit), name);
+}
+
+struct Told {
+  const diagnosis::HistoryEntry *first = nullptr, *last = nullptr;
+  std::size_t count = 0;
+};
+
+Told told_of(const JointDay& joint) {
+  Told told;
+  for (const diagnosis::HistoryEntry& e : joint.estimates) {
+    if (!tells(e)) continue;
+    if (!told.first) told.first = &e;
+    told.last = &e;
+    ++told.count;
+  }
+  return told;
+}
+
+std::string told_text(const JointDay& joint, const Told& told) {
+  if (joint.estimates.empty()) return "none";
+  std::string text = fmt::format("{} of {} told", told.count, joint.estimates.size());
+  if (told.last) text += ", the last " + utc_time(told.last->time);
+  return text;
+}
+
+Json joint_json(const JointDay& joint) {
+  const Told told = told_of(joint);
+  Json json = {{"joint", joint.joint},
+               {"grade", joint.estimates.empty() ? "" : joint.estimates.back().grade},
+               {"estimates", joint.estimates.size()},
+               {"told", told.count},
+               {"series", Json::array()},
+               {"changes", Json::array()}};
+  for (const diagnosis::HistoryEntry& e : joint.estimates)
+    json["series"].push_back({{"time", e.time},
+                              {"grade", e.grade},
+                              {"backlash", json_number(e.backlash)},
+                              {"interval", json_interval(e.lower, e.upper)},
+                              {"backlash_angle", json_number(e.backlash_angle)},
+                              {"angle_interval", json_interval(e.angle_lower, e.angle_upper)}});
+  for (const diagnosis::KnownChange& c : joint.changes)
+    json["changes"].push_back({{"id", c.id},
+                               {"state", diagnosis::to_string(c.state)},
+                               {"effect", c.found.effect},
+                               {"since", c.found.since},
+                               {"since_interval", {c.found.since_from, c.found.since_to}},
+                               {"until", c.found.until ? Json(*c.found.until) : Json(nullptr)},
+                               {"text", change_text(c.found)}});
+  return json;
+}
+
+Json row_of(const JointDay& joint) {
+  const Told told = told_of(joint);
+  Json row = {{"joint", joint.joint},
+              {"grade", joint.estimates.empty() ? "" : joint.estimates.back().grade},
+              {"first", play_text(told.first)},
+              {"last", play_text(told.last)},
+              {"told", told_text(joint, told)},
+              {"changes", Json::array()}};
+  for (const diagnosis::KnownChange& c : joint.changes)
+    row["changes"].push_back(change_text(c.found) +
+                             (c.state == diagnosis::ChangeState::ended ? ", over" : ""));
+  return row;
+}
+
+std::string plots_of(const Day& day) {
+  try {
+    const ScratchFolder scratch;
+    write_file(scratch.path("day.json"), day_json(day));
+    return drawn_figures("day_report.py", {scratch.path("day.json")});
+  } catch (const CannotWrite& error) {
+    return no_figures(error.what());
+  }
+}
+
+}  // namespace
+
+bool tells(const diagnosis::HistoryEntry& e) {
+  return std::isfinite(e.backlash) || std::isfinite(e.upper) || std::isfinite(e.backlash_angle) ||
+         std::isfinite(e.angle_upper);
+}
+
+Day read_day(const std::string& folder, double to, double hours) {
+  Day day;
+  const std::map<std::string, JointDay> all = read_files(folder, day.warnings);
+  day.to = std::isnan(to) ? last_time(all) : to;
+  if (!std::isfinite(day.to)) throw BadData(folder, "its files hold no estimate and no change");
+  day.from = day.to - 3600 * hours;
+  for (const auto& [name, joint] : all) day.joints.push_back(within(joint, day.from, day.to));
+  return day;
+}
+
+std::string day_summary(const Day& day) {
+  std::vector<std::string> changes;
+  std::size_t silent = 0;
+  for (const JointDay& joint : day.joints) {
+    silent += told_of(joint).count == 0;
+    for (const diagnosis::KnownChange& c : joint.changes)
+      changes.push_back(joint.joint + ": " + change_text(c.found));
+  }
+  std::string text = fmt::format("{} to {}: {} {}, ", utc_time(day.from), utc_time(day.to), day.joints.size(),
+                                 day.joints.size() == 1 ? "joint" : "joints");
+  text += changes.empty() ? "no change was told" : "changed: " + joined(changes);
+  if (silent > 0) text += fmt::format("; of {} no estimate told the play", silent);
+  return text;
+}
+
+std::string day_json(const Day& day) {
+  Json json = {
+      {"schema_version", 1},         {"version", version()},    {"from", day.from},        {"to", day.to},
+      {"summary", day_summary(day)}, {"joints", Json::array()}, {"warnings", day.warnings}};
+  for (const JointDay& joint : day.joints) json["joints"].push_back(joint_json(joint));
+  return dumped(json, 1);
+}
+
+std::string day_page(const Day& day, const Provenance& provenance) {
+  Json data = {{"summary", day_summary(day)},
+               {"joints", Json::array()},
+               {"plots", plots_of(day)},
+               {"warnings", warnings_section(day.warnings)},
+               {"provenance", provenance_sections(provenance)}};
+  for (const JointDay& joint : day.joints) data["joints"].push_back(row_of(joint));
+  return report_page("A day of the joints, " + utc_date(day.to), filled(kDayTemplate, data));
+}
+
+}  // namespace backlash::report

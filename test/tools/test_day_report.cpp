@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// day_report as a user calls it, on files as the monitors write them.
+#include <nlohmann/json.hpp>
+
+#include "backlash_diagnosis/diagnosis/change_log.h"
+#include "backlash_diagnosis/diagnosis/history.h"
+#include "tools/command_runner.h"
+
+namespace backlash::test {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kNoon = 1798804800;  // 2027-01-01T12:00:00Z
+constexpr double kHour = 3600;
+
+class DayReport : public CommandTest {
+ protected:
+  /// Each hour of two days that end at noon; `play` in mrad, NaN: cannot tell.
+  void history(const std::string& joint, const std::string& grade, double play) {
+    diagnosis::History file({path("history/" + joint + ".csv")});
+    for (int hour = -48; hour <= 0; ++hour) {
+      diagnosis::HistoryEntry e;
+      e.time = kNoon + hour * kHour;
+      e.grade = grade;
+      e.backlash_angle = 1e-3 * play, e.angle_lower = 0.9e-3 * play, e.angle_upper = 1.1e-3 * play;
+      e.rig_digest = "0";
+      file.append(e);
+    }
+  }
+
+  void change(const std::string& joint, double hour, diagnosis::ChangeState state) {
+    diagnosis::KnownChange c;
+    c.id = 1;
+    c.state = state;
+    c.found.effect = "backlash";
+    c.found.since = kNoon + hour * kHour;
+    c.found.since_from = c.found.since - 60, c.found.since_to = c.found.since + 60;
+    c.found.size = {{"angle", "rad", 2e-4, 1e-5}};
+    c.seen = c.found.since + 600;
+    diagnosis::append_change(path("history/" + joint + "_changes.csv"), c);
+  }
+
+  Json day(int code, const std::string& more = "") {
+    const Outcome outcome = run("day_report history --out day.html --json day.json " + more);
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    return Json::parse(read("day.json"));
+  }
+
+  void SetUp() override {
+    CommandTest::SetUp();
+    shell("mkdir history");
+  }
+};
+
+TEST_F(DayReport, ADayWithoutAChangeIsToldAsSuch) {
+  history("elbow", "good", 0.5);
+  const Json told = day(0);
+  EXPECT_EQ(told["to"], kNoon);
+  EXPECT_EQ(told["joints"].size(), 1u);
+  const Json& elbow = told["joints"][0];
+  EXPECT_EQ(elbow["joint"], "elbow");
+  EXPECT_EQ(elbow["told"], 25);  // of the last day alone, both ends among them
+  EXPECT_EQ(elbow["series"][0]["time"], kNoon - 24 * kHour);
+  EXPECT_DOUBLE_EQ(elbow["series"][0]["backlash_angle"], 0.5e-3);
+  expect_contains(read("day.html"), "0.5 [0.45, 0.55] mrad");
+  EXPECT_EQ(day(0, "--hours 2 --until 2027-01-01T06:30:00Z")["joints"][0]["told"], 2);
+}
+
+TEST_F(DayReport, ChangesOfTheDayAreTold) {
+  history("elbow", "good", 0.5);
+  history("wrist", "watch", 0.8);
+  EXPECT_EQ(day(1)["joints"].size(), 2u);
+  change("wrist", -5, diagnosis::ChangeState::standing);
+  change("elbow", -6, diagnosis::ChangeState::withdrawn);
+  const Json told = day(2);
+  EXPECT_TRUE(told["joints"][0]["changes"].empty());
+  EXPECT_EQ(told["joints"][1]["changes"][0]["since"], kNoon - 5 * kHour);
+  expect_contains(told["summary"].get<std::string>(), "wrist: backlash since 2027-01-01T07:00:00Z");
+  expect_contains(read("day.html"), "backlash since 2027-01-01T07:00:00Z");
+  // It began after that day.
+  EXPECT_EQ(day(1, "--until 2027-01-01T06:00:00Z")["joints"][1]["changes"].size(), 0u);
+}
+
+TEST_F(DayReport, AJointOfWhichNothingCanBeToldIsCounted) {
+  history("elbow", "cannot_tell", std::nan(""));
+  const Json told = day(3);
+  EXPECT_EQ(told["joints"][0]["told"], 0);
+  expect_contains(told["summary"].get<std::string>(), "of 1 no estimate told the play");
+}
+
+TEST_F(DayReport, WrongFoldersAndTimesAreRefused) {
+  EXPECT_EQ(run("day_report nowhere --out day.html").code, 66);
+  EXPECT_EQ(run("day_report history --out day.html").code, 65);
+  write("history/elbow.csv", "time,value\n1,2\n");
+  const Outcome wrong = run("day_report history --out day.html");
+  EXPECT_EQ(wrong.code, 65);
+  expect_contains(wrong.err, "elbow.csv");
+  shell("rm history/elbow.csv");
+  history("elbow", "good", 0.5);
+  EXPECT_EQ(run("day_report history --out day.html --until yesterday").code, 64);
+  EXPECT_EQ(run("day_report history --out day.html --hours -1").code, 64);
+  EXPECT_FALSE(exists("day.html"));
+}
+
+}  // namespace
+}  // namespace backlash::test
