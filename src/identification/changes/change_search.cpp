@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "change_search.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/signal/distributions.h"
+
+namespace backlash::identification {
+
+ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motion,
+                           std::vector<ScannedEffect> candidates, const std::vector<FoundChange>& beside,
+                           const ChangeSettings& settings, const Progress& progress)
+    : model_(model),
+      motion_(motion),
+      candidates_(std::move(candidates)),
+      settings_(settings),
+      progress_(progress),
+      beside_(beside),
+      first_(residual_of(model, motion, settings)),
+      margin_(static_cast<std::size_t>(settings.margin / settings.block)),
+      blocks_(static_cast<std::size_t>(motion.moments.back().time / settings.block) + 1) {
+  beside_column_ = first_.nuisances.cols();
+  const Background with = background(beside_);
+  first_.nuisances = with.columns;
+  first_.spread = with.spread;
+}
+
+Eigen::MatrixXd ChangeSearch::found_columns(const FoundChange& f) const {
+  Eigen::MatrixXd z = effect_columns(motion_, f.effect);
+  const double from = settings_.block * double(f.from), to = settings_.block * double(f.to);
+  if (f.effect.ramp) z = Eigen::MatrixXd(z.col(1) - from * z.col(0));
+  for (Eigen::Index r = 0; r < z.rows(); ++r)
+    if (motion_.time(r) < from || motion_.time(r) >= to) z.row(r).setZero();
+  return z;
+}
+
+Background ChangeSearch::background(const std::vector<FoundChange>& others) const {
+  Background b;
+  b.residual = first_.residual;
+  b.columns = first_.nuisances;
+  b.spread = first_.spread;
+  for (const FoundChange& f : others) {
+    const Eigen::MatrixXd z = found_columns(f);
+    const Eigen::Index p = b.columns.cols();
+    b.columns.conservativeResize(Eigen::NoChange, p + z.cols());
+    b.columns.rightCols(z.cols()) = z;
+    b.spread.conservativeResize(p + z.cols());
+    b.spread.tail(z.cols()).setConstant(std::numeric_limits<double>::infinity());
+  }
+  b.variance = model_.noise * model_.noise;
+  b.solve();
+  return b;
+}
+
+std::vector<signal::Measured> ChangeSearch::beside(const std::vector<FoundChange>& found) const {
+  const Background b = background(found);
+  const double noisier = std::max(1.0, b.left().squaredNorm() / double(motion_.size()) / b.variance);
+  std::vector<signal::Measured> all;
+  for (Eigen::Index i = beside_column_; i < b.estimate.size(); ++i)
+    all.push_back({b.estimate[i], std::sqrt(noisier * b.inverse(i, i))});
+  return all;
+}
+
+std::size_t ChangeSearch::windows() const {
+  std::size_t count = 0;
+  double last = -settings_.window;
+  for (Eigen::Index r = 0; r < motion_.size(); ++r)
+    if (const double t = motion_.time(r); t - last >= settings_.window) {
+      ++count;
+      last = t;
+    }
+  return count;
+}
+
+double ChangeSearch::threshold(Eigen::Index values) const {
+  const double hours = motion_.moments.back().time / 3600;
+  const double p = settings_.false_alarms_per_hour * hours /
+                   (double(candidates_.size()) * double(std::max<std::size_t>(windows(), 1)));
+  return signal::chi_square_quantile(1 - std::clamp(p, 1e-14, 0.5), double(values));
+}
+
+double ChangeSearch::left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const {
+  const Eigen::VectorXd left = b.left();
+  double squares = 0;
+  rows = 0;
+  for (Eigen::Index r = 0; r < motion_.size(); ++r) {
+    const double t = motion_.time(r);
+    if (t < settings_.block * double(from) || t >= settings_.block * double(to)) continue;
+    squares += left[r] * left[r];
+    ++rows;
+  }
+  return squares;
+}
+
+FoundChange ChangeSearch::scanned(const ScannedEffect& c, const Background& b, std::size_t step) const {
+  FoundChange best{c.effect, 0, blocks_, {}, c.inflation, 0, {}};
+  const EffectSums sums(motion_, effect_columns(motion_, c.effect), b, settings_.block, c.effect.ramp);
+  for (std::size_t k = margin_; k + margin_ < blocks_; k += step) {
+    EffectSums::Score s = sums.score(k, blocks_, b);
+    if (s.gain / c.inflation <= best.gain) continue;
+    best.from = k;
+    best.gain = s.gain / c.inflation;
+    best.score = std::move(s);
+  }
+  return best;
+}
+
+std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
+  std::vector<FoundChange> all;
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    if (progress_ && !progress_(double(i) / double(candidates_.size()), candidates_[i].effect.name()))
+      throw Cancelled();
+    all.push_back(scanned(candidates_[i], b, 5));
+  }
+  // By what they explain: the inflation of one may be chance.
+  const auto most = std::max_element(all.begin(), all.end(), [](const FoundChange& x, const FoundChange& y) {
+    return x.score.gain < y.score.gain;
+  });
+  if (most == all.end() || most->score.values.size() == 0) return std::nullopt;
+  // Of those that explain it alike one with fewer values.
+  const double alike = settings_.alike * most->score.gain;
+  const FoundChange* simplest = &*most;
+  for (const FoundChange& f : all)
+    if (f.score.gain >= alike && f.score.values.size() > 0 &&
+        f.score.values.size() < simplest->score.values.size())
+      simplest = &f;
+  FoundChange found = *simplest;
+  for (const FoundChange& f : all)
+    if (f.score.gain >= alike && f.effect.id != found.effect.id) {
+      const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
+      if (!told) found.alike.push_back(f.effect.id);
+    }
+  return found;
+}
+
+bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
+  double rows = 0;
+  const double squares = left_after(b, f.from, f.to, rows), explained = f.score.gain * b.variance;
+  if (explained < settings_.least_explained * squares) return false;
+  if (explained < rows * model_.least_change * model_.least_change) return false;
+  // More noise than in the healthy records counts against it.
+  const double all = b.left().squaredNorm(), left = std::max(all - explained, 0.0);
+  const double noisier = std::max(1.0, left / double(motion_.size()) / b.variance);
+  return f.gain / noisier > threshold(f.score.values.size());
+}
+
+void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
+  if (!f.effect.has_order()) return;
+  const double least = f.effect.least_order();
+  for (const double step : {0.1, 0.02}) {
+    const double middle = f.effect.shape;
+    for (int i = -5; i <= 5; ++i) {
+      ChangeEffect e = f.effect;
+      e.shape = middle + step * i;
+      if (e.shape < least) continue;
+      const EffectSums sums(motion_, effect_columns(motion_, e), b, settings_.block, false);
+      EffectSums::Score s = sums.score(f.from, f.to, b);
+      if (s.gain <= f.score.gain) continue;
+      f.effect = e;
+      f.score = std::move(s);
+    }
+  }
+}
+
+void ChangeSearch::refine(FoundChange& f, const Background& b) const {
+  refine_order(f, b);
+  const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+  f.score = sums.score(f.from, f.to, b);
+  for (std::size_t k = margin_; k + margin_ / 2 < f.to; ++k) {
+    EffectSums::Score s = sums.score(k, f.to, b);
+    if (s.gain <= f.score.gain) continue;
+    f.from = k;
+    f.score = std::move(s);
+  }
+  f.gain = f.score.gain / f.inflation;
+}
+
+/// An end, where the record with it is told clearly better.
+void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
+  const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+  FoundChange ended = f;
+  for (int round = 0; round < 3; ++round) {
+    for (std::size_t k = ended.from + margin_ / 2; k + margin_ / 2 < blocks_; ++k) {
+      EffectSums::Score s = sums.score(ended.from, k, b);
+      if (s.gain <= ended.score.gain) continue;
+      ended.to = k;
+      ended.score = std::move(s);
+    }
+    if (ended.to == f.to) return;
+    refine(ended, b);
+  }
+  const double more = (ended.score.gain - f.score.gain) / f.inflation;
+  if (more > threshold(1) && ended.score.gain > (1 + 5 * settings_.least_further) * f.score.gain) f = ended;
+}
+
+/// Whether it may have begun before the record did.
+bool ChangeSearch::begins_before(const FoundChange& f, const Background& b) const {
+  Change change;
+  onset_interval(f, b, change);
+  return change.since_from <= motion_.start;
+}
+
+/// The record as a whole has another value of the effect: a nuisance from then on.
+void ChangeSearch::differ(FoundChange f) {
+  different_.push_back(f.effect.name());
+  f.from = 0;
+  f.to = blocks_ + 1;
+  const Background with = background({f});
+  first_.nuisances = with.columns;
+  first_.spread = with.spread;
+}
+
+/// A change of its own, not what the shape of an earlier one leaves.
+bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChange>& found) const {
+  for (const FoundChange& f : found) {
+    const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
+    const double least = apart < settings_.same_event ? settings_.least_beside : settings_.least_further;
+    if (next.gain < least * f.gain) return false;
+  }
+  return std::none_of(beside_.begin(), beside_.end(), [&](const FoundChange& f) {
+    const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
+    return apart < settings_.same_event && next.gain < settings_.least_with_other * f.gain;
+  });
+}
+
+/// A change that another takes back later, the same effect with the opposite value, is one with an end.
+void ChangeSearch::unite(std::vector<FoundChange>& found) const {
+  for (FoundChange& f : found)
+    for (auto later = found.begin(); later != found.end(); ++later) {
+      const bool same = f.effect.name() == later->effect.name() && !f.effect.ramp;
+      if (!same || f.from >= later->from || f.to <= later->from) continue;
+      if ((f.score.values + later->score.values).norm() > settings_.undone * f.score.values.norm()) continue;
+      f.to = later->from;
+      found.erase(later);
+      return;
+    }
+}
+
+std::vector<FoundChange> ChangeSearch::run() {
+  std::vector<FoundChange> found;
+  for (int k = 0; k < settings_.most_changes; ++k) {
+    const Background b = background(found);
+    std::optional<FoundChange> next = best(b);
+    if (!next) break;
+    refine(*next, b);
+    if (!believed(*next, b)) break;
+    if (begins_before(*next, b)) {
+      differ(*next);
+      continue;
+    }
+    if (!further(*next, found)) break;
+    find_end(*next, b);
+    found.push_back(*next);
+    // Each anew beside the others.
+    for (std::size_t i = 0; found.size() > 1 && i < found.size(); ++i) {
+      std::vector<FoundChange> others = found;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      refine(found[i], background(others));
+    }
+    unite(found);
+  }
+  return found;
+}
+
+bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
+  if (all.empty()) return true;
+  // So many at once are rather one of another shape.
+  if (all.size() >= static_cast<std::size_t>(settings_.most_changes)) return false;
+  std::size_t from = blocks_;
+  for (const FoundChange& f : all) from = std::min(from, f.from);
+  const Background before = background({}), after = background(all);
+  double rows = 0, rows_before = 0;
+  const double left = left_after(after, from, blocks_, rows);
+  const double squares = left_after(before, from, blocks_, rows);
+  const double noise =
+      std::max(left_after(after, 0, from, rows_before) / std::max(rows_before, 1.0), before.variance);
+  return left - 2 * noise * rows < settings_.unknown_left * squares;
+}
+
+/// A residual that grows and follows no effect.
+std::optional<Change> ChangeSearch::louder() const {
+  const Eigen::VectorXd left = background({}).left();
+  std::vector<double> begin, squares, rows;  // of windows
+  for (Eigen::Index r = 0; r < left.size(); ++r) {
+    if (begin.empty() || motion_.time(r) - begin.back() >= settings_.window) {
+      begin.push_back(motion_.time(r));
+      squares.push_back(0);
+      rows.push_back(0);
+    }
+    squares.back() += left[r] * left[r];
+    ++rows.back();
+  }
+  const double total = left.squaredNorm(), count = double(left.size());
+  double before = 0, rows_before = 0, most = 0;
+  std::optional<Change> change;
+  for (std::size_t k = 1; k + 1 < begin.size(); ++k) {
+    before += squares[k - 1];
+    rows_before += rows[k - 1];
+    const double a = before / rows_before, b = (total - before) / (count - rows_before);
+    // Twice the log likelihood ratio of another variance from here on.
+    const double gain =
+        count * std::log(total / count) - rows_before * std::log(a) - (count - rows_before) * std::log(b);
+    if (begin[k] < settings_.margin || gain <= most) continue;
+    most = gain;
+    change.reset();
+    if (b < settings_.unknown_louder * std::max(a, model_.noise * model_.noise)) continue;
+    change.emplace();
+    change->effect = "unknown";
+    change->gain = gain;
+    change->since = motion_.start + begin[k];
+    change->since_from = change->since - settings_.window;
+    change->since_to = change->since + settings_.window;
+    change->error_before = change->error_after = std::sqrt(b);
+  }
+  return change;
+}
+
+void ChangeSearch::onset_interval(const FoundChange& f, const Background& b, Change& change) const {
+  const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+  double rows = 0;
+  // What the shape of the effect leaves widens it like noise.
+  const double squares = left_after(b, f.from, f.to, rows) - f.score.gain * b.variance;
+  const double noisier = std::max(1.0, squares / std::max(rows, 1.0) / b.variance);
+  const double drop = settings_.onset_drop * f.inflation * noisier;
+  std::size_t low = f.from, high = f.from;
+  for (std::size_t k = 0; k < f.to; ++k) {
+    if (sums.score(k, f.to, b).gain < f.score.gain - drop) continue;
+    low = std::min(low, k);
+    high = std::max(high, k);
+  }
+  if (low <= margin_) low = 0;
+  const double since = settings_.block * double(f.from);
+  change.since = motion_.start + since;
+  change.since_from =
+      motion_.start + std::max(0.0, settings_.block * double(low) - settings_.block - settings_.onset_least);
+  change.since_to = motion_.start + settings_.block * double(high) + settings_.block + settings_.onset_least;
+}
+
+Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& all, bool linear) const {
+  std::vector<FoundChange> others;
+  for (const FoundChange& o : all)
+    if (o.from != f.from || o.effect.name() != f.effect.name()) others.push_back(o);
+  const Background b = background(others), with = background(all);
+  Change change;
+  change.effect = f.effect.id;
+  change.alike = f.alike;
+  change.gain = f.gain;
+  onset_interval(f, b, change);
+  // Changes of one event hold each other's onset.
+  for (const FoundChange& o : others)
+    if (std::fabs(double(o.from) - double(f.from)) * settings_.block < settings_.same_event) {
+      change.since_from -= settings_.same_event / 2;
+      change.since_to += settings_.same_event / 2;
+      break;
+    }
+  if (f.to < blocks_) change.until = motion_.start + settings_.block * double(f.to);
+  double rows = 0;
+  change.error_before = std::sqrt(left_after(b, f.from, f.to, rows) / std::max(rows, 1.0));
+  const double after = left_after(with, f.from, f.to, rows) / std::max(rows, 1.0);
+  change.error_after = std::sqrt(after);
+  Eigen::VectorXd values = f.score.values;
+  Eigen::MatrixXd covariance = f.score.covariance * f.inflation * std::max(1.0, after / b.variance);
+  covariance.diagonal().array() += std::pow(settings_.model_error * values.norm(), 2);
+  const double span = settings_.block * double(f.to - f.from);
+  if (f.effect.ramp) {
+    values *= span;
+    covariance *= span * span;
+  }
+  change.size = change_size(f.effect, values, covariance, linear);
+  if (f.effect.ramp) change.size.push_back({"span", "s", {span, settings_.block}});
+  return change;
+}
+
+}  // namespace backlash::identification

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which changes one channel of a record shows: the best effect and onset, again and again beside those that
+// were found, as long as they are believed.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/identification/changes/changes.h"
+#include "change_scan.h"
+
+namespace backlash::identification {
+
+struct FoundChange {
+  ChangeEffect effect;
+  std::size_t from = 0, to = 0;  // blocks
+  EffectSums::Score score;
+  double inflation = 1, gain = 0;
+  std::vector<std::string> alike;
+};
+
+struct ScannedEffect {
+  ChangeEffect effect;
+  double inflation = 1;
+};
+
+/// One channel of a record against a healthy machine.
+class ChangeSearch {
+ public:
+  /// `beside`: changes that another channel shows, of which this one may show any share.
+  ChangeSearch(const HealthyModel& model, const SampledMotion& motion, std::vector<ScannedEffect> candidates,
+               const std::vector<FoundChange>& beside, const ChangeSettings& settings,
+               const Progress& progress);
+
+  std::vector<FoundChange> run();
+  double threshold(Eigen::Index values) const;
+  std::size_t windows() const;
+  Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
+  bool explained(const std::vector<FoundChange>& all) const;
+  std::optional<Change> louder() const;
+  const std::vector<std::string>& different() const { return different_; }
+  /// Values of the columns that stand beside, `found` being so.
+  std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
+
+ private:
+  Background background(const std::vector<FoundChange>& others) const;
+  Eigen::MatrixXd found_columns(const FoundChange& f) const;
+  std::optional<FoundChange> best(const Background& b) const;
+  FoundChange scanned(const ScannedEffect& c, const Background& b, std::size_t step) const;
+  bool believed(const FoundChange& f, const Background& b) const;
+  bool begins_before(const FoundChange& f, const Background& b) const;
+  void differ(FoundChange f);
+  bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
+  void refine(FoundChange& f, const Background& b) const;
+  void refine_order(FoundChange& f, const Background& b) const;
+  void find_end(FoundChange& f, const Background& b) const;
+  void unite(std::vector<FoundChange>& found) const;
+  void onset_interval(const FoundChange& f, const Background& b, Change& change) const;
+  double left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const;
+
+  const HealthyModel& model_;
+  const SampledMotion& motion_;
+  const std::vector<ScannedEffect> candidates_;
+  const ChangeSettings& settings_;
+  const Progress& progress_;
+  const std::vector<FoundChange> beside_;
+  Whitened first_;
+  Eigen::Index beside_column_ = 0;      // the first of what stands beside
+  std::vector<std::string> different_;  // effects that the record has from its beginning
+  const std::size_t margin_, blocks_;
+};
+
+}  // namespace backlash::identification
