@@ -65,8 +65,8 @@ int exit_code(const report::Day& day) {
 }
 
 int run(const Arguments& arguments) {
-  const std::string folder = arguments.positional(0), out = arguments.text("out"),
-                    json = arguments.text("json");
+  const std::string& folder = arguments.positional(0);
+  const std::string out = arguments.text("out"), json = arguments.text("json");
   check_output(out, {});
   if (!json.empty()) check_output(json, {out});
   const report::Day day =

@@ -31,7 +31,8 @@ Command command() {
   };
   c.notes =
       "Records need motor_torque and motor_position, of two inertias also load_position where the backlash "
-      "is asked; ordinary motion will do, but must be no faster than in the healthy records. Warm-up as in the healthy records, and slow drift of friction by up to 10 %, is no "
+      "is asked; ordinary motion will do, but must be no faster than in the healthy records. Warm-up as in "
+      "the healthy records, and slow drift of friction by up to 10 %, is no "
       "change. Sizes are what was added at the onset. A change that no effect explains is called unknown.";
   c.examples = {
       "detect_changes --rig config/ur5_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
