@@ -39,7 +39,7 @@ Command command() {
       "are all "
       "that is known of the place: no walls, no collisions of the arm with itself. Watch the motion in a "
       "simulation of the cell, or slowly, before it is run.";
-  c.examples = {"plan_motion config/two_link_arm/two_link_arm.yaml --acceleration 5 --out motion.yaml"};
+  c.examples = {"plan_motion config/two_link_arm/two_link_arm.yaml --out motion.yaml"};
   c.exit_codes =
       "  0   done\n  3   the gap of a joint cannot be shown within the limits; the motion for all others is "
       "written\n";
