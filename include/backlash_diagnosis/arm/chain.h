@@ -63,8 +63,8 @@ std::string read_urdf(const std::string& path);
 Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints);
 Chain chain_of_urdf(const std::string& text, const std::string& name, const std::vector<std::string>& joints);
 
-/// What <limit> of a joint says; NaN where it does not: a revolute joint without lower < upper, a continuous
-/// one (which has no such limits), velocity or effort that are not > 0.
+/// What the limit element of a joint says; NaN where it does not: a revolute joint without lower < upper, a
+/// continuous one (which has no such limits), velocity or effort that are not > 0.
 struct JointLimits {
   double lower, upper;  // rad
   double velocity;      // rad/s

@@ -17,10 +17,10 @@ struct MotionLimits {
   double start = 0;             // rad, where the joint is before
 };
 
-/// The URDF's <limit>, tighter where the rig file's `motion_limits` of the joint says so, which also has the
-/// acceleration and, of a continuous joint, the position; `acceleration` [rad/s^2] where the file has none. A
-/// joint that is held stays there. Throws MissingInput; BadData (file, line, key, value, limit) for a limit
-/// that nobody states, one beyond the URDF's, a start outside.
+/// The URDF's limit element, tighter where the rig file's `motion_limits` of the joint says so, which also
+/// has the acceleration and, of a continuous joint, the position; `acceleration` [rad/s^2] where the file has
+/// none. A joint that is held stays there. Throws MissingInput; BadData (file, line, key, value, limit) for a
+/// limit that nobody states, one beyond the URDF's, a start outside.
 std::vector<MotionLimits> load_motion_limits(const GearedArm& arm, std::optional<double> acceleration);
 
 }  // namespace backlash::geared_arm

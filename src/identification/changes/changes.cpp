@@ -130,15 +130,16 @@ void tell_sides(const ChannelChanges& torque, const ChannelChanges* deflection, 
   }
 }
 
-/// What follows no effect in either channel is told once.
-void add_deflection(const Changes& more, const ChangeSettings& settings, Changes& all) {
-  const std::vector<Change> torque = all.changes;
+/// Beside a change of the torque a deflection that follows no effect is no change of its own: the teeth are
+/// loaded otherwise from then on.
+void add_deflection(const Changes& more, Changes& all) {
+  const bool alone = all.changes.empty();
   for (const Change& c : more.changes) {
-    const bool told = std::any_of(torque.begin(), torque.end(), [&](const Change& t) {
-      return c.effect == "unknown" && t.effect == c.effect &&
-             std::fabs(t.since - c.since) < 2 * settings.window;
-    });
-    if (!told) all.changes.push_back(c);
+    if (alone || c.effect != "unknown")
+      all.changes.push_back(c);
+    else
+      all.warnings.push_back("since " + to_text(std::round(c.since)) +
+                             " s the deflection follows no effect, beside the change of the torque");
   }
   all.healthy_terms.insert(all.healthy_terms.end(), more.healthy_terms.begin(), more.healthy_terms.end());
   all.different.insert(all.different.end(), more.different.begin(), more.different.end());
@@ -173,7 +174,7 @@ Changes changes_of_two(const model::Rig& rig, double behind, const std::vector<r
     const HealthyModel model = commission_healthy(healthy, sampling, settings);
     const ChannelChanges deflection = search(model, torque.found);
     tell_sides(torque, &deflection, compliance_of(model), settings, all);
-    add_deflection(deflection.told, settings, all);
+    add_deflection(deflection.told, all);
   } catch (const CannotIdentify& error) {
     tell_sides(torque, nullptr, kNaN, settings, all);
     all.warnings.push_back("changes of the backlash cannot be told: " + std::string(error.what()));

@@ -195,7 +195,9 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
   motion.row_interval = dt * double(stride);
   const bool torque = sampling.channel == ChangeChannel::torque;
   const double usable_time = double(motion.rows.size()) * motion.row_interval;
-  const double shortest = torque ? settings.shortest : settings.shortest_pressed;
+  const double shortest = !torque         ? settings.shortest_pressed
+                          : sampling.mesh ? settings.shortest_of_two
+                                          : settings.shortest;
   if (usable_time < shortest)
     throw CannotIdentify(
         record.name + " moves for " + to_text(usable_time) + " s in a way that can be judged" +

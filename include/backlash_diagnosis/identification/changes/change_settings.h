@@ -27,6 +27,7 @@ struct ChangeSettings {
   double gap = 2.5;             // intervals between samples that are none. Choice
   double longest_gap = 600;     // s. Choice: the machine has another temperature then
   double shortest = 30;         // s, of usable motion in a record. Choice
+  double shortest_of_two = 15;  // s, the same of two inertias, between changes of the flank. Choice
   double shortest_pressed = 8;  // s, the same with a flank pressed for certain, for the deflection. Choice
 
   double least_load = 0.05;  // - of the largest load of the teeth: less presses no flank for certain. Choice
