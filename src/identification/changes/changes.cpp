@@ -130,16 +130,13 @@ void tell_sides(const ChannelChanges& torque, const ChannelChanges* deflection, 
   }
 }
 
-/// Beside a change of the torque a deflection that follows no effect is no change of its own: the teeth are
-/// loaded otherwise from then on.
+/// A deflection that follows no effect is no change by itself: teeth that are loaded otherwise do that too.
 void add_deflection(const Changes& more, Changes& all) {
-  const bool alone = all.changes.empty();
   for (const Change& c : more.changes) {
-    if (alone || c.effect != "unknown")
+    if (c.effect != "unknown")
       all.changes.push_back(c);
     else
-      all.warnings.push_back("since " + to_text(std::round(c.since)) +
-                             " s the deflection follows no effect, beside the change of the torque");
+      all.warnings.push_back("since " + to_text(std::round(c.since)) + " s the deflection follows no effect");
   }
   all.healthy_terms.insert(all.healthy_terms.end(), more.healthy_terms.begin(), more.healthy_terms.end());
   all.different.insert(all.different.end(), more.different.begin(), more.different.end());
