@@ -130,18 +130,22 @@ void tell_sides(const ChannelChanges& torque, const ChannelChanges* deflection, 
   }
 }
 
-/// A deflection that follows no effect is no change by itself: teeth that are loaded otherwise do that too.
 void add_deflection(const Changes& more, Changes& all) {
-  for (const Change& c : more.changes) {
-    if (c.effect != "unknown")
-      all.changes.push_back(c);
-    else
-      all.warnings.push_back("since " + to_text(std::round(c.since)) + " s the deflection follows no effect");
-  }
+  all.changes.insert(all.changes.end(), more.changes.begin(), more.changes.end());
   all.healthy_terms.insert(all.healthy_terms.end(), more.healthy_terms.begin(), more.healthy_terms.end());
   all.different.insert(all.different.end(), more.different.begin(), more.different.end());
   all.warnings.insert(all.warnings.end(), more.warnings.begin(), more.warnings.end());
   all.deflection_noise = more.noise;
+}
+
+/// What follows no effect is no change of two inertias: crossings of the gap, more of them in another task,
+/// do that too (simulation).
+void warn_of_unknown(Changes& all) {
+  const auto unknown = [](const Change& c) { return c.effect == "unknown"; };
+  for (const Change& c : all.changes)
+    if (unknown(c))
+      all.warnings.push_back("since " + to_text(std::round(c.since)) + " s the record follows no effect");
+  all.changes.erase(std::remove_if(all.changes.begin(), all.changes.end(), unknown), all.changes.end());
 }
 
 /// Two inertias: the torque first, whose changes may load the teeth otherwise; then the deflection.
@@ -189,12 +193,13 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
   for (const record::Record& r : healthy) all.push_back(&r);
   const MotionSampling sampling = sampling_of(all, settings);
   Changes out;
-  if (rig.mesh.rigid)
-    out = changes_in(commission_healthy(healthy, sampling, settings), healthy, record, {}, rig.linear,
-                     settings, progress)
-              .told;
-  else
+  if (rig.mesh.rigid) {
+    const HealthyModel model = commission_healthy(healthy, sampling, settings);
+    out = changes_in(model, healthy, record, {}, rig.linear, settings, progress).told;
+  } else {
     out = changes_of_two(rig, behind, healthy, record, sampling, settings, progress);
+    warn_of_unknown(out);
+  }
   std::sort(out.changes.begin(), out.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });
   return out;
