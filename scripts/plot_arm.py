@@ -4,7 +4,6 @@
 
 usage: plot_arm.py RECORD.csv REPORT.json [RECORD.csv REPORT.json]... --out PICTURE
 """
-import csv
 import os
 import sys
 
@@ -13,18 +12,6 @@ import plotting  # noqa: E402
 
 plt = plotting.page_pyplot()
 POINTS = 6000  # per panel
-
-
-def load(path):
-    try:
-        with open(path, newline="") as stream:
-            rows = csv.reader(stream)
-            names = next(rows)
-            return dict(zip(names, zip(*([float(cell) for cell in row] for row in rows))))
-    except OSError as error:
-        plotting.fail(66, error)
-    except (StopIteration, ValueError) as error:
-        plotting.fail(65, "%s: not a record of an arm: %r" % (path, error))
 
 
 def answer(joint):
@@ -55,7 +42,8 @@ def main():
     arguments = parser.parse_args()
     if len(arguments.files) % 2:
         parser.error("every record needs its report")
-    pairs = [(load(arguments.files[i]), plotting.load_json(arguments.files[i + 1], "a report of diagnose_record"))
+    pairs = [(plotting.load_columns(arguments.files[i], "a record of an arm"),
+              plotting.load_json(arguments.files[i + 1], "a report of diagnose_record"))
              for i in range(0, len(arguments.files), 2)]
     joints = max(len(report.get("joints", ())) for _, report in pairs)
     if joints == 0:

@@ -4,7 +4,6 @@
 
 usage: plot_motion.py PLAN.json TRAJECTORY.csv --out PICTURE   (of plan_motion --json and --csv)
 """
-import csv
 import os
 import sys
 
@@ -14,18 +13,6 @@ import plotting  # noqa: E402
 plt = plotting.page_pyplot()
 FLANKS = {-1: "tab:orange", 1: "tab:blue"}
 STATUS = {"shown": "shown", "unconfirmed": "not confirmed", "not_found": "no motion found", "impossible": "cannot be shown"}
-
-
-def load(path):
-    try:
-        with open(path, newline="") as stream:
-            rows = csv.reader(stream)
-            names = next(rows)
-            return dict(zip(names, zip(*([float(cell) for cell in row] for row in rows))))
-    except OSError as error:
-        plotting.fail(66, error)
-    except (StopIteration, ValueError) as error:
-        plotting.fail(65, "%s: not a trajectory: %r" % (path, error))
 
 
 def draw_angle(axes, time, angle, name, joint):
@@ -58,7 +45,7 @@ def main():
     parser.add_argument("--out", required=True)
     arguments = parser.parse_args()
     plan = plotting.load_json(arguments.plan, "a plan of plan_motion")
-    trajectory = load(arguments.trajectory)
+    trajectory = plotting.load_columns(arguments.trajectory, "a trajectory")
     joints = plan.get("joints", {})
     if not joints or any(name + "/mesh_torque" not in trajectory for name in joints):
         plotting.fail(65, "%s: not the trajectory of %s" % (arguments.trajectory, arguments.plan))

@@ -5,6 +5,7 @@ Exit codes of all of them: 0 done, 64 usage, 65 not the data, 66 data missing, 7
 """
 import argparse
 import base64
+import csv
 import io
 import json
 import os
@@ -55,6 +56,19 @@ def load_yaml(path, what):
     except OSError as error:
         fail(66, error)
     except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        fail(65, "%s: not %s: %r" % (path, what, error))
+
+
+def load_columns(path, what):
+    """The columns of a CSV by name, all numbers."""
+    try:
+        with open(path, newline="", encoding="utf-8") as stream:
+            rows = csv.reader(stream)
+            names = next(rows)
+            return dict(zip(names, zip(*([float(cell) for cell in row] for row in rows))))
+    except OSError as error:
+        fail(66, error)
+    except (StopIteration, ValueError) as error:
         fail(65, "%s: not %s: %r" % (path, what, error))
 
 
