@@ -16,8 +16,6 @@
 namespace backlash::diagnosis {
 namespace {
 
-constexpr double kFinest =
-    6e-7;  // m, half width: flanks are no smoother (ground, Ra 0.3 um), equations no finer
 constexpr double kErrors = 2;          // half width in standard errors, 95 %
 constexpr double kErrorsAlone = 2.1;   // of torque alone, by priors that are choices: simulation
 constexpr double kMostLeftOut = 0.34;  // of the windows: choice
@@ -57,7 +55,12 @@ void check(const WaveformSettings& s) {
       throw InvalidParameter("waveform.link_friction", s.link_friction, "must be >= 0");
   }
   require("contact_stiffness", s.contact_stiffness);
-  require("contact_loss", s.contact_loss);
+  if (!std::isnan(s.contact_loss)) require("contact_loss", s.contact_loss);
+  if (!std::isnan(s.contact_damping)) require("contact_damping", s.contact_damping);
+  if (!(s.contact_exponent >= 1 && s.contact_exponent <= 1.5))
+    throw InvalidParameter("waveform.contact_exponent", s.contact_exponent, "must be 1 to 1.5");
+  if (s.angular && s.base_radius != 1)
+    throw InvalidParameter("waveform.base_radius", s.base_radius, "must be 1 of a mesh of angles");
   require("friction_speed", s.friction_speed);
   require("sensor_gain", s.sensor_gain);
   if (!(s.dry_friction >= 0)) throw InvalidParameter("waveform.dry_friction", s.dry_friction, "must be >= 0");
@@ -65,7 +68,7 @@ void check(const WaveformSettings& s) {
 
 /// From what the file says, with the scale that its values have in common.
 double deviations(const WaveformSolution& s, std::size_t k) {
-  const double common = s.common_scale * kScalePower[k] / s.priors[k].spread;
+  const double common = s.common_scale * s.priors[k].power / s.priors[k].spread;
   return std::fabs(s.z[k]) / std::hypot(1, common);
 }
 
@@ -108,9 +111,10 @@ void refuse_waveform(const WaveformSolution& s) {
     throw Refusal{Status::out_of_domain,
                   "the record fits only a machine far from that of the rig file: " + value_text(s, worst)};
   if (s.rival_cost < kRivalCost &&
-      2 * std::fabs(s.rival - s.half_gap) > std::max(kFinest, 2 * kRivalApart * s.half_gap))
-    throw Refusal{Status::ambiguous, fmt::format("backlash of {:.4g} m and of {:.4g} m fit the record alike",
-                                                 2 * s.half_gap, 2 * s.rival)};
+      2 * std::fabs(s.rival - s.half_gap) > std::max(s.finest, 2 * kRivalApart * s.half_gap))
+    throw Refusal{Status::ambiguous,
+                  fmt::format("backlash of {:.4g} {} and of {:.4g} {} fit the record alike", 2 * s.half_gap,
+                              s.unit, 2 * s.rival, s.unit)};
 }
 
 namespace {
@@ -120,21 +124,21 @@ double error_of(const WaveformSolution& s, std::size_t k) {
   return s.told[k] * s.priors[k].spread * (s.priors[k].factor ? s.values[k] : 1);
 }
 
-std::vector<ContradictedValue> contradicted(const WaveformSolution& s) {
+std::vector<ContradictedValue> contradicted(const WaveformSolution& s, const WaveformSettings& settings) {
   std::vector<ContradictedValue> found;
   for (std::size_t k = kHalfGap + 1; k <= kSensorGain; ++k)
     if (deviations(s, k) > kFar && std::fabs(s.z[k]) > kErrorsFar * s.told[k])
       found.push_back({waveform_value_name(static_cast<int>(k)),
-                       waveform_quantities()[k - 1].unit,  // both start with the damping of the motor
+                       waveform_quantities()[k - 1].unit_in(settings),  // both start with the motor's damping
                        s.priors[k].value, s.values[k], error_of(s, k)});
   return found;
 }
 
-std::string message_of(const WaveformSolution& s, bool position) {
+std::string message_of(const WaveformSolution& s, const std::vector<ContradictedValue>& far, bool position) {
   std::string text = fmt::format("fitted to {} of {} reversals, {}", s.windows - s.left_out, s.windows,
                                  position ? "torque and position" : "torque alone");
   if (!position) text += ": limited by the declared stiffness of the sensor and by inertias";
-  const std::string wrong = contradiction_text(contradicted(s));
+  const std::string wrong = contradiction_text(far);
   return wrong.empty() ? text : text + "; " + wrong;
 }
 
@@ -155,16 +159,18 @@ void fill(Estimate& e, const WaveformSolution& s, const WaveformSettings& settin
   e.backlash = 2 * s.half_gap;
   const double half = (position ? kErrors : kErrorsAlone) * s.log_error;
   const double below = e.backlash * (1 - std::exp(-half)), above = e.backlash * (std::exp(half) - 1);
-  e.lower = std::max(0.0, e.backlash - std::hypot(below, kFinest));
-  e.upper = e.backlash + std::hypot(above, kFinest);
+  e.lower = std::max(0.0, e.backlash - std::hypot(below, s.finest));
+  e.upper = e.backlash + std::hypot(above, s.finest);
   e.backlash_angle = e.backlash / per_angle;
   e.angle_lower = e.lower / per_angle, e.angle_upper = e.upper / per_angle;
+  const bool some = e.lower > 0;
+  if (settings.angular) e.backlash = e.lower = e.upper = kNaN;
   if (!position) e.declared = below / per_angle;  // nearly all of it, by the symmetry
   e.from_record = e.fits_machine = true;
-  e.message = message_of(s, position);
-  e.declared_wrong = contradicted(s);
-  e.status = e.lower > 0 ? Status::ok : Status::below_range;
-  if (e.lower > 0) return;
+  e.declared_wrong = contradicted(s, settings);
+  e.message = message_of(s, e.declared_wrong, position);
+  e.status = some ? Status::ok : Status::below_range;
+  if (some) return;
   e.message = "no more play than equations of rigid flanks can tell; " + e.message;
   e.backlash = e.backlash_angle = kNaN;
 }

@@ -34,7 +34,7 @@ WaveformSettings after(const WaveformSettings& before, const WaveformSolution& s
   Eigen::MatrixXd c(count, count);
   Eigen::VectorXd u(count);
   for (int i = 0; i < count; ++i) {
-    u[i] = kScalePower[of_fit(i)];
+    u[i] = s.priors[static_cast<std::size_t>(of_fit(i))].power;
     for (int j = 0; j < count; ++j) {
       const int a = of_fit(i), b = of_fit(j);
       c(i, j) = s.covariance(a, b) * s.priors[static_cast<std::size_t>(a)].spread *
@@ -95,9 +95,11 @@ const std::vector<WaveformQuantity>& waveform_quantities() {
       {"output_stiffness", "N m/rad", "output stiffness", true, 1, &S::output_stiffness,
        &W::output_stiffness},
       {"output_damping", kDamping, "output damping", true, 1, &S::output_damping, &W::output_damping},
-      {"contact_stiffness", "N/m^1.5", "contact stiffness", true, 1.5, &S::contact_stiffness,
-       &W::contact_stiffness},
-      {"contact_loss", "s/m", "contact loss", true, 1, &S::contact_loss, &W::contact_loss},
+      {"contact_stiffness", "N/m^n", "contact stiffness", true, kNaN, &S::contact_stiffness,
+       &W::contact_stiffness, "N m/rad^n"},
+      {"contact_loss", "s/m", "contact loss", true, 1, &S::contact_loss, &W::contact_loss, "s/rad"},
+      {"contact_damping", "N s/m", "contact damping", true, 1, &S::contact_damping, &W::contact_damping,
+       kDamping},
       {"load_inertia", kInertia, "link inertia", true, 1, &S::link_inertia, &W::link_inertia},
       {"load_viscous", kDamping, "link damping", true, 1, &S::link_damping, &W::link_damping},
       {"load_coulomb", "N m", "dry friction of the link", false, 0, &S::link_friction, &W::link_friction},
@@ -106,6 +108,10 @@ const std::vector<WaveformQuantity>& waveform_quantities() {
       {"sensor_time_constant", "s", "time constant of the sensor", false, 0, &S::sensor_time_constant,
        &W::sensor_time_constant}};
   return table;
+}
+
+double scale_power(const WaveformQuantity& quantity, const WaveformSettings& settings) {
+  return quantity.at == &WaveformSettings::contact_stiffness ? settings.contact_exponent : quantity.power;
 }
 
 WaveformCommissioning commission_waveform(const std::vector<record::Record>& records,

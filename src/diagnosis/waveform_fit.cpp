@@ -54,8 +54,10 @@ WaveformFit::WaveformFit(const WaveformData& data, const WaveformPriors& priors,
 /// The inverse of 1 + common^2 w w^T, w the symmetry in spreads (Sherman and Morrison).
 MatrixXd waveform_precision(const WaveformPriors& priors, double common) {
   VectorXd w = VectorXd::Zero(kGlobalValues);
-  for (int k = kHalfGap + 1; k < kGlobalValues; ++k)
-    w[k] = kScalePower[k] * common / priors[static_cast<std::size_t>(k)].spread;
+  for (int k = kHalfGap + 1; k < kGlobalValues; ++k) {
+    const WaveformPrior& prior = priors[static_cast<std::size_t>(k)];
+    w[k] = prior.power * common / prior.spread;
+  }
   const double share = 1 / (1 + w.squaredNorm());
   return MatrixXd::Identity(kGlobalValues, kGlobalValues) - share * w * w.transpose();
 }
@@ -305,7 +307,7 @@ std::vector<double> WaveformFit::residual(std::size_t window, WaveformChannel ch
   WaveformMotion motion;
   for (std::size_t i = 0; i < kWaveformSets; ++i) put(point.z, point.starts[window], i, sets);
   const WaveformWindow& w = data_.windows[window];
-  const int length = std::max(stage_.lengths[window], 1);
+  const int length = stage_.lengths[window];
   move_waveform(w, grid(), length, sets, motion);
   const auto& measured = channel == kTorqueChannel ? data_.torque : data_.position;
   const auto& moved = channel == kTorqueChannel ? motion.torque : motion.position;

@@ -21,16 +21,16 @@ struct WaveformPrior {
   double value = 0, spread = 1;
   bool factor = false;
   bool fitted = true;
+  double power = 0;  // in the factor of the symmetry of waveform.h
 };
 using WaveformPriors = std::array<WaveformPrior, kGlobalValues>;
-/// Powers in the factor c of the symmetry of waveform.h. Theory.
-constexpr double kScalePower[kGlobalValues] = {-1, 1, 0, -1, 1, 1, 1, 1, 1, 1, 1, 1.5, 1, 1, 1};
 
 /// Of the fit, in the order of waveform_quantities().
-constexpr int kQuantityPlaces[] = {
-    kMotorDamping,  kDryFriction, kFrictionSpeed,   kSensorStiffness, kSensorDamping,    kMotorInertia,
-    kPinionInertia, kGearInertia, kOutputStiffness, kOutputDamping,   kContactStiffness, kContactLoss,
-    kLinkInertia,   kLinkDamping, kLinkFriction,    kSensorGain,      kSensorLag,        kSensorTime};
+constexpr int kQuantityPlaces[] = {kMotorDamping,    kDryFriction,   kFrictionSpeed,    kSensorStiffness,
+                                   kSensorDamping,   kMotorInertia,  kPinionInertia,    kGearInertia,
+                                   kOutputStiffness, kOutputDamping, kContactStiffness, kContactLoss,
+                                   kContactDamping,  kLinkInertia,   kLinkDamping,      kLinkFriction,
+                                   kSensorGain,      kSensorLag,     kSensorTime};
 
 using WaveformStart = Eigen::Matrix<double, kStartValues, 1>;
 
@@ -63,7 +63,7 @@ Eigen::MatrixXd waveform_precision(const WaveformPriors& priors, double common);
 
 class WaveformFit {
  public:
-  /// `common`: standard deviation of a factor's logarithm, that value k has to the power kScalePower[k].
+  /// `common`: standard deviation of a factor's logarithm, that each value has to its power.
   WaveformFit(const WaveformData& data, const WaveformPriors& priors, double common);
 
   /// How far the fit looks, and what it believes.
@@ -83,7 +83,7 @@ class WaveformFit {
   Eigen::MatrixXd covariance() const;
   const std::vector<int>& fitted() const { return fitted_; }
 
-  /// Measured minus moved, of one window and channel.
+  /// Measured minus moved, of one window that the last stage used, and of one channel.
   std::vector<double> residual(std::size_t window, WaveformChannel channel) const;
 
   /// Value in its unit.

@@ -3,15 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #endif
 
+#include "waveform_lanes.h"
+
 namespace backlash::diagnosis {
 namespace {
 
-using Lanes = double __attribute__((vector_size(8 * kWaveformSets)));
-#define WAVEFORM_INLINE inline __attribute__((always_inline))
+using Lanes = WaveformLanes;
 
 WAVEFORM_INLINE Lanes positive(const Lanes& a) {
   return a > 0 ? a : Lanes{};
@@ -41,11 +43,14 @@ Lanes per_inertia(const Lanes& v) {
   return v > 0 ? 1 / v : Lanes{};
 }
 
-template <WaveformOutput Output>
+/// By what power of their penetration the teeth resist.
+enum class Teeth { line, power, hertz };
+
+template <WaveformOutput Output, Teeth Law>
 struct Train {
   Lanes half_gap, motor_damping, dry, slow, ki, ci, per_jm, per_jp, per_jg, ko, co, contact, loss, slope;
-  Lanes per_jl, link_damping, link_dry;
-  double lever;
+  Lanes per_jl, link_damping, link_dry, contact_damping;
+  double lever, exponent;
 
   explicit Train(const Lanes* v, const WaveformGrid& grid)
       : half_gap(v[kHalfGap]),
@@ -65,7 +70,28 @@ struct Train {
         per_jl(per_inertia(v[kLinkInertia])),
         link_damping(v[kLinkDamping]),
         link_dry(positive(v[kLinkFriction])),
-        lever(grid.base_radius) {}
+        contact_damping(v[kContactDamping]),
+        lever(grid.base_radius),
+        exponent(grid.exponent) {}
+
+  /// At penetration `depth` [m], approaching at `rate` [m/s]: N, no tension.
+  WAVEFORM_INLINE Lanes push(const Lanes& depth, const Lanes& rate) const {
+    if constexpr (Law == Teeth::hertz) return contact * depth * root(depth) * positive(1 + loss * rate);
+    const Lanes spring = Law == Teeth::line ? contact * depth : contact * lanes_power(depth, exponent);
+    const Lanes force = positive(spring * (1 + loss * rate) + contact_damping * rate);
+    return depth > 0 ? force : Lanes{};
+  }
+
+  /// Penetration of one set at rest, m, and its stiffness there, N m/rad.
+  std::pair<double, double> pressed(double torque, int set) const {
+    const double force = torque / lever;
+    if constexpr (Law == Teeth::hertz) {
+      const double depth = std::cbrt(force / contact[set] * force / contact[set]);
+      return {depth, 1.5 * contact[set] * std::sqrt(depth) * lever * lever};
+    }
+    const double depth = std::pow(force / contact[set], 1 / exponent);
+    return {depth, exponent * force / depth * lever * lever};
+  }
 
   /// Of the gear and of the link, rad/s^2.
   WAVEFORM_INLINE void output(const State& s, const Lanes& teeth, State& rate) const {
@@ -84,8 +110,8 @@ struct Train {
   WAVEFORM_INLINE State rate(const State& s, const Lanes& drive) const {
     const Lanes x = lever * (s.qp - s.qg), v = lever * (s.wp - s.wg);
     const Lanes depth = positive(magnitude(x) - half_gap);
-    const Lanes push = lever * contact * depth * root(depth) * positive(1 + loss * (x < 0 ? -v : v));
-    const Lanes teeth = x < 0 ? -push : push;
+    const Lanes pushed = lever * push(depth, x < 0 ? -v : v);
+    const Lanes teeth = x < 0 ? -pushed : pushed;
     const Lanes sensor = ki * (s.qm - s.qp) + ci * (s.wm - s.wp);
     State rate;
     rate.qm = s.wm, rate.wm = (drive + slope * s.qm - motor_damping * s.wm - sensor) * per_jm;
@@ -126,15 +152,14 @@ struct Train {
 
 /// 5 ms before a reversal nothing else moves: the gear of a locked output follows the pinion on its flank; a
 /// free link is driven by it.
-template <WaveformOutput Output>
-State start(const Train<Output>& train, const WaveformWindow& window, const Lanes* v) {
+template <WaveformOutput Output, Teeth Law>
+State start(const Train<Output, Law>& train, const WaveformWindow& window, const Lanes* v) {
   const Lanes load = positive(v[kStartFlank]);
   Lanes depth = {}, share = {};
   for (int i = 0; i < kWaveformSets; ++i) {
     if (!(load[i] > 0)) continue;
-    const double force = load[i] / train.lever;
-    depth[i] = std::cbrt(force / train.contact[i] * force / train.contact[i]);
-    const double stiffness = 1.5 * train.contact[i] * std::sqrt(depth[i]) * train.lever * train.lever;
+    const auto [deep, stiffness] = train.pressed(load[i], i);
+    depth[i] = deep;
     share[i] = Output == WaveformOutput::locked ? stiffness / (stiffness + train.ko[i]) : 1;
   }
   const Lanes off = v[kStartFlank] < 0 ? v[kStartFlank] / train.ki : Lanes{};
@@ -196,13 +221,13 @@ class Drive {
   Lanes delay_, change_;
 };
 
-template <WaveformOutput Output>
+template <WaveformOutput Output, Teeth Law>
 WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   Lanes v[kAllValues];
   for (std::size_t k = 0; k < kAllValues; ++k)
     for (std::size_t i = 0; i < kWaveformSets; ++i) v[k][static_cast<int>(i)] = sets[k][i];
-  const Train<Output> train(v, grid);
+  const Train<Output, Law> train(v, grid);
   State s = start(train, window, v);
   const double h = grid.interval / grid.steps;
   const Drive drive(window, grid, v[kSwitchDelay]);
@@ -232,15 +257,24 @@ WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& 
           lagged(torque, rate, static_cast<int>(k * steps), static_cast<int>(i), sets[kSensorLag][i], h);
 }
 
+template <WaveformOutput Output>
+WAVEFORM_INLINE void move_by_teeth(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+                                   const WaveformSets& sets, WaveformMotion& motion) {
+  if (grid.exponent == kHertzExponent)
+    return move_all<Output, Teeth::hertz>(window, grid, samples, sets, motion);
+  if (grid.exponent == 1) return move_all<Output, Teeth::line>(window, grid, samples, sets, motion);
+  move_all<Output, Teeth::power>(window, grid, samples, sets, motion);
+}
+
 WAVEFORM_INLINE void move_any(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   switch (grid.output) {
     case WaveformOutput::locked:
-      return move_all<WaveformOutput::locked>(window, grid, samples, sets, motion);
+      return move_by_teeth<WaveformOutput::locked>(window, grid, samples, sets, motion);
     case WaveformOutput::link:
-      return move_all<WaveformOutput::link>(window, grid, samples, sets, motion);
+      return move_by_teeth<WaveformOutput::link>(window, grid, samples, sets, motion);
     case WaveformOutput::coupled_link:
-      return move_all<WaveformOutput::coupled_link>(window, grid, samples, sets, motion);
+      return move_by_teeth<WaveformOutput::coupled_link>(window, grid, samples, sets, motion);
   }
 }
 

@@ -39,8 +39,9 @@ enum WaveformValue {
   kGearInertia,       // Jg
   kOutputStiffness,   // Ko, N m/rad
   kOutputDamping,     // Co, N m s/rad
-  kContactStiffness,  // K, N/m^1.5
+  kContactStiffness,  // K, N/m^n
   kContactLoss,       // alpha, s/m
+  kContactDamping,    // c, N s/m
   kLinkInertia,       // Jl, kg m^2
   kLinkDamping,       // cl, N m s/rad
   kLinkFriction,      // N m, < 0 counts as 0
@@ -63,6 +64,7 @@ enum WaveformValue {
   kStartValues = kAllValues - kGlobalValues
 };
 
+constexpr double kHertzExponent = 1.5;      // exponent of the contact that takes the least time
 constexpr double kWaveformRateTime = 1e-3;  // s, of the start values that are rates: choice
 constexpr int kWaveformSets = 8;  // moved at once: two registers of AVX2, so that their waits overlap
 using WaveformSets = std::array<std::array<double, kWaveformSets>, kAllValues>;
@@ -82,6 +84,7 @@ struct WaveformGrid {
   double base_radius = 0;           // m
   bool sensor_with_damper = false;  // the sensor shows T and not the spring's share
   WaveformOutput output = WaveformOutput::locked;
+  double exponent = kHertzExponent;  // of the contact
 };
 
 /// One column per set; all have `samples` rows.

@@ -15,8 +15,8 @@ double waveform_twist(const WaveformSettings& settings, double level);
 /// s, cycle of the motor against the pinion.
 double waveform_ring(const WaveformSettings& settings);
 
-/// For samples at this interval [s].
-WaveformGrid waveform_grid(const WaveformSettings& settings, double interval);
+/// For samples at this interval [s], under a torque of `level` [N m].
+WaveformGrid waveform_grid(const WaveformSettings& settings, double interval, double level);
 
 /// Half of the range, but for rare values; 1 without values.
 double waveform_swing(const std::vector<double>& values);

@@ -58,14 +58,12 @@ class Solver {
     data_.windows = waveform_windows(record, ring_, kMostWindows, free);
     data_.torque = record.column(record::Channel::sensor_torque);
     data_.position = record.column(record::Channel::motor_position);
-    data_.grid = waveform_grid(settings, record.sampling_interval());
-    const double latest = settings.sensor_delay + kLatest * settings.spread.sensor_delay;
-    data_.unseen = std::min(static_cast<int>(std::ceil(latest / data_.grid.interval)),
-                            waveform_lead(ring_, data_.grid.interval) / 2);
     time_ = record.time;
     for (const WaveformWindow& w : data_.windows)
       data_.level +=
           (std::fabs(w.before) + std::fabs(w.after)) / 2 / static_cast<double>(data_.windows.size());
+    data_.grid = waveform_grid(settings, record.sampling_interval(), data_.level);
+    data_.unseen = unseen_samples();
     swing_[kTorqueChannel] = waveform_swing(data_.torque);
     swing_[kPositionChannel] = waveform_position_swing(data_);
     data_.guesses = waveform_starts(data_, settings);
@@ -96,6 +94,13 @@ class Solver {
   }
 
  private:
+  /// At the start of a window: what a late sensor shows there was before it.
+  int unseen_samples() const {
+    const double latest = settings_.sensor_delay + kLatest * settings_.spread.sensor_delay;
+    return std::min(static_cast<int>(std::ceil(latest / data_.grid.interval)),
+                    waveform_lead(ring_, data_.grid.interval) / 2);
+  }
+
   std::vector<bool> search_set() const {
     std::vector<bool> set(data_.windows.size(), false);
     const std::size_t pairs = set.size() / 2, take = std::min<std::size_t>(pairs, kSearchWindows / 2);
@@ -217,13 +222,13 @@ class Solver {
   /// Windows whose motion the start values do not catch.
   void leave_out(const WaveformFit& fit) {
     for (int c = 0; c < channels(); ++c) {
-      std::vector<double> rms;
+      std::vector<double> rms(used_.size(), 0), of_used;
       for (std::size_t w = 0; w < used_.size(); ++w)
-        rms.push_back(window_rms(fit, w, static_cast<WaveformChannel>(c)));
-      const double middle = signal::median(rms);
-      const double most = data_.grid.output == WaveformOutput::locked
-                              ? std::max(middle, kModelError * swing_[c]) * std::sqrt(kLeftOut)
-                              : middle * std::sqrt(kLeftOutFree[c]);
+        if (used_[w]) of_used.push_back(rms[w] = window_rms(fit, w, static_cast<WaveformChannel>(c)));
+      const double middle = signal::median(of_used);
+      const bool locked = data_.grid.output == WaveformOutput::locked;
+      const double most =
+          std::max(middle, kModelError * swing_[c]) * std::sqrt(locked ? kLeftOut : kLeftOutFree[c]);
       for (std::size_t w = 0; w < used_.size(); ++w)
         if (!(rms[w] <= most)) used_[w] = false;
     }
@@ -300,6 +305,7 @@ class Solver {
     s.covariance = Eigen::MatrixXd::Zero(kGlobalValues, kGlobalValues);
     s.covariance(fit.fitted(), fit.fitted()) = covariance;
     s.priors = priors, s.common_scale = settings_.common_scale;
+    s.finest = settings_.finest(), s.unit = settings_.angular ? "rad" : "m";
     for (int c = 0; c < channels(); ++c) s.misfit[c] = misfit(fit, static_cast<WaveformChannel>(c));
     s.windows = static_cast<int>(used_.size());
     s.left_out = static_cast<int>(std::count(used_.begin(), used_.end(), false));
@@ -337,6 +343,7 @@ const char* waveform_value_name(int which) {
                                                    "output damping",
                                                    "contact stiffness",
                                                    "contact loss",
+                                                   "contact damping",
                                                    "link inertia",
                                                    "link damping",
                                                    "dry friction of the link",

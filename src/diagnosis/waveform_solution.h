@@ -28,6 +28,8 @@ struct WaveformSolution {
   Eigen::MatrixXd covariance;  // of all values, in spreads; 0 where a value is not fitted
   WaveformPriors priors;
   double common_scale = 0;
+  double finest = kNaN;      // half width of the narrowest interval, in `unit`
+  const char* unit = "m";    // of the gap
   std::vector<double> told;  // share of the prior spread that the record leaves, per value; 1: tells nothing
   WaveformMisfit misfit[kWaveformChannels];
   int windows = 0, left_out = 0, iterations = 0;

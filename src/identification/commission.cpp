@@ -10,17 +10,23 @@
 namespace backlash::identification {
 namespace {
 
+const char* unit_of_gap(const diagnosis::WaveformSettings& machine) {
+  return machine.angular ? "rad" : "m";
+}
+
 void put_parameters(Identification& result, const diagnosis::WaveformCommissioning& found) {
   for (const diagnosis::WaveformQuantity& q : diagnosis::waveform_quantities()) {
     if (!q.in(found.machine)) continue;
     const double value = found.machine.*q.at, spread = found.machine.spread.*q.spread;
-    const double error = q.factor ? value * std::hypot(spread, q.power * found.machine.common_scale) : spread;
+    const double common = scale_power(q, found.machine) * found.machine.common_scale;
+    const double error = q.factor ? value * std::hypot(spread, common) : spread;
     result.parameters[q.name] = {value, error};
-    result.units[q.name] = q.unit;
+    result.units[q.name] = q.unit_in(found.machine);
   }
   const diagnosis::WaveformCommissioning::State& first = found.states.front();
-  result.parameters["backlash"] = {first.backlash, first.backlash * first.log_error};
-  result.units["backlash"] = "m";
+  const char* const gap = found.machine.angular ? "backlash_angle" : "backlash";
+  result.parameters[gap] = {first.backlash, first.backlash * first.log_error};
+  result.units[gap] = unit_of_gap(found.machine);
 }
 
 void warn(Identification& result, const diagnosis::WaveformCommissioning& found) {
@@ -53,8 +59,8 @@ Identification commission(const rig_file::RigFile& file, const std::vector<recor
   for (std::size_t i = 0; i < records.size(); ++i) {
     const auto& state = found.states[i];
     report.records.push_back(records[i].name);
-    report.message +=
-        fmt::format("{}{}: backlash {:.4g} m", i > 0 ? "; " : "", records[i].name, state.backlash);
+    report.message += fmt::format("{}{}: backlash {:.4g} {}", i > 0 ? "; " : "", records[i].name,
+                                  state.backlash, unit_of_gap(found.machine));
     for (std::size_t c = 0; c < (state.position ? 2U : 1U); ++c)
       result.channels[kNames[c]] = {state.residual[c], state.noise[c]};
   }

@@ -127,9 +127,10 @@ void warn_of_misfit(Identification& result) {
 void require_servo(const model::Rig& rig) {
   if (!model::has_two_inertias(rig))
     throw CannotIdentify(
-        std::string("identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
-                    "link), and with a torque sensor (elastic input coupling, Hunt-Crossley mesh of exponent "
-                    "1.5, damping > 0 of motor and couplings, no terms); this rig has ") +
+        std::string(
+            "identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
+            "link), and with a torque sensor (elastic input coupling, mesh that is linear, a power law or "
+            "Hunt-Crossley, damping > 0 of motor and couplings, no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
         (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
         (rig.link_locked ? "locked" : "free") + " link");

@@ -88,7 +88,7 @@ class Listing {
 
   void fill_quantity(DeclaredValue& v, std::size_t q) {
     const diagnosis::WaveformQuantity& quantity = diagnosis::waveform_quantities()[q];
-    v.unit = quantity.unit;
+    v.unit = file_.diagnosis.waveform ? quantity.unit_in(*file_.diagnosis.waveform) : quantity.unit;
     v.share = shared_inertia(known_places()[q], file_.rig);
     if (!v.uncertainty.empty() && v.uncertainty.back() != '%') v.uncertainty += " " + v.unit;
     if (!file_.diagnosis.waveform || !quantity.in(*file_.diagnosis.waveform)) return;

@@ -93,6 +93,7 @@ const std::vector<KnownPlace>& known_places() {
       {{"gear_train", "output_coupling", "damping"}},
       {{"gear_train", "mesh", "contact", "stiffness"}},
       {{"gear_train", "mesh", "contact", "alpha"}},
+      {{"gear_train", "mesh", "contact", "damping"}},
       {{"gear_train", "link", "inertia"}, &Rig::output_coupling, &Rig::gear},
       {{"gear_train", "link", "viscous_damping"}},
       {{"gear_train", "link", "coulomb_friction"}},
@@ -132,18 +133,19 @@ std::string commissioned_text(const RigFile& file, const diagnosis::WaveformComm
     const diagnosis::WaveformQuantity& q = diagnosis::waveform_quantities()[i];
     const KnownPlace& place = known_places()[i];
     if (!q.in(found.machine)) continue;
+    const char* unit = q.unit_in(found.machine);
     if (std::count(found.untold.begin(), found.untold.end(), q.name) > 0) continue;
     const double whole = found.machine.*q.at, value = whole - shared_inertia(place, file.rig);
     if (q.factor && !(value > 0))
       throw CannotIdentify(
-          fmt::format("{} {:.4g} {} is less than the share of what moves along", q.name, whole, q.unit));
+          fmt::format("{} {:.4g} {} is less than the share of what moves along", q.name, whole, unit));
     const double spread = found.machine.spread.*q.spread * (q.factor ? whole / value : 1);
     const bool extra = place.path.front() == "commissioned";
     const std::string text = known_text(value, spread, q.factor, extra ? "" : source);
     if (extra)
-      section += fmt::format("  {}: {}   # {}\n", q.name, text, q.unit);
+      section += fmt::format("  {}: {}   # {}\n", q.name, text, unit);
     else
-      document.set(fmt::format("{}", fmt::join(place.path, ".")), text, q.unit);
+      document.set(fmt::format("{}", fmt::join(place.path, ".")), text, unit);
   }
   const diagnosis::WaveformCommissioning::State& first = found.states.front();
   set_backlash_of(document, file, first.backlash, first.log_error, source);

@@ -28,7 +28,8 @@ double default_uncertainty(const model::Rig& rig, const model::GearTrain& train,
                                               : DeclaredUncertainty::kCoupling;
   const double torque = settings.lost_motion->torque, all = train.elastic_deflection(torque);
   const double coupling = rig.input_coupling.rigid ? 0 : torque / rig.input_coupling.stiffness;
-  return elastic_uncertainty(coupling, std::fmax(0, all - coupling));
+  const auto contact = rig.mesh.contact->power_contact();
+  return elastic_uncertainty(coupling, std::fmax(0, all - coupling), contact ? contact->exponent : 1);
 }
 
 void fill_link(const model::Rig& rig, diagnosis::WaveformSettings& s) {
@@ -40,20 +41,30 @@ void fill_link(const model::Rig& rig, diagnosis::WaveformSettings& s) {
   s.link_friction = rig.link.coulomb_friction;
 }
 
+/// False for a law that the estimator's equations do not have.
+bool fill_contact(const model::Mesh& mesh, diagnosis::WaveformSettings& s) {
+  const std::optional<model::PowerContact> contact = mesh.contact->power_contact();
+  if (!contact || mesh.contact->needs_impact_speed()) return false;
+  s.angular = mesh.angular();
+  s.base_radius = mesh.lever();
+  s.contact_stiffness = contact->stiffness, s.contact_exponent = contact->exponent;
+  const ParameterValues& values = mesh.contact_spec().values;
+  if (contact->loss > 0) s.contact_loss = values.at("alpha");
+  if (contact->damping > 0) s.contact_damping = contact->damping;
+  return true;
+}
+
 /// Of a rig that the estimator's equations describe; nothing of any other.
 std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   const model::Coupling &in = rig.input_coupling, &out = rig.output_coupling;
-  if (in.rigid || (out.rigid && rig.link_locked) || rig.mesh.rigid || rig.mesh.angular() ||
-      rig.mesh.variation || rig.mesh.pairs || rig.motor_axis_ratio() != 1 || rig.linear ||
-      !rig.terms.empty() || rig.coupled)
-    return std::nullopt;
-  if (rig.mesh.contact_spec().law != "hunt_crossley" || rig.mesh.contact_spec().values.at("exponent") != 1.5)
+  if (in.rigid || (out.rigid && rig.link_locked) || rig.mesh.rigid || rig.mesh.variation || rig.mesh.pairs ||
+      rig.motor_axis_ratio() != 1 || rig.linear || !rig.terms.empty() || rig.coupled)
     return std::nullopt;
   if (rig.pinion.viscous_damping != 0 || rig.gear.viscous_damping != 0 || rig.motor.viscous_asymmetry != 0 ||
       rig.motor.coulomb_asymmetry != 0 || rig.link.viscous_asymmetry != 0 || rig.link.coulomb_asymmetry != 0)
     return std::nullopt;
   diagnosis::WaveformSettings s;
-  s.base_radius = rig.mesh.base_radius;
+  if (!fill_contact(rig.mesh, s)) return std::nullopt;
   s.motor_inertia = rig.motor.inertia + 0.5 * in.inertia;
   s.pinion_inertia = rig.pinion.inertia + 0.5 * in.inertia;
   if (!out.rigid) s.gear_inertia = rig.gear.inertia + 0.5 * out.inertia;
@@ -62,11 +73,9 @@ std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
   s.sensor_stiffness = in.stiffness, s.sensor_damping = in.damping;
   if (!out.rigid) s.output_stiffness = out.stiffness, s.output_damping = out.damping;
   if (!rig.link_locked) fill_link(rig, s);
-  s.contact_stiffness = rig.mesh.contact_spec().values.at("stiffness");
-  s.contact_loss = rig.mesh.contact_spec().values.at("alpha");
   s.sensor_with_damper = rig.sensor_with_damper;
   for (const double value : {s.motor_inertia, s.pinion_inertia, s.gear_inertia, s.motor_damping,
-                             s.sensor_damping, s.output_damping, s.contact_loss, s.link_inertia})
+                             s.sensor_damping, s.output_damping, s.link_inertia})
     if (value <= 0) return std::nullopt;  // a factor of nothing is nothing
   return s;
 }
@@ -144,16 +153,17 @@ void use_spread(RigFile& file) {
   const double torque = file.simulation.excitation.amplitude, all = difference.elastic_deflection(torque);
   if (!(all > 0)) return;
   const double coupling = torque / file.rig.input_coupling.stiffness, flank = std::fmax(0, all - coupling);
-  const double softest = std::expm1(kNormal95 * spread.contact_stiffness * 2 / 3);  // theory: Hertz
+  const double exponent = file.diagnosis.waveform->contact_exponent;
+  const double softest = std::expm1(kNormal95 * spread.contact_stiffness / exponent);
   difference.declared_uncertainty =
       (std::expm1(kNormal95 * spread.sensor_stiffness) * coupling + softest * flank) / all;
 }
 
 }  // namespace
 
-double elastic_uncertainty(double coupling, double flank) {
+double elastic_uncertainty(double coupling, double flank, double exponent) {
   using Known = DeclaredUncertainty;
-  const double softest = std::pow(Known::kContactFactor, 2.0 / 3) - 1;  // theory: Hertz
+  const double softest = std::pow(Known::kContactFactor, 1 / exponent) - 1;
   const double all = coupling + flank;
   return all > 0 ? (Known::kCoupling * coupling + softest * flank) / all : 0;
 }
@@ -177,7 +187,9 @@ model::Rig with_machine(model::Rig rig, const diagnosis::WaveformSettings& machi
     rig.link.coulomb_friction = machine.link_friction;
   }
   model::ContactSpec contact = rig.mesh.contact_spec();
-  contact.values["stiffness"] = machine.contact_stiffness, contact.values["alpha"] = machine.contact_loss;
+  contact.values["stiffness"] = machine.contact_stiffness;
+  if (machine.contact_loss > 0) contact.values["alpha"] = machine.contact_loss;
+  if (machine.contact_damping > 0) contact.values["damping"] = machine.contact_damping;
   rig.mesh.contact = model::make_contact_law(contact.law, contact.values);
   return rig;
 }

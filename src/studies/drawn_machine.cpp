@@ -27,7 +27,7 @@ void move(const rig_file::RigFile& file, const diagnosis::WaveformQuantity& q, d
   double spread = values.spread.*q.spread;
   if (std::isnan(spread)) spread = Spread::kDryFriction * file.simulation.excitation.amplitude;
   double& value = values.*q.at;
-  value = q.factor ? value * std::exp(spreads * spread + q.power * scale)
+  value = q.factor ? value * std::exp(spreads * spread + scale_power(q, values) * scale)
                    : std::max(0.0, value + spreads * spread);
 }
 

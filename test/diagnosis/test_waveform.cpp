@@ -94,11 +94,16 @@ TEST(Waveform, SettingsOutOfRange) {
     refuses([&](WaveformSettings& s) { s.sensor_stiffness = bad; });
     refuses([&](WaveformSettings& s) { s.output_damping = bad; });
     refuses([&](WaveformSettings& s) { s.contact_stiffness = bad; });
-    refuses([&](WaveformSettings& s) { s.contact_loss = bad; });
     refuses([&](WaveformSettings& s) {
       s.output = WaveformOutput::link, s.link_friction = 0, s.link_inertia = bad;
     });
   }
+  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::infinity()}) {  // NaN: it has none
+    refuses([&](WaveformSettings& s) { s.contact_loss = bad; });
+    refuses([&](WaveformSettings& s) { s.contact_damping = bad; });
+  }
+  for (const double bad : {0.9, 1.6, kNaN}) refuses([&](WaveformSettings& s) { s.contact_exponent = bad; });
+  refuses([](WaveformSettings& s) { s.angular = true; });  // with a radius of 15 mm
   refuses([](WaveformSettings& s) { s.dry_friction = -0.1; });
   refuses([](WaveformSettings& s) {
     s.output = WaveformOutput::link, s.link_inertia = 1e-4, s.link_friction = -0.1;

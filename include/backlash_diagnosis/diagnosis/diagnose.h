@@ -28,7 +28,7 @@ struct DiagnosisSettings {
   std::optional<MomentumTransferSettings> momentum_transfer;
   std::optional<WaveformSettings> waveform;
   std::string no_waveform =  // why not, where it is absent
-      "the rig has no torque sensor before a Hunt-Crossley mesh of exponent 1.5, or has terms";
+      "the rig has no torque sensor before teeth that follow a power of their penetration, or has terms";
 
   /// Without the estimator that takes seconds.
   void leave_out_waveform(const std::string& why = "takes seconds: not run here, but by diagnose_record") {

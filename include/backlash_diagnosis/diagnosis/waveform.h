@@ -4,7 +4,7 @@
 // the motor's position where that is recorded, about the reversals of the motor's torque:
 //
 //   Jm qm'' = tau - cm qm' - dry(qm') - T        T = Ki (qm - qp) + Ci (qm' - qp')
-//   Jp qp'' = T - F rb                           F = K d^1.5 max(0, 1 + 3/2 alpha d')
+//   Jp qp'' = T - F rb                           F = max(0, K d^n (1 + 3/2 alpha d') + c d')
 //   Jg qg'' = F rb - Ko qg - Co qg'              d = |rb (qp - qg)| - backlash / 2
 //
 // (Sarkar, Ellis and Moore 1997, Eqs. 1 to 12, whose output is locked). Where the link is free, its inertia
@@ -16,8 +16,10 @@
 // No declared value has to be right, only its spread. What the spreads below are where the rig file does not
 // say them is a choice: what data sheets and drawings are good for.
 //
-// Symmetry of torque alone: with inertias, damping and stiffnesses times c, the contact's K times c^1.5 and
-// its alpha times c, and the backlash divided by c, the torque is the same. From torque alone the play is
+// The exponent n is as declared; alpha or c may be absent. A mesh of angles has rb = 1: d in rad, F in N m.
+//
+// Symmetry of torque alone: with inertias, damping and stiffnesses times s, the contact's K times s^n and its
+// alpha and c times s, and the backlash divided by s, the torque is the same. From torque alone the play is
 // known no better than one of these scales, mostly the stiffness of the torque sensor. An angle ends that.
 //
 // Needs motor_torque that reverses and sensor_torque, evenly sampled, at least three samples in a cycle of
@@ -25,8 +27,8 @@
 // taken from motor_torque; of any other torque its samples, joined by straight lines.
 //
 // Interval, 95 %: two standard errors of the fit with its priors, on the logarithm of the play, widened by
-// what the residual has of structure, and not below what equations of rigid flanks can tell (kFinest). With a
-// free link standard errors are 1.8 times as large: simulation.
+// what the residual has of structure, and not below what equations of rigid flanks can tell (`finest`). With
+// a free link standard errors are 1.8 times as large: simulation.
 #pragma once
 
 #include <string>
@@ -42,11 +44,12 @@ namespace backlash::diagnosis {
 struct WaveformSpread {
   double sensor_stiffness = 0.09;  ///< factor: 18 % at 95 %
   double motor_inertia = 0.15, pinion_inertia = 0.15,
-         gear_inertia = 0.15;                               ///< factor: 30 % at 95 %, by a drawing
-  double motor_damping = 0.5;                               ///< factor: 2.7 at 95 %
-  double sensor_damping = 1.3;                              ///< factor: 13 at 95 %, no data sheet has it
-  double output_stiffness = 0.46, output_damping = 0.46;    ///< factor: 2.5 at 95 %
-  double contact_stiffness = 0.46, contact_loss = 0.46;     ///< factor: 2.5 at 95 %
+         gear_inertia = 0.15;                             ///< factor: 30 % at 95 %, by a drawing
+  double motor_damping = 0.5;                             ///< factor: 2.7 at 95 %
+  double sensor_damping = 1.3;                            ///< factor: 13 at 95 %, no data sheet has it
+  double output_stiffness = 0.46, output_damping = 0.46;  ///< factor: 2.5 at 95 %
+  double contact_stiffness = 0.46, contact_loss = 0.46,
+         contact_damping = 0.46;                            ///< factor: 2.5 at 95 %
   double link_inertia = 0.15;                               ///< factor: 30 % at 95 %, by a drawing
   double link_damping = 0.5;                                ///< factor: 2.7 at 95 %
   double link_friction = kNaN;                              ///< N m; NaN: kDryFriction of the torque's level
@@ -72,15 +75,18 @@ enum class WaveformOutput {
 /// The declared machine. All at the motor_position axis, as the rig file gives them. What it has not is NaN.
 struct WaveformSettings {
   WaveformOutput output = WaveformOutput::locked;
-  double base_radius = kNaN;                              ///< rb, m, > 0
+  double base_radius = kNaN;                              ///< rb, m, > 0; of a mesh of angles 1
+  bool angular = false;                                   ///< a mesh of angles
   double motor_inertia = kNaN;                            ///< Jm, kg m^2, > 0, with its share of the sensor
   double pinion_inertia = kNaN, gear_inertia = kNaN;      ///< Jp, Jg, kg m^2, > 0; no Jg: part of the link
   double motor_damping = kNaN;                            ///< cm, N m s/rad, > 0
   double dry_friction = 0;                                ///< N m, of the motor, >= 0
   double sensor_stiffness = kNaN, sensor_damping = kNaN;  ///< Ki, N m/rad, Ci, N m s/rad, > 0
   double output_stiffness = kNaN, output_damping = kNaN;  ///< Ko, N m/rad, Co, N m s/rad, > 0
-  double contact_stiffness = kNaN;                        ///< K, N/m^1.5, > 0
-  double contact_loss = kNaN;                             ///< alpha, s/m, > 0
+  double contact_stiffness = kNaN;                        ///< K, N/m^n, > 0
+  double contact_exponent = 1.5;                          ///< n, 1 to 1.5; is not fitted
+  double contact_loss = kNaN;                             ///< alpha, s/m, > 0; NaN: none
+  double contact_damping = kNaN;                          ///< c, N s/m, > 0; NaN: none
   double link_inertia = kNaN;                             ///< Jl, kg m^2, > 0, with its share of the output
   double link_damping = kNaN;                             ///< cl, N m s/rad, > 0; NaN: none
   double link_friction = kNaN;                            ///< N m, >= 0, dry friction of the link
@@ -92,6 +98,11 @@ struct WaveformSettings {
   /// Besides the spreads: standard deviation of the logarithm of a factor that all values of the symmetry
   /// above have in common, of a machine commissioned from torque alone.
   double common_scale = 0;
+
+  /// Half width of the narrowest interval, in the unit of the play. Flanks are no smoother (ground, Ra 0.3
+  /// um), equations no finer; of a mesh of angles the same of a gear of 15 mm, as no radius is known.
+  /// Choices.
+  double finest() const { return angular ? 4e-5 : 6e-7; }
 };
 
 /// What a fit rests on, for people to see: what was measured about the reversals, what the fitted machine
@@ -128,14 +139,20 @@ Estimate estimate_waveform(const record::Record& record, const WaveformSettings&
 struct WaveformQuantity {
   const char *name, *unit, *words;  ///< key in reports, unit, name in messages
   bool factor;                      ///< its spread is of the logarithm, else in its unit
-  double power;                     ///< in the factor c of the symmetry
+  double power;                     ///< in the factor s of the symmetry, see scale_power()
   double WaveformSettings::*at;
   double WaveformSpread::*spread;
+  const char* unit_of_angles = nullptr;  ///< of a mesh of angles, where it is another
 
+  const char* unit_in(const WaveformSettings& settings) const {
+    return settings.angular && unit_of_angles != nullptr ? unit_of_angles : unit;
+  }
   /// Whether this machine has it.
   bool in(const WaveformSettings& settings) const { return settings.*at == settings.*at; }
 };
 const std::vector<WaveformQuantity>& waveform_quantities();
+/// Its power in the factor of the symmetry: that of the contact's stiffness is the exponent.
+double scale_power(const WaveformQuantity& quantity, const WaveformSettings& settings);
 
 /// A machine as records of it tell it.
 struct WaveformCommissioning {

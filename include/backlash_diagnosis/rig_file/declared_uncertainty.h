@@ -15,8 +15,8 @@ struct DeclaredUncertainty {
 };
 
 /// Relative 95 % uncertainty of an elastic deflection, of which the couplings' share [rad] is `coupling` and
-/// that of the flanks `flank`, whose deflection goes with the power -2/3 of its stiffness (Hertz).
+/// that of the flanks `flank`, whose force goes with the power `exponent` of their deflection.
 /// The two are added: both may err to one side.
-double elastic_uncertainty(double coupling, double flank);
+double elastic_uncertainty(double coupling, double flank, double exponent = 1.5);
 
 }  // namespace backlash::rig_file
