@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Records of a test bench, with names and units of its own, clean and damaged. Generators as in csv_faults."""
+import json
 import math
 
 from case import Case
@@ -43,7 +44,7 @@ class Bench:
         lines = ["channels:"]
         for (channel, _, _, _), name, unit in zip(self.known, self.names, self.units):
             says = ", unit: %r" % unit if self.units_in == "map" else ""
-            lines.append("  %s: {column: '%s'%s}" % (channel, name, says))
+            lines.append("  %s: {column: %s%s}" % (channel, json.dumps(name), says))
         return "\n".join(lines) + "\n"
 
 

@@ -24,14 +24,14 @@ class BenchCsv : public CommandTest {
     done("simulate rig.yaml --duration 3 --out own.csv");
     // Milliseconds, degrees, a current of 2 N m/A, arc minutes of the other sign; semicolons, decimal commas.
     ASSERT_EQ(
-        shell("awk -F, 'BEGIN {print \"# bench 4\"; print \"No;t [ms];\\\"Iq, filtered\\\";phi [deg];psi "
+        shell("(awk -F, 'BEGIN {print \"# bench 4\"; print \"No;t [ms];\\\"Iq, filtered\\\";phi [deg];psi "
               "(arcmin)\";"
               " print \";;A;;\"}"
               " NR == 1 {for (i = 1; i <= NF; ++i) at[$i] = i; next}"
               " {line = sprintf(\"%d;%.12g;%.17g;%.17g;%.17g\", NR, 1000 * $at[\"time\"], "
               "$at[\"motor_torque\"] / 2,"
               " $at[\"motor_position\"] * 45 / atan2(1, 1), -$at[\"load_position\"] * 2700 / atan2(1, 1));"
-              " gsub(/\\./, \",\", line); print line}' own.csv >bench.csv")
+              " gsub(/\\./, \",\", line); print line}' own.csv >bench.csv)")
             .code,
         0);
     write("bench.yaml", read("rig.yaml") +
@@ -75,18 +75,18 @@ TEST_F(BenchCsv, IsReadAsTheRecordItWasMadeOf) {
 }
 
 TEST_F(BenchCsv, RefusalsNameFileLineAndColumn) {
-  ASSERT_EQ(shell("sed '1,2s/deg/Nm/' bench.csv >wrong.csv").code, 0);
+  ASSERT_EQ(shell("(sed '1,2s/deg/Nm/' bench.csv >wrong.csv)").code, 0);
   Outcome outcome = run("identify wrong.csv --rig bench.yaml --out f.yaml --json f.json");
   EXPECT_EQ(outcome.code, 65);
   expect_contains(outcome.err,
                   "wrong.csv:2: column 'phi [deg]' of channels.motor_position: not there, there are: No, ");
-  ASSERT_EQ(shell("sed 's/phi .deg./phi/' bench.yaml >other.yaml").code, 0);
+  ASSERT_EQ(shell("(sed 's/phi .deg./phi/' bench.yaml >other.yaml)").code, 0);
   outcome = run("compare_models wrong.csv other.yaml --json f.json");
   EXPECT_EQ(outcome.code, 65);
   expect_contains(
       outcome.err,
       "wrong.csv:2: phi [Nm]: unit = 'Nm' of channels.motor_position: a torque, expected an angle");
-  ASSERT_EQ(shell("sed 's/column: t}/column: t, unit: fortnight}/' bench.yaml >other.yaml").code, 0);
+  ASSERT_EQ(shell("(sed 's/column: t}/column: t, unit: fortnight}/' bench.yaml >other.yaml)").code, 0);
   outcome = run("trace_residual --rig other.yaml --train bench.csv --test bench.csv --out d");
   EXPECT_EQ(outcome.code, 65);
   expect_contains(outcome.err, "channels.time.unit = fortnight: unknown, known are s, ");
