@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/record/unit.h"
 #include "csv_lines.h"

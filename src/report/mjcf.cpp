@@ -45,7 +45,7 @@ std::string body(const JointModel& joint, const std::string& name, bool last, do
   const JointInertia inertia = inertia_of(joint, last);
   std::string friction;
   if (values.coulomb > 0)
-    friction = fmt::format(" frictionloss=\"{}\" solreffriction=\"{} 1\" solimpfriction=\"{} {} 1 0.5 1\"",
+    friction = fmt::format(R"( frictionloss="{}" solreffriction="{} 1" solimpfriction="{} {} 1 0.5 1")",
                            values.coulomb, 2 * step, kStiffFriction, kStiffFriction);
   return fmt::format(
       "    <body name=\"{0}\">\n"
@@ -61,13 +61,11 @@ std::string teeth(const JointModel& joint, const std::string& name) {
   std::string between;
   if (joint.forward > joint.backward) {
     const double inertia = joint.reduced_inertia();
-    between =
-        fmt::format("limited=\"true\" range=\"{} {}\" solreflimit=\"{} {}\" solimplimit=\"{} {} 1 0.5 1\"",
-                    joint.backward, joint.forward, -joint.stiffness / inertia, -joint.damping / inertia,
-                    kImpedance, kImpedance);
+    between = fmt::format(R"(limited="true" range="{} {}" solreflimit="{} {}" solimplimit="{} {} 1 0.5 1")",
+                          joint.backward, joint.forward, -joint.stiffness / inertia, -joint.damping / inertia,
+                          kImpedance, kImpedance);
   } else {
-    between =
-        fmt::format("stiffness=\"{}\" damping=\"{}\" springlength=\"0\"", joint.stiffness, joint.damping);
+    between = fmt::format(R"(stiffness="{}" damping="{}" springlength="0")", joint.stiffness, joint.damping);
   }
   return fmt::format(
       "  <tendon>\n"
