@@ -15,6 +15,7 @@ constexpr double kStiffFriction = 0.9999;  // of dry friction: the most (mjMAXIM
 constexpr double kPhasePerStep = 0.05;     // rad of the vibration on the flank; choice, see export_a_model.md
 constexpr double kDecayPerStep = 0.1;      // of the relative speed on the flank in a step
 constexpr double kLongestStep = 1e-3;      // s
+constexpr double kLeastGap = 1e-12;        // rad: MuJoCo wants limits that differ
 
 /// The largest of 1, 2, 5 times a power of ten that is not above.
 double rounded_down(double value) {
@@ -56,17 +57,13 @@ std::string body(const JointModel& joint, const std::string& name, bool last, do
       values.viscous, friction);
 }
 
-/// The teeth: q_motor - q_load between two soft limits, or a spring where there is no play.
+/// The teeth: q_motor - q_load between two soft limits.
 std::string teeth(const JointModel& joint, const std::string& name) {
-  std::string between;
-  if (joint.forward > joint.backward) {
-    const double inertia = joint.reduced_inertia();
-    between = fmt::format(R"(limited="true" range="{} {}" solreflimit="{} {}" solimplimit="{} {} 1 0.5 1")",
-                          joint.backward, joint.forward, -joint.stiffness / inertia, -joint.damping / inertia,
-                          kImpedance, kImpedance);
-  } else {
-    between = fmt::format(R"(stiffness="{}" damping="{}" springlength="0")", joint.stiffness, joint.damping);
-  }
+  const double inertia = joint.reduced_inertia();
+  const std::string between =
+      fmt::format(R"(limited="true" range="{} {}" solreflimit="{} {}" solimplimit="{} {} 1 0.5 1")",
+                  joint.backward, std::max(joint.forward, joint.backward + kLeastGap),
+                  -joint.stiffness / inertia, -joint.damping / inertia, kImpedance, kImpedance);
   return fmt::format(
       "  <tendon>\n"
       "    <fixed name=\"{0}_teeth\" {1}>\n"

@@ -135,6 +135,20 @@ TEST(MujocoModel, FrictionIsDryAndViscous) {
   EXPECT_NE(stuck.position(0), 0);
 }
 
+TEST(MujocoModel, TheMotorsOwnShaftIsGeared) {
+  rig_file::RigFile file = servo();
+  const double ratio = file.rig.reduction_ratio;  // 110
+  file.rig.motor_side = true;
+  file.rig.motor.inertia /= ratio * ratio;
+  file.rig.motor.viscous_damping /= ratio * ratio;
+  file.rig.motor.coulomb_friction /= ratio;
+  World world(file);
+  world.step(400 / ratio);
+  // 400 N m at the load, less 63 N m that oppose, on 6.3 kg m^2; the impedance of dry friction leaves 1e-4 of
+  // it.
+  EXPECT_NEAR(world.velocity(0), (400.0 - 63) / 6.3 * world.time_step(), 1e-3 * 53 * world.time_step());
+}
+
 struct Difference {
   double position = 0, deflection = 0;  // largest, over the largest there was
 };
@@ -178,6 +192,9 @@ TEST(MujocoModel, MovesAsOurOwnSimulator) {
   // friction fall within a step of 1e-4 s of their moments, about twelve of them in 3 s.
   EXPECT_LT(ours.position, 5e-4);
   EXPECT_LT(ours.deflection, 0.005);
+  rig_file::RigFile closed = servo();
+  closed.rig.mesh.backlash = 0;
+  EXPECT_LT(difference(closed, 400).deflection, 0.005);
   // A limit whose impedance is not small is no such spring, whatever its solref.
   for (const char* impedance : {"0.01 0.01", "0.1 0.1", "0.9 0.95"})
     print(std::string("impedance ") + impedance, difference(servo(), 400, impedance));
