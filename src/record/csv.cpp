@@ -251,7 +251,8 @@ Record read_csv(std::istream& in, const std::string& name, const ChannelMap& map
     if (mapped.find_header()) return mapped.read();
     if (!mapped.first_line_is_own()) mapped.refuse();
     in.clear();
-    in.seekg(0);
+    if (!in.seekg(0))
+      throw BadData(name, "is no file, which is needed to read it by channels of the rig file");
   }
   return record_of_joint(read_joints_csv(in, name, map.linear), joint, name);
 }

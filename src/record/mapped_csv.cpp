@@ -167,7 +167,9 @@ const Unit* MappedCsv::unit_of(const Column& column, std::string_view row) const
     unit = here;
   }
   if (unit == nullptr && !is_own_column(source.column))
-    fail_unit(header_line_, column, "", "neither the file nor the map says it, known are " + known_units());
+    fail_unit(header_line_, column, "",
+              "neither the file nor the map says it, known are " +
+                  (column.target != nullptr ? known_units(source.channel, map_.linear) : known_units()));
   return unit;
 }
 

@@ -221,7 +221,7 @@ TEST(MappedCsv, UnitsThatAreUnknownOrOfAnotherKindAreRefused) {
   map.columns[0] = column(Channel::motor_position, "x");
   begins(refusal("t,x\n0,1\n", map),
          "bench.csv:1: x: unit = '' of channels.motor_position: neither the file nor the map says it, known "
-         "are s, ");
+         "are rad, mrad, deg, ");
   begins(refusal("t,x [furlong]\n0,1\n", map),
          "bench.csv:1: x [furlong]: unit = 'furlong' of channels.motor_position: unknown, known are s, ");
   begins(refusal("t,x\ns,furlong\n0,1\n", map),
