@@ -27,6 +27,7 @@ tests=(
   ros-robot-state-publisher python3-tf2-msgs                      # arm.launch, and what it tells tf
   chromium chromium-driver python3-selenium                       # tests that look at the pages in a browser
   liborocos-kdl-dev                                               # oracle of the arm's dynamics
+  libmujoco-dev                                                   # runs what export_model writes
   clang-format clang-tidy doxygen                                 # what scripts/check_style.sh and api_doc.sh call
 )
 case ${1:-} in

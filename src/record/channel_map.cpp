@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/unit.h"
 
 namespace backlash::record {
 
@@ -48,7 +49,9 @@ std::vector<std::string> ChannelMap::topics() const {
 }
 
 ChannelMap ChannelMap::on(const std::string& topic) const {
-  ChannelMap part{joint, {}, declared};
+  ChannelMap part;
+  part.joint = joint;
+  part.declared = declared;
   for (const ChannelSource& s : sources)
     if (s.topic == topic) part.sources.push_back(s);
   return part;
@@ -73,28 +76,90 @@ ChannelMap usual_channels(const std::string& joint) {
   return map;
 }
 
-void check(const ChannelMap& map) {
-  const auto require = [](bool valid, const ChannelSource& s, const char* key, const std::string& value,
-                          const char* limit) {
-    if (!valid) throw InvalidParameter("channels." + channel_name(s.channel) + "." + key, value, limit);
-  };
+namespace {
+
+void require(bool valid, const std::string& source, const char* key, const std::string& value,
+             const std::string& limit) {
+  if (!valid) throw InvalidParameter("channels." + source + "." + key, value, limit);
+}
+
+void check_conversion(const std::string& source, double scale, double offset) {
+  require(std::isfinite(scale) && scale != 0, source, "scale", std::to_string(scale),
+          "must be finite and not 0");
+  require(std::isfinite(offset), source, "offset", std::to_string(offset), "must be finite");
+}
+
+template <typename Sources>
+void check_channels(const Sources& sources, const std::string& joint) {
   bool shows = false;
-  for (std::size_t i = 0; i < map.sources.size(); ++i) {
-    const ChannelSource& s = map.sources[i];
-    require(!s.name.empty(), s, "name", "''", "must not be empty");
-    require(!s.topic.empty(), s, "topic", "''", "must not be empty");
-    require(std::isfinite(s.scale) && s.scale != 0, s, "scale", std::to_string(s.scale),
-            "must be finite and not 0");
-    require(std::isfinite(s.offset), s, "offset", std::to_string(s.offset), "must be finite");
-    for (std::size_t k = 0; k < i; ++k)
-      require(map.sources[k].channel != s.channel, s, "name", s.name,
+  for (auto s = sources.begin(); s != sources.end(); ++s) {
+    for (auto other = sources.begin(); other != s; ++other)
+      require(other->channel != s->channel, channel_name(s->channel), "name", joint,
               "must be the only source of the channel");
-    shows = shows || std::count(kBacklashChannels.begin(), kBacklashChannels.end(), s.channel) > 0;
+    shows = shows || std::count(kBacklashChannels.begin(), kBacklashChannels.end(), s->channel) > 0;
   }
   if (!shows)
     throw InvalidParameter(
-        "channels", map.joint,
+        "channels", joint,
         "must have a torque, a position, the speed of the motor, a current or an acceleration");
+}
+
+/// A name that the package's own format has too means the same here as there.
+void check_own_name(const ColumnSource& s, const std::string& source, const std::string& own,
+                    const Unit* unit) {
+  const std::string name = s.column.substr(s.column.rfind('/') + 1);
+  if (!is_own_column(s.column)) return;
+  const bool same =
+      name == own && (unit == nullptr || unit->si(1) == 1) && s.scale.value_or(1) == 1 && s.offset == 0;
+  require(same, source, "column", s.column,
+          "is a name of the package's own format, where it is " + name +
+              " in SI units: rename it in the header, or give it its unit there (" + name + " [...])");
+}
+
+void check_column(const ColumnSource& s, const std::string& source, const std::string& own) {
+  require(!s.column.empty(), source, "column", "''", "must not be empty");
+  check_conversion(source, s.scale.value_or(1), s.offset);
+  const Unit* const unit = s.unit.empty() ? nullptr : find_unit(s.unit);
+  require(s.unit.empty() || unit != nullptr, source, "unit", s.unit, "unknown, known are " + known_units());
+  check_own_name(s, source, own, unit);
+}
+
+void check_columns(const ChannelMap& map) {
+  require(!map.time.column.empty(), kTimeColumn, "column", "''", "must name the column with the time");
+  check_column(map.time, kTimeColumn, kTimeColumn);
+  if (const Unit* const unit = find_unit(map.time.unit))
+    require(unit->quantity == Quantity::time, kTimeColumn, "unit", map.time.unit, "is no time");
+  for (const ColumnSource& s : map.columns) {
+    const std::string& name = channel_name(s.channel);
+    check_column(s, name, name);
+    require(s.column != map.time.column, name, "column", s.column, "is the column with the time");
+    if (const Unit* const unit = find_unit(s.unit)) {
+      const std::string reason = misfit(*unit, s.channel, map.linear, s.scale.has_value());
+      require(reason.empty(), name, "unit", s.unit, reason);
+    }
+  }
+  check_channels(map.columns, map.joint);
+}
+
+}  // namespace
+
+const std::string kTimeColumn = "time";
+
+bool is_own_column(std::string_view name) {
+  const std::string_view channel = name.substr(name.rfind('/') + 1);
+  return name == kTimeColumn || std::any_of(kChannels.begin(), kChannels.end(),
+                                            [&](Channel c) { return channel == channel_name(c); });
+}
+
+void check(const ChannelMap& map) {
+  for (const ChannelSource& s : map.sources) {
+    const std::string& name = channel_name(s.channel);
+    require(!s.name.empty(), name, "name", "''", "must not be empty");
+    require(!s.topic.empty(), name, "topic", "''", "must not be empty");
+    check_conversion(name, s.scale, s.offset);
+  }
+  if (!map.columns.empty() || !map.time.column.empty()) check_columns(map);
+  if (map.declared || map.columns.empty()) check_channels(map.sources, map.joint);
 }
 
 }  // namespace backlash::record

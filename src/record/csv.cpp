@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <deque>
 #include <istream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -16,11 +16,14 @@
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/record/time_base.h"
+#include "backlash_diagnosis/record/unit.h"
+#include "csv_lines.h"
+#include "csv_time.h"
+#include "mapped_csv.h"
 
 namespace backlash::record {
 namespace {
 
-const std::string kTimeColumn = "time";
 constexpr char kSeparator = ',';
 
 std::vector<std::string> required_names() {
@@ -35,91 +38,20 @@ bool has_required_channel(const std::vector<Channel>& channels) {
   });
 }
 
-std::string in_quotes(std::string_view text) {
-  return "'" + printable(text) + "'";
-}
-
-// Lines of a stream in pieces of bounded size: a device or a file without line ends must not fill the memory.
-class LineReader {
- public:
-  LineReader(std::istream& in, const std::string& name)
-      : in_(in), name_(name), buffer_(std::size_t{1} << 16, '\0') {}
-
-  // The next line without its end; valid until the next call. False at the end of the stream.
-  bool next(std::string_view& line) {
-    ++number_;
-    const char* newline = find_newline();
-    while (newline == nullptr && refill()) newline = find_newline();
-    const std::size_t length =
-        newline != nullptr ? static_cast<std::size_t>(newline - buffer_.data()) - begin_ : filled_ - begin_;
-    if (length > kLongestCsvLine) {
-      fail("line is longer than " + std::to_string(kLongestCsvLine) + " bytes");
-    }
-    if (newline == nullptr && begin_ == filled_) return false;
-    const char* const start = buffer_.data() + begin_;
-    const char* const end = newline != nullptr ? newline : buffer_.data() + filled_;
-    begin_ = static_cast<std::size_t>(end - buffer_.data()) + (newline != nullptr ? 1 : 0);
-    line = std::string_view(start, static_cast<std::size_t>(end - start));
-    if (line.find('\0') != std::string_view::npos) fail("contains a NUL byte: not a text file in UTF-8");
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    if (number_ == 1 && line.substr(0, 3) == "\xef\xbb\xbf") line.remove_prefix(3);
-    return true;
-  }
-
-  std::size_t number() const { return number_; }
-
-  [[noreturn]] void fail(const std::string& reason) const {
-    throw BadData(name_ + ":" + std::to_string(number_), reason);
-  }
-
- private:
-  const char* find_newline() const {
-    return static_cast<const char*>(std::memchr(buffer_.data() + begin_, '\n', filled_ - begin_));
-  }
-
-  // Reads more behind what is there; false where there is no more or the line is too long already.
-  bool refill() {
-    std::memmove(buffer_.data(), buffer_.data() + begin_, filled_ - begin_);
-    filled_ -= begin_;
-    begin_ = 0;
-    if (filled_ > kLongestCsvLine) return false;
-    if (filled_ == buffer_.size()) buffer_.resize(2 * buffer_.size());
-    in_.read(buffer_.data() + filled_, static_cast<std::streamsize>(buffer_.size() - filled_));
-    const auto count = static_cast<std::size_t>(in_.gcount());
-    filled_ += count;
-    if (in_.bad()) fail("cannot be read further");
-    return count > 0;
-  }
-
-  std::istream& in_;
-  const std::string name_;
-  std::string buffer_;
-  std::size_t begin_ = 0, filled_ = 0, number_ = 0;
-};
-
-void split(std::string_view line, std::vector<std::string_view>& fields) {
-  fields.clear();
-  for (;;) {
-    const auto comma = line.find(kSeparator);
-    fields.push_back(trimmed(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return;
-    line.remove_prefix(comma + 1);
-  }
-}
-
 class Reader {
  public:
-  Reader(std::istream& in, const std::string& name) : lines_(in, name), name_(name) {}
+  Reader(std::istream& in, const std::string& name, bool linear)
+      : lines_(in, name), name_(name), linear_(linear) {}
 
   std::vector<JointRecord> read() {
     read_header();
-    read_rows();
-    if (time_.empty()) throw BadData(name_, "no data: there are only column names");
-    Record& first = joints_.front().record;
-    const std::string repeated = stamps_.describe("line " + std::to_string(first_repeated_line_));
-    if (!repeated.empty()) first.warnings.push_back(repeated);
-    for (std::string& warning : describe_time_base(time_)) first.warnings.push_back(std::move(warning));
-    for (JointRecord& joint : joints_) joint.record.time = time_;
+    each_row(lines_, [this](std::string_view line) { read_row(line); });
+    if (rows_.times.empty()) throw BadData(name_, "no data: there are only column names");
+    joints_.front().record.warnings = rows_.warnings();
+    for (JointRecord& joint : joints_) {
+      joint.record.time = rows_.times;
+      if (clock_) joint.record.origin = clock_->origin();
+    }
     return {std::make_move_iterator(joints_.begin()), std::make_move_iterator(joints_.end())};
   }
 
@@ -128,7 +60,7 @@ class Reader {
     std::string_view line;
     if (!lines_.next(line)) throw BadData(name_ + ":1", "empty, expected column names");
     if (trimmed(line).empty()) lines_.fail("an empty line, expected column names");
-    split(line, fields_);
+    split(line, kSeparator, fields_);
     refuse_other_separator();
     for (const std::string_view field : fields_) add_column(std::string(field));
     if (time_column_ == kNone) lines_.fail("no column 'time'; there are: " + joined(names_));
@@ -145,25 +77,43 @@ class Reader {
     }
   }
 
-  void add_column(const std::string& name) {
-    if (name.empty()) lines_.fail("column " + std::to_string(names_.size() + 1) + " has no name");
-    if (std::find(names_.begin(), names_.end(), name) != names_.end()) {
-      lines_.fail("column = " + in_quotes(name) + ": there twice");
+  void add_column(const std::string& text) {
+    if (text.empty()) lines_.fail("column " + std::to_string(names_.size() + 1) + " has no name");
+    const Label label = label_of(text);
+    const std::string name(label.name);
+    if (!is_own_column(name) || name.front() == '/') fail_unknown_column(text);
+    if (std::find(bare_names_.begin(), bare_names_.end(), name) != bare_names_.end()) {
+      lines_.fail("column = " + in_quotes(text) + ": there twice");
     }
+    const Unit* const unit = label.has_unit ? find_unit(label.unit) : nullptr;
+    if (label.has_unit && unit == nullptr) fail_unit(text, label, "unknown, known are " + known_units());
     if (name == kTimeColumn) {
+      if (unit != nullptr && unit->quantity != Quantity::time) fail_unit(text, label, "is no time");
+      if (unit != nullptr) clock_.emplace(*unit);
       time_column_ = names_.size();
       targets_.push_back(nullptr);
     } else {
-      const auto slash = name.rfind('/');
-      const std::string joint = slash == std::string::npos ? "" : name.substr(0, slash);
-      const std::string channel = slash == std::string::npos ? name : name.substr(slash + 1);
-      const auto known = std::find_if(kChannels.begin(), kChannels.end(),
-                                      [&](Channel c) { return channel_name(c) == channel; });
-      if (known == kChannels.end() || slash == 0) fail_unknown_column(name);
-      channels_[joint].push_back(*known);
-      targets_.push_back(&record_of(joint).column(*known));
+      add_channel(name, text, label, unit);
     }
-    names_.push_back(name);
+    units_.push_back(unit);
+    bare_names_.push_back(name);
+    names_.push_back(text);
+  }
+
+  void add_channel(const std::string& name, const std::string& text, const Label& label, const Unit* unit) {
+    const auto slash = name.rfind('/');
+    const std::string joint = slash == std::string::npos ? "" : name.substr(0, slash);
+    const Channel channel = channel_from_name(name.substr(slash + 1));
+    if (unit != nullptr)
+      if (const std::string reason = misfit(*unit, channel, linear_, false); !reason.empty())
+        fail_unit(text, label, reason);
+    channels_[joint].push_back(channel);
+    targets_.push_back(&record_of(joint).column(channel));
+  }
+
+  [[noreturn]] void fail_unit(const std::string& column, const Label& label,
+                              const std::string& reason) const {
+    lines_.fail(printable(column) + ": unit = " + in_quotes(label.unit) + ": " + reason);
   }
 
   Record& record_of(const std::string& joint) {
@@ -192,23 +142,8 @@ class Reader {
     }
   }
 
-  void read_rows() {
-    std::string_view line;
-    std::size_t empty_line = 0;
-    while (lines_.next(line)) {
-      if (trimmed(line).empty()) {
-        if (empty_line == 0) empty_line = lines_.number();
-        continue;
-      }
-      if (empty_line != 0) {
-        throw BadData(name_ + ":" + std::to_string(empty_line), "an empty line amid the data");
-      }
-      read_row(line);
-    }
-  }
-
   void read_row(std::string_view line) {
-    split(line, fields_);
+    split(line, kSeparator, fields_);
     if (fields_.size() != names_.size()) {
       refuse_other_separator();
       lines_.fail(std::to_string(fields_.size()) + (fields_.size() == 1 ? " field" : " fields") + " in " +
@@ -216,32 +151,19 @@ class Reader {
     }
     values_.resize(fields_.size());
     for (std::size_t i = 0; i < fields_.size(); ++i) values_[i] = read_field(i);
-    if (!accept_stamp(values_[time_column_])) return;
+    if (!rows_.accept(values_[time_column_], names_[time_column_], fields_[time_column_], lines_)) return;
     for (std::size_t i = 0; i < fields_.size(); ++i) {
       if (i != time_column_) targets_[i]->push_back(values_[i]);
     }
   }
 
-  double read_field(std::size_t i) const {
-    const ParsedNumber number = parse_number(fields_[i]);
-    if (number) return number.value;
-    lines_.fail(names_[i] + " = " + in_quotes(fields_[i]) + ": " +
-                (fields_[i].empty() ? "empty" : number.problem));
-  }
-
-  bool accept_stamp(double stamp) {
-    switch (stamps_.next(stamp)) {
-      case StampVerdict::accept:
-        time_.push_back(stamp);
-        return true;
-      case StampVerdict::repeated:
-        if (first_repeated_line_ == 0) first_repeated_line_ = lines_.number();
-        return false;
-      case StampVerdict::backwards:
-        break;
-    }
-    lines_.fail("time = " + in_quotes(fields_[time_column_]) + ": goes back, the row before has " +
-                to_text(stamps_.last()));
+  double read_field(std::size_t i) {
+    const bool of_clock = clock_ && i == time_column_;
+    const ParsedNumber number = of_clock ? clock_->read(fields_[i]) : parse_number(fields_[i]);
+    if (!number)
+      lines_.fail(printable(names_[i]) + " = " + in_quotes(fields_[i]) + ": " +
+                  (fields_[i].empty() ? "empty" : number.problem));
+    return of_clock || units_[i] == nullptr ? number.value : units_[i]->si(number.value);
   }
 
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
@@ -249,15 +171,16 @@ class Reader {
   LineReader lines_;
   const std::string name_;
   std::deque<JointRecord> joints_;  // targets_ point into them
-  std::vector<double> time_;
-  std::vector<std::string> names_;
+  const bool linear_;
+  RowTimes rows_;
+  std::optional<StampReader> clock_;             // where the time has a unit
+  std::vector<std::string> names_, bare_names_;  // with and without unit
+  std::vector<const Unit*> units_;
   std::map<std::string, std::vector<Channel>> channels_;  // of each joint
   std::vector<std::vector<double>*> targets_;             // one per column, nullptr for time
   std::size_t time_column_ = kNone;
   std::vector<std::string_view> fields_;
   std::vector<double> values_;
-  StampChecker stamps_;
-  std::size_t first_repeated_line_ = 0;
 };
 
 std::vector<Channel> present_channels(const Record& record) {
@@ -317,13 +240,30 @@ Record read_csv(std::istream& in, const std::string& name) {
   return record_of_joint(read_joints_csv(in, name), "", name);
 }
 
-std::vector<JointRecord> read_joints_csv(const std::string& path) {
+Record read_csv(const std::string& path, const ChannelMap& map, const std::string& joint) {
   std::ifstream in = open_input(path);
-  return read_joints_csv(in, path);
+  return read_csv(in, path, map, joint);
 }
 
-std::vector<JointRecord> read_joints_csv(std::istream& in, const std::string& name) {
-  return Reader(in, name).read();
+Record read_csv(std::istream& in, const std::string& name, const ChannelMap& map, const std::string& joint) {
+  if (!map.columns.empty()) {
+    MappedCsv mapped(in, name, map);
+    if (mapped.find_header()) return mapped.read();
+    if (!mapped.first_line_is_own()) mapped.refuse();
+    in.clear();
+    if (!in.seekg(0))
+      throw BadData(name, "is no file, which is needed to read it by channels of the rig file");
+  }
+  return record_of_joint(read_joints_csv(in, name, map.linear), joint, name);
+}
+
+std::vector<JointRecord> read_joints_csv(const std::string& path, bool linear) {
+  std::ifstream in = open_input(path);
+  return read_joints_csv(in, path, linear);
+}
+
+std::vector<JointRecord> read_joints_csv(std::istream& in, const std::string& name, bool linear) {
+  return Reader(in, name, linear).read();
 }
 
 Record record_of_joint(std::vector<JointRecord> joints, const std::string& joint, const std::string& name) {

@@ -14,6 +14,7 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 import bag_faults
+import bench_faults
 import csv_faults
 import yaml_faults
 from case import BAD, VERDICTS, run
@@ -61,7 +62,7 @@ def run_files(arguments, table):
     program_of, config = package_programs()
     clean = Clean(program_of, config)
     classes = {}
-    for module in (csv_faults, bag_faults, yaml_faults):
+    for module in (csv_faults, bench_faults, bag_faults, yaml_faults):
         classes.update(module.classes(clean))
     chosen = [kind for kind in classes if arguments.only in kind]
     jobs = [(kind, number) for kind in chosen for number in range(arguments.count)

@@ -36,7 +36,10 @@ skewness: 1.5
 """
 LIMITS = "schema_version: 1\nbacklash: {watch: 1e-4, service: 1.5e-4, stop: 2e-4}\n"
 RECORDS = ["time,motor_torque\n0,1\n0.001,2\n", "time,motor_position,load_position\r\n0,1,2\r\n1,2,3\r\n",
-           "\ufefftime, sensor_torque\n0, -1e-3\n0.5, nan\n", "time,motor_torque\n0,1\n0,1\n1,2\n\n\n", "time;motor_torque\n0;1\n"]
+           "\ufefftime, sensor_torque\n0, -1e-3\n0.5, nan\n", "time,motor_torque\n0,1\n0,1\n1,2\n\n\n", "time;motor_torque\n0;1\n",
+           "time [ms],motor_position (deg)\n0,1\n2,3\n", "# bench\nt [ms];phi [deg];Iq\n0;1,5;2\n1;2,5;3\n",
+           "t\tphi\tIq\n[s]\tarcmin\t\n1700000000.25\t1\t2\n1700000000.5\t1\t2\n",
+           "\"t [hh:mm:ss]\",phi [rad],Iq,\"a \"\"b\"\", c\"\n9:00:00.5,1,2,\n9:00:01,1,2,\"x\"\n"]
 
 
 def write(folder, name, text):

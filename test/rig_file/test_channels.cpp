@@ -39,6 +39,29 @@ TEST(Channels, AreThoseOfThisPackageWhereNoneAreTold) {
   EXPECT_EQ(map.sources.front().name, "elbow_motor");
 }
 
+TEST(Channels, MayBeColumnsOfACsv) {
+  const record::ChannelMap map = parse(
+      "channels:\n"
+      "  time: {column: \"t [ms]\"}\n"
+      "  motor_position: {column: Encoder, unit: deg, scale: -1, offset: 0.5}\n"
+      "  load_position: {column: Out, unit: deg, name: elbow}\n");
+  EXPECT_TRUE(map.declared);  // for messages: load_position alone
+  ASSERT_EQ(map.sources.size(), 1u);
+  EXPECT_EQ(map.sources[0].channel, record::Channel::load_position);
+  EXPECT_EQ(map.time.column, "t [ms]");
+  ASSERT_EQ(map.columns.size(), 2u);
+  EXPECT_EQ(map.columns[0].column, "Encoder");
+  EXPECT_EQ(map.columns[0].unit, "deg");
+  EXPECT_EQ(map.columns[0].scale, -1.0);
+  EXPECT_EQ(map.columns[0].offset, 0.5);
+  EXPECT_FALSE(map.columns[1].scale.has_value());
+
+  const record::ChannelMap columns_only =
+      parse("channels:\n  time: {column: t, unit: s}\n  motor_position: {column: x, unit: rad}\n");
+  EXPECT_FALSE(columns_only.declared);  // messages have the names of this package
+  EXPECT_EQ(columns_only.sources.front().name, "elbow_motor");
+}
+
 TEST(Channels, WrongOnesAreRefusedWithTheirPlace) {
   const auto refusal = [](const std::string& text) -> std::string {
     try {
@@ -57,6 +80,23 @@ TEST(Channels, WrongOnesAreRefusedWithTheirPlace) {
   EXPECT_NE(refusal("channels:\n  motor_position: {name: a, scale: 0}\n").find("must be finite and not 0"),
             std::string::npos);
   EXPECT_NE(refusal("channels: {}\n").find("must have a torque"), std::string::npos);
+  const std::string time = "channels:\n  time: {column: t, unit: s}\n  motor_position: ";
+  EXPECT_EQ(refusal(time + "{column: x, unit: furlong}\n")
+                .find("rig.yaml:3: channels.motor_position.unit = furlong: unknown, known are s, "),
+            0u);
+  EXPECT_NE(refusal(time + "{column: x, unit: Nm}\n").find("a torque, expected an angle"), std::string::npos);
+  EXPECT_NE(refusal(time + "{column: t, unit: rad}\n").find("is the column with the time"),
+            std::string::npos);
+  EXPECT_NE(refusal(time + "{column: x, unit: rad, scale: 0}\n").find("must be finite and not 0"),
+            std::string::npos);
+  EXPECT_NE(refusal(time + "{column: x, unit: rad, topic: a}\n").find("motor_position.topic"),
+            std::string::npos);
+  EXPECT_NE(refusal(time + "{column: x, unit: rad, name: a, scale: 2}\n").find("motor_position.scale"),
+            std::string::npos);
+  EXPECT_NE(refusal(time + "{name: x}\n").find("channels"), std::string::npos);  // a time, and no column
+  EXPECT_NE(refusal("channels:\n  motor_position: {column: x, unit: rad}\n").find("time"), std::string::npos);
+  EXPECT_NE(refusal("channels:\n  time: {column: t, unit: s, scale: 2}\n").find("channels"),
+            std::string::npos);
   EXPECT_NE(refusal("channels: 3\n").find("rig.yaml:1: channels = 3"), std::string::npos);
 }
 

@@ -55,8 +55,8 @@ class Commands : public CommandTest {
 TEST_F(Commands, HelpAndVersion) {
   for (const std::string& command : std::vector<std::string>{
            "simulate", "backlash_trend", "build_curve", "compare_models", "diagnose_record", "convert_record",
-           "gear_geometry", "identify", "integrator_study", "search_parameters", "separability_map",
-           "trace_residual", "uncertainty_study"}) {
+           "export_model", "gear_geometry", "identify", "integrator_study", "search_parameters",
+           "separability_map", "trace_residual", "uncertainty_study"}) {
     const std::string help = done(command + " --help").out;
     expect_contains(help, "Usage: " + command);
     for (const char* part : {"Options:", "rosrun", "Exit codes"}) expect_contains(help, part);

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where the channels of one joint come from: which topic, which name in its messages, which of their fields,
-// and what must be done to the value. A robot publishes names and units of its own; this says what they are.
+// or which column of a CSV, and what must be done to the value. A robot and a test bench have names and units
+// of their own; this says what they are.
 //
 //   channel = scale * field + offset
+//   channel = scale * (column in SI) + offset
 #pragma once
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "backlash_diagnosis/record/record.h"
@@ -32,10 +35,22 @@ struct ChannelSource {
   double offset = 0;  // unit of the channel
 };
 
+/// A column of a CSV that has names and units of its own.
+struct ColumnSource {
+  Channel channel = Channel::motor_position;  // means nothing for the time
+  std::string column;                         // as in the header, with or without the unit there
+  std::string unit;                           // where the file does not say it (record/unit.h)
+  std::optional<double> scale;                // unit of the channel over the SI unit of the column, != 0
+  double offset = 0;                          // unit of the channel
+};
+
 struct ChannelMap {
   std::string joint;  // what the joint is called in answers
   std::vector<ChannelSource> sources;
-  bool declared = false;  // by the rig file or a parameter; else the names that this package gives
+  bool declared = false;  // `sources` by the rig file or a parameter; else the names that this package gives
+  std::vector<ColumnSource> columns;  // of a CSV; empty: the package's own format only
+  ColumnSource time;                  // of the same CSV
+  bool linear = false;                // the axis: m and N for rad and N m
 
   /// All topics, that of the motor's position (else of the first source) first: its stamps count.
   std::vector<std::string> topics() const;
@@ -52,8 +67,16 @@ struct ChannelMap {
 ///   <joint>_accelerometer                                                           effort = acceleration
 ChannelMap usual_channels(const std::string& joint);
 
+extern const std::string kTimeColumn;  ///< "time", of a CSV in the package's own format
+
+/// Whether a file in the package's own format may have a column of that name: `time`, a channel,
+/// JOINT/channel.
+bool is_own_column(std::string_view name);
+
 /// Throws InvalidParameter for a channel twice, no channel that shows backlash, an empty name or topic, a
-/// scale of 0, a scale or offset that is not finite.
+/// scale of 0, a scale or offset that is not finite; of columns also for none with the time, a unit that is
+/// unknown or of another kind, and one of the package's own names (`time`, `motor_position`) that means
+/// anything but what it is: no file in the package's own format may be read as something else.
 void check(const ChannelMap& map);
 
 }  // namespace backlash::record

@@ -66,7 +66,7 @@ BagPlace place_of(const rig_file::RigFile& file) {
 
 record::Record read_record(const std::string& path, const BagPlace& place) {
   check_record_path(path);
-  if (ends_in(path, ".csv")) return record::record_of_joint(record::read_joints_csv(path), place.joint, path);
+  if (ends_in(path, ".csv")) return record::read_csv(path, place.channels, place.joint);
   return place.channels.declared ? ros_bridge::read_bag(path, place.channels)
                                  : ros_bridge::read_bag(path, place.joint, place.topic);
 }

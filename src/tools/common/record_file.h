@@ -14,11 +14,11 @@ namespace backlash::tools {
 
 extern const std::string kDefaultJoint;  ///< "joint"
 
-/// Where in a bag the record is; means nothing for a CSV.
+/// Where in a bag or a CSV the record is.
 struct BagPlace {
-  std::string joint;  ///< empty: the only one there is
-  std::string topic = "joint_states";
-  record::ChannelMap channels;  ///< where it is declared it says both
+  std::string joint;                   ///< empty: the only one there is
+  std::string topic = "joint_states";  ///< of a bag
+  record::ChannelMap channels;         ///< of a bag where it is declared, of a CSV where it has columns
 };
 
 /// Where the joint of a rig file is.
