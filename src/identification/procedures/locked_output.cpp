@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/identification/procedures/locked_output.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "locked_signals.h"
+
+namespace backlash::identification {
+namespace {
+
+constexpr int kGrid = 12;               // choice (time): places that either edge is tried at first
+constexpr double kLeastOnFlank = 0.03;  // choice: of the rows, beyond either edge
+constexpr double kMisfit = 1.5;         // as identify.cpp: times the noise floor
+constexpr double kHold = 0.5;        // theory: samples, between a torque that is held and one of the moment
+constexpr int kRounds = 3;           // choice: of what the terms make of the fitted mesh
+constexpr long kSpareBlocks = 4;     // choice: beyond the unknowns, for a covariance from blocks
+constexpr double kVagueOffset = 1;   // choice: of the torque's spread; only a preloaded mesh feels it
+constexpr double kFewestPasses = 3;  // theory: in a single one to and fro a drift looks like play
+
+enum : Eigen::Index { kInertia, kViscous, kCoulomb, kOffset, kDrift, kStiffness, kPlus, kMinus, kUnknowns };
+
+double rms(const Eigen::VectorXd& values) {
+  return values.norm() / std::sqrt(double(values.size()));
+}
+
+double spread(const Eigen::VectorXd& values) {
+  return rms(values.array() - values.mean());
+}
+
+LockedMesh mesh_of(const Eigen::VectorXd& p) {
+  return {p[kStiffness], p[kPlus], p[kMinus], p[kDrift]};
+}
+
+/// One record, its torque, and the rig as it is known.
+class Fit {
+ public:
+  Fit(const LockedSignals& signals, const model::Rig& rig, double passes)
+      : signals_(signals),
+        rig_(rig),
+        passes_(passes),
+        columns_(signals.picked(signals.columns())),
+        travel_(signal::extent(signals.data().motor)) {}
+
+  void start();
+  void refine();
+  /// Torque anew with what the terms make of the mesh as it is fitted.
+  void take_torque(const LockedMesh& mesh) {
+    whole_torque_ = signals_.torque(rig_, mesh);
+    torque_ = signals_.picked(whole_torque_);
+  }
+  void judge(double floor);
+
+  Eigen::VectorXd predicted() const {
+    return signals_.columns() * p_.head(4) + signals_.mesh_torque(rig_, mesh_of(p_));
+  }
+  const Eigen::VectorXd& values() const { return p_; }
+  const Eigen::MatrixXd& covariance() const { return fit_.covariance; }
+  const Eigen::VectorXd& whole_torque() const { return whole_torque_; }
+  Eigen::VectorXd residuals() const { return sigma_ * fit_.residuals.head(torque_.size()); }
+  Eigen::VectorXd torque() const { return torque_; }
+  double share_beyond(bool plus) const;
+
+ private:
+  Eigen::VectorXd mesh(const LockedMesh& m) const { return signals_.picked(signals_.mesh_torque(rig_, m)); }
+  Eigen::VectorXd rows(const Eigen::VectorXd& p) const;
+  void widen(const Eigen::VectorXd& variance);
+
+  const LockedSignals& signals_;
+  const model::Rig& rig_;
+  double passes_;
+  Eigen::MatrixXd columns_;
+  signal::Extent travel_;
+  Eigen::VectorXd whole_torque_, torque_, p_, scale_;
+  double sigma_ = 1;
+  signal::LeastSquaresFit fit_;
+};
+
+/// Rows in standard deviations, then what is known beside them: offset and drift are vague, not unknown.
+Eigen::VectorXd Fit::rows(const Eigen::VectorXd& p) const {
+  if (!(p[kStiffness] > 0)) throw CannotIdentify("stiffness <= 0");
+  Eigen::VectorXd out(torque_.size() + 2);
+  out.head(torque_.size()) = (torque_ - columns_ * p.head(4) - mesh(mesh_of(p))) / sigma_;
+  out[torque_.size()] = -p[kOffset] / (kVagueOffset * spread(torque_));
+  out[torque_.size() + 1] = -p[kDrift] / scale_[kDrift];
+  return out;
+}
+
+/// The best of a grid of edges, at each of which everything else is linear.
+void Fit::start() {
+  const double declared = rig_.mesh.contact_spec().values.at("stiffness"), step = travel_.size() / kGrid;
+  take_torque({declared, travel_.high, travel_.low, 0});
+  std::vector<Eigen::VectorXd> plus, minus;
+  for (int i = 0; i < kGrid; ++i) {
+    const double edge = travel_.low + i * step;
+    plus.push_back(mesh({declared, edge, travel_.low - travel_.size(), 0}));
+    minus.push_back(mesh({declared, travel_.high + travel_.size(), edge + step, 0}));
+  }
+  double least = INFINITY;
+  Eigen::MatrixXd a(torque_.size(), 5);
+  a.leftCols(4) = columns_;
+  p_ = Eigen::VectorXd::Zero(kUnknowns);
+  for (int i = 0; i < kGrid; ++i)
+    for (int j = 0; j <= i; ++j) {  // edges travel/kGrid apart or more, or the same
+      a.col(4) = plus[std::size_t(i)] + minus[std::size_t(j)];
+      std::optional<signal::LeastSquaresFit> fit;
+      try {
+        fit = signal::fit_linear(a, torque_);
+      } catch (const CannotIdentify&) {
+        continue;  // an edge beyond what slides
+      }
+      const double left = rms(fit->residuals);
+      if (!(left < least) || !(fit->values[4] > 0)) continue;
+      least = left;
+      p_.head(4) = fit->values.head(4);
+      p_[kStiffness] = declared * fit->values[4];
+      p_[kPlus] = travel_.low + i * step;
+      p_[kMinus] = travel_.low + (j + 1) * step;
+    }
+  if (!std::isfinite(least)) throw CannotIdentify("no flank: torque does not rise with position");
+  sigma_ = least;
+  scale_ = Eigen::VectorXd::Zero(kUnknowns);
+  for (Eigen::Index i = 0; i < 4; ++i) scale_[i] = spread(torque_) / rms(columns_.col(i));
+  scale_[kDrift] = travel_.size() / (2 * signals_.middle());
+  if (passes_ < kFewestPasses) scale_[kDrift] *= 1e-6;
+  scale_[kStiffness] = p_[kStiffness];
+  scale_[kPlus] = scale_[kMinus] = step;
+}
+
+void Fit::refine() {
+  signal::NonlinearOptions options;
+  options.step = 1e-3;
+  options.wide_iterations = 6;
+  const auto f = [this](const Eigen::VectorXd& p) { return rows(p); };
+  fit_ = signal::fit_nonlinear(f, p_, scale_, options);
+  p_ = fit_.values;
+  sigma_ *= rms(fit_.residuals.head(torque_.size()));  // rows of variance 1
+  fit_ = signal::fit_nonlinear(f, p_, scale_, options);
+  p_ = fit_.values;
+}
+
+double Fit::share_beyond(bool plus) const {
+  double beyond = 0;
+  for (const Eigen::Index k : signals_.rows()) {
+    const double t = double(k) * signals_.data().interval - signals_.middle();
+    const double x = signals_.data().motor[std::size_t(k)] - p_[kDrift] * t;
+    beyond += plus ? x > p_[kPlus] : x < p_[kMinus];
+  }
+  return beyond / double(torque_.size());
+}
+
+/// Correlations stay.
+void Fit::widen(const Eigen::VectorXd& variance) {
+  const Eigen::VectorXd growth = variance.cwiseQuotient(fit_.covariance.diagonal()).cwiseMax(1).cwiseSqrt();
+  fit_.covariance = growth.asDiagonal() * fit_.covariance * growth.asDiagonal();
+}
+
+void Fit::judge(double floor) {
+  const Eigen::Index n = torque_.size();
+  const auto f = [this](const Eigen::VectorXd& p) { return rows(p); };
+  Eigen::VectorXd steps = 1e-2 * scale_;
+  steps[kPlus] = steps[kMinus] = 0.02 * travel_.size();
+  signal::widen_jacobian(fit_, f, steps);
+  const auto pass = Eigen::Index(double(n) / passes_);
+  const Eigen::Index longest = n / (kUnknowns + kSpareBlocks), shortest = n / (4 * kUnknowns);
+  const Eigen::MatrixXd white = fit_.covariance;
+  Eigen::VectorXd variance = white.diagonal();
+  for (const Eigen::Index length : {std::min(pass, longest), std::min(pass, shortest)}) {
+    const Eigen::Index block = std::max<Eigen::Index>(1, length);
+    const double free = double(n) / double(block) - double(kUnknowns);
+    const double student = signal::student_t_quantile(0.975, free) / signal::kNormalQuantile975;
+    variance = variance.cwiseMax(student * student * signal::block_covariance(fit_, block, 2).diagonal());
+  }
+  widen(variance);
+  const Eigen::VectorXd later = signals_.picked(signals_.delayed_by_sample()) / sigma_;
+  Eigen::VectorXd gradient = fit_.jacobian.topRows(n).transpose() * later;
+  const Eigen::VectorXd shift = kHold * (white * gradient);
+  fit_.covariance += shift * shift.transpose();
+  const double left = rms(residuals());
+  if (left <= kMisfit * floor) return;
+  const double beyond = std::sqrt(double(n) * (left * left - floor * floor)) / sigma_;
+  Eigen::VectorXd follows(kUnknowns);
+  for (Eigen::Index i = 0; i < kUnknowns; ++i) {
+    const double change = fit_.jacobian.col(i).head(n).norm(), known = fit_.jacobian.col(i).tail(2).norm();
+    follows[i] = 1 / (std::pow(change / beyond, 2) + known * known);
+  }
+  widen(follows);
+}
+
+signal::Measured with_error(double value, double variance) {
+  return {value, std::sqrt(variance)};
+}
+
+/// A rig whose flanks lie where the fit has them; what overlaps counts as no gap.
+model::Rig with_mesh(model::Rig rig, const LockedMesh& mesh) {
+  model::ContactSpec spec = rig.mesh.contact_spec();
+  spec.values["stiffness"] = mesh.stiffness;
+  rig.mesh.contact = model::make_contact_law(spec.law, spec.values);
+  rig.mesh.backlash = std::max(0.0, mesh.plus - mesh.minus) * rig.mesh.lever();
+  return rig;
+}
+
+void fill(const Fit& fit, const LockedSignals& signals, const model::Rig& rig, double floor,
+          LockedOutput& out) {
+  const Eigen::VectorXd& p = fit.values();
+  const Eigen::MatrixXd& v = fit.covariance();
+  const auto value = [&](Eigen::Index i) { return with_error(p[i], v(i, i)); };
+  out.inertia = value(kInertia);
+  out.viscous = value(kViscous);
+  out.viscous.value -= rig.pinion.viscous_damping;
+  out.coulomb = value(kCoulomb);
+  out.offset = value(kOffset);
+  out.stiffness = value(kStiffness);
+  out.backlash_angle =
+      with_error(p[kPlus] - p[kMinus], v(kPlus, kPlus) + v(kMinus, kMinus) - 2 * v(kPlus, kMinus));
+  out.centre = mesh_of(p).centre();
+  out.drift = value(kDrift);
+  out.cutoff = signals.cutoff();
+  out.interval = signals.data().interval;
+  const double size = spread(fit.torque());
+  out.relative_error = rms(fit.residuals()) / size;
+  out.floor = floor / size;
+  const Eigen::VectorXd predicted = fit.predicted(), &measured = fit.whole_torque();
+  out.measured.assign(measured.begin(), measured.end());
+  out.predicted.assign(predicted.begin(), predicted.end());
+  out.counts = signals.counts();
+}
+
+}  // namespace
+
+LockedOutput identify_locked_output(const record::Record& record, const model::Rig& declared) {
+  const LockedSignals signals(record, declared);
+  const double passes = 2 * signals.middle() / time_between_reversals(signals.data());
+  model::Rig rig = declared;
+  Fit fit(signals, rig, passes);
+  fit.start();
+  for (int round = 0; round < (rig.terms.empty() ? 1 : kRounds); ++round) {
+    fit.refine();
+    rig = with_mesh(rig, mesh_of(fit.values()));
+    fit.take_torque(mesh_of(fit.values()));
+  }
+  for (const bool plus : {true, false})
+    if (fit.share_beyond(plus) < kLeastOnFlank)
+      throw CannotIdentify(
+          fmt::format("{}: the flank that holds {} torque is touched in {:.2g} % of the samples in which the "
+                      "motor slides",
+                      record.name, plus ? "positive" : "negative", 100 * fit.share_beyond(plus)));
+  const double floor = noise_floors(rig, signals.data(), {}, signals.cutoff(), 0).torque;
+  fit.judge(floor);
+  LockedOutput out;
+  fill(fit, signals, rig, floor, out);
+  return out;
+}
+
+}  // namespace backlash::identification

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A record of a joint with locked output as the columns of a regression (locked_output.h).
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "backlash_diagnosis/identification/fit/servo_data.h"
+#include "backlash_diagnosis/model/rig.h"
+
+namespace backlash::identification {
+
+/// Where the flanks are and how stiff: all that is not linear.
+struct LockedMesh {
+  double stiffness = 0;        // of the contact law, in its unit
+  double plus = 0, minus = 0;  // rad, motor_position at the flanks in the middle of the record
+  double drift = 0;            // rad/s
+  double centre() const { return 0.5 * (plus + minus); }
+};
+
+/// Everything is low-passed after what does not slide has been set to 0.
+class LockedSignals {
+ public:
+  /// `rig` at the load side, with rigid couplings. Throws CannotIdentify.
+  LockedSignals(const record::Record& record, const model::Rig& rig);
+
+  const ServoData& data() const { return data_; }
+  double cutoff() const { return cutoff_; }
+  double middle() const { return 0.5 * double(data_.size()) * data_.interval; }  // s
+  const std::vector<char>& counts() const { return counts_; }
+  /// Samples that count, as many as a signal of this bandwidth has independent values.
+  const std::vector<Eigen::Index>& rows() const { return rows_; }
+  /// a, v, sign(v), 1; all samples.
+  const Eigen::MatrixXd& columns() const { return columns_; }
+
+  /// N m, less what the rig declares beside the columns and the mesh, which a mesh of these values may
+  /// change.
+  Eigen::VectorXd torque(const model::Rig& rig, const LockedMesh& mesh) const;
+  /// What one sample's delay of the torque adds to it.
+  Eigen::VectorXd delayed_by_sample() const;
+  /// N m, of the contact law of `rig` with these values.
+  Eigen::VectorXd mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const;
+
+  Eigen::VectorXd picked(const Eigen::VectorXd& values) const;
+  Eigen::MatrixXd picked(const Eigen::MatrixXd& values) const;
+
+ private:
+  Eigen::VectorXd low_passed(std::vector<double> values) const;
+
+  ServoData data_;
+  double cutoff_;
+  std::vector<int> direction_;
+  std::vector<char> counts_;
+  std::vector<Eigen::Index> rows_;
+  Eigen::MatrixXd columns_;
+};
+
+}  // namespace backlash::identification
