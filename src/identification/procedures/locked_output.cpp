@@ -22,9 +22,12 @@ constexpr int kGrid = 12;               // choice (time): places that either edg
 constexpr double kLeastOnFlank = 0.03;  // choice: of the rows, beyond either edge
 constexpr double kMisfit = 1.5;         // as identify.cpp: times the noise floor
 constexpr double kHold = 0.5;        // theory: samples, between a torque that is held and one of the moment
+constexpr double kReach = 0.5;       // theory: standard deviations of what is known within a bound, 95 %
 constexpr int kRounds = 3;           // choice: of what the terms make of the fitted mesh
 constexpr long kSpareBlocks = 4;     // choice: beyond the unknowns, for a covariance from blocks
 constexpr double kVagueOffset = 1;   // choice: of the torque's spread; only a preloaded mesh feels it
+constexpr double kTold = 2;          // choice: standard errors of the stiffness, from which there are flanks
+constexpr double kMostLeft = 0.5;    // choice: relative error, beyond which the model says too little
 constexpr double kFewestPasses = 3;  // theory: in a single one to and fro a drift looks like play
 
 enum : Eigen::Index { kInertia, kViscous, kCoulomb, kOffset, kDrift, kStiffness, kPlus, kMinus, kUnknowns };
@@ -69,11 +72,16 @@ class Fit {
   Eigen::VectorXd residuals() const { return sigma_ * fit_.residuals.head(torque_.size()); }
   Eigen::VectorXd torque() const { return torque_; }
   double share_beyond(bool plus) const;
+  /// Then dry friction turns within a sample, and its mean is less than it is.
+  bool chatters() const { return signals_.chatters(model::GearTrain(rig_).motor_inertia()); }
 
  private:
   Eigen::VectorXd mesh(const LockedMesh& m) const { return signals_.picked(signals_.mesh_torque(rig_, m)); }
   Eigen::VectorXd rows(const Eigen::VectorXd& p) const;
   void widen(const Eigen::VectorXd& variance);
+  void add_timing(const Eigen::MatrixXd& white);
+  void add_noise_of_motion(const Eigen::MatrixXd& white);
+  void allow_for_left(double floor);
 
   const LockedSignals& signals_;
   const model::Rig& rig_;
@@ -181,19 +189,49 @@ void Fit::judge(double floor) {
     variance = variance.cwiseMax(student * student * signal::block_covariance(fit_, block, 2).diagonal());
   }
   widen(variance);
+  add_timing(white);
+  add_noise_of_motion(white);
+  allow_for_left(floor);
+  if (chatters()) {
+    const double coulomb = std::fabs(p_[kCoulomb]), speed = rms(columns_.col(kViscous));
+    fit_.covariance(kCoulomb, kCoulomb) += std::pow(kReach * coulomb, 2);
+    fit_.covariance(kViscous, kViscous) += std::pow(coulomb / speed, 2);
+  }
+}
+
+/// Torque and position may be apart by a part of a sample, which acts like a damping.
+void Fit::add_timing(const Eigen::MatrixXd& white) {
   const Eigen::VectorXd later = signals_.picked(signals_.delayed_by_sample()) / sigma_;
-  Eigen::VectorXd gradient = fit_.jacobian.topRows(n).transpose() * later;
+  const Eigen::VectorXd gradient = fit_.jacobian.topRows(torque_.size()).transpose() * later;
   const Eigen::VectorXd shift = kHold * (white * gradient);
   fit_.covariance += shift * shift.transpose();
+}
+
+/// Noise of speed and acceleration lessens what they make of the torque, and where the torque answers to the
+/// measured position, as in a closed loop, goes with what is left of it.
+void Fit::add_noise_of_motion(const Eigen::MatrixXd& white) {
+  const auto [acceleration, speed] = signals_.noise_of_motion();
+  const double left = rms(residuals()), rows = double(torque_.size());
+  for (const auto& [i, noise] : {std::pair(kInertia, acceleration), std::pair(kViscous, speed)}) {
+    const Eigen::VectorXd shift =
+        white.col(i) * (rows * noise * (left + std::fabs(p_[i]) * noise) / (sigma_ * sigma_));
+    fit_.covariance += kReach * kReach * shift * shift.transpose();
+  }
+}
+
+/// What is left beyond noise may follow what a value changes, wholly: it is told no better than |left| /
+/// |change per unit|, or than it is known beside the record.
+void Fit::allow_for_left(double floor) {
   const double left = rms(residuals());
   if (left <= kMisfit * floor) return;
+  const Eigen::Index n = torque_.size();
   const double beyond = std::sqrt(double(n) * (left * left - floor * floor)) / sigma_;
-  Eigen::VectorXd follows(kUnknowns);
+  Eigen::VectorXd variance(kUnknowns);
   for (Eigen::Index i = 0; i < kUnknowns; ++i) {
     const double change = fit_.jacobian.col(i).head(n).norm(), known = fit_.jacobian.col(i).tail(2).norm();
-    follows[i] = 1 / (std::pow(change / beyond, 2) + known * known);
+    variance[i] = 1 / (std::pow(change / beyond, 2) + known * known);
   }
-  widen(follows);
+  widen(variance);
 }
 
 signal::Measured with_error(double value, double variance) {
@@ -258,6 +296,15 @@ LockedOutput identify_locked_output(const record::Record& record, const model::R
   fit.judge(floor);
   LockedOutput out;
   fill(fit, signals, rig, floor, out);
+  if (fit.chatters())
+    out.warnings.push_back(record.name +
+                           ": the torque jumps from sample to sample and the motor with it: dry friction is "
+                           "shaken off, and friction can hardly be told");
+  if (!(out.stiffness.value > kTold * out.stiffness.standard_error) || out.relative_error > kMostLeft)
+    throw CannotIdentify(fmt::format(
+        "{}: torque hardly follows the position: stiffness {:.3g} +- {:.2g}, {:.3g} % of the torque "
+        "unexplained",
+        record.name, out.stiffness.value, out.stiffness.standard_error, 100 * out.relative_error));
   return out;
 }
 

@@ -8,14 +8,19 @@
 
 #include "../fit/servo_prediction.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/noise.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::identification {
 namespace {
 
-constexpr double kOversampling = 1.25;      // theory: rows per second over 2 cutoff
-constexpr double kLeastShare = 0.02;        // choice: of the samples, that slide in each direction
-constexpr std::size_t kFewestRows = 64;     // choice
+constexpr double kOversampling = 1.25;   // theory: rows per second over 2 cutoff
+constexpr double kLeastShare = 0.02;     // choice: of the samples, that slide in each direction
+constexpr double kBeyondChance = 8;      // choice: standard deviations of a correlation of white noises
+constexpr double kTurns = 0.5;           // choice: of the usual speed, that a sample's torque takes or gives
+constexpr std::size_t kFewestRows = 64;  // choice
 constexpr std::size_t kFewestSamples = 64;  // theory: for the noise of a position (bandwidth.h)
 
 /// The rig without what the columns and the mesh do not say.
@@ -25,16 +30,42 @@ model::Rig plain(model::Rig rig) {
   return rig;
 }
 
+std::vector<double> above(std::vector<double> values, double interval, double cutoff) {
+  const std::vector<double> slow = signal::low_pass(values, interval, cutoff);
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] -= slow[k];
+  return values;
+}
+
+/// Correlation of x[k] with y[k + lag] over the samples that count, and how many these are.
+std::pair<double, double> correlation(const std::vector<double>& x, const std::vector<double>& y, long lag,
+                                      const std::vector<char>& counts) {
+  double xx = 0, yy = 0, xy = 0, n = 0;
+  for (long k = std::max(0L, -lag); k < long(y.size()) - std::max(0L, lag); ++k) {
+    if (!counts[k]) continue;
+    xx += x[k] * x[k];
+    yy += y[k + lag] * y[k + lag];
+    xy += x[k] * y[k + lag];
+    ++n;
+  }
+  return {xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0, n};
+}
+
 }  // namespace
 
 LockedSignals::LockedSignals(const record::Record& record, const model::Rig& rig) {
   if (record.size() < kFewestSamples)
     throw CannotIdentify(fmt::format("{}: only {} samples", record.name, record.size()));
   data_ = servo_data(record, rig);
+  const std::vector<double>& position = record.column(record::Channel::motor_position);
+  position_noise_ =
+      std::max(signal::position_noise(position), signal::resolution(position) / std::sqrt(12.0));
   data_.load.clear();
   cutoff_ = with_bands({}, rig, {data_}).cutoff;
   const PreparedServo prepared(data_, cutoff_, 0);
   direction_ = prepared.direction;
+  fast_torque_ = above(data_.torque, data_.interval, cutoff_);
+  // Of a step from sample to sample: a central difference does not see what turns round each sample.
+  fast_step_ = above(signal::differences(position, 1), data_.interval, cutoff_);
   counts_ = prepared.counts;
   const auto stride = std::max(1L, std::lround(1 / (2 * kOversampling * cutoff_ * data_.interval)));
   long forward = 0, backward = 0;
@@ -75,6 +106,33 @@ Eigen::VectorXd LockedSignals::torque(const model::Rig& rig, const LockedMesh& m
                             without = prepared.residuals(plain(rig), of_moment).predicted_torque;
   for (std::size_t k = 0; k < torque.size(); ++k) torque[k] -= with[k] - without[k];
   return low_passed(std::move(torque));
+}
+
+/// White noise of the position, differentiated twice and once up to the cutoff: the squares of the gains
+/// (2 pi f)^2 and 2 pi f integrated. What is smooth already has less.
+std::pair<double, double> LockedSignals::noise_of_motion() const {
+  const double t = data_.interval, w = 2 * M_PI * cutoff_,
+               speed = w * std::sqrt(2 * cutoff_ * t / 3) * position_noise_;
+  const double left = std::min(speed, data_.rate_noise);
+  return {left * w * std::sqrt(0.6), left};
+}
+
+bool LockedSignals::chatters(double inertia) const {
+  double torque = 0, n = 0;
+  std::vector<double> speeds;
+  for (std::size_t k = 0; k < counts_.size(); ++k) {
+    if (!counts_[k]) continue;
+    torque += fast_torque_[k] * fast_torque_[k];
+    speeds.push_back(data_.motor_rate[k]);
+    ++n;
+  }
+  const double kick = std::sqrt(torque / n) * data_.interval / inertia;
+  if (kick < kTurns * signal::median_magnitude(speeds)) return false;
+  for (const long lag : {-1L, 0L, 1L}) {
+    const auto [r, samples] = correlation(fast_torque_, fast_step_, lag, counts_);
+    if (std::fabs(r) > kBeyondChance / std::sqrt(samples)) return true;
+  }
+  return false;
 }
 
 Eigen::VectorXd LockedSignals::delayed_by_sample() const {

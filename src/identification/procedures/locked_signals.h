@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/identification/fit/servo_data.h"
@@ -36,6 +37,12 @@ class LockedSignals {
   /// N m, less what the rig declares beside the columns and the mesh, which a mesh of these values may
   /// change.
   Eigen::VectorXd torque(const model::Rig& rig, const LockedMesh& mesh) const;
+  /// rad/s^2, rad/s: standard deviation of the noise of both columns.
+  std::pair<double, double> noise_of_motion() const;
+  /// Whether the motor's torque drives it to and fro between the samples: what the low-pass leaves out of
+  /// torque and steps of the position go together, and the torque is enough to turn a motor of this inertia
+  /// round.
+  bool chatters(double inertia) const;
   /// What one sample's delay of the torque adds to it.
   Eigen::VectorXd delayed_by_sample() const;
   /// N m, of the contact law of `rig` with these values.
@@ -49,6 +56,9 @@ class LockedSignals {
 
   ServoData data_;
   double cutoff_;
+  double position_noise_;  // rad
+  std::vector<double> fast_torque_,
+      fast_step_;  // N m, rad per sample: above the band, where the motor slides
   std::vector<int> direction_;
   std::vector<char> counts_;
   std::vector<Eigen::Index> rows_;

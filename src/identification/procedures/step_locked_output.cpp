@@ -140,6 +140,7 @@ ProcedureReport run_locked_output(IdentificationCase& c) {
     LockedOutput one = identify_locked_output(r.record, rig);
     require_still_gear(c.declared, one, r.record.name);
     c.result.torque.push_back({r.record.name, one.interval, one.measured, one.predicted, one.counts});
+    c.result.warnings.insert(c.result.warnings.end(), one.warnings.begin(), one.warnings.end());
     found.push_back(std::move(one));
   });
   std::vector<std::string> contradicted, untold;

@@ -40,6 +40,7 @@ struct LockedOutput {
   double interval = 0;        // s
   std::vector<double> measured, predicted;  // N m, filtered
   std::vector<char> counts;                 // samples that count
+  std::vector<std::string> warnings;
 };
 
 /// Throws CannotIdentify where this rig cannot be served, with the reason.
