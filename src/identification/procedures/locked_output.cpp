@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/signal/block_regression.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
@@ -23,7 +24,10 @@ constexpr double kLeastOnFlank = 0.03;  // choice: of the rows, beyond either ed
 constexpr double kMisfit = 1.5;         // as identify.cpp: times the noise floor
 constexpr double kHold = 0.5;        // theory: samples, between a torque that is held and one of the moment
 constexpr double kReach = 0.5;       // theory: standard deviations of what is known within a bound, 95 %
-constexpr int kRounds = 3;           // choice: of what the terms make of the fitted mesh
+constexpr int kStates = 8;           // choice: places of position and of speed, each way
+constexpr int kParts = 16;           // choice: of a record, foretold by the others
+constexpr int kDraws = 100;          // choice (time)
+constexpr int kRounds = 5;           // choice: of what the terms make of the fitted mesh
 constexpr long kSpareBlocks = 4;     // choice: beyond the unknowns, for a covariance from blocks
 constexpr double kVagueOffset = 1;   // choice: of the torque's spread; only a preloaded mesh feels it
 constexpr double kTold = 2;          // choice: standard errors of the stiffness, from which there are flanks
@@ -81,7 +85,8 @@ class Fit {
   void widen(const Eigen::VectorXd& variance);
   void add_timing(const Eigen::MatrixXd& white);
   void add_noise_of_motion(const Eigen::MatrixXd& white);
-  void allow_for_left(double floor);
+  double systematic(double floor) const;
+  void allow_for_left(const Eigen::MatrixXd& white, double floor);
 
   const LockedSignals& signals_;
   const model::Rig& rig_;
@@ -191,7 +196,7 @@ void Fit::judge(double floor) {
   widen(variance);
   add_timing(white);
   add_noise_of_motion(white);
-  allow_for_left(floor);
+  allow_for_left(white, floor);
   if (chatters()) {
     const double coulomb = std::fabs(p_[kCoulomb]), speed = rms(columns_.col(kViscous));
     fit_.covariance(kCoulomb, kCoulomb) += std::pow(kReach * coulomb, 2);
@@ -219,31 +224,42 @@ void Fit::add_noise_of_motion(const Eigen::MatrixXd& white) {
   }
 }
 
-/// What is left beyond noise may follow what a value changes, wholly: it is told no better than |left| /
-/// |change per unit|, or than it is known beside the record.
-void Fit::allow_for_left(double floor) {
-  const double left = rms(residuals());
-  if (left <= kMisfit * floor) return;
-  const Eigen::Index n = torque_.size();
-  const double beyond = std::sqrt(double(n) * (left * left - floor * floor)) / sigma_;
-  Eigen::VectorXd variance(kUnknowns);
-  for (Eigen::Index i = 0; i < kUnknowns; ++i) {
-    const double change = fit_.jacobian.col(i).head(n).norm(), known = fit_.jacobian.col(i).tail(2).norm();
-    variance[i] = 1 / (std::pow(change / beyond, 2) + known * known);
-  }
-  widen(variance);
+/// N m, root mean square of what is left that is no noise: beyond the floor where that is clear, else what
+/// follows position or speed from one part of the record to the others.
+double Fit::systematic(double floor) const {
+  const Eigen::VectorXd left = residuals();
+  const double size = rms(left);
+  if (size > kMisfit * floor) return std::sqrt(size * size - floor * floor);
+  const Eigen::MatrixXd features = signals_.states(kStates);
+  std::vector<int> block;
+  for (Eigen::Index i = 0; i < left.size(); ++i) block.push_back(int(i * kParts / left.size()));
+  signal::BlockRegressionSettings settings;
+  settings.draws = kDraws;
+  const signal::PredictedShare share = signal::predicted_share(features, left, block, settings);
+  const bool clear = share.lower > 0 && share.value > share.chance;
+  return clear ? std::sqrt(share.value) * size : 0;
+}
+
+/// A signal of that size that the model lacks moves a value by no more than |signal| |row of the
+/// pseudo-inverse| (Cauchy and Schwarz).
+void Fit::allow_for_left(const Eigen::MatrixXd& white, double floor) {
+  const double beyond = kReach * std::sqrt(double(torque_.size())) * systematic(floor) / sigma_;
+  if (beyond > 0) widen(beyond * beyond * white.diagonal());
 }
 
 signal::Measured with_error(double value, double variance) {
   return {value, std::sqrt(variance)};
 }
 
-/// A rig whose flanks lie where the fit has them; what overlaps counts as no gap.
-model::Rig with_mesh(model::Rig rig, const LockedMesh& mesh) {
+/// What terms are counted with; flanks that overlap count as no gap.
+model::Rig as_fitted(model::Rig rig, const Eigen::VectorXd& p) {
+  const LockedMesh mesh = mesh_of(p);
   model::ContactSpec spec = rig.mesh.contact_spec();
   spec.values["stiffness"] = mesh.stiffness;
   rig.mesh.contact = model::make_contact_law(spec.law, spec.values);
   rig.mesh.backlash = std::max(0.0, mesh.plus - mesh.minus) * rig.mesh.lever();
+  rig.motor.coulomb_friction = std::max(0.0, p[kCoulomb]);
+  rig.motor.viscous_damping = std::max(0.0, p[kViscous] - rig.pinion.viscous_damping);
   return rig;
 }
 
@@ -283,7 +299,7 @@ LockedOutput identify_locked_output(const record::Record& record, const model::R
   fit.start();
   for (int round = 0; round < (rig.terms.empty() ? 1 : kRounds); ++round) {
     fit.refine();
-    rig = with_mesh(rig, mesh_of(fit.values()));
+    rig = as_fitted(rig, fit.values());
     fit.take_torque(mesh_of(fit.values()));
   }
   for (const bool plus : {true, false})

@@ -9,6 +9,7 @@
 #include "../fit/servo_prediction.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/block_regression.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
@@ -115,6 +116,24 @@ std::pair<double, double> LockedSignals::noise_of_motion() const {
                speed = w * std::sqrt(2 * cutoff_ * t / 3) * position_noise_;
   const double left = std::min(speed, data_.rate_noise);
   return {left * w * std::sqrt(0.6), left};
+}
+
+Eigen::MatrixXd LockedSignals::states(int count) const {
+  std::vector<double> position, speed;
+  Eigen::MatrixXd way(rows_.size(), 2);
+  for (const Eigen::Index k : rows_) {
+    position.push_back(data_.motor[std::size_t(k)]);
+    speed.push_back(std::fabs(data_.motor_rate[std::size_t(k)]));
+  }
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const bool forward = direction_[std::size_t(rows_[i])] > 0;
+    way.row(Eigen::Index(i)) << forward, !forward;
+  }
+  const Eigen::MatrixXd where = signal::row_products(signal::hat_functions(position, count), way),
+                        fast = signal::row_products(signal::hat_functions(speed, count), way);
+  Eigen::MatrixXd all(way.rows(), where.cols() + fast.cols());
+  all << where, fast;
+  return all;
 }
 
 bool LockedSignals::chatters(double inertia) const {

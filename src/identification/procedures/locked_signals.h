@@ -39,6 +39,8 @@ class LockedSignals {
   Eigen::VectorXd torque(const model::Rig& rig, const LockedMesh& mesh) const;
   /// rad/s^2, rad/s: standard deviation of the noise of both columns.
   std::pair<double, double> noise_of_motion() const;
+  /// Rows: where the motor is, and how fast, in `count` places each and either way.
+  Eigen::MatrixXd states(int count) const;
   /// Whether the motor's torque drives it to and fro between the samples: what the low-pass leaves out of
   /// torque and steps of the position go together, and the torque is enough to turn a motor of this inertia
   /// round.
