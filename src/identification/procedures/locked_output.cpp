@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/signal/block_regression.h"
@@ -27,6 +28,7 @@ constexpr double kReach = 0.5;       // theory: standard deviations of what is k
 constexpr int kStates = 8;           // choice: places of position and of speed, each way
 constexpr int kParts = 16;           // choice: of a record, foretold by the others
 constexpr int kDraws = 100;          // choice (time)
+constexpr double kClear = 4;         // choice: standard deviations of white noise
 constexpr int kRounds = 5;           // choice: of what the terms make of the fitted mesh
 constexpr long kSpareBlocks = 4;     // choice: beyond the unknowns, for a covariance from blocks
 constexpr double kVagueOffset = 1;   // choice: of the torque's spread; only a preloaded mesh feels it
@@ -76,15 +78,22 @@ class Fit {
   Eigen::VectorXd residuals() const { return sigma_ * fit_.residuals.head(torque_.size()); }
   Eigen::VectorXd torque() const { return torque_; }
   double share_beyond(bool plus) const;
+  /// Before what the model may lack is counted.
+  const signal::Measured& known_stiffness() const { return known_stiffness_; }
+  const std::vector<std::string>& lacking() const { return lacking_; }
   /// Then dry friction turns within a sample, and its mean is less than it is.
   bool chatters() const { return signals_.chatters(model::GearTrain(rig_).motor_inertia()); }
 
  private:
+  Eigen::VectorXd column(Lack lack, const Eigen::VectorXd& p) const {
+    return signals_.picked(signals_.lack(lack, rig_, mesh_of(p)));
+  }
   Eigen::VectorXd mesh(const LockedMesh& m) const { return signals_.picked(signals_.mesh_torque(rig_, m)); }
   Eigen::VectorXd rows(const Eigen::VectorXd& p) const;
   void widen(const Eigen::VectorXd& variance);
   void add_timing(const Eigen::MatrixXd& white);
   void add_noise_of_motion(const Eigen::MatrixXd& white);
+  void add_lacks();
   double systematic(double floor) const;
   void allow_for_left(const Eigen::MatrixXd& white, double floor);
 
@@ -96,6 +105,8 @@ class Fit {
   Eigen::VectorXd whole_torque_, torque_, p_, scale_;
   double sigma_ = 1;
   signal::LeastSquaresFit fit_;
+  signal::Measured known_stiffness_;
+  std::vector<std::string> lacking_;
 };
 
 /// Rows in standard deviations, then what is known beside them: offset and drift are vague, not unknown.
@@ -194,9 +205,11 @@ void Fit::judge(double floor) {
     variance = variance.cwiseMax(student * student * signal::block_covariance(fit_, block, 2).diagonal());
   }
   widen(variance);
+  known_stiffness_ = fit_.parameter(kStiffness);
   add_timing(white);
   add_noise_of_motion(white);
   allow_for_left(white, floor);
+  add_lacks();
   if (chatters()) {
     const double coulomb = std::fabs(p_[kCoulomb]), speed = rms(columns_.col(kViscous));
     fit_.covariance(kCoulomb, kCoulomb) += std::pow(kReach * coulomb, 2);
@@ -216,11 +229,39 @@ void Fit::add_timing(const Eigen::MatrixXd& white) {
 /// measured position, as in a closed loop, goes with what is left of it.
 void Fit::add_noise_of_motion(const Eigen::MatrixXd& white) {
   const auto [acceleration, speed] = signals_.noise_of_motion();
-  const double left = rms(residuals()), rows = double(torque_.size());
+  const double left = signals_.answer() * rms(residuals()), rows = double(torque_.size());
   for (const auto& [i, noise] : {std::pair(kInertia, acceleration), std::pair(kViscous, speed)}) {
     const Eigen::VectorXd shift =
         white.col(i) * (rows * noise * (left + std::fabs(p_[i]) * noise) / (sigma_ * sigma_));
     fit_.covariance += kReach * kReach * shift * shift.transpose();
+  }
+}
+
+/// By how much the values move where an effect that the rig does not declare is fitted as well and is clear.
+void Fit::add_lacks() {
+  signal::NonlinearOptions options;
+  options.step = 1e-3;
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(kUnknowns + 1), scale = start;
+  start.head(kUnknowns) = p_;
+  scale.head(kUnknowns) = scale_;
+  for (const Lack lack : kLacks) {
+    const auto f = [&](const Eigen::VectorXd& p) {
+      Eigen::VectorXd out = rows(p.head(kUnknowns));
+      out.head(torque_.size()) -= p[kUnknowns] / sigma_ * column(lack, p);
+      return out;
+    };
+    scale[kUnknowns] = spread(torque_) / rms(column(lack, p_));
+    signal::LeastSquaresFit wider;
+    try {
+      wider = signal::fit_nonlinear(f, start, scale, options);
+    } catch (const CannotIdentify&) {
+      continue;  // the record does not tell the two apart
+    }
+    const signal::Measured strength = wider.parameter(kUnknowns);
+    if (!(std::fabs(strength.value) > kClear * strength.standard_error)) continue;
+    lacking_.push_back(lack_name(lack));
+    const Eigen::VectorXd moved = wider.values.head(kUnknowns) - p_;
+    fit_.covariance += moved * moved.transpose();
   }
 }
 
@@ -312,15 +353,19 @@ LockedOutput identify_locked_output(const record::Record& record, const model::R
   fit.judge(floor);
   LockedOutput out;
   fill(fit, signals, rig, floor, out);
+  if (!fit.lacking().empty())
+    out.warnings.push_back(record.name + ": what is left looks like " + joined(fit.lacking()) +
+                           ", which the rig file lacks; the errors hold that");
   if (fit.chatters())
     out.warnings.push_back(record.name +
                            ": the torque jumps from sample to sample and the motor with it: dry friction is "
                            "shaken off, and friction can hardly be told");
-  if (!(out.stiffness.value > kTold * out.stiffness.standard_error) || out.relative_error > kMostLeft)
-    throw CannotIdentify(fmt::format(
-        "{}: torque hardly follows the position: stiffness {:.3g} +- {:.2g}, {:.3g} % of the torque "
-        "unexplained",
-        record.name, out.stiffness.value, out.stiffness.standard_error, 100 * out.relative_error));
+  const signal::Measured& stiffness = fit.known_stiffness();
+  if (!(stiffness.value > kTold * stiffness.standard_error) || out.relative_error > kMostLeft)
+    throw CannotIdentify(
+        fmt::format("{}: torque hardly follows the position: stiffness {:.3g} +- {:.2g}, {:.3g} % of the "
+                    "torque unexplained",
+                    record.name, stiffness.value, stiffness.standard_error, 100 * out.relative_error));
   return out;
 }
 

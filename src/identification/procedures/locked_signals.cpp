@@ -8,6 +8,7 @@
 
 #include "../fit/servo_prediction.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/block_regression.h"
 #include "backlash_diagnosis/signal/noise.h"
@@ -20,6 +21,7 @@ namespace {
 constexpr double kOversampling = 1.25;   // theory: rows per second over 2 cutoff
 constexpr double kLeastShare = 0.02;     // choice: of the samples, that slide in each direction
 constexpr double kBeyondChance = 8;      // choice: standard deviations of a correlation of white noises
+constexpr double kChance = 3;            // choice: the same, that chance may hide
 constexpr double kTurns = 0.5;           // choice: of the usual speed, that a sample's torque takes or gives
 constexpr std::size_t kFewestRows = 64;  // choice
 constexpr std::size_t kFewestSamples = 64;  // theory: for the noise of a position (bandwidth.h)
@@ -53,20 +55,22 @@ std::pair<double, double> correlation(const std::vector<double>& x, const std::v
 
 }  // namespace
 
-LockedSignals::LockedSignals(const record::Record& record, const model::Rig& rig) {
+LockedSignals::LockedSignals(const record::Record& recorded, const model::Rig& rig) {
+  const record::Record record = record::evenly_sampled(recorded);
   if (record.size() < kFewestSamples)
     throw CannotIdentify(fmt::format("{}: only {} samples", record.name, record.size()));
   data_ = servo_data(record, rig);
-  const std::vector<double>& position = record.column(record::Channel::motor_position);
+  position_ = record.column(record::Channel::motor_position);
   position_noise_ =
-      std::max(signal::position_noise(position), signal::resolution(position) / std::sqrt(12.0));
+      std::max(signal::position_noise(position_), signal::resolution(position_) / std::sqrt(12.0));
   data_.load.clear();
   cutoff_ = with_bands({}, rig, {data_}).cutoff;
   const PreparedServo prepared(data_, cutoff_, 0);
   direction_ = prepared.direction;
+  usual_speed_ = signal::median_magnitude(data_.motor_rate);
   fast_torque_ = above(data_.torque, data_.interval, cutoff_);
   // Of a step from sample to sample: a central difference does not see what turns round each sample.
-  fast_step_ = above(signal::differences(position, 1), data_.interval, cutoff_);
+  fast_step_ = above(signal::differences(position_, 1), data_.interval, cutoff_);
   counts_ = prepared.counts;
   const auto stride = std::max(1L, std::lround(1 / (2 * kOversampling * cutoff_ * data_.interval)));
   long forward = 0, backward = 0;
@@ -136,6 +140,15 @@ Eigen::MatrixXd LockedSignals::states(int count) const {
   return all;
 }
 
+double LockedSignals::answer() const {
+  double most = 0;
+  for (const long lag : {-1L, 0L, 1L}) {
+    const auto [r, samples] = correlation(fast_torque_, fast_step_, lag, counts_);
+    most = std::max(most, std::fabs(r) + kChance / std::sqrt(samples));
+  }
+  return std::min(1.0, most);
+}
+
 bool LockedSignals::chatters(double inertia) const {
   double torque = 0, n = 0;
   std::vector<double> speeds;
@@ -147,11 +160,7 @@ bool LockedSignals::chatters(double inertia) const {
   }
   const double kick = std::sqrt(torque / n) * data_.interval / inertia;
   if (kick < kTurns * signal::median_magnitude(speeds)) return false;
-  for (const long lag : {-1L, 0L, 1L}) {
-    const auto [r, samples] = correlation(fast_torque_, fast_step_, lag, counts_);
-    if (std::fabs(r) > kBeyondChance / std::sqrt(samples)) return true;
-  }
-  return false;
+  return answer() > (kBeyondChance + kChance) / std::sqrt(n);
 }
 
 Eigen::VectorXd LockedSignals::delayed_by_sample() const {
@@ -160,7 +169,7 @@ Eigen::VectorXd LockedSignals::delayed_by_sample() const {
   return low_passed(std::move(change));
 }
 
-Eigen::VectorXd LockedSignals::mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const {
+std::vector<double> LockedSignals::raw_mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const {
   model::ContactSpec spec = rig.mesh.contact_spec();
   spec.values["stiffness"] = mesh.stiffness;
   const auto law = model::make_contact_law(spec.law, spec.values);
@@ -170,10 +179,42 @@ Eigen::VectorXd LockedSignals::mesh_torque(const model::Rig& rig, const LockedMe
   std::vector<double> torque(data_.size(), 0.0);
   for (std::size_t k = 0; k < torque.size(); ++k) {
     if (direction_[k] == 0) continue;
-    const double x = data_.motor[k] - mesh.drift * (double(k) * data_.interval - middle),
+    const double x = position_[k] - mesh.drift * (double(k) * data_.interval - middle),
                  rate = rates * data_.motor_rate[k];
     if (x > mesh.plus) torque[k] += lever * law->force(lever * (x - mesh.plus), rate, 0);
     if (x < mesh.minus) torque[k] -= lever * law->force(lever * (mesh.minus - x), -rate, 0);
+  }
+  return torque;
+}
+
+Eigen::VectorXd LockedSignals::mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const {
+  return low_passed(raw_mesh_torque(rig, mesh));
+}
+
+std::string lack_name(Lack lack) {
+  switch (lack) {
+    case Lack::load_friction:
+      return "friction that follows the load";
+    case Lack::hardening:
+      return "a stiffness that follows the load";
+    case Lack::slow_friction:
+      return "friction that changes at low speed";
+    default:
+      return "a delay between torque and position";
+  }
+}
+
+Eigen::VectorXd LockedSignals::lack(Lack lack, const model::Rig& rig, const LockedMesh& mesh) const {
+  if (lack == Lack::delay) return delayed_by_sample();
+  std::vector<double> torque = raw_mesh_torque(rig, mesh);
+  for (std::size_t k = 0; k < torque.size(); ++k) {
+    const double load = std::fabs(torque[k]), way = double(direction_[k]);
+    if (lack == Lack::load_friction)
+      torque[k] = way * load;
+    else if (lack == Lack::hardening)
+      torque[k] *= load;
+    else
+      torque[k] = way * std::exp(-std::fabs(data_.motor_rate[k]) / usual_speed_);
   }
   return low_passed(std::move(torque));
 }

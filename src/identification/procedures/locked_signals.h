@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,11 @@ struct LockedMesh {
   double drift = 0;            // rad/s
   double centre() const { return 0.5 * (plus + minus); }
 };
+
+/// What a machine like this often has beside it.
+enum class Lack { load_friction, hardening, slow_friction, delay };
+constexpr Lack kLacks[] = {Lack::load_friction, Lack::hardening, Lack::slow_friction, Lack::delay};
+std::string lack_name(Lack lack);
 
 /// Everything is low-passed after what does not slide has been set to 0.
 class LockedSignals {
@@ -41,6 +47,10 @@ class LockedSignals {
   std::pair<double, double> noise_of_motion() const;
   /// Rows: where the motor is, and how fast, in `count` places each and either way.
   Eigen::MatrixXd states(int count) const;
+  /// 0 to 1: largest correlation of what the low-pass leaves out of the torque with steps of the position
+  /// beside it, as in a closed loop whose torque answers to the noise of the position; at least what chance
+  /// may hide.
+  double answer() const;
   /// Whether the motor's torque drives it to and fro between the samples: what the low-pass leaves out of
   /// torque and steps of the position go together, and the torque is enough to turn a motor of this inertia
   /// round.
@@ -49,16 +59,23 @@ class LockedSignals {
   Eigen::VectorXd delayed_by_sample() const;
   /// N m, of the contact law of `rig` with these values.
   Eigen::VectorXd mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const;
+  /// In a unit of its own.
+  Eigen::VectorXd lack(Lack lack, const model::Rig& rig, const LockedMesh& mesh) const;
 
   Eigen::VectorXd picked(const Eigen::VectorXd& values) const;
   Eigen::MatrixXd picked(const Eigen::MatrixXd& values) const;
 
  private:
+  std::vector<double> raw_mesh_torque(const model::Rig& rig, const LockedMesh& mesh) const;
   Eigen::VectorXd low_passed(std::vector<double> values) const;
 
   ServoData data_;
   double cutoff_;
+  // rad, as recorded: where a slow motion starts and stops a low-pass would bend it by more than the
+  // encoder's steps
+  std::vector<double> position_;
   double position_noise_;  // rad
+  double usual_speed_;     // rad/s
   std::vector<double> fast_torque_,
       fast_step_;  // N m, rad per sample: above the band, where the motor slides
   std::vector<int> direction_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -17,10 +18,10 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kTold = 2;        // choice: standard errors, from which a value is told
-constexpr double kAgree = 0.01;    // choice: chance below which records contradict each other
-constexpr double kGearAbove = 10;  // choice: times the band of the fit, of the gear on its coupling
-constexpr double kLinear = 1e-6;   // theory: relative, of a law whose force doubles with the depth
+constexpr double kTold = 2;       // choice: standard errors, from which a value is told
+constexpr double kAgree = 0.01;   // choice: chance below which records contradict each other
+constexpr double kGearAbove = 5;  // choice: times the band of the fit: then its inertia counts 4 %
+constexpr double kLinear = 1e-6;  // theory: relative, of a law whose force doubles with the depth
 
 /// The same machine with the coupling taken for a part of the teeth, whose stiffness is that of both.
 model::Rig without_coupling(const model::Rig& rig) {
@@ -35,12 +36,13 @@ struct Quantity {
   Member at;
   bool common;  // of all records; else of each
 };
-constexpr Quantity kQuantities[] = {{"motor_inertia", &LockedOutput::inertia, true},
-                                    {"motor_viscous", &LockedOutput::viscous, true},
-                                    {"motor_coulomb", &LockedOutput::coulomb, true},
-                                    {"mesh_stiffness", &LockedOutput::stiffness, true},
-                                    {"backlash_angle", &LockedOutput::backlash_angle, true},
-                                    {"offset", &LockedOutput::offset, false}};
+const char* const kOffset = "offset";  // of a record: the rig file has no place for it
+const Quantity kQuantities[] = {{"motor_inertia", &LockedOutput::inertia, true},
+                                {"motor_viscous", &LockedOutput::viscous, true},
+                                {"motor_coulomb", &LockedOutput::coulomb, true},
+                                {"mesh_stiffness", &LockedOutput::stiffness, true},
+                                {"backlash_angle", &LockedOutput::backlash_angle, true},
+                                {kOffset, &LockedOutput::offset, false}};
 
 /// Mean by the errors, which grow where the records contradict each other.
 signal::Measured combined(const std::vector<LockedOutput>& found, const Quantity& q,
@@ -105,7 +107,7 @@ void require_still_gear(const model::Rig& rig, const LockedOutput& found, const 
   if (resonance < kGearAbove * found.cutoff)
     throw CannotIdentify(fmt::format(
         "{}: moves in {:.3g} Hz, at which the gear swings on its coupling ({:.3g} Hz): teeth and coupling "
-        "are in series only below a tenth of that; move more slowly",
+        "are in series only below a fifth of that; move more slowly",
         record, found.cutoff, resonance));
 }
 
@@ -150,17 +152,16 @@ ProcedureReport run_locked_output(IdentificationCase& c) {
     floor += f.floor * f.floor / double(found.size());
   }
   c.result.channels["torque"] = {std::sqrt(error), std::sqrt(floor)};
+  std::map<std::string, signal::Measured> values;  // all of them, or none where one cannot be told
   for (const Quantity& q : kQuantities) {
-    signal::Measured m = combined(found, q, contradicted);
+    signal::Measured& m = values[q.name] = combined(found, q, contradicted);
     if (q.at == &LockedOutput::inertia) m.value -= model::GearTrain(rig).motor_inertia() - rig.motor.inertia;
     if (q.at == &LockedOutput::stiffness) m = less_coupling(m, c.declared);
-    if (q.common) {
-      take(c, q.name, m, untold);
-    } else {
-      c.result.parameters[q.name] = m;
-      c.result.units[q.name] = model::axis_unit("N m", c.declared.linear);
-    }
   }
+  for (const auto& [name, value] : values)
+    if (name != kOffset) take(c, name, value, untold);
+  c.result.parameters[kOffset] = values.at(kOffset);
+  c.result.units[kOffset] = model::axis_unit("N m", c.declared.linear);
   if (!untold.empty())
     c.result.warnings.push_back("the records do not tell " + joined(untold) +
                                 ": what the rig file says of it is kept");
