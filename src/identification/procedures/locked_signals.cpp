@@ -21,6 +21,7 @@ namespace {
 constexpr double kOversampling = 1.25;   // theory: rows per second over 2 cutoff
 constexpr double kLeastShare = 0.02;     // choice: of the samples, that slide in each direction
 constexpr double kBeyondChance = 8;      // choice: standard deviations of a correlation of white noises
+constexpr double kReach = 0.3;           // theory: periods of its band that a smooth speed is sharp to
 constexpr double kChance = 3;            // choice: the same, that chance may hide
 constexpr double kTurns = 0.5;           // choice: of the usual speed, that a sample's torque takes or gives
 constexpr std::size_t kFewestRows = 64;  // choice
@@ -37,6 +38,17 @@ std::vector<double> above(std::vector<double> values, double interval, double cu
   const std::vector<double> slow = signal::low_pass(values, interval, cutoff);
   for (std::size_t k = 0; k < values.size(); ++k) values[k] -= slow[k];
   return values;
+}
+
+/// Where the motor moves one way over all samples within `reach`.
+std::vector<int> sliding(const std::vector<int>& direction, long reach) {
+  std::vector<int> sure = direction;
+  const long n = long(direction.size());
+  for (long k = 1; k < n; ++k) {
+    if (direction[k] == direction[k - 1]) continue;
+    for (long j = std::max(0L, k - reach); j < std::min(n, k + reach); ++j) sure[j] = 0;
+  }
+  return sure;
 }
 
 /// Correlation of x[k] with y[k + lag] over the samples that count, and how many these are.
@@ -66,7 +78,7 @@ LockedSignals::LockedSignals(const record::Record& recorded, const model::Rig& r
   data_.load.clear();
   cutoff_ = with_bands({}, rig, {data_}).cutoff;
   const PreparedServo prepared(data_, cutoff_, 0);
-  direction_ = prepared.direction;
+  direction_ = sliding(prepared.direction, reach());
   usual_speed_ = signal::median_magnitude(data_.motor_rate);
   fast_torque_ = above(data_.torque, data_.interval, cutoff_);
   // Of a step from sample to sample: a central difference does not see what turns round each sample.
@@ -75,6 +87,7 @@ LockedSignals::LockedSignals(const record::Record& recorded, const model::Rig& r
   const auto stride = std::max(1L, std::lround(1 / (2 * kOversampling * cutoff_ * data_.interval)));
   long forward = 0, backward = 0;
   for (long k = 0; k < long(data_.size()); ++k) {
+    counts_[k] = counts_[k] && direction_[k] != 0;
     if (!counts_[k]) continue;
     (direction_[k] > 0 ? forward : backward) += 1;
     if (k % stride == 0) rows_.push_back(k);
@@ -91,6 +104,12 @@ LockedSignals::LockedSignals(const record::Record& recorded, const model::Rig& r
   columns_.col(1) = low_passed(data_.motor_rate);
   columns_.col(2) = low_passed({direction_.begin(), direction_.end()});
   columns_.col(3) = low_passed(std::vector<double>(data_.size(), 1.0));
+}
+
+long LockedSignals::reach() const {
+  const double t = data_.interval, per_band = 2 * M_PI * std::sqrt(2 * t / 3);  // of rate noise: band^1.5
+  const double band = std::pow(data_.rate_noise / (per_band * position_noise_), 2.0 / 3);
+  return position_noise_ > 0 ? std::lround(kReach / (band * t)) : 0;
 }
 
 Eigen::VectorXd LockedSignals::low_passed(std::vector<double> values) const {

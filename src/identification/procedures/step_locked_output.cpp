@@ -76,28 +76,34 @@ signal::Measured less_coupling(const signal::Measured& sum, const model::Rig& ri
   return {teeth, sum.standard_error * std::pow(teeth / sum.value, 2)};
 }
 
-/// Whether a value is told, or kept: so vague that it may be 0, and that more than what the file says.
-bool is_told(const signal::Measured& m, double declared) {
-  return m.value > kTold * m.standard_error || kTold * m.standard_error < kDeclaredUncertainty * declared;
+/// Whether a value that may be 0 is less than what the file says of it, with what that is uncertain by.
+bool is_small(const signal::Measured& m, double declared) {
+  return kTold * m.standard_error < kDeclaredUncertainty * declared;
+}
+
+/// The table's units are those of a mesh without base radius.
+std::string unit_of(const rig_file::RigParameter& p, const model::Rig& rig) {
+  const std::string& law = rig.mesh.contact_spec().law;
+  if (!p.contact.empty() && !rig.mesh.angular())
+    for (const model::ContactLawType& type : model::contact_laws())
+      for (const ParameterSpec& spec : type.parameters)
+        if (type.name == law && spec.name == p.contact) return spec.unit;
+  return model::axis_unit(p.unit, rig.linear);
 }
 
 void take(IdentificationCase& c, const std::string& name, signal::Measured m,
           std::vector<std::string>& untold) {
   const rig_file::RigParameter& p = rig_file::servo_parameter(name);
-  const bool gap = p.kind == rig_file::ParameterKind::backlash;
-  const bool inertia = p.kind == rig_file::ParameterKind::inertia;
-  if (inertia && !(m.value > kTold * m.standard_error)) {  // no machine has none
-    untold.push_back(name);
-    return;
-  }
-  if (!gap && !is_told(m, p.get(c.declared))) {
+  const bool clear = m.value > kTold * m.standard_error, gap = p.kind == rig_file::ParameterKind::backlash,
+             friction = p.is_friction();  // may be 0, unlike an inertia or a stiffness
+  if (!clear && !gap && !(friction && is_small(m, p.get(c.declared)))) {
     untold.push_back(name);
     return;
   }
   m.value = std::max(0.0, m.value);
   p.set(c.result.rig, m.value);
   c.result.parameters[name] = m;
-  c.result.units[name] = model::axis_unit(p.unit, c.declared.linear);
+  c.result.units[name] = unit_of(p, c.declared);
 }
 
 void require_still_gear(const model::Rig& rig, const LockedOutput& found, const std::string& record) {
