@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -44,6 +46,14 @@ double rms(const Eigen::VectorXd& values) {
 
 double spread(const Eigen::VectorXd& values) {
   return rms(values.array() - values.mean());
+}
+
+/// Differences over more than a step of the encoder, which hides what less changes.
+signal::NonlinearOptions wide_steps() {
+  signal::NonlinearOptions options;
+  options.step = 0.02;
+  options.wide_step = 0.1;
+  return options;
 }
 
 LockedMesh mesh_of(const Eigen::VectorXd& p) {
@@ -89,6 +99,12 @@ class Fit {
     return signals_.picked(signals_.lack(lack, rig_, mesh_of(p)));
   }
   Eigen::VectorXd mesh(const LockedMesh& m) const { return signals_.picked(signals_.mesh_torque(rig_, m)); }
+  struct Start {
+    double left = INFINITY;  // N m, root mean square
+    Eigen::VectorXd p;
+  };
+  double declared_stiffness() const { return rig_.mesh.contact_spec().values.at("stiffness"); }
+  void consider(const Eigen::VectorXd& teeth, double plus, double minus, Eigen::Index linear, Start& best);
   Eigen::VectorXd rows(const Eigen::VectorXd& p) const;
   void widen(const Eigen::VectorXd& variance);
   void add_timing(const Eigen::MatrixXd& white);
@@ -107,6 +123,7 @@ class Fit {
   signal::LeastSquaresFit fit_;
   signal::Measured known_stiffness_;
   std::vector<std::string> lacking_;
+  std::vector<Eigen::VectorXd> starts_;
 };
 
 /// Rows in standard deviations, then what is known beside them: offset and drift are vague, not unknown.
@@ -119,57 +136,73 @@ Eigen::VectorXd Fit::rows(const Eigen::VectorXd& p) const {
   return out;
 }
 
-/// The best of a grid of edges, at each of which everything else is linear.
+/// With these edges everything else is linear: keeps what leaves least. `linear` columns count: without the
+/// last there is no offset.
+void Fit::consider(const Eigen::VectorXd& teeth, double plus, double minus, Eigen::Index linear,
+                   Start& best) {
+  Eigen::MatrixXd a(torque_.size(), linear + 1);
+  a << columns_.leftCols(linear), teeth;
+  try {
+    const signal::LeastSquaresFit fit = signal::fit_linear(a, torque_);
+    const double left = rms(fit.residuals);
+    if (!(left < best.left) || !(fit.values[linear] > 0)) return;
+    best = {left, Eigen::VectorXd::Zero(kUnknowns)};
+    best.p.head(linear) = fit.values.head(linear);
+    best.p[kStiffness] = declared_stiffness() * fit.values[linear];
+    best.p[kPlus] = plus;
+    best.p[kMinus] = minus;
+  } catch (const CannotIdentify&) {  // an edge beyond what slides
+  }
+}
+
+/// The best of a grid of edges, and of small gaps without an offset, whose place a preloaded mesh hardly
+/// tells.
 void Fit::start() {
-  const double declared = rig_.mesh.contact_spec().values.at("stiffness"), step = travel_.size() / kGrid;
-  take_torque({declared, travel_.high, travel_.low, 0});
+  const double stiffness = declared_stiffness(), step = travel_.size() / kGrid;
+  take_torque({stiffness, travel_.high, travel_.low, 0});
   std::vector<Eigen::VectorXd> plus, minus;
   for (int i = 0; i < kGrid; ++i) {
     const double edge = travel_.low + i * step;
-    plus.push_back(mesh({declared, edge, travel_.low - travel_.size(), 0}));
-    minus.push_back(mesh({declared, travel_.high + travel_.size(), edge + step, 0}));
+    plus.push_back(mesh({stiffness, edge, travel_.low - travel_.size(), 0}));
+    minus.push_back(mesh({stiffness, travel_.high + travel_.size(), edge + step, 0}));
   }
-  double least = INFINITY;
-  Eigen::MatrixXd a(torque_.size(), 5);
-  a.leftCols(4) = columns_;
-  p_ = Eigen::VectorXd::Zero(kUnknowns);
+  Start any, small;
   for (int i = 0; i < kGrid; ++i)
-    for (int j = 0; j <= i; ++j) {  // edges travel/kGrid apart or more, or the same
-      a.col(4) = plus[std::size_t(i)] + minus[std::size_t(j)];
-      std::optional<signal::LeastSquaresFit> fit;
-      try {
-        fit = signal::fit_linear(a, torque_);
-      } catch (const CannotIdentify&) {
-        continue;  // an edge beyond what slides
-      }
-      const double left = rms(fit->residuals);
-      if (!(left < least) || !(fit->values[4] > 0)) continue;
-      least = left;
-      p_.head(4) = fit->values.head(4);
-      p_[kStiffness] = declared * fit->values[4];
-      p_[kPlus] = travel_.low + i * step;
-      p_[kMinus] = travel_.low + (j + 1) * step;
+    for (int j = 0; j <= i; ++j)
+      consider(plus[std::size_t(i)] + minus[std::size_t(j)], travel_.low + i * step,
+               travel_.low + (j + 1) * step, 4, any);
+  for (int i = 1; i < 2 * kGrid; ++i)
+    for (const double gap : {0.1 * step, step}) {
+      const double high = travel_.low + 0.5 * (i * step + gap), low = high - gap;
+      consider(mesh({stiffness, high, low, 0}), high, low, 3, small);
     }
-  if (!std::isfinite(least)) throw CannotIdentify("no flank: torque does not rise with position");
-  sigma_ = least;
+  for (const Start& s : {any, small})
+    if (std::isfinite(s.left)) starts_.push_back(s.p);
+  if (starts_.empty()) throw CannotIdentify("no flank: torque does not rise with position");
+  sigma_ = std::min(any.left, small.left);
   scale_ = Eigen::VectorXd::Zero(kUnknowns);
   for (Eigen::Index i = 0; i < 4; ++i) scale_[i] = spread(torque_) / rms(columns_.col(i));
   scale_[kDrift] = travel_.size() / (2 * signals_.middle());
   if (passes_ < kFewestPasses) scale_[kDrift] *= 1e-6;
-  scale_[kStiffness] = p_[kStiffness];
+  scale_[kStiffness] = starts_.front()[kStiffness];
   scale_[kPlus] = scale_[kMinus] = step;
 }
 
 void Fit::refine() {
-  signal::NonlinearOptions options;
-  options.step = 1e-3;
+  signal::NonlinearOptions options = wide_steps();
   options.wide_iterations = 6;
   const auto f = [this](const Eigen::VectorXd& p) { return rows(p); };
-  fit_ = signal::fit_nonlinear(f, p_, scale_, options);
-  p_ = fit_.values;
+  double least = INFINITY;
+  for (const Eigen::VectorXd& p : starts_) {
+    const signal::LeastSquaresFit fit = signal::fit_nonlinear(f, p, scale_, options);
+    if (fit.residuals.norm() >= least) continue;
+    least = fit.residuals.norm();
+    fit_ = fit;
+  }
   sigma_ *= rms(fit_.residuals.head(torque_.size()));  // rows of variance 1
-  fit_ = signal::fit_nonlinear(f, p_, scale_, options);
+  fit_ = signal::fit_nonlinear(f, fit_.values, scale_, options);
   p_ = fit_.values;
+  starts_ = {p_};
 }
 
 double Fit::share_beyond(bool plus) const {
@@ -239,8 +272,7 @@ void Fit::add_noise_of_motion(const Eigen::MatrixXd& white) {
 
 /// By how much the values move where an effect that the rig does not declare is fitted as well and is clear.
 void Fit::add_lacks() {
-  signal::NonlinearOptions options;
-  options.step = 1e-3;
+  const signal::NonlinearOptions options = wide_steps();
   Eigen::VectorXd start = Eigen::VectorXd::Zero(kUnknowns + 1), scale = start;
   start.head(kUnknowns) = p_;
   scale.head(kUnknowns) = scale_;

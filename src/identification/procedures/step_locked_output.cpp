@@ -23,10 +23,19 @@ constexpr double kAgree = 0.01;   // choice: chance below which records contradi
 constexpr double kGearAbove = 5;  // choice: times the band of the fit: then its inertia counts 4 %
 constexpr double kLinear = 1e-6;  // theory: relative, of a law whose force doubles with the depth
 
-/// The same machine with the coupling taken for a part of the teeth, whose stiffness is that of both.
+/// The same machine with the coupling taken for a part of the teeth. The stiffness of both is fitted; each
+/// damps its share of the motion, as the file has it.
 model::Rig without_coupling(const model::Rig& rig) {
   model::Rig out = rig;
   out.output_coupling = {};
+  model::ContactSpec spec = rig.mesh.contact_spec();
+  if (rig.output_coupling.rigid || !spec.values.has("damping")) return out;
+  const double square = rig.mesh.lever() * rig.mesh.lever(),
+               teeth = rig.output_coupling.stiffness /
+                       (rig.output_coupling.stiffness + square * spec.values.at("stiffness"));
+  spec.values["damping"] = teeth * teeth * spec.values.at("damping") +
+                           std::pow(1 - teeth, 2) * rig.output_coupling.damping / square;
+  out.mesh.contact = model::make_contact_law(spec.law, spec.values);
   return out;
 }
 
