@@ -52,8 +52,12 @@ void require_locked_output(const model::Rig& rig);
 /// Standard errors: the largest of those from blocks of residuals as long as the motion of one direction and
 /// shorter ones, times Student's t over the normal quantile; half a sample by which torque and position may
 /// be apart; and where the model leaves more than 1.5 times the noise, what is left as if it followed each
-/// value. Throws CannotIdentify where a channel is missing, the motor slides in fewer than 5 % of the samples
-/// or not in both directions, or a flank is not touched.
+/// value. Besides by how much the values move where an effect that the rig does not declare is fitted as well
+/// and is clear beyond four standard deviations: friction that follows the load, a stiffness that hardens,
+/// friction at low speed, a delay. `warnings` name it, and say where the torque shakes dry friction off.
+///
+/// Throws CannotIdentify where a channel is missing, the motor surely slides in fewer than 2 % of the samples
+/// in either direction, a flank is not touched, or torque hardly follows the position.
 LockedOutput identify_locked_output(const record::Record& record, const model::Rig& rig);
 
 }  // namespace backlash::identification
