@@ -7,6 +7,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/procedures/gap_terms.h"
+#include "backlash_diagnosis/identification/procedures/locked_output.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
@@ -70,6 +71,7 @@ std::vector<std::string> parameter_names(const model::Rig& rig) {
 /// All but the first and the last take the torque for this joint's alone.
 std::vector<Procedure> procedures_for(const model::Rig& rig) {
   if (rig.mesh.rigid) return {{"one_inertia", run_one_inertia}};
+  if (rig.link_locked) return {{"locked_output", run_locked_output}};
   if (rig.coupled) return {servo_procedures().front(), servo_procedures().back()};
   return servo_procedures();
 }
@@ -124,13 +126,14 @@ void warn_of_misfit(Identification& result) {
           " %: the machine has an effect that the rig file lacks");
 }
 
-void require_servo(const model::Rig& rig) {
+void require_served(const model::Rig& rig) {
+  if (rig.input_coupling.rigid && rig.link_locked) return require_locked_output(rig);
   if (!model::has_two_inertias(rig))
     throw CannotIdentify(
-        std::string(
-            "identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
-            "link), and with a torque sensor (elastic input coupling, mesh that is linear, a power law or "
-            "Hunt-Crossley, damping > 0 of motor and couplings, no terms); this rig has ") +
+        std::string("identify knows machines of one inertia (mesh: rigid), of two (rigid couplings, free "
+                    "link), with a locked output (rigid input coupling), and with a torque sensor (elastic "
+                    "input coupling, mesh that is linear, a power law or Hunt-Crossley, damping > 0 of motor "
+                    "and couplings, no terms); this rig has ") +
         (rig.input_coupling.rigid ? "a rigid" : "an elastic") + " input coupling, " +
         (rig.output_coupling.rigid ? "a rigid" : "an elastic") + " output coupling and a " +
         (rig.link_locked ? "locked" : "free") + " link");
@@ -149,7 +152,8 @@ IdentificationCase identification_case(const model::Rig& declared,
   c.result.rig = c.declared;
   read_records(records, declared, c);
   if (declared.mesh.rigid) return c;
-  require_servo(declared);
+  require_served(declared);
+  if (declared.link_locked) return c;
   c.names = parameter_names(c.declared);
   for (const std::string& name : c.names) c.result.units[name] = rig_file::servo_parameter(name).unit;
   return c;
@@ -169,7 +173,7 @@ Identification identify(const model::Rig& declared, const std::vector<record::Re
       c.result.procedures.push_back({procedure.name, {}, error.what()});
       continue;
     }
-    if (declared.mesh.rigid || procedure.run == run_output_error) continue;
+    if (declared.mesh.rigid || declared.link_locked || procedure.run == run_output_error) continue;
     if (c.result.gap_map && (c.result.gap_map->varies || gap_varies(declared)))
       c.declared = with_gap_map(c.declared, *c.result.gap_map);
     update_from_findings(c);

@@ -37,7 +37,8 @@ Command command() {
   c.notes =
       "A rig with two inertias (rigid couplings, free link) is identified from motor_torque, motor_position "
       "and load_position; one "
-      "inertia (mesh: rigid) from motor_torque and motor_position. More runs tell more: constant speeds both "
+      "inertia (mesh: rigid) and a locked output (link: locked) from motor_torque and motor_position. More "
+      "runs tell more: constant speeds both "
       "ways (friction, gap "
       "over position), sine about a speed (inertia), sweep with bias (frequency response), square wave "
       "(damping), load moved by "

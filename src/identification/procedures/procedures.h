@@ -18,6 +18,7 @@ struct CaseRecord {
   record::Record record;  // load side
   bool has_load = false;
   bool motor_moves = true, load_moves = true;
+  bool any() const { return true; }
   bool drive() const { return motor_moves && load_moves; }  // motor and load together
   bool motor_alone() const { return has_load && motor_moves && !load_moves; }
 };
@@ -57,6 +58,7 @@ ProcedureReport run_clearance(IdentificationCase& c);
 ProcedureReport run_gap_map(IdentificationCase& c);
 ProcedureReport run_output_error(IdentificationCase& c);
 ProcedureReport run_one_inertia(IdentificationCase& c);
+ProcedureReport run_locked_output(IdentificationCase& c);
 
 // What the steps share.
 
