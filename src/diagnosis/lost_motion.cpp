@@ -286,6 +286,7 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
                               play.travel)};
   }
   estimate.status = Status::ok;
+  estimate.with_deflection = !settings.subtract_elastic_deflection;
   estimate.backlash_angle = std::max(0.0, play.value);
   estimate.angle_lower = std::max(0.0, play.value - half);
   estimate.angle_upper = play.value + half;

@@ -91,8 +91,22 @@ Set consistent(const Estimates& all, const Set& sound) {
 struct Choice {
   Set members, dissenters;
   Set agree;           // say the same as the members and are not needed
+  Set parts;           // free play, where the members tell that with the deflection under torque
   std::string reason;  // of the choice, where there are dissenters
 };
+
+/// Moves free play that fits into the play from wall to wall from the sound ones to the parts.
+void set_parts(const Estimates& all, Choice& choice, Set& sound) {
+  const Set whole = filtered(sound, [&](int i) { return all[i].with_deflection; });
+  const Set free = filtered(sound, [&](int i) { return !all[i].with_deflection; });
+  const bool fit = std::all_of(free.begin(), free.end(), [&](int i) {
+    return std::all_of(whole.begin(), whole.end(),
+                       [&](int k) { return all[i].angle_lower <= upper(all[k]); });
+  });
+  if (whole.empty() || free.empty() || !fit) return;
+  choice.parts = free;
+  sound = whole;
+}
 
 /// See combine(). Estimates without interval agree with nobody and count only where there is nothing else.
 Choice choose(const Estimates& all) {
@@ -105,6 +119,7 @@ Choice choose(const Estimates& all) {
     if (blind != all.end()) choice.members = {static_cast<int>(blind - all.begin())};
     return choice;
   }
+  set_parts(all, choice, sound);
   choice.members = consistent(all, sound);
   if (choice.members.size() < sound.size()) choice.reason = "what rests on the same contradicts itself";
   if (!share_a_point(all, choice.members, kContradiction)) {
@@ -258,6 +273,14 @@ struct Judge {
     return others.empty() ? others : ", may be " + others;
   }
 
+  /// The free play within a play from wall to wall.
+  std::string parts() const {
+    std::string text;
+    for (const int i : choice.parts)
+      text += "; free play within it by " + all[i].method + " " + shown(amount_of(all[i], angular), unit());
+    return text;
+  }
+
   std::string contradictions() const {
     std::vector<std::string> parts;
     for (const int i : choice.dissenters) {
@@ -369,7 +392,7 @@ Verdict combine(const std::vector<Estimate>& estimates, const std::optional<Limi
       std::string(to_string(verdict.grade)) + judge.may_be(verdict.grade) + ": backlash " +
       shown(judge.now, judge.unit()) + " by " + names(estimates, members) +
       (judge.choice.agree.empty() ? "" : " (" + names(estimates, judge.choice.agree) + " agree)") +
-      judge.since_baseline() + judge.contradictions();
+      judge.since_baseline() + judge.parts() + judge.contradictions();
   return with_declared_wrong(std::move(verdict), estimates);
 }
 

@@ -60,6 +60,19 @@ bool mentions(const Verdict& v, const std::string& words) {
   return v.message.find(words) != std::string::npos;
 }
 
+/// Play from wall to wall and free play are two quantities: the smaller one is a part of the other.
+TEST(Verdict, FreePlayIsAPartOfThePlayFromWallToWall) {
+  Estimate whole = ok("lost_motion", 1.2e-4, 2e-6);
+  whole.with_deflection = true;
+  const Verdict v = combined({whole, ok("momentum_transfer", 7e-5, 2e-6)});
+  EXPECT_EQ(v.grade, Grade::watch) << v.message;
+  EXPECT_NEAR(v.backlash, 1.2e-4, 1e-12);
+  EXPECT_TRUE(v.dissenters.empty());
+  EXPECT_TRUE(mentions(v, "free play within it by momentum_transfer 7e-05 m")) << v.message;
+  // Free play beyond it is impossible.
+  EXPECT_EQ(combined({whole, ok("momentum_transfer", 1.5e-4, 2e-6)}).grade, Grade::cannot_tell);
+}
+
 // 8e-5 +- 2e-6 and 8.5e-5 +- 2e-6 lie 3.5 standard deviations apart, 8.9e-5 six.
 TEST(Verdict, IntervalsThatJustMissEachOtherWidenTheAnswer) {
   const Verdict near = combined({ok("a", 8e-5, 2e-6), ok("b", 8.5e-5, 2e-6)});
