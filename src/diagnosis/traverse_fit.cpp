@@ -23,12 +23,17 @@ constexpr double kKnownGap = 3, kKnownStiffness = 0.35, kKnownDamping = 0.7, kKn
 constexpr double kNoFriction = 0.1;              // of the level, where none is declared
 constexpr double kHeld = 0.5, kKnownHeld = 0.3;  // shares of the sample before: theory, choice
 constexpr double kStartSpread[] = {0.5, 5e-2};   // of the deflection, of the rms speed's scale: choice
-constexpr double kSlowTorque = 0.05, kSlowTime = 0.4, kLeastNoise = 0.1, kFastPart = 8;
-constexpr double kUntold = 0.1, kUntoldLoad = 0.5;  // of the level: a torque that nothing else tells
-constexpr double kDifference = 1e-4;                // spreads, step of a difference
-constexpr double kStartDifference = 1e-2;           // the same of a start value
+constexpr double kSlowTorque = 0.05;             // of the level, a torque that nothing tells: choice
+constexpr double kSlowTime = 0.4;                // windows, within which it changes: choice
+constexpr double kLeastNoise = 0.1;              // of the torque's variance, white whatever else is: choice
+constexpr double kFastPart = 8;                  // the position counts as so many times noisier: simulation
+constexpr double kUntold = 0.1;            // of the level: a torque on the motor that nothing else tells
+constexpr double kUntoldLoad = 0.5;        // the same on the load: gravity
+constexpr double kDifference = 1e-4;       // spreads, step of a difference
+constexpr double kStartDifference = 1e-2;  // the same of a start value
 constexpr double kFirstDamping = 1e-2, kLeastDamping = 1e-6, kHarder = 4, kEasier = 5;
 constexpr double kLongestMove = 0.5;  // spreads, of a value in one step
+constexpr double kFarthestOwn = 10;   // spreads, of a value of one crossing
 constexpr double kEnough = 1e-5;      // gain of the cost below which it ends, relative
 constexpr double kFarOff = 3;         // times the median rms: a crossing is left out
 constexpr int kLook = 6;              // steps between two looks for such crossings
@@ -177,9 +182,9 @@ bool TraverseFit::iterate() {
     VectorXd toward = -z_;
     std::vector<TraverseMatrix> own(windows_.size());
     for (std::size_t w = 0; w < windows_.size(); ++w) {
-      if (!used_[w]) continue;
       own[w] = parts_[w].own;
       own[w].diagonal() *= 1 + damping_;
+      if (!used_[w]) continue;
       const TraverseMatrix inverse = own[w].inverse();
       MatrixXd shared = parts_[w].shared;
       shared.diagonal() *= 1 + damping_;
@@ -189,9 +194,11 @@ bool TraverseFit::iterate() {
     const VectorXd move =
         VectorXd(signal::solve_symmetric(normal, toward)).cwiseMax(-kLongestMove).cwiseMin(kLongestMove);
     std::vector<TraverseOwn> moved = own_;
-    for (std::size_t w = 0; w < windows_.size(); ++w)
-      if (used_[w])
-        moved[w] += own[w].inverse() * (parts_[w].own_toward - parts_[w].mixed.transpose() * move);
+    // Those that are left out move on too, or none could come back.
+    for (std::size_t w = 0; w < windows_.size(); ++w) {
+      moved[w] += own[w].inverse() * (parts_[w].own_toward - parts_[w].mixed.transpose() * move);
+      moved[w] = moved[w].cwiseMax(-kFarthestOwn).cwiseMin(kFarthestOwn);
+    }
     const double cost = cost_of(z_ + move, moved, nullptr);
     gain_ = cost_ - cost;
     if (!(gain_ > 0)) continue;
@@ -206,7 +213,10 @@ void TraverseFit::leave_out() {
   std::vector<double> rms(windows_.size());
   cost_of(z_, own_, &rms);
   const double most = kFarOff * std::max(1.0, signal::median(rms));
-  for (std::size_t w = 0; w < windows_.size(); ++w) used_[w] = rms[w] <= most;
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    used_[w] = rms[w] <= most;
+    if (!used_[w]) own_[w].setZero();
+  }
   cost_ = cost_of(z_, own_, nullptr);
 }
 
