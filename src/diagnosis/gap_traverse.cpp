@@ -18,17 +18,21 @@ namespace {
 // All choices, tried on simulated machines, but where another origin is given.
 constexpr double kModel = 0.2;                 // of the play, see gap_traverse.h: simulation
 constexpr double kAlike = 0.2;                 // of the play, between fits that tell the same: choice
-constexpr int kFewest = 20;                    // crossings
+constexpr double kSame = 0.05;                 // of the play, between guesses that came to the same: choice
+constexpr double kUnsureFriction = 0.5;        // of the declared dry friction of the motor, as the fit has it
+constexpr double kUnsureTorque = 2;            // theory: 95 % of what nothing tells
+constexpr int kFewest = 20, kFewestFirst = 8;  // crossings, for the answer and to know the motor
 constexpr int kMost = 60;                      // beyond them the errors do not shrink: the equations limit
-constexpr int kSearched = 16;                  // for the first guesses
+constexpr int kSearched = 24;                  // for the first guesses
 constexpr double kGuesses[] = {-0.5, 0, 0.5};  // spreads of the gap: 0.2, 1, 4.5 times the declared one
-constexpr int kSearch = 12, kFit = 30;         // steps
+constexpr int kSearch = 20, kFit = 40;         // steps
 constexpr double kMisfit = 2;                  // noises, of the median crossing
 constexpr double kFar = 4;                     // spreads of a declared value
-constexpr double kMostLeftOut = 0.34;          // of the crossings
+constexpr double kMostLeftOut = 0.2;           // of the crossings
 constexpr double kVague = 0.7;                 // half width of the interval of the logarithm: a factor of two
 constexpr double kRivalCost = 9;               // theory: three standard errors
 constexpr double kHidden = 1;                  // deflections under the noise, that a play must exceed
+constexpr double kLaw = 0.05;                  // of the deflection: teeth that yield by no power of it, 95 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid || !std::isfinite(value)) throw InvalidParameter(name, value, limit);
@@ -69,31 +73,50 @@ struct Solution {
   double rival_gap, rival_cost;  // rad; more than the best's
 };
 
-Solution solve(const TraverseData& data, const GapTraverseSettings& settings) {
-  const TraversePriors priors = traverse_priors(data, settings);
+/// What fits begin with: guesses that some of the crossings have improved, without those that came to the
+/// same.
+std::vector<TraverseFit> guesses_of(const TraverseData& data, const TraversePriors& priors) {
   std::vector<TraverseFit> guesses;
   for (const double guess : kGuesses) {
     guesses.emplace_back(data, priors, some(data.windows, kSearched), guess);
     guesses.back().run(kSearch);
+    const auto same = [&](const TraverseFit& other) {
+      return std::fabs(std::log(other.value(kTraverseGap) / guesses.back().value(kTraverseGap))) < kSame;
+    };
+    if (std::any_of(guesses.begin(), guesses.end() - 1, same)) guesses.pop_back();
   }
-  // Each leaves out other crossings: all are compared on all.
+  return guesses;
+}
+
+double cost_of(const TraverseFit& fit) {
+  return fit.cost() + fit.left_out() * kFar * kFar * 64;  // left out is no way to be better
+}
+
+const TraverseFit& cheapest(const std::vector<TraverseFit>& fits) {
+  return *std::min_element(fits.begin(), fits.end(),
+                           [](const auto& a, const auto& b) { return cost_of(a) < cost_of(b); });
+}
+
+/// Each leaves out other crossings: all are compared on all.
+Solution solve(const TraverseData& data, const std::vector<TraverseFit>& guesses) {
   std::vector<TraverseFit> fits;
   for (const TraverseFit& guess : guesses) {
-    fits.emplace_back(guess, some(data.windows, kMost));
+    fits.emplace_back(guess, data, some(data.windows, kMost));
     fits.back().run(kFit);
   }
-  const auto cost = [](const TraverseFit& f) {
-    return f.cost() + f.left_out() * kFar * kFar * 64;  // left out is no way to be better
-  };
-  const auto best = std::min_element(fits.begin(), fits.end(),
-                                     [&](const auto& a, const auto& b) { return cost(a) < cost(b); });
-  const double gap = best->value(kTraverseGap);
-  Solution solution{*best, gap, std::numeric_limits<double>::infinity()};
+  const TraverseFit& best = cheapest(fits);
+  const double gap = best.value(kTraverseGap);
+  Solution solution{best, gap, std::numeric_limits<double>::infinity()};
   for (const TraverseFit& other : fits)
     if (std::fabs(std::log(other.value(kTraverseGap) / gap)) > kAlike &&
-        cost(other) - cost(*best) < solution.rival_cost)
-      solution.rival_gap = other.value(kTraverseGap), solution.rival_cost = cost(other) - cost(*best);
+        cost_of(other) - cost_of(best) < solution.rival_cost)
+      solution.rival_gap = other.value(kTraverseGap), solution.rival_cost = cost_of(other) - cost_of(best);
   return solution;
+}
+
+/// [rad] Of a flank under the usual torque.
+double deflection(const TraverseFit& fit, const TraverseData& data) {
+  return data.level / fit.value(kTraverseStiffness);
 }
 
 void refuse(const TraverseFit& fit, const TraverseData& data) {
@@ -117,10 +140,12 @@ void refuse(const TraverseFit& fit, const TraverseData& data) {
       throw Refusal{Status::out_of_domain,
                     fmt::format("the record fits only a machine far from that of the rig file: {} {:.3g}",
                                 names[k], fit.value(k))};
-  const double hidden = kHidden * data.noise / fit.value(kTraverseStiffness);
+  const double hidden =
+      std::max(kHidden * data.noise / fit.value(kTraverseStiffness), 2 * kLaw * deflection(fit, data));
   if (fit.value(kTraverseGap) < hidden)
-    throw Refusal{Status::below_range,
-                  fmt::format("less than {:.2g} rad, which the noise of the torque hides", hidden)};
+    throw Refusal{
+        Status::below_range,
+        fmt::format("less than {:.2g} rad, which noise and the yielding of the teeth hide", hidden)};
 }
 
 void fill(Estimate& e, const Solution& solution, const TraverseData& data, const GapTraverseSettings& s) {
@@ -132,7 +157,8 @@ void fill(Estimate& e, const Solution& solution, const TraverseData& data, const
                   fmt::format("{:.4g} and {:.4g} rad fit the record alike", gap, solution.rival_gap)};
   const int used = fit.windows() - fit.left_out();
   const double error = std::max(fit.standard_error() * std::max(1.0, fit.misfit()), fit.clustered_error());
-  const double half = std::hypot(signal::student_t_quantile(0.975, used - 1) * error, kModel);
+  const double half = std::hypot(signal::student_t_quantile(0.975, used - 1) * error, kModel,
+                                 kLaw * deflection(fit, data) / gap);
   if (!(half < kVague))
     throw Refusal{Status::insufficient_data,
                   fmt::format("{} crossings of the gap tell it only from {:.2g} to {:.2g} rad", used,
@@ -146,20 +172,39 @@ void fill(Estimate& e, const Solution& solution, const TraverseData& data, const
                   data.crossings, fit.misfit());
 }
 
+void require_crossings(const TraverseData& data, int fewest) {
+  if (int(data.windows.size()) >= fewest) return;
+  throw Refusal{Status::insufficient_data,
+                fmt::format("the gap was crossed {} times, {} of them from a clear press on a flank, which "
+                            "{} are needed of; moves that reverse with more than {:.2g} N m would do",
+                            data.crossings, data.windows.size(), fewest, data.clear)};
+}
+
+/// Crossings that begin in a clear press whatever is wrong with the declared friction of the motor.
+TraverseData first_data(const record::Record& record, const GapTraverseSettings& s) {
+  return traverse_data(
+      record, s, {s.motor_inertia, s.motor_damping, s.motor_friction, kUnsureFriction * s.motor_friction});
+}
+
+/// Crossings by the motor that those have told.
+TraverseData second_data(const record::Record& record, const GapTraverseSettings& s, const TraverseFit& fit) {
+  return traverse_data(record, s,
+                       {fit.value(kTraverseMotorInertia), fit.value(kTraverseMotorDamping),
+                        fit.value(kTraverseMotorFriction), kUnsureTorque * fit.untold()});
+}
+
 }  // namespace
 
 Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSettings& settings) {
   check(settings);
   return estimate_or_refusal("gap_traverse", [&](Estimate& estimate) {
     check_channels(record);
-    const TraverseData data = traverse_data(record, settings);
-    if (int(data.windows.size()) < kFewest)
-      throw Refusal{
-          Status::insufficient_data,
-          fmt::format("the gap was crossed {} times, {} of them from a clear press on a flank, which "
-                      "{} are needed of; moves that reverse with more than {:.2g} N m would do",
-                      data.crossings, data.windows.size(), kFewest, 10 * data.noise)};
-    fill(estimate, solve(data, settings), data, settings);
+    const TraverseData first = first_data(record, settings);
+    require_crossings(first, kFewestFirst);
+    const std::vector<TraverseFit> guesses = guesses_of(first, traverse_priors(first, settings));
+    const TraverseData data = second_data(record, settings, cheapest(guesses));
+    require_crossings(data, kFewest);
+    fill(estimate, solve(data, guesses), data, settings);
   });
 }
 

@@ -27,6 +27,7 @@ constexpr double kTiming = 0.5;          // samples, when the impact began
 // simulated servos with 20 % torque noise.
 constexpr double kNoisyTiming = 0.8;
 constexpr double kLeastOverFriction = 0.7;  // simulation: servos with up to twice the declared friction
+constexpr int kSettle = 2;                  // choice: looks at what is left in flight
 constexpr double kToldElasticShare = 0.2;   // simulation: the level is told to some 10 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
@@ -84,24 +85,54 @@ std::vector<Crossing> free_crossings(const Flank& flank, double shortness) {
   return crossings;
 }
 
+/// Dry friction [N m] that in the median leaves nothing on the flank while the motor side flies.
+double friction_in_flight(const Motor& motor, const MomentumTransferSettings& s) {
+  const Flank flank = calm_flank(motor, s);
+  std::vector<double> left;
+  for (const Crossing& c : find_crossings(flank, shortness_of_impacts(flank, motor.interval, s)))
+    for (double i = std::ceil(c.release) + double(flank.half); i < c.impact - double(flank.half); ++i)
+      left.push_back(std::copysign(1, motor.speed[std::size_t(i)]) * flank.torque[std::size_t(i)]);
+  if (left.size() < kFewestCrossings) return s.motor_friction;
+  return std::max(0.0, s.motor_friction + signal::median(std::move(left)));
+}
+
 /// Of all crossings, rad but for the speed.
 struct Travels {
-  std::vector<double> gap, timing, elastic, smear;
+  std::vector<double> gap, timing, elastic, law, smear;
   std::vector<double> impact_speed;  // rad/s
 };
+
+/// [N m] On the flank, of the record's larger ones.
+double large_torque(const Flank& flank) {
+  std::vector<double> sizes;
+  for (const double f : flank.torque) sizes.push_back(std::abs(f));
+  return signal::quantile(std::move(sizes), 0.95);
+}
+
+/// By how much more the flank yields under a small torque where it does by Hertz and is declared at the
+/// torque `most` of the record.
+double more_after_hertz(double torque, double most, const MomentumTransferSettings& s) {
+  if (s.output_locked || !s.flank_deflection || !(torque > 0 && torque < most)) return 0;
+  return s.flank_deflection(most) * std::pow(torque / most, 2.0 / 3) - s.flank_deflection(torque);
+}
 
 Travels travels_of(const Motor& motor, const Flank& flank, const std::vector<Crossing>& crossings,
                    double shortness, const MomentumTransferSettings& s) {
   // The integral of a speed that jumps between two samples is known to half a sample too.
   const double blur = kTiming * (motor.tachometer ? 1 + shortness : 1);
+  const double most = large_torque(flank);
   Travels all;
   for (const Crossing& c : crossings) {
     const auto place = [&](double index) { return at(flank.pinion.position, index) - at(motor.load, index); };
-    const double deflection =
-        s.flank_deflection ? s.flank_deflection(0.5 * flank.level) + s.flank_deflection(c.impact_torque) : 0;
+    const double law =
+        0.5 * (more_after_hertz(0.5 * flank.level, most, s) + more_after_hertz(c.impact_torque, most, s));
+    const double deflection = law + (s.flank_deflection ? s.flank_deflection(0.5 * flank.level) +
+                                                              s.flank_deflection(c.impact_torque)
+                                                        : 0);
     all.gap.push_back(c.side * (place(c.impact) - place(c.release)) - deflection);
     all.timing.push_back(std::abs(place(c.impact) - place(c.impact - blur)));
     all.elastic.push_back(deflection);
+    all.law.push_back(law);
     all.smear.push_back(std::abs(place(c.impact) - place(c.impact - double(flank.half))));
     all.impact_speed.push_back(std::abs(at(motor.speed, c.impact)));
   }
@@ -125,7 +156,7 @@ double half_width(const Travels& travels, const signal::RobustScale& scale, cons
   const double noisy = kNoisyTiming * smear * std::min(1.0, 2 * kNoiseFree * flank.noise / flank.level);
   const double share = std::max(s.elastic_uncertainty, motor.torque_measured ? 0 : kToldElasticShare);
   return std::sqrt(scatter * scatter + std::pow(signal::median(travels.timing), 2) + noisy * noisy +
-                   std::pow(share * signal::median(travels.elastic), 2));
+                   std::pow(share * signal::median(travels.elastic) + signal::median(travels.law), 2));
 }
 
 void require_sense(double lower, double upper, const MomentumTransferSettings& s) {
@@ -158,10 +189,12 @@ void check_friction(const Flank& flank, const MomentumTransferSettings& s) {
                     flank.level, s.motor_friction)};
 }
 
-void fill(const record::Record& record, const MomentumTransferSettings& s, Estimate& estimate) {
+void fill(const record::Record& record, MomentumTransferSettings s, Estimate& estimate) {
   Motor motor = collect(record, s);
   check_domain(motor, s);
   if (!motor.torque_measured) tell_torque(motor, s);
+  if (!s.output_locked && motor.torque_measured)
+    for (int i = 0; i < kSettle; ++i) s.motor_friction = friction_in_flight(motor, s);
   const Flank flank = calm_flank(motor, s);
   check_friction(flank, s);
   const double shortness = shortness_of_impacts(flank, motor.interval, s);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "traverse_fit.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -22,12 +23,17 @@ constexpr double kKnownGap = 3, kKnownStiffness = 0.35, kKnownDamping = 0.7, kKn
 constexpr double kNoFriction = 0.1;              // of the level, where none is declared
 constexpr double kHeld = 0.5, kKnownHeld = 0.3;  // shares of the sample before: theory, choice
 constexpr double kStartSpread[] = {0.5, 5e-2};   // of the deflection, of the rms speed's scale: choice
-constexpr double kSlopeOfNoise = 0.5;            // theory: 0.32 for white noise, of a slope over five samples
-constexpr double kUntold = 0.1;                  // of the level: a torque that nothing else tells
-constexpr double kDifference = 1e-4;             // spreads, step of a difference
-constexpr double kStartDifference = 1e-2;        // the same of a start value
+constexpr double kSlowTorque = 0.05;             // of the level, a torque that nothing tells: choice
+constexpr double kSlowTime = 0.4;                // windows, within which it changes: choice
+constexpr double kLeastNoise = 0.1;              // of the torque's variance, white whatever else is: choice
+constexpr double kFastPart = 8;                  // the position counts as so many times noisier: simulation
+constexpr double kUntold = 0.1;            // of the level: a torque on the motor that nothing else tells
+constexpr double kUntoldLoad = 0.5;        // the same on the load: gravity
+constexpr double kDifference = 1e-4;       // spreads, step of a difference
+constexpr double kStartDifference = 1e-2;  // the same of a start value
 constexpr double kFirstDamping = 1e-2, kLeastDamping = 1e-6, kHarder = 4, kEasier = 5;
-constexpr double kLongestMove = 1.5;  // spreads, of a value in one step
+constexpr double kLongestMove = 0.5;  // spreads, of a value in one step
+constexpr double kFarthestOwn = 10;   // spreads, of a value of one crossing
 constexpr double kEnough = 1e-5;      // gain of the cost below which it ends, relative
 constexpr double kFarOff = 3;         // times the median rms: a crossing is left out
 constexpr int kLook = 6;              // steps between two looks for such crossings
@@ -67,12 +73,45 @@ TraverseFit::TraverseFit(const TraverseData& data, const TraversePriors& priors,
   // What a window knows of its start comes from the torque there, with its noise.
   const double per_torque = 1 / priors_[kTraverseStiffness].value;
   own_spread_ << std::hypot(kStartSpread[0] * data.level, data.noise) * per_torque,
-      std::hypot(kStartSpread[1] * data.slow * 100, kSlopeOfNoise * data.noise * per_torque / data.interval),
-      kUntold * data.level, kUntold * data.level;
+      std::hypot(kStartSpread[1] * data.slow * 100, data.slope_noise * per_torque), kUntold * data.level,
+      kUntoldLoad * data.level;
+  for (const TraverseWindow& window : windows_) weigh(window);
 }
 
-TraverseFit::TraverseFit(const TraverseFit& other, std::vector<TraverseWindow> windows)
-    : TraverseFit(other.data_, other.priors_, std::move(windows), 0) {
+/// What is left has three parts: the noise of the torque, of which two samples are averaged; that of the
+/// position, which two differences make large and fast; and a slow torque that nothing tells. The noise of
+/// the position comes in as a factor of the motor's inertia, which would be fitted too small where it counted
+/// as much as it is: its fast part is all but left out.
+void TraverseFit::weigh(const TraverseWindow& window) {
+  const double differences =
+      priors_[kTraverseMotorInertia].value * data_.position_noise / (data_.interval * data_.interval);
+  const double white = data_.torque_noise * data_.torque_noise, blue = differences * differences,
+               slow = kSlowTorque * data_.level * kSlowTorque * data_.level;
+  const double kBlue[] = {6, -4, 1}, kHeldNoise[] = {0.5, 0.25, 0};
+  Weights w;
+  for (Eigen::Index k = 1; k + 1 < Eigen::Index(data_.samples); ++k)
+    if (data_.counts[window.first + std::size_t(k)]) w.counted.push_back(k);
+  const auto count = Eigen::Index(w.counted.size());
+  MatrixXd noise(count, count), all(count, count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const auto apart = std::size_t(std::abs(w.counted[std::size_t(i)] - w.counted[std::size_t(k)]));
+      const double held = apart < 3 ? kHeldNoise[apart] * white : 0,
+                   fast = apart < 3 ? kBlue[apart] * blue : 0;
+      noise(i, k) = held + fast;
+      all(i, k) = held + kFastPart * kFastPart * fast +
+                  slow * std::exp(-double(apart) / (kSlowTime * double(data_.samples)));
+    }
+  all.diagonal().array() += kLeastNoise * white + 1e-9 * all(0, 0);
+  w.deviation = all.llt().matrixL();
+  const MatrixXd half = w.deviation.triangularView<Eigen::Lower>().solve(noise);
+  w.of_noise = w.deviation.triangularView<Eigen::Lower>().solve(half.transpose()).trace();
+  weights_.push_back(std::move(w));
+}
+
+TraverseFit::TraverseFit(const TraverseFit& other, const TraverseData& data,
+                         std::vector<TraverseWindow> windows)
+    : TraverseFit(data, other.priors_, std::move(windows), 0) {
   z_ = other.z_;
 }
 
@@ -87,26 +126,24 @@ TraverseMachine TraverseFit::machine(const VectorXd& z) const {
   return m;
 }
 
-/// In noises.
+/// In standard deviations, independent of each other.
 VectorXd TraverseFit::residual(std::size_t window, const VectorXd& z, const TraverseOwn& own) const {
   const TraverseOwn scaled = own.cwiseProduct(own_spread_);
-  VectorXd r(static_cast<Eigen::Index>(data_.samples));
-  traverse_residual(data_, windows_[window], machine(z), scaled, r.data());
-  return r / data_.noise;
+  VectorXd all(static_cast<Eigen::Index>(data_.samples));
+  traverse_residual(data_, windows_[window], machine(z), scaled, all.data());
+  const VectorXd counted = all(weights_[window].counted);
+  return weights_[window].deviation.triangularView<Eigen::Lower>().solve(counted);
 }
 
 TraverseFit::Part TraverseFit::linearise(std::size_t window) const {
   const VectorXd r = residual(window, z_, own_[window]);
   MatrixXd slopes(r.size(), kTraverseValues + kTraverseOwn);
   for (int k = 0; k < kTraverseValues + kTraverseOwn; ++k) {
-    VectorXd up = z_, down = z_;
-    TraverseOwn above = own_[window], below = above;
+    VectorXd z = z_;
+    TraverseOwn own = own_[window];
     const double step = k < kTraverseValues ? kDifference : kStartDifference;
-    if (k < kTraverseValues)
-      up[k] += step, down[k] -= step;
-    else
-      above[k - kTraverseValues] += step, below[k - kTraverseValues] -= step;
-    slopes.col(k) = (residual(window, up, above) - residual(window, down, below)) / (2 * step);
+    (k < kTraverseValues ? z[k] : own[k - kTraverseValues]) += step;
+    slopes.col(k) = (residual(window, z, own) - r) / step;
   }
   const MatrixXd normal = signal::gram(slopes);
   const VectorXd toward = -signal::transposed_product(slopes, r);
@@ -126,7 +163,7 @@ double TraverseFit::cost_of(const VectorXd& z, const std::vector<TraverseOwn>& o
     const auto w = static_cast<std::size_t>(index);
     if (!used_[w] && rms == nullptr) return;
     const double squares = residual(w, z, own[w]).squaredNorm();
-    if (rms != nullptr) (*rms)[w] = std::sqrt(squares / static_cast<double>(data_.samples));
+    if (rms != nullptr) (*rms)[w] = std::sqrt(squares / weights_[w].of_noise);
     of[w] = used_[w] ? squares + own[w].squaredNorm() : 0;
   });
   double sum = z.squaredNorm();
@@ -145,9 +182,9 @@ bool TraverseFit::iterate() {
     VectorXd toward = -z_;
     std::vector<TraverseMatrix> own(windows_.size());
     for (std::size_t w = 0; w < windows_.size(); ++w) {
-      if (!used_[w]) continue;
       own[w] = parts_[w].own;
       own[w].diagonal() *= 1 + damping_;
+      if (!used_[w]) continue;
       const TraverseMatrix inverse = own[w].inverse();
       MatrixXd shared = parts_[w].shared;
       shared.diagonal() *= 1 + damping_;
@@ -157,9 +194,11 @@ bool TraverseFit::iterate() {
     const VectorXd move =
         VectorXd(signal::solve_symmetric(normal, toward)).cwiseMax(-kLongestMove).cwiseMin(kLongestMove);
     std::vector<TraverseOwn> moved = own_;
-    for (std::size_t w = 0; w < windows_.size(); ++w)
-      if (used_[w])
-        moved[w] += own[w].inverse() * (parts_[w].own_toward - parts_[w].mixed.transpose() * move);
+    // Those that are left out move on too, or none could come back.
+    for (std::size_t w = 0; w < windows_.size(); ++w) {
+      moved[w] += own[w].inverse() * (parts_[w].own_toward - parts_[w].mixed.transpose() * move);
+      moved[w] = moved[w].cwiseMax(-kFarthestOwn).cwiseMin(kFarthestOwn);
+    }
     const double cost = cost_of(z_ + move, moved, nullptr);
     gain_ = cost_ - cost;
     if (!(gain_ > 0)) continue;
@@ -174,7 +213,10 @@ void TraverseFit::leave_out() {
   std::vector<double> rms(windows_.size());
   cost_of(z_, own_, &rms);
   const double most = kFarOff * std::max(1.0, signal::median(rms));
-  for (std::size_t w = 0; w < windows_.size(); ++w) used_[w] = rms[w] <= most;
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    used_[w] = rms[w] <= most;
+    if (!used_[w]) own_[w].setZero();
+  }
   cost_ = cost_of(z_, own_, nullptr);
 }
 
@@ -197,6 +239,13 @@ double TraverseFit::misfit() const {
   std::vector<double> rms(windows_.size());
   cost_of(z_, own_, &rms);
   return signal::median(rms);
+}
+
+double TraverseFit::untold() const {
+  double squares = 0;
+  for (std::size_t w = 0; w < windows_.size(); ++w)
+    if (used_[w]) squares += std::pow(own_[w][2] * own_spread_[2], 2);
+  return std::sqrt(squares / std::max(1, windows() - left_out()));
 }
 
 namespace {

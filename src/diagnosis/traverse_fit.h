@@ -25,8 +25,8 @@ class TraverseFit {
   /// Uses `windows` of the data's, and begins with a gap of `first_gap` spreads.
   TraverseFit(const TraverseData& data, const TraversePriors& priors, std::vector<TraverseWindow> windows,
               double first_gap);
-  /// Another fit's machine on these windows.
-  TraverseFit(const TraverseFit& other, std::vector<TraverseWindow> windows);
+  /// Another fit's machine on these windows, of its data or of others.
+  TraverseFit(const TraverseFit& other, const TraverseData& data, std::vector<TraverseWindow> windows);
 
   /// At most so many steps; crossings that the machine does not follow are left out on the way.
   void run(int iterations);
@@ -39,6 +39,8 @@ class TraverseFit {
   int left_out() const;
   /// Median over the crossings of the rms residual, in noises.
   double misfit() const;
+  /// N m, rms over the crossings of the torque on the motor that nothing else tells.
+  double untold() const;
   /// Of the logarithm of the gap: the fit's, and by crossings as clusters (sandwich).
   double standard_error() const;
   double clustered_error() const;
@@ -52,7 +54,15 @@ class TraverseFit {
     TraverseOwn own_toward;
   };
 
+  /// How what is left of one crossing counts.
+  struct Weights {
+    std::vector<Eigen::Index> counted;  // samples
+    Eigen::MatrixXd deviation;          // Cholesky factor of the covariance of what is left there, N m
+    double of_noise = 0;                // expected of noise alone, of the sum of squares
+  };
+
   double value(int which, double z) const;
+  void weigh(const TraverseWindow& window);
   TraverseMachine machine(const Eigen::VectorXd& z) const;
   Eigen::VectorXd residual(std::size_t window, const Eigen::VectorXd& z, const TraverseOwn& own) const;
   Part linearise(std::size_t window) const;
@@ -64,6 +74,7 @@ class TraverseFit {
   const TraverseData& data_;
   TraversePriors priors_;
   std::vector<TraverseWindow> windows_;
+  std::vector<Weights> weights_;
   std::vector<char> used_;
   std::vector<TraverseOwn> own_;  // in spreads
   TraverseOwn own_spread_;

@@ -17,16 +17,47 @@ namespace {
 constexpr double kCycleSamples = 8;  // fewest samples in a cycle of the motor against the load
 constexpr double kStep = 0.06;       // of the integration times the fastest frequency, rad
 constexpr double kBefore = 0.8;      // cycles of a window before a crossing: tell the start
-constexpr double kAfter = 1.7;       // and from its begin on: the first touches
+constexpr double kAfter = 2.6;       // and from its begin on: the first touches
+constexpr double kCounted = 0.5;     // share of a window in which the motor moves
 constexpr double kUneven = 0.25;     // of an interval, from one sample to the next
-constexpr double kClear = 3.1;       // noises of the averaged torque, above which it presses a flank
+constexpr double kClear = 4.4;       // noises of the averaged torque, above which it presses a flank
+constexpr double kAveraged = 0.16;   // cycles, half width of the average
 constexpr double kSlow = 0.02;       // of the rms speed: there dry friction takes any value
 constexpr double kFade = 0.01;       // of it: the load's friction turns its sign within
 constexpr std::size_t kFewestSamples = 256;
-// Quadratic over five samples (Savitzky and Golay 1964): value, slope per sample, and what it leaves of
-// noise.
-constexpr double kValue[] = {-3 / 35.0, 12 / 35.0, 17 / 35.0, 12 / 35.0, -3 / 35.0};
-constexpr double kSlope[] = {-0.2, -0.1, 0, 0.1, 0.2};
+
+/// Value and slope per sample of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
+struct Quadratic {
+  std::vector<double> value, slope;
+  std::size_t reach;
+
+  explicit Quadratic(std::size_t to_each_side) : reach(to_each_side) {
+    const auto m = static_cast<double>(reach);
+    for (double k = -m; k <= m; ++k) {
+      value.push_back((3 * (3 * m * m + 3 * m - 1) - 15 * k * k) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3)));
+      slope.push_back(3 * k / (m * (m + 1) * (2 * m + 1)));
+    }
+  }
+
+  double of(const std::vector<double>& x, std::size_t i, const std::vector<double>& weights) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < weights.size(); ++k) sum += weights[k] * x[i + k - reach];
+    return sum;
+  }
+};
+
+/// What the weights leave of the noise of a torque of which two samples are averaged, and of second
+/// differences of positions [N m].
+double noise_of(const std::vector<double>& weights, double torque, double differences) {
+  double squares = 0;
+  const auto at = [&](std::ptrdiff_t i) {
+    return i < 0 || i >= std::ptrdiff_t(weights.size()) ? 0 : weights[std::size_t(i)];
+  };
+  for (std::ptrdiff_t i = -1; i <= std::ptrdiff_t(weights.size()); ++i)
+    squares += std::pow(0.5 * torque * (at(i) + at(i - 1)), 2) +
+               std::pow(differences * (at(i - 1) - 2 * at(i) + at(i + 1)), 2);
+  return std::sqrt(squares);
+}
 
 double cycle_of(const GapTraverseSettings& s) {
   return 2 * M_PI / std::sqrt(s.stiffness * (1 / s.motor_inertia + 1 / s.load_inertia));
@@ -47,39 +78,32 @@ void check_samples(const record::Record& record, double interval, double cycle) 
   }
 }
 
-double filtered(const std::vector<double>& x, std::size_t i, const double* weights) {
-  double sum = 0;
-  for (std::size_t k = 0; k < 5; ++k) sum += weights[k] * x[i + k - 2];
-  return sum;
-}
-
-/// What the declared motor leaves for the teeth.
-std::vector<double> torque_of_teeth(const TraverseData& d, const GapTraverseSettings& s) {
+/// What the motor leaves for the teeth.
+std::vector<double> torque_of_teeth(const TraverseData& d, const TraverseMotor& motor) {
   std::vector<double> teeth(d.torque.size(), 0.0);
   for (std::size_t i = 1; i + 1 < teeth.size(); ++i)
-    teeth[i] = 0.5 * (d.torque[i] + d.torque[i - 1]) - s.motor_inertia * d.acceleration[i] -
-               s.motor_damping * d.rate[i] - std::copysign(s.motor_friction, d.rate[i]);
+    teeth[i] = 0.5 * (d.torque[i] + d.torque[i - 1]) - motor.inertia * d.acceleration[i] -
+               motor.damping * d.rate[i] - std::copysign(motor.friction, d.rate[i]);
   return teeth;
 }
 
-/// Neighbours share a sample of the torque: every second one is taken.
-double noise_of(const std::vector<double>& teeth) {
-  std::vector<double> half[2];
-  for (std::size_t i = 2; i + 2 < teeth.size(); ++i) half[i % 2].push_back(teeth[i]);
-  return 0.5 * (signal::noise_from_differences(half[0], 2) + signal::noise_from_differences(half[1], 2));
+std::size_t reach_of(const TraverseData& d, double cycle) {
+  return std::max<std::size_t>(2, std::size_t(std::lround(kAveraged * cycle / d.interval)));
 }
 
-void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle) {
+void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle, double unsure) {
   const std::size_t n = teeth.size();
+  const Quadratic quadratic(reach_of(d, cycle));
   std::vector<double> smooth(n, 0.0), pressed;
   std::vector<int> flank(n, 0);
   const double clear = kClear * d.noise;
-  for (std::size_t i = 2; i + 2 < n; ++i) {
-    smooth[i] = filtered(teeth, i, kValue);
+  for (std::size_t i = quadratic.reach + 1; i + quadratic.reach + 1 < n; ++i) {
+    smooth[i] = quadratic.of(teeth, i, quadratic.value);
     if (std::fabs(smooth[i]) < clear) continue;
     flank[i] = smooth[i] > 0 ? 1 : -1;
     pressed.push_back(std::fabs(smooth[i]));
   }
+  d.clear = clear + unsure;
   if (!pressed.empty()) d.level = signal::median(pressed);
   const auto before = static_cast<std::size_t>(std::lround(kBefore * cycle / d.interval));
   d.samples = before + static_cast<std::size_t>(std::lround(kAfter * cycle / d.interval));
@@ -91,10 +115,17 @@ void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycl
     if (left == 0 || flank[left] == flank[i]) continue;
     ++d.crossings;
     std::size_t first = left > before ? left - before : 0;
-    while (first < left && (first < 3 || flank[first] != flank[left])) ++first;
-    if (first < free_from || first + d.samples + 3 >= n || i + d.samples / 8 > first + d.samples) continue;
-    d.windows.push_back(
-        {first, double(flank[first]), smooth[first], filtered(teeth, first, kSlope) / d.interval});
+    const auto sure = [&](std::size_t k) {
+      return k > 2 + quadratic.reach && flank[left] * smooth[k] > d.clear;
+    };
+    while (first < left && !sure(first)) ++first;
+    if (first < free_from || !sure(first) || first + d.samples + quadratic.reach + 1 >= n ||
+        i + d.samples / 8 > first + d.samples)
+      continue;
+    const auto from = d.counts.begin() + std::ptrdiff_t(first), to = from + std::ptrdiff_t(d.samples);
+    if (double(std::count(from, to, 1)) < kCounted * double(d.samples)) continue;
+    d.windows.push_back({first, double(flank[first]), smooth[first],
+                         quadratic.of(teeth, first, quadratic.slope) / d.interval});
     free_from = first + d.samples / 2;
   }
 }
@@ -164,7 +195,8 @@ class Teeth {
 
 }  // namespace
 
-TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings) {
+TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings,
+                           const TraverseMotor& motor) {
   TraverseData d;
   d.interval = record.sampling_interval();
   const double cycle = cycle_of(settings);
@@ -184,9 +216,15 @@ TraverseData traverse_data(const record::Record& record, const GapTraverseSettin
   if (!(squares > 0)) throw Refusal{Status::insufficient_data, "the motor does not move"};
   d.slow = kFade * std::sqrt(squares);
   for (std::size_t i = 0; i < n; ++i) d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares);
-  const std::vector<double> teeth = torque_of_teeth(d, settings);
-  d.noise = noise_of(teeth);
-  find_windows(d, teeth, cycle);
+  const std::vector<double> teeth = torque_of_teeth(d, motor);
+  d.torque_noise = signal::noise_from_differences(d.torque, 2);
+  d.position_noise = std::max(signal::noise_from_differences(d.position, 4),
+                              signal::smallest_step(d.position) / std::sqrt(12.0));
+  const Quadratic quadratic(reach_of(d, cycle));
+  const double differences = motor.inertia * d.position_noise / (d.interval * d.interval);
+  d.noise = noise_of(quadratic.value, d.torque_noise, differences);
+  d.slope_noise = noise_of(quadratic.slope, d.torque_noise, differences) / d.interval;
+  find_windows(d, teeth, cycle, motor.unsure);
   return d;
 }
 

@@ -48,15 +48,25 @@ struct TraverseData {
   std::vector<double> position, rate;  // rad, rad/s
   std::vector<double> acceleration;    // rad/s^2, second difference
   std::vector<char> counts;            // whether dry friction is told: not about a standstill
-  double noise = 0;                    // N m, of the torque through the teeth
+  double noise = 0, slope_noise = 0;   // N m, N m/s, of the averaged torque through the teeth
+  double torque_noise = 0;             // N m, of a sample of the torque, white
+  double position_noise = 0;           // rad, the same of the position, at least that of its steps
+  double clear = 0;                    // N m, of it, that presses a flank for sure
   double level = 0;                    // N m, of it, median where it presses a flank
   double slow = 0;                     // rad/s, below which dry friction fades
   std::size_t crossings = 0;           // changes of flank, of which windows may hold several
   std::vector<TraverseWindow> windows;
 };
 
+/// What is known of the motor, by which a record is cut into windows.
+struct TraverseMotor {
+  double inertia = 0, damping = 0, friction = 0;  // kg m^2, N m s/rad, N m
+  double unsure = 0;  // N m, by which the torque that it leaves for the teeth may be off
+};
+
 /// Throws Refusal.
-TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings);
+TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings,
+                           const TraverseMotor& motor);
 
 /// Recorded torque less what the machine needs, N m, at each sample of the window; 0 where it does not count.
 void traverse_residual(const TraverseData& data, const TraverseWindow& window, const TraverseMachine& machine,

@@ -16,8 +16,8 @@
 namespace backlash::rig_file {
 namespace {
 
-constexpr double kFreeElastic = 1;  // simulation: servos declared within 40 %, of the deflection, 95 %
-constexpr double kNormal95 = 1.96;  // standard deviations of 95 %, both ends: theory
+constexpr double kFreeElastic = 0.67;  // theory: of the deflection, of teeth 40 % softer than declared
+constexpr double kNormal95 = 1.96;     // standard deviations of 95 %, both ends: theory
 
 /// Where the file does not say how well it knows the elastic deflection that lost_motion subtracts. A mesh of
 /// angles is one spring with all that is merged into it, of the stated uncertainty.

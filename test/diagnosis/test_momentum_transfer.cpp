@@ -80,6 +80,27 @@ TEST(MomentumTransfer, DryFrictionOfTheMotorIsNoTorqueOfTheTeeth) {
   EXPECT_EQ(estimate_momentum_transfer(record, s).status, Status::out_of_domain);
 }
 
+// Of a free load the friction is that which leaves nothing in flight, not the declared one.
+TEST(MomentumTransfer, DryFrictionIsToldInFlightWhereTheLoadIsFree) {
+  constexpr double kGap = 1e-2, kFriction = 0.5;
+  record::Record record = crossing(kGap);
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const double speed = record.column(record::Channel::motor_velocity)[i];
+    record.column(record::Channel::motor_torque)[i] += speed == 0 ? 0 : std::copysign(kFriction, speed);
+  }
+  record.column(record::Channel::load_position).assign(record.size(), 0.0);
+  for (const double declared : {0.3 * kFriction, 1.7 * kFriction}) {
+    MomentumTransferSettings s = settings();
+    s.output_locked = false, s.motor_friction = declared;
+    const Estimate e = estimate_momentum_transfer(record, s);
+    ASSERT_EQ(e.status, Status::ok) << e.message;
+    EXPECT_NEAR(e.backlash_angle, kGap,
+                0.03 * kGap);  // the release, found to half a sample either side of the jump
+    EXPECT_LE(e.angle_lower, 1.01 * kGap);
+    EXPECT_GE(e.angle_upper, 0.97 * kGap);
+  }
+}
+
 // Nothing is told of a free load whose flanks, as declared, may yield by as much as was travelled.
 TEST(MomentumTransfer, OfAFreeLoadNoPlayIsNotTold) {
   constexpr double kGap = 1e-2;

@@ -8,17 +8,25 @@
 //   Jl ql'' = F - cl sign(ql')                      F has the sign of qm - ql
 //
 // with gap, k, p, c, Jl, Jm, bm, cm and cl of all crossings together, free within what is known of them, and
-// two start values of each. All at the motor_position axis. The teeth are a spring at the usual torque T, and
-// may yield by a power p of the deflection, 1 within a factor of 1.5 (1.5: Hertz), as far as the record
-// tells.
+// of each two start values and a torque on motor and load. All at the motor_position axis. The teeth are a
+// spring at the usual torque T, and may yield by a power p of the deflection, 1 within a factor of 1.5 (1.5:
+// Hertz), as far as the record tells.
+//
+// Where a crossing begins the teeth must press one flank for sure: by more than noise and half of the
+// declared dry friction of the motor. The motor that such crossings tell finds more of them.
+//
+// What is left is weighted by its covariance: noise of the torque, a slow torque that nothing tells (5 % of
+// T), and noise of the position, which second differences make large and fast. The inertia of the motor
+// multiplies that noise, and a fit that counted it as it is would take a smaller inertia for a better one
+// (attenuation); its fast part is all but left out.
 //
 // Needs motor_torque and motor_position, evenly sampled, at least eight samples in a cycle of the motor
 // against the load, and 20 crossings that begin in contact. No period.
 //
 // Interval, 95 %: Student's t with the larger of two standard errors of the logarithm (crossings as clusters;
-// the fit's own), and 20 % besides for what these equations do not hold: set by simulated machines with
-// cogging, gravity, Stribeck friction, varying play, transmission errors and teeth after Hertz that are not
-// told to the fit.
+// the fit's own), 20 % for what these equations do not hold, and 5 % of the deflection of the teeth under T:
+// checked on simulated machines with cogging, gravity, Stribeck friction, varying play, transmission errors
+// and teeth after Hertz that are not told to the fit.
 #pragma once
 
 #include "backlash_diagnosis/diagnosis/estimate.h"
@@ -42,7 +50,7 @@ struct GapTraverseSettings {
 ///   out_of_domain      uneven or too coarse samples; the equations do not fit the record, or only with
 ///                      values far from the declared ones
 ///   ambiguous          two plays fit alike
-///   below_range        the play is less than what the torque's noise hides
+///   below_range        the play is less than the noise of the torque hides, or a tenth of the deflection
 Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSettings& settings);
 
 }  // namespace backlash::diagnosis

@@ -42,7 +42,10 @@
 // travel of the pinion within half a sample at the impact (a sample by tachometer on a rigid flank, where
 // speed jumps), a share of its travel within the averages as large as the noise, and the declared uncertainty
 // of the elastic deflections. Travel within the averages beyond the gap is out of the domain. About 94 %
-// coverage in simulations, see test_rig_estimators.cpp.
+// coverage in simulations, see test_rig_estimators.cpp. Of a free load the dry friction is not the declared
+// one but that which leaves nothing in flight, and the flanks may yield by any law between the declared one
+// and Hertz's, which agree at the torque that the flanks exceed for a twentieth of the time: the middle is
+// taken, both ends are in the interval.
 #pragma once
 
 #include <functional>
