@@ -19,7 +19,7 @@ constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
 constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
 
 // Columns in this order: of the equation of motion; of the deflection, that under the same load.
-enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kCommonColumns };
+enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kJerk, kCommonColumns };
 enum TorqueBase { kWarmViscous = kCommonColumns, kWarmCoulomb, kBaseColumns };
 enum DeflectionBase { kHalfGap = kCommonColumns, kScale };
 
@@ -31,6 +31,7 @@ Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
   x.col(kOffset).setOnes();
   x.col(kCosine) = column(motion, [](const Moment& m) { return std::cos(m.position); });
   x.col(kSine) = column(motion, [](const Moment& m) { return std::sin(m.position); });
+  x.col(kJerk) = column(motion, [](const Moment& m) { return m.jerk; });
   if (motion.sampling.channel == ChangeChannel::deflection) {
     x.col(kHalfGap) = column(motion, [](const Moment& m) { return m.side(); });
     x.col(kScale) = column(motion, [](const Moment& m) { return m.position; });
@@ -219,6 +220,7 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
     for (const Moment& m : sampled_motion(r, sampling, settings).moments) {
       squares += m.speed * m.speed;
       model.sampling.fastest = std::max(model.sampling.fastest, settings.fast * std::fabs(m.speed));
+      model.sampling.hardest = std::max(model.sampling.hardest, settings.fast * std::fabs(m.acceleration));
       ++count;
     }
   model.sampling.speed = std::sqrt(squares / count);
