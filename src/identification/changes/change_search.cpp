@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/signal/distributions.h"
+#include "onset_threshold.h"
 
 namespace backlash::identification {
 
@@ -78,9 +78,10 @@ std::size_t ChangeSearch::windows() const {
 
 double ChangeSearch::threshold(Eigen::Index values) const {
   const double hours = motion_.moments.back().time / 3600;
-  const double p = settings_.false_alarms_per_hour * hours /
-                   (double(candidates_.size()) * double(std::max<std::size_t>(windows(), 1)));
-  return signal::chi_square_quantile(1 - std::clamp(p, 1e-14, 0.5), double(values));
+  const double probability =
+      std::clamp(settings_.false_alarms_per_hour * hours / double(candidates_.size()), 1e-14, 0.1);
+  const double fewest = double(margin_), most = double(windows()) * settings_.window / settings_.block;
+  return gain_by_chance(probability, double(values), fewest, std::max(fewest, most));
 }
 
 double ChangeSearch::left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const {

@@ -16,8 +16,8 @@
 #include <random>
 #include <vector>
 
-#include "backlash_diagnosis/signal/distributions.h"
 #include "identification/changes/change_scan.h"
+#include "identification/changes/onset_threshold.h"
 
 namespace backlash::change_study {
 namespace {
@@ -162,8 +162,8 @@ void false_alarms(long windows, unsigned long seed) {
     gains.push_back(gain_of(look, inflation()));
     look.clear();
   }
-  for (const double allowed : {0.3, 0.1, 0.03}) {  // per look
-    const double height = signal::chi_square_quantile(1 - allowed / kLook, 1);
+  for (const double allowed : {0.1, 0.03, 0.01}) {  // per look
+    const double height = identification::gain_by_chance(allowed, 1, kMargin, kLook);
     const auto wrong = std::count_if(gains.begin(), gains.end(), [&](double g) { return g > height; });
     fmt::print("{} looks at {} windows, {:.0f} false alarms allowed: {}\n", gains.size(), kLook,
                allowed * double(gains.size()), wrong);
