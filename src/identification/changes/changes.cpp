@@ -104,6 +104,19 @@ void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>
                       joined(nearest) + "): commission with more motion of this kind";
 }
 
+/// What is over soon is no change of the machine, whatever it looks like: a push, or a fault that few passes
+/// show.
+void take_out_short(const ChangeSettings& settings, Changes& out) {
+  const double shortest = double(settings.least_windows) * settings.window;
+  const auto is_short = [&](const Change& c) { return c.until && *c.until - c.since < shortest; };
+  for (const Change& c : out.changes)
+    if (is_short(c) && out.cannot_tell.empty())
+      out.cannot_tell =
+          "from " + whole_seconds(c.since) + " to " + whole_seconds(*c.until) +
+          " the record differs from the healthy ones, too short to tell by what (nearest: " + c.effect + ")";
+  out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
+}
+
 ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::Record>& healthy,
                           const record::Record& record, const std::vector<FoundChange>& beside, bool linear,
                           const ChangeSettings& settings, const Progress& progress) {
@@ -121,6 +134,7 @@ ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::R
   for (const ChangeEffect& e : model.further) out.healthy_terms.push_back(e.name());
   for (const FoundChange& f : found) out.changes.push_back(search.told(f, found, linear));
   tell_unexplained(search, found, model.sampling.mesh.has_value(), settings, out);
+  take_out_short(settings, out);
   out.different = search.different();
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +

@@ -70,8 +70,11 @@ Changes changes_of(const record::Record& record, double false_alarms_per_hour = 
 
 TEST(Changes, NothingIsToldOfHealthyRecords) {
   // Ten records of 200 s at one false alarm a month: 1 in 1300 would be chance.
-  for (unsigned seed = 10; seed < 20; ++seed)
-    EXPECT_TRUE(changes_of(made(seed, 200, nothing)).changes.empty()) << seed;
+  for (unsigned seed = 10; seed < 20; ++seed) {
+    const Changes found = changes_of(made(seed, 200, nothing));
+    EXPECT_TRUE(found.changes.empty()) << seed;
+    EXPECT_EQ(found.cannot_tell, "") << seed;
+  }
 }
 
 TEST(Changes, ThresholdIsWhatTheRateAsksFor) {
@@ -143,6 +146,16 @@ TEST(Changes, ThatFollowNoEffectAreUnknown) {
   ASSERT_EQ(found.changes.size(), 1u);
   EXPECT_EQ(found.changes.front().effect, "unknown");
   EXPECT_NEAR(found.changes.front().since, kOnset, 6);
+}
+
+TEST(Changes, ADamagedToothIsNotCalledAWave) {
+  // Few passes show it: a cogging of 4 s fits them.
+  const Changes found = changes_of(made(30, 200, [](const Motion& m) {
+    const double x = (m.q - 0.4) / 0.05;
+    return m.t < kOnset ? 0 : 0.1 * std::exp(-x * x / 2);
+  }));
+  EXPECT_TRUE(found.changes.empty());
+  EXPECT_NE(found.cannot_tell, "");
 }
 
 TEST(Changes, ARecordThatBeginsWarmOrPausesHasNone) {

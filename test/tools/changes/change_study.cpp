@@ -218,6 +218,7 @@ void healthy(const Options& options) {
         const auto found =
             identification::detect_changes(joint.rig(), learned, stream.slice(from, to), settings_of(rate));
         suspected += !found.changes.empty();
+        cannot += found.changes.empty() && !found.cannot_tell.empty();
         ledger.take(look_of(found, from, to));
         different += !ledger.unexplained_difference().empty();
       } catch (const CannotIdentify&) {
