@@ -82,7 +82,12 @@ def _changes(words, time_limit):
         _, told = _run(words, time_limit)
     except _Ended as ended:
         return {"changes": json.dumps({"status": ended.args[0], "reason": ended.args[1]})}
+    if told is None:
+        return {"changes": json.dumps({"status": "cannot_tell", "reason": "the record cannot be judged"})}
     found = told["changes"]
+    if not found and told["cannot_tell"]:
+        return {"changes": json.dumps({"status": "cannot_tell", "reason": told["cannot_tell"]}),
+                "residual": told["healthy_residual"]}
     return {"changes": json.dumps({"status": "done", "changes": found}),
             "residual": found[0]["error_before"] if found else told["healthy_residual"]}
 

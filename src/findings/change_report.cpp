@@ -46,6 +46,9 @@ std::string change_summary(const identification::Changes& found) {
       text += "; the record does not tell it from: " + joined(c.alike);
     text += "\n";
   }
+  if (!found.cannot_tell.empty())
+    text += (text.empty() ? "cannot tell: " : "what else has changed cannot be told: ") + found.cannot_tell +
+            "\n";
   if (text.empty()) text = "no change found\n";
   return text + fmt::format("{} windows of motion judged\n", found.windows);
 }
@@ -53,7 +56,7 @@ std::string change_summary(const identification::Changes& found) {
 std::string change_json(const identification::Changes& found, const ChangeInputs& inputs) {
   report::Json changes = report::Json::array();
   for (const identification::Change& c : found.changes) changes.push_back(change_json(c, inputs.joint));
-  const report::Json json = {
+  report::Json json = {
       {"schema_version", 1},
       {"version", version()},
       {"record", inputs.record},
@@ -67,8 +70,10 @@ std::string change_json(const identification::Changes& found, const ChangeInputs
       {"healthy_deflection_residual", report::json_number(found.deflection_noise)},
       {"healthy_terms", found.healthy_terms},
       {"different_from_beginning", found.different},
+      {"cannot_tell", nullptr},
       {"warnings", found.warnings},
   };
+  if (!found.cannot_tell.empty()) json["cannot_tell"] = found.cannot_tell;
   return report::dumped(json, 2);
 }
 

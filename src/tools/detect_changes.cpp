@@ -40,7 +40,8 @@ Command command() {
   c.exit_codes =
       "  0   nothing has changed\n"
       "  2   something has\n"
-      "  3   the records cannot tell (too little motion, another gear train)\n";
+      "  3   the records cannot tell (too little motion, another gear train, something that no effect "
+      "explains)\n";
   return c;
 }
 
@@ -82,7 +83,10 @@ int detect(const Arguments& arguments) {
   told.joint = rig.rig.joint;
   write_text(arguments.text("json"), findings::change_json(found, told));
   std::cout << findings::change_summary(found);
-  return found.changes.empty() ? kHealthy : kFault;
+  if (!found.changes.empty()) return kFault;
+  if (found.cannot_tell.empty()) return kHealthy;
+  std::cerr << "detect_changes: " << found.cannot_tell << '\n';
+  return kInconclusive;
 }
 
 }  // namespace

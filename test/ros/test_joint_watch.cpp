@@ -28,7 +28,7 @@ struct Robot {
   std::mt19937 random{7};
   double time = 0;                                // s of motion; stands still while the joint rests
   double stamp = 0;                               // s since kStart
-  double friction = 0;                            // N m, added
+  double friction = 0, swing = 0;                 // N m, added; the second as no effect does
   double position_glitch = 0, torque_glitch = 0;  // rad and N m, of the next sample
   std::vector<diagnosis::KnownChange> news;
 
@@ -57,7 +57,8 @@ struct Robot {
       acceleration += a[i] * o * (rate * std::cos(o * time) - pace * pace * o * std::sin(o * time));
     }
     const double dry = pace > 0 ? std::copysign(0.75 + friction, w) : 0;
-    const double torque = 0.45 * acceleration + 1.1 * w + dry + 3 * std::sin(q) + noise(random);
+    const double torque =
+        0.45 * acceleration + 1.1 * w + dry + 3 * std::sin(q) + swing * std::sin(3 * stamp) + noise(random);
     time += pace / kRate;
     if (lost)
       stamp += 1 / kRate;
@@ -151,6 +152,17 @@ TEST(JointWatch, SaysWhyItCannotTell) {
   EXPECT_NE(changing.watch.state().why_not.find("change within themselves: motor_coulomb"), std::string::npos)
       << changing.watch.state().why_not;
   EXPECT_FALSE(std::filesystem::exists(folder.path("joint_healthy.csv")));
+  // Nor is what follows no effect a healthy machine.
+  Robot healthy(settings(folder));
+  healthy.move(121);
+  ASSERT_TRUE(std::filesystem::exists(folder.path("joint_healthy.csv")));
+  Robot odd(settings(folder));
+  odd.swing = 0.3;
+  odd.move(95);
+  EXPECT_TRUE(odd.news.empty());
+  EXPECT_NE(odd.watch.state().why_not.find("from its beginning the record follows no effect"),
+            std::string::npos)
+      << odd.watch.state().why_not;
   WatchSettings sensor = settings(folder);
   sensor.joint.rig = rig_file::default_rig_file();
   EXPECT_NE(Robot(sensor).watch.state().why_not.find("does not declare"), std::string::npos);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // detect_changes as a user calls it, on records of a joint with known changes.
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -12,7 +13,22 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-class DetectChanges : public CommandTest {};
+class DetectChanges : public CommandTest {
+ protected:
+  /// The second behind the first, 1 s later.
+  std::string joined_records(const std::string& first, const std::string& second) const {
+    std::istringstream before(read(first)), after(read(second));
+    std::string line, text;
+    double last = 0;
+    while (std::getline(before, line)) {
+      text += line + "\n";
+      if (line[0] != 't') last = std::stod(line);
+    }
+    for (std::getline(after, line); std::getline(after, line);)
+      text += std::to_string(std::stod(line) + last + 1) + line.substr(line.find(',')) + "\n";
+    return text;
+  }
+};
 
 TEST_F(DetectChanges, TellsEachChangeOfTheSharedRecordsAndNothingElse) {
   const auto truth_file = find_data("changes/truth.json");
@@ -50,13 +66,7 @@ TEST_F(DetectChanges, TellsSinceWhenAJointOfTwoInertiasHasMorePlay) {
   ASSERT_EQ(simulate("--duration 200 --seed 1 --out healthy.csv"), 0);
   ASSERT_EQ(simulate("--duration 90 --seed 2 --out before.csv"), 0);
   ASSERT_EQ(simulate("--duration 60 --seed 3 --backlash 7e-4 --out after.csv"), 0);
-  // 1 s is missing between them.
-  std::istringstream before(read("before.csv")), after(read("after.csv"));
-  std::string line, text;
-  while (std::getline(before, line)) text += line + "\n";
-  for (std::getline(after, line); std::getline(after, line);)
-    text += std::to_string(std::stod(line) + 91) + line.substr(line.find(',')) + "\n";
-  write("record.csv", text);
+  write("record.csv", joined_records("before.csv", "after.csv"));
   const Outcome outcome =
       run("detect_changes --rig " + rig + " --healthy healthy.csv --json out.json record.csv");
   ASSERT_EQ(outcome.code, 2) << outcome.err;
@@ -69,6 +79,48 @@ TEST_F(DetectChanges, TellsSinceWhenAJointOfTwoInertiasHasMorePlay) {
   const Json& angle = change["size"]["angle"];
   EXPECT_NEAR(angle["value"].get<double>(), 1.6e-4, 3 * angle["standard_error"].get<double>());
   EXPECT_GT(report["healthy_deflection_residual"], 0);
+}
+
+TEST_F(DetectChanges, AnotherTaskIsNoChangeAndWhatFollowsNoEffectIsNoHealth) {
+  const std::string rig = package_file("config/simulated_robot/shoulder.yaml");
+  std::ifstream in(rig);
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  for (const auto& [old, other] :
+       {std::pair<std::string, std::string>{"[0.6, -0.3, 0.2]", "[0.2, -0.1, 0.1]"},
+        {"dwell: 0.4", "dwell: 0.05"}}) {
+    ASSERT_NE(text.find(old), std::string::npos);
+    text.replace(text.find(old), old.size(), other);
+  }
+  write("short_moves.yaml", text);
+  ASSERT_EQ(run("simulate " + rig + " --duration 200 --seed 1 --out healthy.csv").code, 0);
+  ASSERT_EQ(run("simulate " + rig + " --duration 60 --seed 2 --out long.csv").code, 0);
+  ASSERT_EQ(run("simulate short_moves.yaml --duration 60 --seed 3 --out short.csv").code, 0);
+  const auto detect = [&] {
+    return run("detect_changes --rig " + rig + " --healthy healthy.csv --json out.json record.csv");
+  };
+  write("record.csv", joined_records("long.csv", "short.csv"));
+  const Outcome healthy = detect();
+  EXPECT_EQ(healthy.code, 0) << healthy.out << healthy.err;
+  EXPECT_TRUE(Json::parse(read("out.json"))["cannot_tell"].is_null());
+  // The motor's torque swings by 10 N m all the time.
+  std::istringstream lines(read("long.csv"));
+  std::string line, swings;
+  std::getline(lines, line);
+  swings = line + "\n";
+  ASSERT_EQ(line.rfind("time,motor_torque,", 0), 0u) << line;
+  while (std::getline(lines, line)) {
+    const std::size_t first = line.find(','), second = line.find(',', first + 1);
+    const double torque = std::stod(line.substr(first + 1)) + 10 * std::sin(3 * std::stod(line));
+    swings += line.substr(0, first + 1) + std::to_string(torque) + line.substr(second) + "\n";
+  }
+  write("record.csv", swings);
+  const Outcome outcome = detect();
+  EXPECT_EQ(outcome.code, 3) << outcome.out;
+  expect_contains(outcome.out, "cannot tell: from its beginning");
+  expect_contains(outcome.err, "from its beginning the record follows no effect");
+  const Json json = Json::parse(read("out.json"));
+  EXPECT_TRUE(json["changes"].empty());
+  expect_contains(json["cannot_tell"].get<std::string>(), "from its beginning");
 }
 
 TEST_F(DetectChanges, RefusesOtherGearTrains) {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/signal/distributions.h"
+#include "onset_threshold.h"
 
 namespace backlash::identification {
 
@@ -78,9 +78,10 @@ std::size_t ChangeSearch::windows() const {
 
 double ChangeSearch::threshold(Eigen::Index values) const {
   const double hours = motion_.moments.back().time / 3600;
-  const double p = settings_.false_alarms_per_hour * hours /
-                   (double(candidates_.size()) * double(std::max<std::size_t>(windows(), 1)));
-  return signal::chi_square_quantile(1 - std::clamp(p, 1e-14, 0.5), double(values));
+  const double probability =
+      std::clamp(settings_.false_alarms_per_hour * hours / double(candidates_.size()), 1e-14, 0.1);
+  const double fewest = double(margin_), most = double(windows()) * settings_.window / settings_.block;
+  return gain_by_chance(probability, double(values), fewest, std::max(fewest, most));
 }
 
 double ChangeSearch::left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const {
@@ -137,6 +138,13 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   return found;
 }
 
+/// What `b` leaves, less the change as it was fitted.
+Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& b) const {
+  const Eigen::MatrixXd z = found_columns(f);
+  const Eigen::VectorXd without = b.residual - z * f.score.values;
+  return without - b.columns * (b.inverse * (b.columns.transpose() * without / b.variance));
+}
+
 bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   double rows = 0;
   const double squares = left_after(b, f.from, f.to, rows), explained = f.score.gain * b.variance;
@@ -145,7 +153,11 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   // More noise than in the healthy records counts against it.
   const double all = b.left().squaredNorm(), left = std::max(all - explained, 0.0);
   const double noisier = std::max(1.0, left / double(motion_.size()) / b.variance);
-  return f.gain / noisier > threshold(f.score.values.size());
+  // And so does noise that follows the effect for as long as a window.
+  const Eigen::VectorXd beside = left_with(f, b);
+  const double own =
+      score_inflation(motion_, beside, effect_columns(motion_, f.effect), b.variance, settings_.window);
+  return f.score.gain / std::max(f.inflation * noisier, own) > threshold(f.score.values.size());
 }
 
 void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
@@ -281,41 +293,25 @@ bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
   return left - 2 * noise * rows < settings_.unknown_left * squares;
 }
 
-/// A residual that grows and follows no effect.
-std::optional<Change> ChangeSearch::louder() const {
-  const Eigen::VectorXd left = background({}).left();
-  std::vector<double> begin, squares, rows;  // of windows
+std::optional<LoudStretch> ChangeSearch::loud(const std::vector<FoundChange>& all) const {
+  const Eigen::VectorXd left = background(all).left(), expected = expected_squares(model_, motion_);
+  std::vector<double> times, squares;
   for (Eigen::Index r = 0; r < left.size(); ++r) {
-    if (begin.empty() || motion_.time(r) - begin.back() >= settings_.window) {
-      begin.push_back(motion_.time(r));
-      squares.push_back(0);
-      rows.push_back(0);
-    }
-    squares.back() += left[r] * left[r];
-    ++rows.back();
+    times.push_back(motion_.time(r));
+    squares.push_back(left[r] * left[r] / expected[r]);
   }
-  const double total = left.squaredNorm(), count = double(left.size());
-  double before = 0, rows_before = 0, most = 0;
-  std::optional<Change> change;
-  for (std::size_t k = 1; k + 1 < begin.size(); ++k) {
-    before += squares[k - 1];
-    rows_before += rows[k - 1];
-    const double a = before / rows_before, b = (total - before) / (count - rows_before);
-    // Twice the log likelihood ratio of another variance from here on.
-    const double gain =
-        count * std::log(total / count) - rows_before * std::log(a) - (count - rows_before) * std::log(b);
-    if (begin[k] < settings_.margin || gain <= most) continue;
-    most = gain;
-    change.reset();
-    if (b < settings_.unknown_louder * std::max(a, model_.noise * model_.noise)) continue;
-    change.emplace();
-    change->effect = "unknown";
-    change->gain = gain;
-    change->since = motion_.start + begin[k];
-    change->since_from = change->since - settings_.window;
-    change->since_to = change->since + settings_.window;
-    change->error_before = change->error_after = std::sqrt(b);
-  }
+  return loud_stretch(times, squares, settings_);
+}
+
+Change ChangeSearch::unknown(const LoudStretch& stretch) const {
+  Change change;
+  change.effect = "unknown";
+  change.gain = stretch.gain;
+  change.since = motion_.start + stretch.from;
+  change.since_from = change.since - settings_.window;
+  change.since_to = change.since + settings_.window;
+  if (!stretch.to_end) change.until = motion_.start + stretch.to;
+  change.error_before = change.error_after = model_.noise * std::sqrt(stretch.times);
   return change;
 }
 

@@ -9,6 +9,7 @@
 
 #include "backlash_diagnosis/identification/changes/changes.h"
 #include "change_scan.h"
+#include "unexplained.h"
 
 namespace backlash::identification {
 
@@ -38,7 +39,9 @@ class ChangeSearch {
   std::size_t windows() const;
   Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
   bool explained(const std::vector<FoundChange>& all) const;
-  std::optional<Change> louder() const;
+  /// What is left beside these is louder than the healthy machine.
+  std::optional<LoudStretch> loud(const std::vector<FoundChange>& all) const;
+  Change unknown(const LoudStretch& stretch) const;
   const std::vector<std::string>& different() const { return different_; }
   /// Values of the columns that stand beside, `found` being so.
   std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
@@ -48,6 +51,7 @@ class ChangeSearch {
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;
   FoundChange scanned(const ScannedEffect& c, const Background& b, std::size_t step) const;
+  Eigen::VectorXd left_with(const FoundChange& f, const Background& b) const;
   bool believed(const FoundChange& f, const Background& b) const;
   bool begins_before(const FoundChange& f, const Background& b) const;
   void differ(FoundChange f);

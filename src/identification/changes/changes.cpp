@@ -12,6 +12,14 @@
 namespace backlash::identification {
 namespace {
 
+std::string whole_seconds(double time) {
+  return to_text(std::round(time)) + " s";
+}
+
+double rounded(double x) {
+  return std::round(10 * x) / 10;
+}
+
 /// What one channel shows.
 struct ChannelChanges {
   std::vector<FoundChange> found;
@@ -50,6 +58,65 @@ std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& 
   };
 }
 
+/// Where the record is louder than the healthy machine. Of two inertias another task alone may do that, up to
+/// a limit: their teeth cross the gap more often or harder.
+void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<std::string> nearest,
+               bool of_two, const ChangeSettings& settings, Changes& out) {
+  Change unknown = search.unknown(loud);
+  if (!loud.from_beginning && (!of_two || loud.times >= settings.unknown_of_two)) {
+    unknown.alike = std::move(nearest);
+    out.changes.push_back(unknown);
+    return;
+  }
+  const std::string since =
+                        loud.from_beginning ? "from its beginning" : "since " + whole_seconds(unknown.since),
+                    until = unknown.until ? " to " + whole_seconds(*unknown.until) : "";
+  out.cannot_tell =
+      since + until + " the record follows no effect, " + to_text(rounded(std::sqrt(loud.times))) +
+      " times as far from it as the healthy records; if its task is another one, commission with "
+      "motion of this kind";
+}
+
+/// What no effect explains is no health.
+void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
+                      const ChangeSettings& settings, Changes& out) {
+  std::optional<LoudStretch> loud = search.loud(found);
+  double explained = 0;
+  std::vector<std::string> nearest;
+  for (const FoundChange& f : found) {
+    explained += f.score.gain;
+    nearest.push_back(f.effect.id);
+  }
+  if (search.explained(found) && !(loud && loud->excess > explained)) {
+    if (loud && !found.empty())
+      out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +
+                             " the record follows no effect, beside " + joined(nearest));
+    else if (loud)
+      tell_loud(search, *loud, {}, of_two, settings, out);
+    return;
+  }
+  out.changes.clear();
+  loud = search.loud({});
+  if (loud)
+    tell_loud(search, *loud, nearest, of_two, settings, out);
+  else
+    out.cannot_tell = "the record differs from the healthy ones in a way that no effect explains (nearest: " +
+                      joined(nearest) + "): commission with more motion of this kind";
+}
+
+/// What is over soon is no change of the machine, whatever it looks like: a push, or a fault that few passes
+/// show.
+void take_out_short(const ChangeSettings& settings, Changes& out) {
+  const double shortest = double(settings.least_windows) * settings.window;
+  const auto is_short = [&](const Change& c) { return c.until && *c.until - c.since < shortest; };
+  for (const Change& c : out.changes)
+    if (is_short(c) && out.cannot_tell.empty())
+      out.cannot_tell =
+          "from " + whole_seconds(c.since) + " to " + whole_seconds(*c.until) +
+          " the record differs from the healthy ones, too short to tell by what (nearest: " + c.effect + ")";
+  out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
+}
+
 ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::Record>& healthy,
                           const record::Record& record, const std::vector<FoundChange>& beside, bool linear,
                           const ChangeSettings& settings, const Progress& progress) {
@@ -66,21 +133,8 @@ ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::R
   out.noise = model.noise;
   for (const ChangeEffect& e : model.further) out.healthy_terms.push_back(e.name());
   for (const FoundChange& f : found) out.changes.push_back(search.told(f, found, linear));
-  if (found.empty())
-    if (const auto change = search.louder()) out.changes.push_back(*change);
-  if (!search.explained(found)) {
-    std::vector<std::string> nearest;
-    for (const Change& c : out.changes) nearest.push_back(c.effect);
-    out.changes.clear();
-    if (std::optional<Change> unknown = search.louder()) {
-      unknown->alike = nearest;
-      out.changes.push_back(*unknown);
-    } else {
-      out.warnings.push_back(
-          "the record differs from the healthy ones in a way that no effect explains (nearest: " +
-          joined(nearest) + "): commission with more motion of this kind");
-    }
-  }
+  tell_unexplained(search, found, model.sampling.mesh.has_value(), settings, out);
+  take_out_short(settings, out);
   out.different = search.different();
   for (const std::string& name : search.different())
     out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
@@ -136,16 +190,27 @@ void add_deflection(const Changes& more, Changes& all) {
   all.different.insert(all.different.end(), more.different.begin(), more.different.end());
   all.warnings.insert(all.warnings.end(), more.warnings.begin(), more.warnings.end());
   all.deflection_noise = more.noise;
+  if (all.cannot_tell.empty()) all.cannot_tell = more.cannot_tell;
 }
 
-/// What follows no effect is no change of two inertias: crossings of the gap, more of them in another task,
-/// do that too (simulation).
-void warn_of_unknown(Changes& all) {
-  const auto unknown = [](const Change& c) { return c.effect == "unknown"; };
-  for (const Change& c : all.changes)
-    if (unknown(c))
-      all.warnings.push_back("since " + to_text(std::round(c.since)) + " s the record follows no effect");
-  all.changes.erase(std::remove_if(all.changes.begin(), all.changes.end(), unknown), all.changes.end());
+/// What one channel cannot name while the other names it, or cannot either, is told once.
+void unite_unknown(const ChangeSettings& settings, Changes& all) {
+  std::vector<Change> kept;
+  for (std::size_t i = 0; i < all.changes.size(); ++i) {
+    const Change& c = all.changes[i];
+    const auto told_by = [&](const Change& o) {
+      const bool together = o.since_from - settings.same_event <= c.since_to &&
+                            c.since_from - settings.same_event <= o.since_to;
+      return together && (o.effect != "unknown" || &o < &c);
+    };
+    const auto other = std::find_if(all.changes.begin(), all.changes.end(), told_by);
+    if (c.effect != "unknown" || other == all.changes.end())
+      kept.push_back(c);
+    else if (other->effect != "unknown")
+      all.warnings.push_back("since " + whole_seconds(c.since) + " the record follows no effect, beside " +
+                             other->effect);
+  }
+  all.changes = kept;
 }
 
 /// Two inertias: the torque first, whose changes may load the teeth otherwise; then the deflection.
@@ -198,7 +263,7 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
     out = changes_in(model, healthy, record, {}, rig.linear, settings, progress).told;
   } else {
     out = changes_of_two(rig, behind, healthy, record, sampling, settings, progress);
-    warn_of_unknown(out);
+    unite_unknown(settings, out);
   }
   std::sort(out.changes.begin(), out.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });

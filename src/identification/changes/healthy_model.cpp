@@ -19,7 +19,7 @@ constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
 constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
 
 // Columns in this order: of the equation of motion; of the deflection, that under the same load.
-enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kCommonColumns };
+enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kJerk, kCommonColumns };
 enum TorqueBase { kWarmViscous = kCommonColumns, kWarmCoulomb, kBaseColumns };
 enum DeflectionBase { kHalfGap = kCommonColumns, kScale };
 
@@ -31,6 +31,7 @@ Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
   x.col(kOffset).setOnes();
   x.col(kCosine) = column(motion, [](const Moment& m) { return std::cos(m.position); });
   x.col(kSine) = column(motion, [](const Moment& m) { return std::sin(m.position); });
+  x.col(kJerk) = column(motion, [](const Moment& m) { return m.jerk; });
   if (motion.sampling.channel == ChangeChannel::deflection) {
     x.col(kHalfGap) = column(motion, [](const Moment& m) { return m.side(); });
     x.col(kScale) = column(motion, [](const Moment& m) { return m.position; });
@@ -200,6 +201,24 @@ Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const C
   return spread;
 }
 
+/// The line of squares over roughness, both of its values >= 0.
+void set_expected_squares(const HealthyData& data, const PooledFit& fit, const ChangeSettings& settings,
+                          HealthyModel& model) {
+  std::vector<double> rough, squares;
+  for (std::size_t r = 0; r < data.motions.size(); ++r) {
+    const Eigen::VectorXd left = data.motions[r].target - data.columns[r] * fit.values;
+    for (Eigen::Index i = 0; i < left.size(); ++i) {
+      rough.push_back(data.motions[r].moment(i).roughness);
+      squares.push_back(left[i] * left[i]);
+    }
+  }
+  const Eigen::Map<const Eigen::ArrayXd> x(rough.data(), fit.rows), y(squares.data(), fit.rows);
+  const double most = (1 - settings.least_steady) * y.mean() / x.mean();
+  const double slope = ((x - x.mean()) * y).sum() / (x - x.mean()).square().sum();
+  model.rough = std::isfinite(slope) ? std::clamp(slope, 0.0, most) : 0;
+  model.steady = y.mean() - model.rough * x.mean();
+}
+
 double rms_about_offset(const HealthyData& data, const PooledFit& fit) {
   double squares = 0;
   for (const SampledMotion& m : data.motions)
@@ -219,6 +238,7 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
     for (const Moment& m : sampled_motion(r, sampling, settings).moments) {
       squares += m.speed * m.speed;
       model.sampling.fastest = std::max(model.sampling.fastest, settings.fast * std::fabs(m.speed));
+      model.sampling.hardest = std::max(model.sampling.hardest, settings.fast * std::fabs(m.acceleration));
       ++count;
     }
   model.sampling.speed = std::sqrt(squares / count);
@@ -232,6 +252,7 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   model.values = fit.values;
   model.spread = spread_of(data, fit, settings);
   model.noise = std::sqrt(fit.squares / double(fit.rows));
+  set_expected_squares(data, fit, settings, model);
   if (sampling.mesh) model.least_change = settings.least_of_two * rms_about_offset(data, fit);
   model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
   return model;
@@ -260,6 +281,13 @@ SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
   SampledMotion motion = sampled_motion(record, model.sampling, settings);
   set_loads(model.values, motion);
   return motion;
+}
+
+Eigen::VectorXd expected_squares(const HealthyModel& model, const SampledMotion& motion) {
+  Eigen::VectorXd out(motion.size());
+  for (Eigen::Index i = 0; i < out.size(); ++i)
+    out[i] = model.steady + model.rough * motion.moment(i).roughness;
+  return out;
 }
 
 namespace {

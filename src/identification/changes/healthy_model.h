@@ -19,6 +19,8 @@ struct HealthyModel {
   Eigen::VectorXd values;
   Eigen::VectorXd spread;   // standard deviation from record to record
   double noise = 0;         // N m or rad, rms of the residual
+  double steady = 0;        // (N m)^2 or rad^2, squares of the residual in the smoothest motion
+  double rough = 0;         // what each rad^2/s^6 of the motion's roughness adds to them
   double drift = 0;         // N m, spread of a linear drift of dry friction over a record
   double least_change = 0;  // N m or rad, rms of what a change has to explain
 };
@@ -38,6 +40,9 @@ double compliance_of(const HealthyModel& model);
 /// With `load` of each moment by the model.
 SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
                         const ChangeSettings& settings);
+
+/// Squares that the residual of the healthy machine has in each row: of rough motion more.
+Eigen::VectorXd expected_squares(const HealthyModel& model, const SampledMotion& motion);
 
 /// Residual of the model and its nuisances: columns of its values and what drifts.
 struct Whitened {

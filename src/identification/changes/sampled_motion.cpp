@@ -95,10 +95,12 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
                          const ChangeSettings& settings) {
   const std::size_t n = there.size();
   const double slow = settings.slow * motion.sampling.speed, fast = motion.sampling.fastest;
+  const double hard = motion.sampling.hardest;
   std::vector<char> good(n, 1);
   for (std::size_t k = 0; k < n; ++k) {
     const double speed = std::fabs(motion.moments[k].speed);
-    if (there[k] && speed > slow && (fast == 0 || speed < fast) && rests_on_flank(motion, k)) continue;
+    const bool known = fast == 0 || (speed < fast && std::fabs(motion.moments[k].acceleration) < hard);
+    if (there[k] && speed > slow && known && rests_on_flank(motion, k)) continue;
     // Filters ring for long after a jump of the position, which no motion is.
     const bool jump = fast > 0 && speed > settings.jump * fast;
     const std::size_t reach = jump ? settings.jump_guard * guard : guard;
@@ -127,6 +129,17 @@ void thin(EvenSamples& even, std::size_t n, double interval) {
   even.there = there;
 }
 
+/// Mean squares about each value, `reach` to either side.
+std::vector<double> squares_about(const std::vector<double>& values, std::size_t reach) {
+  std::vector<double> sums = {0}, out;
+  for (const double x : values) sums.push_back(sums.back() + x * x);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const std::size_t from = k > reach ? k - reach : 0, to = std::min(values.size(), k + reach + 1);
+    out.push_back((sums[to] - sums[from]) / double(to - from));
+  }
+  return out;
+}
+
 void add_moments(const EvenSamples& even, const ChangeSettings& settings, SampledMotion& motion) {
   const MotionSampling& sampling = motion.sampling;
   const double dt = sampling.interval, turn = settings.friction_speed * sampling.speed;
@@ -134,7 +147,10 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
     return signal::low_pass(values, dt, sampling.position_cutoff);
   };
   const std::vector<double> position = filtered(even.position), speed = signal::derivative(position, dt),
-                            acceleration = signal::derivative(speed, dt);
+                            acceleration = signal::derivative(speed, dt),
+                            jerk = signal::derivative(acceleration, dt);
+  const std::vector<double> roughness =
+      squares_about(jerk, static_cast<std::size_t>(std::lround(settings.rough / dt)));
   const std::vector<double> parting =
       signal::derivative(signal::derivative(filtered(even.deflection), dt), dt);
   for (std::size_t k = 0; k < position.size(); ++k) {
@@ -142,6 +158,8 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
                 position[k],
                 speed[k],
                 acceleration[k] - sampling.behind * parting[k],
+                jerk[k],
+                roughness[k],
                 std::tanh(speed[k] / turn),
                 0,
                 0,

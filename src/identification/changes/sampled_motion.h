@@ -38,6 +38,7 @@ struct MotionSampling {
   double position_cutoff = 0;  // Hz
   double speed = 1;            // rad/s, rms of the healthy machine
   double fastest = 0;          // rad/s, beyond which nothing is judged; 0: no limit
+  double hardest = 0;          // rad/s^2, the same of accelerations
 };
 
 struct Moment {
@@ -45,6 +46,8 @@ struct Moment {
   double position;      // rad
   double speed;         // rad/s
   double acceleration;  // rad/s^2, the mean of both inertias by their weight
+  double jerk;          // rad/s^3
+  double roughness;     // rad^2/s^6, mean square of that about the moment
   double direction;     // -1..1
   double load;          // N m, that the healthy machine's load takes
   double fluctuation;   // N m s/rad, by which that may fluctuate per speed, faster than the record shows
@@ -63,7 +66,8 @@ struct SampledMotion {
   mutable std::map<std::string, Eigen::MatrixXd>
       known_columns;  // of effect_columns(), so far as there is room
 
-  double time(Eigen::Index row) const { return moments[rows[static_cast<std::size_t>(row)]].time; }
+  const Moment& moment(Eigen::Index row) const { return moments[rows[static_cast<std::size_t>(row)]]; }
+  double time(Eigen::Index row) const { return moment(row).time; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(rows.size()); }
 };
 

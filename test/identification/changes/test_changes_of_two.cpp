@@ -124,6 +124,7 @@ TEST(ChangesOfTwo, NothingIsToldOfHealthyRecords) {
   for (unsigned seed = 10; seed < 15; ++seed) {
     const Changes found = changes_of(made(seed, nothing));
     EXPECT_TRUE(found.changes.empty()) << seed << " " << found.changes.front().effect;
+    EXPECT_EQ(found.cannot_tell, "") << seed;
     EXPECT_TRUE(found.different.empty()) << seed;
   }
 }
@@ -188,6 +189,34 @@ TEST(ChangesOfTwo, GrowingBacklashIsToldWithWhatItGrewBy) {
   EXPECT_NEAR(c.size[0].measured.value, 1e-4, 3 * c.size[0].measured.standard_error);
   EXPECT_EQ(c.size[1].name, "span");
   EXPECT_NEAR(c.size[1].measured.value, kDuration - kOnset, 10);
+}
+
+void friction_swings(Machine& m, double t) {
+  if (t > kOnset) m.motor_coulomb += 30 * std::sin(M_PI * t);
+}
+void encoder_errs(Machine& m, double t) {
+  if (t > kOnset) m.slip = 1e-4 * std::sin(M_PI * t);
+}
+
+TEST(ChangesOfTwo, ThatFollowNoEffectAreUnknown) {
+  // Of friction by seed 31 a cogging fits the last 13 s.
+  for (const Changed changed : {friction_swings, encoder_errs}) {
+    const Changes found = changes_of(made(31, changed));
+    ASSERT_EQ(found.changes.size(), 1u);
+    EXPECT_EQ(found.changes[0].effect, "unknown");
+    EXPECT_NEAR(found.changes[0].since, kOnset, 4);  // a window
+    EXPECT_FALSE(found.changes[0].until);
+    EXPECT_TRUE(found.changes[0].size.empty());
+  }
+}
+
+TEST(ChangesOfTwo, ThatAnotherTaskMightExplainCannotBeTold) {
+  // Rms 2.1e-6 rad beside 1.2e-6 of noise: squares 4.2 times as large, of which the limits are 4 and 16.
+  const Changes found = changes_of(made(30, [](Machine& m, double t) {
+    if (t > kOnset) m.slip = 3e-6 * std::sin(M_PI * t);
+  }));
+  EXPECT_TRUE(found.changes.empty());
+  EXPECT_NE(found.cannot_tell.find("follows no effect"), std::string::npos);
 }
 
 TEST(ChangesOfTwo, BesideAWrongFileTheyAreTheSame) {

@@ -15,6 +15,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/diagnosis/change_ledger.h"
 #include "backlash_diagnosis/identification/changes/changes.h"
+#include "window_study.h"
 
 namespace backlash::change_study {
 namespace {
@@ -27,6 +28,7 @@ constexpr double kStream = 1800;                               // s, of one join
 struct Options {
   double hours = 0, rate = 1.0 / 720;  // h, 1/h
   int onsets = 0;
+  long windows = 0;
   unsigned long seed = 1;
   double sampling = 50;  // Hz
   bool two = false;      // inertias
@@ -216,6 +218,7 @@ void healthy(const Options& options) {
         const auto found =
             identification::detect_changes(joint.rig(), learned, stream.slice(from, to), settings_of(rate));
         suspected += !found.changes.empty();
+        cannot += found.changes.empty() && !found.cannot_tell.empty();
         ledger.take(look_of(found, from, to));
         different += !ledger.unexplained_difference().empty();
       } catch (const CannotIdentify&) {
@@ -291,6 +294,7 @@ int main(int argc, char** argv) {
   add("healthy-hours", po::value(&options.hours), "of healthy joints");
   add("false-alarms-per-hour", po::value(&options.rate), "that are allowed; default 1/720");
   add("onsets", po::value(&options.onsets), "joints that change once");
+  add("windows", po::value(&options.windows), "of scores: false alarms, and delays beside a CUSUM");
   add("rate", po::value(&options.sampling), "of the samples [Hz]; default 50");
   add("two", po::bool_switch(&options.two), "inertias, with an encoder on either side, of each joint");
   add("wander", po::value(&options.wander), "of friction, share up and down in ten minutes; default 0.02");
@@ -305,6 +309,7 @@ int main(int argc, char** argv) {
     }
     if (options.hours > 0) healthy(options);
     if (options.onsets > 0) onsets(options);
+    if (options.windows > 0) study_windows(options.windows, options.seed);
     return 0;
   } catch (const std::exception& error) {
     std::cerr << "change_study: " << error.what() << '\n';

@@ -43,7 +43,10 @@ struct ChangeSettings {
   // more by temperature alone. Choices.
   double wander = 0.03;      // -, of each, standard deviation
   double wander_time = 100;  // s, over which
-  double rest = 10;          // s without motion, after which the machine has another temperature. Choice
+  double rough = 0.15;  // s to either side, over which the motion's roughness is taken. Simulation: teeth
+                        // that cross the gap ring for as long, and so do ends of moves
+  double least_steady = 0.1;  // - of the squares of the residual, that no roughness explains. Choice
+  double rest = 10;           // s without motion, after which the machine has another temperature. Choice
 
   // Changes
   double window = 4;   // s, over which scores are summed. Choice: longer than the residual remembers
@@ -64,10 +67,12 @@ struct ChangeSettings {
   double onset_drop = 8;      // of twice the log likelihood, as wide as the onset is uncertain. Simulation
   double onset_least = 0.1;   // s, half of the narrowest interval. Choice
   double unknown_left = 0.4;  // - of the squares after the onset that may be left. Choice
-  double unknown_louder =
-      4;                // -, squares of the residual after over before, of what no effect explains. Choice
-  double alike = 0.97;  // - of the best gain: effects that fit alike. Choice
-  double model_error = 0.03;  // - of a size, as the shape of an effect is an idealisation. Choice
+  // Squares of the residual over those of healthy motion as rough, of what no effect explains: it cannot be
+  // told, or is a change. Choices. Simulation of healthy machines in other tasks: one inertia 2, two 5.
+  double unknown_louder = 4, unknown_of_two = 16;
+  std::size_t least_windows = 4;  // that it lasts. Choice: a push is no change of the machine
+  double alike = 0.97;            // - of the best gain: effects that fit alike. Choice
+  double model_error = 0.03;      // - of a size, as the shape of an effect is an idealisation. Choice
 };
 
 }  // namespace backlash::identification

@@ -43,6 +43,8 @@ struct Changes {
   double deflection_noise = kNaN;          // rad, the same of the deflection; NaN: not looked at
   std::vector<std::string> healthy_terms;  // what the healthy machine shows beside friction and gravity
   std::vector<std::string> different;      // effects that the record has from its beginning: no change in it
+  std::string
+      cannot_tell;  // what no effect explains while nothing says that the machine has changed; or empty
   std::vector<std::string> warnings;
 };
 

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A stretch of a record that is louder than the healthy machine is in such motion: whatever happens there, no
+// effect that was tried explains it.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "backlash_diagnosis/identification/changes/change_settings.h"
+
+namespace backlash::identification {
+
+struct LoudStretch {
+  double from = 0, to = 0;  // s
+  bool from_beginning = false, to_end = false;
+  double times = 0;   // -, mean square inside over that of the healthy machine
+  double excess = 0;  // sum of squares that are too many
+  double gain = 0;    // twice the log likelihood ratio of another variance inside
+};
+
+/// `times`: s, of rows; `squares`: of what is left there over what the healthy machine leaves in such motion,
+/// mean 1. The likeliest stretch of at least ChangeSettings::least_windows windows that is
+/// ChangeSettings::unknown_louder times as loud as a healthy machine, and as the rest of the record.
+std::optional<LoudStretch> loud_stretch(const std::vector<double>& times, const std::vector<double>& squares,
+                                        const ChangeSettings& settings);
+
+}  // namespace backlash::identification

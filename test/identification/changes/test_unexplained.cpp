@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Squares that the test draws: of a healthy machine chi-square by its definition, then louder by a factor.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "identification/changes/unexplained.h"
+
+namespace backlash::identification {
+namespace {
+
+constexpr double kRate = 50, kDuration = 200;  // Hz, s
+
+/// `times(t)`: mean square over that of a healthy machine.
+std::optional<LoudStretch> stretch_of(unsigned seed, const std::function<double(double)>& louder) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> times, squares;
+  for (int k = 0; k < int(kDuration * kRate); ++k) {
+    const double x = normal(random);
+    times.push_back(k / kRate);
+    squares.push_back(louder(times.back()) * x * x);
+  }
+  return loud_stretch(times, squares, {});
+}
+
+TEST(LoudStretch, HealthyNoiseHasNone) {
+  // 600 squares in the shortest stretch: a mean of 4 is 50 standard deviations away.
+  for (unsigned seed = 1; seed <= 20; ++seed) EXPECT_FALSE(stretch_of(seed, [](double) { return 1; }));
+}
+
+TEST(LoudStretch, LessThanTheFactorIsNone) {
+  // 3 +- 0.07
+  EXPECT_FALSE(stretch_of(1, [](double t) { return t < 100 ? 1 : 3; }));
+}
+
+TEST(LoudStretch, BeginsAndEndsWhereItIsLoud) {
+  const auto found = stretch_of(2, [](double t) { return t > 80 && t < 130 ? 9 : 1; });
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->from, 80, 4);  // a window
+  EXPECT_NEAR(found->to, 130, 4);
+  EXPECT_NEAR(found->times, 9, 1);  // 2500 squares: 0.25 standard deviations, and a window at either end
+  EXPECT_NEAR(found->excess / (8 * 50 * kRate), 1, 0.15);
+  EXPECT_FALSE(found->from_beginning);
+  EXPECT_FALSE(found->to_end);
+}
+
+TEST(LoudStretch, OfAllOfTheRecordIsFromItsBeginning) {
+  const auto found = stretch_of(3, [](double) { return 9; });
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(found->from_beginning);
+  EXPECT_TRUE(found->to_end);
+}
+
+TEST(LoudStretch, IsToldThoughWhatIsFittedSpreadsIt) {
+  // Least squares of what may drift leave a fiftieth of a loud end before it.
+  const auto found = stretch_of(4, [](double t) { return t < 120 ? 20 : 1000; });
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->from, 120, 4);
+  EXPECT_FALSE(found->from_beginning);
+}
+
+TEST(LoudStretch, OnePushIsNone) {
+  EXPECT_FALSE(stretch_of(5, [](double t) { return t > 90 && t < 93 ? 200 : 1; }));
+}
+
+}  // namespace
+}  // namespace backlash::identification
