@@ -55,6 +55,10 @@ double fluctuating_load_rub(const Moment& m, double w0) {
   const double t = std::fabs(m.load), a = m.fluctuation * std::max(0.0, std::fabs(m.speed) - w0);
   return m.direction * (t >= a ? t : (t * t + a * a) / (2 * a));
 }
+/// A joint that stands elsewhere than its encoder shows, by that much less: only gravity knows.
+double less_load_slope(const Moment& m, double) {
+  return -m.load_slope;
+}
 double drag(const Moment& m, double) {
   return m.speed * std::fabs(m.speed);
 }
@@ -151,6 +155,7 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
                                    {"asymmetric_viscous", 0, {speed_size}},
                                    {"quadratic_drag", 0, {drag}},
                                    {"friction_drift", 0, {direction, drift}, true}};
+  if (!sampling.mesh) all.push_back({"encoder_slip", 0, {less_load_slope}});
   for (const double share : kFluctuationSpeeds)
     all.push_back({"load_dependent_friction", share * sampling.speed, {fluctuating_load_rub}});
   for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});
@@ -174,8 +179,9 @@ Eigen::MatrixXd filtered_columns(const SampledMotion& motion, const ChangeEffect
 }  // namespace
 
 Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect) {
-  // That of the load changes with what the machine is taken for.
-  if (effect.id == "load_dependent_friction") return filtered_columns(motion, effect);
+  // Those of the load change with what the machine is taken for.
+  if (effect.id == "load_dependent_friction" || effect.id == "encoder_slip")
+    return filtered_columns(motion, effect);
   const std::string name = effect.name() + (effect.ramp ? " ramp" : "");
   const auto known = motion.known_columns.find(name);
   if (known != motion.known_columns.end()) return known->second;

@@ -97,6 +97,7 @@ void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
     m.fluctuation = kFluctuation * torque / motion.sampling.speed;
     m.load = values[kInertia] * m.acceleration + values[kCosine] * std::cos(m.position) +
              values[kSine] * std::sin(m.position);
+    m.load_slope = values[kSine] * std::cos(m.position) - values[kCosine] * std::sin(m.position);
   }
 }
 

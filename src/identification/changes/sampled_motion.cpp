@@ -163,6 +163,7 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
                 std::tanh(speed[k] / turn),
                 0,
                 0,
+                0,
                 0};
     if (const auto& mesh = sampling.mesh)
       m.mesh = mesh->inertia * (acceleration[k] - parting[k]) + mesh->viscous * m.speed +

@@ -118,6 +118,9 @@ const Case kCases[] = {
      0.15},
     {"motor_viscous", [](const Motion& m) { return m.t < kOnset ? 0 : 0.2 * m.w; }, "motor_viscous", 0.2},
     {"motor_inertia", [](const Motion& m) { return m.t < kOnset ? 0 : 0.1 * m.a; }, "motor_inertia", 0.1},
+    {"encoder_slip",  // the joint stands 0.05 rad behind what is shown
+     [](const Motion& m) { return m.t < kOnset ? 0 : 3 * (std::sin(m.q - 0.05) - std::sin(m.q)); }, "offset",
+     0.05},
     {"gravity", [](const Motion& m) { return m.t < kOnset ? 0 : 0.4 * std::sin(m.q + 0.3); }, "amplitude",
      0.4},
     {"cogging", [](const Motion& m) { return m.t < kOnset ? 0 : 0.2 * std::sin(9 * m.q + 1); }, "phase", 1},
