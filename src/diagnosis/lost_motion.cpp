@@ -286,7 +286,10 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
                               play.travel)};
   }
   estimate.status = Status::ok;
-  estimate.with_deflection = !settings.subtract_elastic_deflection;
+  // Friction on the flanks carries up to as much torque again to the walls.
+  if (!settings.subtract_elastic_deflection && settings.elastic_deflection)
+    estimate.deflection =
+        2 * (1 + settings.elastic_uncertainty) * settings.elastic_deflection(2 * walls.level);
   estimate.backlash_angle = std::max(0.0, play.value);
   estimate.angle_lower = std::max(0.0, play.value - half);
   estimate.angle_upper = play.value + half;

@@ -97,11 +97,14 @@ struct Choice {
 
 /// Moves free play that fits into the play from wall to wall from the sound ones to the parts.
 void set_parts(const Estimates& all, Choice& choice, Set& sound) {
-  const Set whole = filtered(sound, [&](int i) { return all[i].with_deflection; });
-  const Set free = filtered(sound, [&](int i) { return !all[i].with_deflection; });
+  const Set whole = filtered(sound, [&](int i) { return all[i].deflection > 0; });
+  const Set free = filtered(sound, [&](int i) { return !(all[i].deflection > 0); });
+  const auto fits = [&](int part, int k) {
+    return all[part].angle_lower <= upper(all[k]) &&
+           upper(all[part]) >= all[k].angle_lower - all[k].deflection;
+  };
   const bool fit = std::all_of(free.begin(), free.end(), [&](int i) {
-    return std::all_of(whole.begin(), whole.end(),
-                       [&](int k) { return all[i].angle_lower <= upper(all[k]); });
+    return std::all_of(whole.begin(), whole.end(), [&](int k) { return fits(i, k); });
   });
   if (whole.empty() || free.empty() || !fit) return;
   choice.parts = free;

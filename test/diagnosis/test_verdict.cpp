@@ -63,13 +63,14 @@ bool mentions(const Verdict& v, const std::string& words) {
 /// Play from wall to wall and free play are two quantities: the smaller one is a part of the other.
 TEST(Verdict, FreePlayIsAPartOfThePlayFromWallToWall) {
   Estimate whole = ok("lost_motion", 1.2e-4, 2e-6);
-  whole.with_deflection = true;
+  whole.deflection = kToAngle * 6e-5;
   const Verdict v = combined({whole, ok("momentum_transfer", 7e-5, 2e-6)});
   EXPECT_EQ(v.grade, Grade::watch) << v.message;
   EXPECT_NEAR(v.backlash, 1.2e-4, 1e-12);
   EXPECT_TRUE(v.dissenters.empty());
   EXPECT_TRUE(mentions(v, "free play within it by momentum_transfer 7e-05 m")) << v.message;
-  // Free play beyond it is impossible.
+  // Free play beyond it is impossible, and so is less than what the deflection leaves, 6e-5 m.
+  EXPECT_EQ(combined({whole, ok("momentum_transfer", 4e-5, 2e-6)}).grade, Grade::cannot_tell);
   EXPECT_EQ(combined({whole, ok("momentum_transfer", 1.5e-4, 2e-6)}).grade, Grade::cannot_tell);
 }
 

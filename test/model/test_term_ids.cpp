@@ -28,8 +28,10 @@ const std::set<std::pair<std::string, std::string>> kOtherMeanings = {
     {"friction_drift", "src/arm/trace.cpp"},                     // an arm has no terms: the effect of a joint
 };
 
-/// What changes with the time is looked for in columns of a regression, each of which is one term's law.
-const std::set<std::string> kOtherDictionaries = {"src/identification/changes/change_effects.cpp"};
+/// What changes with the time is looked for in columns of a regression, each of which is one term's law; a
+/// term that another simulator's language has is translated by name.
+const std::set<std::string> kOtherDictionaries = {"src/identification/changes/change_effects.cpp",
+                                                  "src/report/joint_model.cpp"};
 
 std::string text_of(const fs::path& path) {
   std::ifstream in(path);

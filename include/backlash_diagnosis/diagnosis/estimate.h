@@ -59,10 +59,12 @@ struct Estimate {
   /// The interval holds what others do not see: a play that depends on the position, teeth that yield by
   /// another law than the declared one. The verdict's holds it too.
   bool must_hold = false;
-  bool with_deflection = false;  ///< from wall to wall under torque: the free play is a part of it
-  bool from_record = false;      ///< what the value depends on was measured on the record, not declared
-  bool fits_machine = false;     // of from_record: the values of the machine that other methods take from the
-                                 // rig file were fitted with it, so that they add nothing
+  /// rad, > 0: from wall to wall under torque, of which at most this is deflection, the rest free play; 0:
+  /// free play, or the deflection is not known.
+  double deflection = 0;
+  bool from_record = false;   ///< what the value depends on was measured on the record, not declared
+  bool fits_machine = false;  // of from_record: the values of the machine that other methods take from the
+                              // rig file were fitted with it, so that they add nothing
   double age = 0;  ///< s, >= 0, by which the samples that it rests on ended before those of the diagnosis
   std::vector<ContradictedValue> declared_wrong;
   std::shared_ptr<const WaveformEvidence> waveform;  ///< null but of `waveform`

@@ -46,7 +46,7 @@ struct Verdict {
 /// Where one of the members has fitted the machine's values to the record (Estimate::fits_machine), the
 /// verdict is its answer alone: the others agree, but rest on values that may be wrong.
 ///
-/// Where one tells the play from wall to wall under torque (Estimate::with_deflection) that is the quantity
+/// Where one tells the play from wall to wall under torque (Estimate::deflection) that is the quantity
 /// of the verdict, and free play that fits into it is told as a part of it.
 ///
 /// Contradiction: never settled by the number of methods, as those that share signal, curve or declared
