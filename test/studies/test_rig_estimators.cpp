@@ -183,6 +183,7 @@ TEST(RigEstimators, MomentumTransferOfServosWithUndeclaredFriction) {
     s.motor_inertia = 6.3;
     s.motor_damping = 13;
     s.flank_deflection = [](double torque) { return torque / 460e3; };
+    s.elastic_uncertainty = 0.67;  // as of a rig file whose load is free: teeth 40 % softer than declared
     const diagnosis::Estimate e = diagnosis::estimate_momentum_transfer(record::read_csv(*path), s);
     if (e.status == diagnosis::Status::out_of_domain) continue;
     ASSERT_EQ(e.status, diagnosis::Status::ok) << *path << ": " << e.message;
