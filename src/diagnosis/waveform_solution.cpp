@@ -225,6 +225,7 @@ class Solver {
       std::vector<double> rms(used_.size(), 0), of_used;
       for (std::size_t w = 0; w < used_.size(); ++w)
         if (used_[w]) of_used.push_back(rms[w] = window_rms(fit, w, static_cast<WaveformChannel>(c)));
+      if (of_used.empty()) return;  // a fit that went nowhere: it is refused for what it leaves out
       const double middle = signal::median(of_used);
       const bool locked = data_.grid.output == WaveformOutput::locked;
       const double most =
