@@ -27,7 +27,7 @@ run_address() {
   local leaks=${REPO}/test/sanitizers/leak.supp
   mkdir -p "${WS}/reports"
   local room log total=0 passed skipped
-  for room in base signal record model simulation diagnosis rig_file identification studies report findings ros tools; do
+  for room in base signal record model simulation diagnosis rig_file identification changes studies report findings ros tools; do
     make -C "${WS}/build" "-j$(nproc)" "${PACKAGE}_test_${room}" >"${WS}/log/build_${room}.log" 2>&1 ||
       fail "the tests of ${room} cannot be built, see ${WS}/log/build_${room}.log"
     log=${WS}/log/${room}.log

@@ -11,9 +11,9 @@
 namespace backlash::findings {
 namespace {
 
-report::Json change_json(const identification::Change& c, const std::string& joint) {
+report::Json change_json(const changes::Change& c, const std::string& joint) {
   report::Json size = report::Json::object();
-  for (const identification::ChangeSize& s : c.size) {
+  for (const changes::ChangeSize& s : c.size) {
     size[s.name] = report::measured(s.measured);
     size[s.name]["unit"] = s.unit;
   }
@@ -33,12 +33,12 @@ report::Json change_json(const identification::Change& c, const std::string& joi
 
 }  // namespace
 
-std::string change_summary(const identification::Changes& found) {
+std::string change_summary(const changes::Changes& found) {
   std::string text;
-  for (const identification::Change& c : found.changes) {
+  for (const changes::Change& c : found.changes) {
     text += fmt::format("{} since {:.1f} s ({:.1f} to {:.1f})", c.effect, c.since, c.since_from, c.since_to);
     if (c.until) text += fmt::format(", until {:.1f} s", *c.until);
-    for (const identification::ChangeSize& s : c.size)
+    for (const changes::ChangeSize& s : c.size)
       text += fmt::format("; {} {} {}", s.name, with_error(s.measured), s.unit);
     if (c.effect == "unknown")
       text += "; no effect explains it" + (c.alike.empty() ? "" : ", nearest: " + joined(c.alike));
@@ -53,9 +53,9 @@ std::string change_summary(const identification::Changes& found) {
   return text + fmt::format("{} windows of motion judged\n", found.windows);
 }
 
-std::string change_json(const identification::Changes& found, const ChangeInputs& inputs) {
+std::string change_json(const changes::Changes& found, const ChangeInputs& inputs) {
   report::Json changes = report::Json::array();
-  for (const identification::Change& c : found.changes) changes.push_back(change_json(c, inputs.joint));
+  for (const changes::Change& c : found.changes) changes.push_back(change_json(c, inputs.joint));
   report::Json json = {
       {"schema_version", 1},
       {"version", version()},

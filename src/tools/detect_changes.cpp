@@ -56,7 +56,7 @@ record::Record read(const std::string& path, const rig_file::RigFile& rig,
 int detect(const Arguments& arguments) {
   const findings::ChangeInputs inputs = {
       arguments.text("rig"), "", arguments.texts("healthy"), arguments.positional(0),
-      arguments.number("false-alarms-per-hour", identification::ChangeSettings{}.false_alarms_per_hour,
+      arguments.number("false-alarms-per-hour", changes::ChangeSettings{}.false_alarms_per_hour,
                        Range::positive())};
   std::vector<std::string> files = inputs.healthy;
   files.push_back(inputs.record);
@@ -68,12 +68,12 @@ int detect(const Arguments& arguments) {
   std::vector<record::Record> healthy;
   for (const std::string& file : inputs.healthy) healthy.push_back(read(file, rig, warnings));
   const record::Record record = read(inputs.record, rig, warnings);
-  identification::ChangeSettings settings;
+  changes::ChangeSettings settings;
   settings.false_alarms_per_hour = inputs.false_alarms_per_hour;
-  identification::Changes found;
+  changes::Changes found;
   try {
     ProgressBar bar;
-    found = identification::detect_changes(rig.rig, healthy, record, settings, bar.progress());
+    found = changes::detect_changes(rig.rig, healthy, record, settings, bar.progress());
   } catch (const CannotIdentify& error) {
     std::cerr << "detect_changes: " << error.what() << '\n';
     return kInconclusive;

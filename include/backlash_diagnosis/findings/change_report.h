@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/identification/changes/changes.h"
+#include "backlash_diagnosis/changes/changes.h"
 
 namespace backlash::findings {
 
@@ -18,10 +18,10 @@ struct ChangeInputs {
 };
 
 /// One line per change; or that none was found.
-std::string change_summary(const identification::Changes& changes);
+std::string change_summary(const changes::Changes& changes);
 
 /// The detect_changes JSON of the design, and beyond it inputs, threshold, noise, warnings and of each change
 /// gain, errors before and after, and what fits alike.
-std::string change_json(const identification::Changes& changes, const ChangeInputs& inputs);
+std::string change_json(const changes::Changes& changes, const ChangeInputs& inputs);
 
 }  // namespace backlash::findings

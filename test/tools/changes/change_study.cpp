@@ -13,8 +13,8 @@
 #include <random>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/changes/changes.h"
 #include "backlash_diagnosis/diagnosis/change_ledger.h"
-#include "backlash_diagnosis/identification/changes/changes.h"
 #include "window_study.h"
 
 namespace backlash::change_study {
@@ -174,18 +174,18 @@ struct Joint {
   }
 };
 
-identification::ChangeSettings settings_of(double rate) {
-  identification::ChangeSettings settings;
+changes::ChangeSettings settings_of(double rate) {
+  changes::ChangeSettings settings;
   settings.false_alarms_per_hour = rate;
   return settings;
 }
 
-diagnosis::ChangeLook look_of(const identification::Changes& found, double from, double to) {
+diagnosis::ChangeLook look_of(const changes::Changes& found, double from, double to) {
   diagnosis::ChangeLook look;
   look.from = from;
   look.to = to;
   look.different = found.different;
-  for (const identification::Change& c : found.changes) {
+  for (const changes::Change& c : found.changes) {
     diagnosis::FoundChange one;
     one.effect = c.effect;
     one.since = c.since;
@@ -193,7 +193,7 @@ diagnosis::ChangeLook look_of(const identification::Changes& found, double from,
     one.since_to = c.since_to;
     one.until = c.until;
     one.gain = c.gain;
-    for (const identification::ChangeSize& s : c.size)
+    for (const changes::ChangeSize& s : c.size)
       one.size.push_back({s.name, s.unit, s.measured.value, s.measured.standard_error});
     look.changes.push_back(one);
   }
@@ -216,7 +216,7 @@ void healthy(const Options& options) {
       ++looks;
       try {
         const auto found =
-            identification::detect_changes(joint.rig(), learned, stream.slice(from, to), settings_of(rate));
+            changes::detect_changes(joint.rig(), learned, stream.slice(from, to), settings_of(rate));
         suspected += !found.changes.empty();
         cannot += found.changes.empty() && !found.cannot_tell.empty();
         ledger.take(look_of(found, from, to));
@@ -256,16 +256,16 @@ void onsets(const Options& options) {
     const Added added{effect, uniform(random, 60, 240), joint.value(effect) * uniform(random, 0.15, 0.4)};
     const std::vector<record::Record> learned = {joint.record(random, kLearn, options.sampling, true, false)};
     const record::Record record = joint.record(random, kWindow, options.sampling, false, false, added);
-    const auto found = identification::detect_changes(
-        joint.rig(), learned, record,
-        settings_of(diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1)));
+    const auto found =
+        changes::detect_changes(joint.rig(), learned, record,
+                                settings_of(diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1)));
     found_any += !found.changes.empty();
     others += found.changes.size() > 1;
-    for (const identification::Change& c : found.changes)
+    for (const changes::Change& c : found.changes)
       if (c.effect != effect)
         fmt::print("told {} ({}) at {:.1f} s, gain {:.3g}; true: {} at {:.1f} s\n", c.effect,
                    fmt::join(c.alike, " "), c.since, c.gain, effect, added.since);
-    for (const identification::Change& c : found.changes) {
+    for (const changes::Change& c : found.changes) {
       if (c.effect != effect) continue;
       ++named;
       onset += c.since_from <= added.since && added.since <= c.since_to;

@@ -16,14 +16,14 @@
 #include <random>
 #include <vector>
 
-#include "identification/changes/change_scan.h"
-#include "identification/changes/onset_threshold.h"
+#include "changes/change_scan.h"
+#include "changes/onset_threshold.h"
 
 namespace backlash::change_study {
 namespace {
 
-using identification::Background;
-using identification::EffectSums;
+using changes::Background;
+using changes::EffectSums;
 
 constexpr int kRows = 8, kLook = 75, kMargin = 2;  // of a window; windows of a look; where no onset is tried
 constexpr double kWindow = 4, kColour = 0.6;       // s; correlation of neighbouring rows
@@ -55,13 +55,13 @@ double sigma() {
 
 /// The largest gain over the onsets of a look, over the inflation of the scores.
 double gain_of(const std::deque<std::vector<double>>& windows, double inflation) {
-  identification::SampledMotion motion;
+  changes::SampledMotion motion;
   const auto n = static_cast<Eigen::Index>(windows.size() * kRows);
   Background b;
   b.residual.resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto window = static_cast<std::size_t>(i) / kRows;
-    identification::Moment m{};
+    changes::Moment m{};
     m.time = kWindow * (double(window) + (double(i % kRows) + 0.5) / kRows);
     motion.moments.push_back(m);
     motion.rows.push_back(static_cast<std::size_t>(i));
@@ -163,7 +163,7 @@ void false_alarms(long windows, unsigned long seed) {
     look.clear();
   }
   for (const double allowed : {0.1, 0.03, 0.01}) {  // per look
-    const double height = identification::gain_by_chance(allowed, 1, kMargin, kLook);
+    const double height = changes::gain_by_chance(allowed, 1, kMargin, kLook);
     const auto wrong = std::count_if(gains.begin(), gains.end(), [&](double g) { return g > height; });
     fmt::print("{} looks at {} windows, {:.0f} false alarms allowed: {}\n", gains.size(), kLook,
                allowed * double(gains.size()), wrong);

@@ -10,7 +10,7 @@
 #include "change_effects.h"
 #include "sampled_motion.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 struct HealthyModel {
   MotionSampling sampling;
@@ -52,4 +52,4 @@ struct Whitened {
 };
 Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings);
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/model/term.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 constexpr double kLeastOrder = 2;  // 1/rad, of waves: below are gravity and eccentric encoders. Choice
@@ -213,4 +213,4 @@ std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::Vec
   return out;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

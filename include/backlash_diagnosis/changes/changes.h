@@ -12,12 +12,12 @@
 
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/progress.h"
-#include "backlash_diagnosis/identification/changes/change_settings.h"
+#include "backlash_diagnosis/changes/change_settings.h"
 #include "backlash_diagnosis/model/rig.h"
 #include "backlash_diagnosis/record/record.h"
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 struct ChangeSize {
   std::string name, unit;
@@ -54,4 +54,4 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
                        const record::Record& record, const ChangeSettings& settings = {},
                        const Progress& progress = {});
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/identification/changes/changes.h"
+#include "backlash_diagnosis/changes/changes.h"
 #include "sampled_motion.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
@@ -32,4 +32,4 @@ Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& 
 std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::VectorXd& values,
                                     const Eigen::MatrixXd& covariance, bool linear);
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "change_scan.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 constexpr double kFluctuation =
@@ -364,4 +364,4 @@ Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, con
   return out;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

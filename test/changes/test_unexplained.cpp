@@ -5,9 +5,9 @@
 #include <functional>
 #include <random>
 
-#include "identification/changes/unexplained.h"
+#include "changes/unexplained.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 constexpr double kRate = 50, kDuration = 200;  // Hz, s
@@ -66,4 +66,4 @@ TEST(LoudStretch, OnePushIsNone) {
 }
 
 }  // namespace
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 constexpr double kThinned = 0.25;  // - of the rate that is kept, where its filter ends. Theory: below a half
@@ -238,4 +238,4 @@ Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(c
   return out;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -2,7 +2,7 @@
 // How large twice the log likelihood ratio of a change grows by chance where the onset may be any.
 #pragma once
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 /// P(largest gain over the onsets > gain), no change there: an effect with `values` values, an onset before
 /// each of the last `fewest` to `most` windows, scores of windows normal and independent. Siegmund 1985,
@@ -15,4 +15,4 @@ double chance_of_gain(double gain, double values, double fewest, double most);
 /// The gain that chance exceeds with `probability`, 0 < probability < 0.5.
 double gain_by_chance(double probability, double values, double fewest, double most);
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/identification/changes/change_settings.h"
+#include "backlash_diagnosis/changes/change_settings.h"
 #include "backlash_diagnosis/record/record.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 /// What is predicted: the motor's torque, or by how much its position is ahead of the load's.
 enum class ChangeChannel { torque, deflection };
@@ -82,4 +82,4 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
 /// f of each moment, filtered, of the rows that count.
 Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(const Moment&)>& f);
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

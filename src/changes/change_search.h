@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "backlash_diagnosis/identification/changes/changes.h"
+#include "backlash_diagnosis/changes/changes.h"
 #include "change_scan.h"
 #include "unexplained.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 struct FoundChange {
   ChangeEffect effect;
@@ -75,4 +75,4 @@ class ChangeSearch {
   const std::size_t margin_, blocks_;
 };
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -8,7 +8,7 @@
 
 #include "healthy_model.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 constexpr double kToldApart = 1e-3;  // - of its squares that an effect must have for itself. Choice
 
@@ -53,4 +53,4 @@ class EffectSums {
 double score_inflation(const SampledMotion& motion, const Eigen::VectorXd& residual,
                        const Eigen::MatrixXd& columns, double variance, double window);
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

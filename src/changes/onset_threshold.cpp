@@ -5,7 +5,7 @@
 
 #include "backlash_diagnosis/signal/distributions.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 constexpr double kDiscrete = 0.583;  // Siegmund 1985, 10.4: -zeta(1/2) / sqrt(2 pi)
@@ -33,4 +33,4 @@ double gain_by_chance(double probability, double values, double fewest, double m
   return (low + high) / 2;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

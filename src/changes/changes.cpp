@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/identification/changes/changes.h"
+#include "backlash_diagnosis/changes/changes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "change_search.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 std::string whole_seconds(double time) {
@@ -270,4 +270,4 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
   return out;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "backlash_diagnosis/identification/changes/change_settings.h"
+#include "backlash_diagnosis/changes/change_settings.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 struct LoudStretch {
   double from = 0, to = 0;  // s
@@ -24,4 +24,4 @@ struct LoudStretch {
 std::optional<LoudStretch> loud_stretch(const std::vector<double>& times, const std::vector<double>& squares,
                                         const ChangeSettings& settings);
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 void Background::solve() {
   Eigen::MatrixXd information = columns.transpose() * columns / variance;
@@ -85,4 +85,4 @@ double score_inflation(const SampledMotion& motion, const Eigen::VectorXd& resid
   return most;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "onset_threshold.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motion,
                            std::vector<ScannedEffect> candidates, const std::vector<FoundChange>& beside,
@@ -371,4 +371,4 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   return change;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

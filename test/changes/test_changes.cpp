@@ -7,9 +7,9 @@
 #include <random>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/changes/changes.h"
+#include "backlash_diagnosis/changes/changes.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 constexpr double kRate = 125;    // Hz
@@ -179,4 +179,4 @@ TEST(Changes, StampsThatMakeNoSenseAreRefused) {
 }
 
 }  // namespace
-}  // namespace backlash::identification
+}  // namespace backlash::changes

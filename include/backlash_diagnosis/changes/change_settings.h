@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-namespace backlash::identification {
+namespace backlash::changes {
 
 struct ChangeSettings {
   double false_alarms_per_hour = 1.0 / 720;  // 1/h, one a month
@@ -75,4 +75,4 @@ struct ChangeSettings {
   double model_error = 0.03;      // - of a size, as the shape of an effect is an idealisation. Choice
 };
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes

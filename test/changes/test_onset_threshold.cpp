@@ -5,9 +5,9 @@
 #include <cmath>
 #include <random>
 
-#include "identification/changes/onset_threshold.h"
+#include "changes/onset_threshold.h"
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 constexpr int kLooks = 30000, kFewest = 2, kMost = 75;
@@ -49,4 +49,4 @@ TEST(OnsetThreshold, IsThatOfOneOnsetWhereThereIsOne) {
 }
 
 }  // namespace
-}  // namespace backlash::identification
+}  // namespace backlash::changes

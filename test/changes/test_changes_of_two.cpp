@@ -9,9 +9,9 @@
 #include <random>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/changes/changes.h"
+#include "backlash_diagnosis/changes/changes.h"
 
-namespace backlash::identification::changes_of_two {
+namespace backlash::changes::changes_of_two {
 
 constexpr double kRate = 100;                      // Hz
 constexpr double kOnset = 120, kDuration = 200;    // s
@@ -263,4 +263,4 @@ TEST(ChangesOfTwo, OtherGearTrainsAreRefused) {
   EXPECT_THROW(changes_of(made(1, nothing), sensor), CannotIdentify);
 }
 
-}  // namespace backlash::identification::changes_of_two
+}  // namespace backlash::changes::changes_of_two

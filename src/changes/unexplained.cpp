@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace backlash::identification {
+namespace backlash::changes {
 namespace {
 
 struct Windows {
@@ -71,4 +71,4 @@ std::optional<LoudStretch> loud_stretch(const std::vector<double>& times, const 
   return best;
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::changes
