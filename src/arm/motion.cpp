@@ -113,7 +113,6 @@ ArmMotion motion_of(const ArmRecord& record, const ArmRig& rig, double from, dou
                                            1 / m.interval, rig.identification.kinematics_cutoff));
   set_kinematics(m, joints, rig);
   set_rows(m, rig);
-  set_regressors(m, rig);
   return m;
 }
 
@@ -144,6 +143,13 @@ ArmRecord arm_record(const std::vector<record::JointRecord>& joints, const ArmRi
 
 std::vector<ArmMotion> motions_of(const ArmRecord& record, const ArmRig& rig,
                                   std::vector<std::string>& warnings) {
+  std::vector<ArmMotion> all = kinematics_of(record, rig, warnings);
+  for (ArmMotion& m : all) set_regressors(m, rig);
+  return all;
+}
+
+std::vector<ArmMotion> kinematics_of(const ArmRecord& record, const ArmRig& rig,
+                                     std::vector<std::string>& warnings) {
   const std::vector<double>& time = record.joints.front().time;
   const double most = record::kGapFactor * record::median_interval(time);
   std::vector<ArmMotion> all;

@@ -68,6 +68,12 @@ std::size_t rest_from(const Hold& h, const std::vector<char>& active, std::size_
   return active.size();
 }
 
+/// s, when the mean before `k` was within the noise last; all of its samples are before.
+double last_within(const Hold& h, std::size_t k, double level, const PushSettings& settings) {
+  while (k > 0 && std::fabs(h.smooth[k] - level) > settings.within * h.noise) --k;
+  return h.time[k - std::min(k, std::size_t(settings.samples))];
+}
+
 std::vector<PushEvent> events(const Hold& h, std::size_t joint, double constant,
                               const PushSettings& settings) {
   const std::vector<char> active = activity(h, settings);
@@ -85,6 +91,7 @@ std::vector<PushEvent> events(const Hold& h, std::size_t joint, double constant,
     e.joint = joint;
     e.begin =
         h.time[k - std::min(k, std::size_t(settings.samples / 2))];  // a mean is late by half of its samples
+    e.earliest = last_within(h, k, level, settings);
     e.clear = std::fabs(h.smooth[k] - level) / h.noise;
     e.released = end < h.time.size();
     e.end = e.released ? h.time[end] : h.time.back();

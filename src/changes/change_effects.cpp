@@ -150,12 +150,13 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
                                    {"motor_viscous", 0, {speed}},
                                    {sampling.mesh ? "load_inertia" : "motor_inertia", 0, {acceleration}},
                                    {"asymmetric_coulomb", 0, {one}},
-                                   {"gravity", 1, {cosine, sine}},
                                    {"load_dependent_friction", 0, {load_rub}},
                                    {"asymmetric_viscous", 0, {speed_size}},
                                    {"quadratic_drag", 0, {drag}},
                                    {"friction_drift", 0, {direction, drift}, true}};
-  if (!sampling.mesh) all.push_back({"encoder_slip", 0, {less_load_slope}});
+  // Of an arm those are effects of the chain.
+  if (!sampling.chain) all.push_back({"gravity", 1, {cosine, sine}});
+  if (!sampling.mesh && !sampling.chain) all.push_back({"encoder_slip", 0, {less_load_slope}});
   for (const double share : kFluctuationSpeeds)
     all.push_back({"load_dependent_friction", share * sampling.speed, {fluctuating_load_rub}});
   for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});
@@ -179,7 +180,8 @@ Eigen::MatrixXd filtered_columns(const SampledMotion& motion, const ChangeEffect
 }  // namespace
 
 Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect) {
-  // Those of the load change with what the machine is taken for.
+  // Those of the load change with what the machine is taken for; those of a chain are given.
+  if (effect.columns.empty()) return motion.known_columns.at(effect.name());
   if (effect.id == "load_dependent_friction" || effect.id == "encoder_slip")
     return filtered_columns(motion, effect);
   const std::string name = effect.name() + (effect.ramp ? " ramp" : "");

@@ -9,7 +9,9 @@ namespace backlash::changes {
 void Background::solve() {
   Eigen::MatrixXd information = columns.transpose() * columns / variance;
   for (Eigen::Index i = 0; i < spread.size(); ++i)
-    information(i, i) += std::isfinite(spread[i]) ? 1 / (spread[i] * spread[i]) : 1e-9 * information(i, i);
+    information(i, i) += std::isfinite(spread[i])   ? 1 / (spread[i] * spread[i])
+                         : information(i, i) > 0 ? 1e-9 * information(i, i)
+                                                 : 1;  // nothing shows it: it stays 0
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
@@ -42,6 +44,10 @@ EffectSums::EffectSums(const SampledMotion& motion, const Eigen::MatrixXd& z, co
 }
 
 EffectSums::Score EffectSums::score(std::size_t from, std::size_t to, const Background& background) const {
+  return score(normal(from, to, background));
+}
+
+EffectSums::Normal EffectSums::normal(std::size_t from, std::size_t to, const Background& background) const {
   const double v = background.variance;
   Eigen::MatrixXd a = (gram_[from] - gram_[to]) / v, b = (cross_[from] - cross_[to]) / v;
   Eigen::VectorXd c = (moments_[from] - moments_[to]) / v;
@@ -53,14 +59,16 @@ EffectSums::Score EffectSums::score(std::size_t from, std::size_t to, const Back
     b = wb;
     c = wc;
   }
-  const Eigen::MatrixXd s = a - b * background.inverse * b.transpose();
+  return {a.diagonal(), a - b * background.inverse * b.transpose(), c - b * background.estimate};
+}
+
+EffectSums::Score EffectSums::score(const Normal& normal) {
   Score score;
-  for (Eigen::Index i = 0; i < s.rows(); ++i)
-    if (!(s(i, i) > kToldApart * a(i, i)) || !(a(i, i) > 0)) return score;
-  const Eigen::VectorXd y = c - b * background.estimate;
-  score.covariance = s.inverse();
-  score.values = score.covariance * y;
-  score.gain = y.dot(score.values);
+  for (Eigen::Index i = 0; i < normal.own.size(); ++i)
+    if (!(normal.information(i, i) > kToldApart * normal.own[i]) || !(normal.own[i] > 0)) return score;
+  score.covariance = normal.information.inverse();
+  score.values = score.covariance * normal.moment;
+  score.gain = normal.moment.dot(score.values);
   if (!std::isfinite(score.gain) || score.gain < 0) return {};
   return score;
 }

@@ -23,6 +23,10 @@ struct Background {
 
   void solve();  // `inverse`, `estimate` from the rest
   Eigen::VectorXd left() const { return residual - columns * estimate; }
+  /// What the best values leave, in variances, the price of their own size included: a gain is taken from it.
+  double misfit() const {
+    return (residual.squaredNorm() - (columns.transpose() * residual).dot(estimate)) / variance;
+  }
 };
 
 /// An effect in a record, summed from blocks to the end.
@@ -38,6 +42,15 @@ class EffectSums {
   };
   /// From block `from` to before block `to`. No values where the record cannot tell.
   Score score(std::size_t from, std::size_t to, const Background& background) const;
+
+  /// What that follows from; those of several channels that share the effect's values add up.
+  struct Normal {
+    Eigen::VectorXd own;          // squares of the columns
+    Eigen::MatrixXd information;  // of the values, the nuisances eliminated
+    Eigen::VectorXd moment;
+  };
+  Normal normal(std::size_t from, std::size_t to, const Background& background) const;
+  static Score score(const Normal& normal);
 
   std::size_t blocks() const { return moments_.size() - 1; }
   double onset(std::size_t block) const { return block_ * double(block); }

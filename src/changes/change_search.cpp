@@ -27,6 +27,7 @@ ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motio
   const Background with = background(beside_);
   first_.nuisances = with.columns;
   first_.spread = with.spread;
+  beside_columns_ = first_.nuisances.cols() - beside_column_;
 }
 
 Eigen::MatrixXd ChangeSearch::found_columns(const FoundChange& f) const {
@@ -252,28 +253,41 @@ void ChangeSearch::unite(std::vector<FoundChange>& found) const {
     }
 }
 
-std::vector<FoundChange> ChangeSearch::run() {
-  std::vector<FoundChange> found;
+std::optional<FoundChange> ChangeSearch::next(const std::vector<FoundChange>& found) {
   for (int k = 0; k < settings_.most_changes; ++k) {
     const Background b = background(found);
     std::optional<FoundChange> next = best(b);
-    if (!next) break;
+    if (!next) return std::nullopt;
     refine(*next, b);
-    if (!believed(*next, b)) break;
+    if (!believed(*next, b)) return std::nullopt;
     if (begins_before(*next, b)) {
       differ(*next);
       continue;
     }
-    if (!further(*next, found)) break;
+    if (!further(*next, found)) return std::nullopt;
     find_end(*next, b);
-    found.push_back(*next);
-    // Each anew beside the others.
-    for (std::size_t i = 0; found.size() > 1 && i < found.size(); ++i) {
-      std::vector<FoundChange> others = found;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-      refine(found[i], background(others));
-    }
-    unite(found);
+    return next;
+  }
+  return std::nullopt;
+}
+
+void ChangeSearch::add(FoundChange next, std::vector<FoundChange>& found) const {
+  found.push_back(std::move(next));
+  // Each anew beside the others.
+  for (std::size_t i = 0; found.size() > 1 && i < found.size(); ++i) {
+    std::vector<FoundChange> others = found;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    refine(found[i], background(others));
+  }
+  unite(found);
+}
+
+std::vector<FoundChange> ChangeSearch::run() {
+  std::vector<FoundChange> found;
+  for (int k = 0; k < settings_.most_changes; ++k) {
+    std::optional<FoundChange> one = next(found);
+    if (!one) break;
+    add(std::move(*one), found);
   }
   return found;
 }
@@ -294,7 +308,13 @@ bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
 }
 
 std::optional<LoudStretch> ChangeSearch::loud(const std::vector<FoundChange>& all) const {
-  const Eigen::VectorXd left = background(all).left(), expected = expected_squares(model_, motion_);
+  const Background b = background(all);
+  const Eigen::VectorXd left = b.left();
+  Eigen::VectorXd expected = expected_squares(model_, motion_);
+  // What stands beside is as well known as its shape.
+  const Eigen::VectorXd beside = b.columns.middleCols(beside_column_, beside_columns_) *
+                                 b.estimate.segment(beside_column_, beside_columns_);
+  expected += (settings_.model_error * beside).cwiseAbs2();
   std::vector<double> times, squares;
   for (Eigen::Index r = 0; r < left.size(); ++r) {
     times.push_back(motion_.time(r));

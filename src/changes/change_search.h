@@ -35,6 +35,12 @@ class ChangeSearch {
                const Progress& progress);
 
   std::vector<FoundChange> run();
+  /// The best change beside those that were found, if it is believed; what the record has from its beginning
+  /// is from then on no change.
+  std::optional<FoundChange> next(const std::vector<FoundChange>& found);
+  void add(FoundChange next, std::vector<FoundChange>& found) const;
+  Background background(const std::vector<FoundChange>& others) const;
+  std::size_t blocks() const { return blocks_; }
   double threshold(Eigen::Index values) const;
   std::size_t windows() const;
   Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
@@ -47,7 +53,6 @@ class ChangeSearch {
   std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
 
  private:
-  Background background(const std::vector<FoundChange>& others) const;
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;
   FoundChange scanned(const ScannedEffect& c, const Background& b, std::size_t step) const;
@@ -70,7 +75,7 @@ class ChangeSearch {
   const Progress& progress_;
   const std::vector<FoundChange> beside_;
   Whitened first_;
-  Eigen::Index beside_column_ = 0;      // the first of what stands beside
+  Eigen::Index beside_column_ = 0, beside_columns_ = 0;  // the first of what stands beside, and how many
   std::vector<std::string> different_;  // effects that the record has from its beginning
   const std::size_t margin_, blocks_;
 };

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 #include "change_search.h"
+#include "channel_changes.h"
 
 namespace backlash::changes {
 namespace {
@@ -27,6 +28,8 @@ struct ChannelChanges {
   Changes told;
 };
 
+}  // namespace
+
 std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
                                          const std::vector<record::Record>& healthy,
                                          const ChangeSettings& settings) {
@@ -41,6 +44,8 @@ std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
   }
   return all;
 }
+
+namespace {
 
 /// What the load of the teeth may be other by: what the motor's torque shows, on whichever side of the gap.
 std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
@@ -77,7 +82,8 @@ void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<
       "motion of this kind";
 }
 
-/// What no effect explains is no health.
+}  // namespace
+
 void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
                       const ChangeSettings& settings, Changes& out) {
   std::optional<LoudStretch> loud = search.loud(found);
@@ -104,8 +110,6 @@ void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>
                       joined(nearest) + "): commission with more motion of this kind";
 }
 
-/// What is over soon is no change of the machine, whatever it looks like: a push, or a fault that few passes
-/// show.
 void take_out_short(const ChangeSettings& settings, Changes& out) {
   const double shortest = double(settings.least_windows) * settings.window;
   const auto is_short = [&](const Change& c) { return c.until && *c.until - c.since < shortest; };
@@ -116,6 +120,8 @@ void take_out_short(const ChangeSettings& settings, Changes& out) {
           " the record differs from the healthy ones, too short to tell by what (nearest: " + c.effect + ")";
   out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
 }
+
+namespace {
 
 ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::Record>& healthy,
                           const record::Record& record, const std::vector<FoundChange>& beside, bool linear,

@@ -95,7 +95,7 @@ void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
   const double torque = motion.target.norm() / std::sqrt(double(std::max<Eigen::Index>(1, motion.size())));
   for (Moment& m : motion.moments) {
     m.fluctuation = kFluctuation * torque / motion.sampling.speed;
-    m.load = values[kInertia] * m.acceleration + values[kCosine] * std::cos(m.position) +
+    m.load = m.chain + values[kInertia] * m.acceleration + values[kCosine] * std::cos(m.position) +
              values[kSine] * std::sin(m.position);
     m.load_slope = values[kSine] * std::cos(m.position) - values[kCosine] * std::sin(m.position);
   }
@@ -350,6 +350,8 @@ Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, con
   const double length = motion.moments.back().time;
   add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * (m.time / length - 0.5); }),
                model.drift);
+  if (motion.sampling.chain)
+    add_nuisance(out, column(motion, [](const Moment& m) { return m.chain; }), settings.chain_share);
   // At rest the machine cools down, and warms up again after; or the clock was set.
   for (const Rest& rest : rests_of(motion, settings)) {
     const auto cooled = [&](const Moment& m) {

@@ -14,7 +14,7 @@ namespace {
 constexpr double kThinned = 0.25;  // - of the rate that is kept, where its filter ends. Theory: below a half
 
 struct EvenSamples {
-  std::vector<double> torque, position, deflection;
+  std::vector<double> torque, position, deflection, chain;
   std::vector<char> there;
 };
 
@@ -36,11 +36,13 @@ void hold(std::vector<double>& values, double next) {
   values.push_back(std::isfinite(next) ? next : values.empty() ? 0 : values.back());
 }
 
-EvenSamples even_samples(const record::Record& record, double interval, bool load,
+EvenSamples even_samples(const record::Record& record, double interval, const MotionSampling& sampling,
                          const ChangeSettings& settings) {
   const auto& torque = record.column(record::Channel::motor_torque);
   const auto& position = record.column(record::Channel::motor_position);
-  const auto& load_position = load ? record.column(record::Channel::load_position) : position;
+  const auto& load_position =
+      sampling.behind > 0 ? record.column(record::Channel::load_position) : position;
+  const auto& chain = record.column(record::Channel::output_torque);
   const double gap = settings.gap * std::max(interval, record.sampling_interval());
   EvenSamples out;
   std::size_t j = 0;
@@ -55,6 +57,7 @@ EvenSamples even_samples(const record::Record& record, double interval, bool loa
     hold(out.torque, x);
     hold(out.position, q);
     hold(out.deflection, d);
+    hold(out.chain, sampling.chain ? (1 - u) * chain[j] + u * chain[j + 1] : 0);
     out.there.push_back(step <= gap && std::isfinite(x) && std::isfinite(q) && std::isfinite(d));
   }
   return out;
@@ -119,7 +122,7 @@ void thin(std::vector<double>& values, std::size_t n, double interval) {
 
 void thin(EvenSamples& even, std::size_t n, double interval) {
   if (n == 1) return;
-  for (std::vector<double>* values : {&even.torque, &even.position, &even.deflection})
+  for (std::vector<double>* values : {&even.torque, &even.position, &even.deflection, &even.chain})
     thin(*values, n, interval);
   std::vector<char> there;
   for (std::size_t k = 0; k < even.there.size(); k += n) {
@@ -164,7 +167,8 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
                 0,
                 0,
                 0,
-                0};
+                0,
+                even.chain[k]};
     if (const auto& mesh = sampling.mesh)
       m.mesh = mesh->inertia * (acceleration[k] - parting[k]) + mesh->viscous * m.speed +
                mesh->coulomb * m.direction + mesh->cosine * std::cos(m.position) +
@@ -196,7 +200,7 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
   check_record(record, load, settings);
   const double dt = sampling.interval;
   const double own = dt / double(sampling.thinned);
-  EvenSamples even = even_samples(record, own, load, settings);
+  EvenSamples even = even_samples(record, own, sampling, settings);
   take_out_spikes(even.torque, even.there, settings);
   take_out_spikes(even.position, even.there, settings);
   if (load) take_out_spikes(even.deflection, even.there, settings);
@@ -215,6 +219,7 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
   const bool torque = sampling.channel == ChangeChannel::torque;
   const double usable_time = double(motion.rows.size()) * motion.row_interval;
   const double shortest = !torque         ? settings.shortest_pressed
+                          : sampling.chain ? settings.shortest_of_arm
                           : sampling.mesh ? settings.shortest_of_two
                                           : settings.shortest;
   if (usable_time < shortest)
@@ -232,9 +237,13 @@ Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(c
   std::vector<double> all;
   all.reserve(motion.moments.size());
   for (const Moment& m : motion.moments) all.push_back(f(m));
-  all = signal::low_pass(all, motion.sampling.interval, motion.sampling.cutoff);
+  return column(motion, std::move(all));
+}
+
+Eigen::VectorXd column(const SampledMotion& motion, std::vector<double> values) {
+  values = signal::low_pass(values, motion.sampling.interval, motion.sampling.cutoff);
   Eigen::VectorXd out(motion.size());
-  for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = all[motion.rows[static_cast<std::size_t>(i)]];
+  for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = values[motion.rows[static_cast<std::size_t>(i)]];
   return out;
 }
 

@@ -30,6 +30,7 @@ struct MotionSampling {
   ChangeChannel channel = ChangeChannel::torque;
   double behind = 0;             // - of the inertia that moves with the load's encoder; 0: there is none
   std::optional<MeshLoad> mesh;  // none: one inertia, or not known yet
+  bool chain = false;            // records tell as output_torque what the rest of an arm takes
   /// N m, that the teeth may bear beside; a flank counts that is pressed with it and without. Empty: nothing.
   std::function<double(const Moment&)> other_load;
   double interval = 0;         // s, of what is looked at
@@ -53,6 +54,7 @@ struct Moment {
   double load_slope;    // N m/rad, of its gravity
   double fluctuation;   // N m s/rad, by which that may fluctuate per speed, faster than the record shows
   double mesh;          // N m, that the teeth bear; 0: one inertia
+  double chain;         // N m, that the rest of an arm takes; 0: there is none
 
   double side() const { return mesh < 0 ? -1 : 1; }  // flank that bears it
 };
@@ -81,5 +83,8 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
 
 /// f of each moment, filtered, of the rows that count.
 Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(const Moment&)>& f);
+
+/// The same of values of the moments.
+Eigen::VectorXd column(const SampledMotion& motion, std::vector<double> values);
 
 }  // namespace backlash::changes

@@ -18,7 +18,7 @@ report::Json change_json(const changes::Change& c, const std::string& joint) {
     size[s.name]["unit"] = s.unit;
   }
   report::Json json = {{"effect", c.effect},
-                       {"joint", joint},
+                       {"joint", c.joint.empty() ? joint : c.joint},
                        {"since", c.since},
                        {"since_interval", {c.since_from, c.since_to}},
                        {"until", nullptr},
@@ -28,6 +28,7 @@ report::Json change_json(const changes::Change& c, const std::string& joint) {
                        {"error_before", report::json_number(c.error_before)},
                        {"error_after", report::json_number(c.error_after)}};
   if (c.until) json["until"] = *c.until;
+  if (!c.link.empty()) json["link"] = c.link;
   return json;
 }
 
@@ -36,7 +37,11 @@ report::Json change_json(const changes::Change& c, const std::string& joint) {
 std::string change_summary(const changes::Changes& found) {
   std::string text;
   for (const changes::Change& c : found.changes) {
-    text += fmt::format("{} since {:.1f} s ({:.1f} to {:.1f})", c.effect, c.since, c.since_from, c.since_to);
+    const std::string place = !c.link.empty()    ? " at " + c.link
+                              : !c.joint.empty() ? " of " + c.joint
+                                                 : "";
+    text += fmt::format("{}{} since {:.1f} s ({:.1f} to {:.1f})", c.effect, place, c.since, c.since_from,
+                        c.since_to);
     if (c.until) text += fmt::format(", until {:.1f} s", *c.until);
     for (const changes::ChangeSize& s : c.size)
       text += fmt::format("; {} {} {}", s.name, with_error(s.measured), s.unit);

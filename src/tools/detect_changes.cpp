@@ -3,9 +3,12 @@
 #include <filesystem>
 #include <iostream>
 
+#include "backlash_diagnosis/arm/arm_rig.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/changes/arm_changes.h"
 #include "backlash_diagnosis/findings/change_report.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
+#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/progress_bar.h"
@@ -53,8 +56,38 @@ record::Record read(const std::string& path, const rig_file::RigFile& rig,
   return record;
 }
 
+changes::Changes changes_of_joint(findings::ChangeInputs& inputs, const changes::ChangeSettings& settings,
+                                  const Progress& progress) {
+  const rig_file::RigFile rig = rig_file::load_rig_file(inputs.rig);
+  inputs.joint = rig.rig.joint;
+  std::vector<std::string> warnings;
+  std::vector<record::Record> healthy;
+  for (const std::string& file : inputs.healthy) healthy.push_back(read(file, rig, warnings));
+  const record::Record record = read(inputs.record, rig, warnings);
+  changes::Changes found = changes::detect_changes(rig.rig, healthy, record, settings, progress);
+  found.warnings.insert(found.warnings.begin(), warnings.begin(), warnings.end());
+  return found;
+}
+
+changes::Changes changes_of_arm(const findings::ChangeInputs& inputs, const changes::ChangeSettings& settings,
+                                const Progress& progress) {
+  const arm::ArmRig rig = arm::load_arm_rig(inputs.rig);
+  std::vector<std::string> warnings;
+  const auto read = [&](const std::string& path) {
+    arm::ArmRecord record = read_arm_record(path, rig);
+    for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
+    return record;
+  };
+  std::vector<arm::ArmRecord> healthy;
+  for (const std::string& file : inputs.healthy) healthy.push_back(read(file));
+  const arm::ArmRecord record = read(inputs.record);
+  changes::Changes found = changes::detect_changes(rig, healthy, record, settings, progress);
+  found.warnings.insert(found.warnings.begin(), warnings.begin(), warnings.end());
+  return found;
+}
+
 int detect(const Arguments& arguments) {
-  const findings::ChangeInputs inputs = {
+  findings::ChangeInputs inputs = {
       arguments.text("rig"), "", arguments.texts("healthy"), arguments.positional(0),
       arguments.number("false-alarms-per-hour", changes::ChangeSettings{}.false_alarms_per_hour,
                        Range::positive())};
@@ -63,25 +96,18 @@ int detect(const Arguments& arguments) {
   for (const std::string& file : files) check_record_path(file);
   files.push_back(inputs.rig);
   check_output(arguments.text("json"), files);
-  const rig_file::RigFile rig = rig_file::load_rig_file(inputs.rig);
-  std::vector<std::string> warnings;
-  std::vector<record::Record> healthy;
-  for (const std::string& file : inputs.healthy) healthy.push_back(read(file, rig, warnings));
-  const record::Record record = read(inputs.record, rig, warnings);
   changes::ChangeSettings settings;
   settings.false_alarms_per_hour = inputs.false_alarms_per_hour;
   changes::Changes found;
   try {
     ProgressBar bar;
-    found = changes::detect_changes(rig.rig, healthy, record, settings, bar.progress());
+    found = arm::is_arm_rig(inputs.rig) ? changes_of_arm(inputs, settings, bar.progress())
+                                        : changes_of_joint(inputs, settings, bar.progress());
   } catch (const CannotIdentify& error) {
     std::cerr << "detect_changes: " << error.what() << '\n';
     return kInconclusive;
   }
-  found.warnings.insert(found.warnings.begin(), warnings.begin(), warnings.end());
-  findings::ChangeInputs told = inputs;
-  told.joint = rig.rig.joint;
-  write_text(arguments.text("json"), findings::change_json(found, told));
+  write_text(arguments.text("json"), findings::change_json(found, inputs));
   std::cout << findings::change_summary(found);
   if (!found.changes.empty()) return kFault;
   if (found.cannot_tell.empty()) return kHealthy;

@@ -85,12 +85,31 @@ inline KDL::JntArray to_kdl(const arm::Joints& values) {
   return array;
 }
 
+/// By KDL.
+class Torques {
+ public:
+  explicit Torques(const arm::Chain& chain)
+      : kdl_(to_kdl(chain)),
+        solver_(kdl_, KDL::Vector(chain.gravity.x(), chain.gravity.y(), chain.gravity.z())) {}
+  arm::Joints operator()(const arm::Joints& q, const arm::Joints& v, const arm::Joints& a) const {
+    KDL::JntArray torque{unsigned(q.size())};
+    solver_.CartToJnt(to_kdl(q), to_kdl(v), to_kdl(a),
+                      KDL::Wrenches(kdl_.getNrOfSegments(), KDL::Wrench::Zero()), torque);
+    return torque.data;
+  }
+
+ private:
+  KDL::Chain kdl_;
+  mutable KDL::ChainIdSolver_RNE solver_;
+};
+
 /// The drives and links of a machine that a rig file does not know, and its records. Torques are KDL's.
 struct Machine {
   arm::ArmRig declared = arm::load_arm_rig(package_file("config/ur5_arm/ur5_arm.yaml"));
   arm::Chain chain = declared.chain;
   std::vector<arm::JointDrive> drives = declared.joints;
   double noise = 0.02;  // A, white
+  arm::Joints slip = arm::Joints::Zero(Eigen::Index(declared.joints.size()));  // rad, encoders show more
 
   /// Links, constants and friction off by some ten percent.
   explicit Machine(std::uint64_t seed) {
@@ -108,6 +127,11 @@ struct Machine {
   }
 
   arm::ArmRecord record(std::uint64_t seed, double duration = 32) const {
+    return record(seed, duration, *this, duration);
+  }
+
+  /// It is another machine from `since` on [s].
+  arm::ArmRecord record(std::uint64_t seed, double duration, const Machine& later, double since) const {
     Random random(seed);
     const auto n = Eigen::Index(drives.size());
     Eigen::MatrixXd amplitude(n, 3), frequency(n, 3), phase(n, 3);
@@ -120,43 +144,46 @@ struct Machine {
     arm::ArmRecord out;
     out.name = "simulated";
     out.joints.resize(drives.size());
-    const KDL::Chain kdl = to_kdl(chain);
-    KDL::ChainIdSolver_RNE solver(kdl, KDL::Vector(chain.gravity.x(), chain.gravity.y(), chain.gravity.z()));
+    const auto state = [&](double at) {
+      arm::Joints q = arm::Joints::Zero(n), v = q, a = q;
+      for (Eigen::Index j = 0; j < n; ++j)
+        for (Eigen::Index i = 0; i < 3; ++i) {
+          const double x = frequency(j, i) * at + phase(j, i);
+          q[j] += amplitude(j, i) * std::sin(x);
+          v[j] += amplitude(j, i) * frequency(j, i) * std::cos(x);
+          a[j] -= amplitude(j, i) * frequency(j, i) * frequency(j, i) * std::sin(x);
+        }
+      return std::array<arm::Joints, 3>{q, v, a};
+    };
+    const Torques before(chain), after(later.chain);
     for (double t = 0; t < duration; t += 0.01) {
-      const auto state = [&](double at) {
-        arm::Joints q = arm::Joints::Zero(n), v = q, a = q;
-        for (Eigen::Index j = 0; j < n; ++j)
-          for (Eigen::Index i = 0; i < 3; ++i) {
-            const double x = frequency(j, i) * at + phase(j, i);
-            q[j] += amplitude(j, i) * std::sin(x);
-            v[j] += amplitude(j, i) * frequency(j, i) * std::cos(x);
-            a[j] -= amplitude(j, i) * frequency(j, i) * frequency(j, i) * std::sin(x);
-          }
-        return std::array<arm::Joints, 3>{q, v, a};
-      };
-      const auto torque_at = [&](const std::array<arm::Joints, 3>& s) {
-        KDL::JntArray torque{unsigned(n)};
-        solver.CartToJnt(to_kdl(s[0]), to_kdl(s[1]), to_kdl(s[2]),
-                         KDL::Wrenches(kdl.getNrOfSegments(), KDL::Wrench::Zero()), torque);
-        return arm::Joints(torque.data);
-      };
+      const Machine& machine = t < since ? *this : later;
       const auto now = state(t);
       for (std::size_t j = 0; j < drives.size(); ++j) {
-        const auto earlier = state(t - drives[j].delay);
+        const arm::JointDrive& drive = machine.drives[j];
+        const auto earlier = state(t - drive.delay);
         const auto k = Eigen::Index(j);
-        const double load = torque_at(earlier)[k], v = earlier[1][k], sign = std::tanh(v / 0.01);
-        const auto& f = drives[j].terms;
-        const double torque = load + f[0] * earlier[2][k] + f[1] * sign + f[2] * v + f[3] * v * std::fabs(v) +
-                              f[4] * v * v * v + f[5] + f[6] * sign * std::fabs(load);
+        arm::Joints q = earlier[0];
+        q -= machine.slip;
+        const double load = (t < since ? before : after)(q, earlier[1], earlier[2])[k];
         record::Record& r = out.joints[j];
         r.time.push_back(t);
         r.column(record::Channel::motor_position).push_back(std::round(now[0][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_velocity).push_back(std::round(now[1][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_current)
-            .push_back(torque / drives[j].constant + noise * random.normal());
+            .push_back(torque(drive, load, earlier[1][k], earlier[2][k]) / drive.constant +
+                       noise * random.normal());
       }
     }
     return out;
+  }
+
+ private:
+  static double torque(const arm::JointDrive& drive, double load, double v, double a) {
+    const auto& f = drive.terms;
+    const double sign = std::tanh(v / 0.01);
+    return load + f[0] * a + f[1] * sign + f[2] * v + f[3] * v * std::fabs(v) + f[4] * v * v * v + f[5] +
+           f[6] * sign * std::fabs(load);
   }
 };
 

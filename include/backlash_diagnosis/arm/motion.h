@@ -45,6 +45,9 @@ struct ArmMotion {
 /// BadData where none is left.
 std::vector<ArmMotion> motions_of(const ArmRecord& record, const ArmRig& rig,
                                   std::vector<std::string>& warnings);
+/// The same without what a fit looks at: `chain`, `drive` and `counts`, which are many times as large.
+std::vector<ArmMotion> kinematics_of(const ArmRecord& record, const ArmRig& rig,
+                                     std::vector<std::string>& warnings);
 constexpr double kShortestStretch = 4;  // s; choice: some cycles of the slowest low-pass and of a motion
 
 /// The part of a motion with from <= time < to.

@@ -23,12 +23,14 @@ struct PushSettings {
       4;  // deviations: half the range within `window` above which the torque is not at rest; choice
   double window = 0.5;  // s; choice: hands are slower than noise
   double between = 1;   // s at rest that end a contact; choice
+  double within = 2;    // deviations: where it has not begun for sure. Theory: of 20 samples one is beyond
   double rest = 0.1;  // rad/s: a faster joint moves by command; choice: pushed joints of the record give 0.02
 };
 
 struct PushEvent {
   std::size_t joint = 0;
   double begin = 0, end = 0;  // s of the record; end: where it is released
+  double earliest = 0;        // s, where it was last within the noise
   double clear = 0;           // deviations of noise at the begin
   bool released = true;       // else the record ends in it
   double torque = 0;  // N m, the farthest from the level before; the drive's, so the push has the other sign

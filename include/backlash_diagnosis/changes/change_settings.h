@@ -28,6 +28,7 @@ struct ChangeSettings {
   double longest_gap = 600;     // s. Choice: the machine has another temperature then
   double shortest = 30;         // s, of usable motion in a record. Choice
   double shortest_of_two = 15;  // s, the same of two inertias, between changes of the flank. Choice
+  double shortest_of_arm = 8;   // s, the same of a joint of an arm. Choice: what pulls at it is known
   double shortest_pressed = 8;  // s, the same with a flank pressed for certain, for the deflection. Choice
 
   double least_load = 0.05;  // - of the largest load of the teeth: less presses no flank for certain. Choice
@@ -46,6 +47,9 @@ struct ChangeSettings {
   double rough = 0.15;  // s to either side, over which the motion's roughness is taken. Simulation: teeth
                         // that cross the gap ring for as long, and so do ends of moves
   double least_steady = 0.1;  // - of the squares of the residual, that no roughness explains. Choice
+  double chain_share = 0.02;  // - of what the rest of an arm takes, that a joint may show otherwise. Choice:
+                              // torque constants fall by as much as windings warm up by 10 K (magnets 0.1 to
+                              // 0.2 %/K)
   double rest = 10;           // s without motion, after which the machine has another temperature. Choice
 
   // Changes
@@ -63,6 +67,8 @@ struct ChangeSettings {
   double same_event = 5;  // s: two that begin so close may be one whose shape is another. Choice
   double least_with_other = 1e-3;  // - of the gain of the other channel's change of the same event. Choice
   double least_beside = 0.25;      // - of the gain of the other that a second one of an event has. Choice
+  double errors_of_mass = 4;       // standard errors, by which a payload has a mass. Choice
+  double farthest_centre = 2;      // m from its joint, that a payload's centre may be. Choice
   int most_changes = 4;            // Choice
   double onset_drop = 8;      // of twice the log likelihood, as wide as the onset is uncertain. Simulation
   double onset_least = 0.1;   // s, half of the narrowest interval. Choice
@@ -71,6 +77,7 @@ struct ChangeSettings {
   // told, or is a change. Choices. Simulation of healthy machines in other tasks: one inertia 2, two 5.
   double unknown_louder = 4, unknown_of_two = 16;
   std::size_t least_windows = 4;  // that it lasts. Choice: a push is no change of the machine
+  double same_link = 0.3;  // share of the squares left by which a payload at another link does better. Choice
   double alike = 0.97;            // - of the best gain: effects that fit alike. Choice
   double model_error = 0.03;      // - of a size, as the shape of an effect is an idealisation. Choice
 };

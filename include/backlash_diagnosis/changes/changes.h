@@ -26,6 +26,7 @@ struct ChangeSize {
 
 struct Change {
   std::string effect;                        // id of an effect, name of a declared value, or "unknown"
+  std::string joint, link;                   // of an arm
   double since = 0;                          // s, in the record's time
   double since_from = 0, since_to = 0;       // s
   std::optional<double> until;               // s; absent: to the end of the record
