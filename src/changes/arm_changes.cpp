@@ -100,7 +100,8 @@ MotionSampling ArmChanges::sampling_of_joint(std::size_t index, const std::vecto
 }
 
 /// A joint rests while others move: the healthy records in which it moves.
-std::vector<record::Record> ArmChanges::long_enough(std::size_t index, const std::vector<ChainMotion>& healthy,
+std::vector<record::Record> ArmChanges::long_enough(std::size_t index,
+                                                    const std::vector<ChainMotion>& healthy,
                                                     const MotionSampling& sampling) const {
   std::vector<record::Record> all;
   std::string why;
@@ -145,10 +146,10 @@ void ArmChanges::add_joint(std::size_t index, const std::vector<ChainMotion>& he
     set_chain_columns(h, index, motion);
     const Eigen::VectorXd residual = residual_of(joint.model, motion, settings_).residual;
     for (std::size_t e = 0; e < effects.size(); ++e)
-      joint.chain_inflation[e] = std::max(
-          joint.chain_inflation[e],
-          score_inflation(motion, residual, effect_columns(motion, effects[e].at_joint()),
-                          joint.model.noise * joint.model.noise, settings_.window));
+      joint.chain_inflation[e] =
+          std::max(joint.chain_inflation[e],
+                   score_inflation(motion, residual, effect_columns(motion, effects[e].at_joint()),
+                                   joint.model.noise * joint.model.noise, settings_.window));
   }
   set_search(joint);
 }
@@ -173,7 +174,8 @@ void ArmChanges::read(const std::vector<arm::ArmRecord>& healthy, const arm::Arm
 void ArmChanges::carry(const FoundChainChange& found, bool from_beginning, const arm::ArmRecord& record) {
   const double start = joints_.front().motion.start, end = record.joints.front().time.back();
   const bool to_end = found.to == joints_.front().search->blocks();
-  carried_.push_back({found.effect.joint, from_beginning ? start : start + settings_.block * double(found.from),
+  carried_.push_back({found.effect.joint,
+                      from_beginning ? start : start + settings_.block * double(found.from),
                       to_end ? end + 1 : start + settings_.block * double(found.to),
                       arm::BodyParameters(found.score.values)});
   std::vector<std::string> told_before;
@@ -288,7 +290,8 @@ void ArmChanges::tell_joint(const ArmJoint& joint, std::size_t place) {
   for (Change& c : one.changes) {
     c.joint = joint.name;
     if (is_left_by_chain(joint, place, c)) {
-      one.warnings.push_back("since " + to_text(std::round(c.since)) + " s the record follows no effect, beside " +
+      one.warnings.push_back("since " + to_text(std::round(c.since)) +
+                             " s the record follows no effect, beside " +
                              described(chain_.front().effect, rig_.chain));
       continue;
     }
@@ -335,7 +338,8 @@ Change ArmChanges::told(const FoundChainChange& f) const {
   static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
   for (int i = 0; i < 3; ++i) {
     const double centre = x[1 + i] / x[0];
-    const double variance = (c(1 + i, 1 + i) - 2 * centre * c(0, 1 + i) + centre * centre * c(0, 0)) / (x[0] * x[0]);
+    const double variance =
+        (c(1 + i, 1 + i) - 2 * centre * c(0, 1 + i) + centre * centre * c(0, 0)) / (x[0] * x[0]);
     change.size.push_back({names[i], "m", {centre, std::sqrt(std::max(0.0, variance))}});
   }
   return change;

@@ -9,8 +9,8 @@
 namespace backlash::changes {
 namespace {
 
-constexpr int kBody = 10;             // parameters of a body
-constexpr double kSlipStep = 1e-5;    // rad, of a central difference: error 1e-10 of the slope. Theory
+constexpr int kBody = 10;           // parameters of a body
+constexpr double kSlipStep = 1e-5;  // rad, of a central difference: error 1e-10 of the slope. Theory
 
 using arm::DriveTerm;
 
@@ -75,12 +75,12 @@ arm::Chain chain_at(const arm::Chain& chain, const std::vector<CarriedBody>& car
 void add_joints(const arm::ArmRig& rig, const arm::Chain& chain, const std::vector<CarriedBody>& carried,
                 const arm::ArmRecord& record, const arm::ArmMotion& m, ChainMotion& out) {
   std::vector<Interpolated> signals;
-  for (const record::Record& joint : record.joints) signals.emplace_back(joint.time, joint.column(rig.channel));
+  for (const record::Record& joint : record.joints)
+    signals.emplace_back(joint.time, joint.column(rig.channel));
   for (std::size_t k = 0; k < m.time.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
-    const arm::Joints torque =
-        inverse_dynamics(carried.empty() ? chain : chain_at(chain, carried, m.time[k]), m.q.row(row),
-                         m.v.row(row), m.a.row(row));
+    const arm::Joints torque = inverse_dynamics(carried.empty() ? chain : chain_at(chain, carried, m.time[k]),
+                                                m.q.row(row), m.v.row(row), m.a.row(row));
     for (std::size_t j = 0; j < out.joints.size(); ++j) {
       const auto c = static_cast<Eigen::Index>(j);
       record::Record& r = out.joints[j];

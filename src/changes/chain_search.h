@@ -32,7 +32,7 @@ struct FoundChainChange {
   EffectSums::Score score;
   std::vector<double> shares;  // of the gain, by joint
   double inflation = 1;
-  double low = 0, high = 0;  // s, of the onset
+  double low = 0, high = 0;        // s, of the onset
   std::vector<std::string> alike;  // others that explain it as well, in words
 
   /// The size has this error, noise that follows the effect included.
@@ -55,7 +55,8 @@ class ChainSearch {
     std::vector<EffectSums> joints;
   };
   Sums sums_of(const ChainEffect& effect) const;
-  EffectSums::Score score(const Sums& sums, std::size_t from, std::size_t to, const ChainEffect& effect) const;
+  EffectSums::Score score(const Sums& sums, std::size_t from, std::size_t to,
+                          const ChainEffect& effect) const;
   FoundChainChange scanned(std::size_t effect) const;
   std::optional<FoundChainChange> chosen() const;
   bool plausible(const FoundChainChange& f) const;

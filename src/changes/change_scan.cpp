@@ -9,9 +9,9 @@ namespace backlash::changes {
 void Background::solve() {
   Eigen::MatrixXd information = columns.transpose() * columns / variance;
   for (Eigen::Index i = 0; i < spread.size(); ++i)
-    information(i, i) += std::isfinite(spread[i])   ? 1 / (spread[i] * spread[i])
-                         : information(i, i) > 0 ? 1e-9 * information(i, i)
-                                                 : 1;  // nothing shows it: it stays 0
+    information(i, i) += std::isfinite(spread[i]) ? 1 / (spread[i] * spread[i])
+                         : information(i, i) > 0  ? 1e-9 * information(i, i)
+                                                  : 1;  // nothing shows it: it stays 0
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());

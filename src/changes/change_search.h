@@ -76,7 +76,7 @@ class ChangeSearch {
   const std::vector<FoundChange> beside_;
   Whitened first_;
   Eigen::Index beside_column_ = 0, beside_columns_ = 0;  // the first of what stands beside, and how many
-  std::vector<std::string> different_;  // effects that the record has from its beginning
+  std::vector<std::string> different_;                   // effects that the record has from its beginning
   const std::size_t margin_, blocks_;
 };
 

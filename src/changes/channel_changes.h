@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What all channels share, be they of a joint or of the joints of an arm: which effects are tried, and what is
-// told of what they leave.
+// What all channels share, be they of a joint or of the joints of an arm: which effects are tried, and what
+// is told of what they leave.
 #pragma once
 
 #include <vector>

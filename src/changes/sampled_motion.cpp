@@ -40,8 +40,7 @@ EvenSamples even_samples(const record::Record& record, double interval, const Mo
                          const ChangeSettings& settings) {
   const auto& torque = record.column(record::Channel::motor_torque);
   const auto& position = record.column(record::Channel::motor_position);
-  const auto& load_position =
-      sampling.behind > 0 ? record.column(record::Channel::load_position) : position;
+  const auto& load_position = sampling.behind > 0 ? record.column(record::Channel::load_position) : position;
   const auto& chain = record.column(record::Channel::output_torque);
   const double gap = settings.gap * std::max(interval, record.sampling_interval());
   EvenSamples out;
@@ -218,10 +217,10 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
   motion.row_interval = dt * double(stride);
   const bool torque = sampling.channel == ChangeChannel::torque;
   const double usable_time = double(motion.rows.size()) * motion.row_interval;
-  const double shortest = !torque         ? settings.shortest_pressed
+  const double shortest = !torque          ? settings.shortest_pressed
                           : sampling.chain ? settings.shortest_of_arm
-                          : sampling.mesh ? settings.shortest_of_two
-                                          : settings.shortest;
+                          : sampling.mesh  ? settings.shortest_of_two
+                                           : settings.shortest;
   if (usable_time < shortest)
     throw CannotIdentify(
         record.name + " moves for " + to_text(usable_time) + " s in a way that can be judged" +

@@ -37,9 +37,7 @@ report::Json change_json(const changes::Change& c, const std::string& joint) {
 std::string change_summary(const changes::Changes& found) {
   std::string text;
   for (const changes::Change& c : found.changes) {
-    const std::string place = !c.link.empty()    ? " at " + c.link
-                              : !c.joint.empty() ? " of " + c.joint
-                                                 : "";
+    const std::string place = !c.link.empty() ? " at " + c.link : !c.joint.empty() ? " of " + c.joint : "";
     text += fmt::format("{}{} since {:.1f} s ({:.1f} to {:.1f})", c.effect, place, c.since, c.since_from,
                         c.since_to);
     if (c.until) text += fmt::format(", until {:.1f} s", *c.until);

@@ -108,7 +108,7 @@ struct Machine {
   arm::ArmRig declared = arm::load_arm_rig(package_file("config/ur5_arm/ur5_arm.yaml"));
   arm::Chain chain = declared.chain;
   std::vector<arm::JointDrive> drives = declared.joints;
-  double noise = 0.02;  // A, white
+  double noise = 0.02;                                                         // A, white
   arm::Joints slip = arm::Joints::Zero(Eigen::Index(declared.joints.size()));  // rad, encoders show more
 
   /// Links, constants and friction off by some ten percent.

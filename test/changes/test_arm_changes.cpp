@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Oracle: arms whose torques KDL computes, that change at a known time. Intervals hold with 95 %; the seeds are
-// fixed, so that the tests are not chance: three standard errors are allowed.
-#include "backlash_diagnosis/changes/arm_changes.h"
-
+// Oracle: arms whose torques KDL computes, that change at a known time. Intervals hold with 95 %; the seeds
+// are fixed, so that the tests are not chance: three standard errors are allowed.
 #include <gtest/gtest.h>
 
 #include "arm/arm_machines.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/changes/arm_changes.h"
 
 namespace backlash::changes {
 namespace {

@@ -78,8 +78,8 @@ struct ChangeSettings {
   double unknown_louder = 4, unknown_of_two = 16;
   std::size_t least_windows = 4;  // that it lasts. Choice: a push is no change of the machine
   double same_link = 0.3;  // share of the squares left by which a payload at another link does better. Choice
-  double alike = 0.97;            // - of the best gain: effects that fit alike. Choice
-  double model_error = 0.03;      // - of a size, as the shape of an effect is an idealisation. Choice
+  double alike = 0.97;     // - of the best gain: effects that fit alike. Choice
+  double model_error = 0.03;  // - of a size, as the shape of an effect is an idealisation. Choice
 };
 
 }  // namespace backlash::changes

@@ -12,6 +12,7 @@
 #include <iostream>
 #include <random>
 
+#include "arm_study.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/changes/changes.h"
 #include "backlash_diagnosis/diagnosis/change_ledger.h"
@@ -27,7 +28,7 @@ constexpr double kStream = 1800;                               // s, of one join
 
 struct Options {
   double hours = 0, rate = 1.0 / 720;  // h, 1/h
-  int onsets = 0;
+  int onsets = 0, arms = 0;
   long windows = 0;
   unsigned long seed = 1;
   double sampling = 50;  // Hz
@@ -294,6 +295,7 @@ int main(int argc, char** argv) {
   add("healthy-hours", po::value(&options.hours), "of healthy joints");
   add("false-alarms-per-hour", po::value(&options.rate), "that are allowed; default 1/720");
   add("onsets", po::value(&options.onsets), "joints that change once");
+  add("arms", po::value(&options.arms), "of six joints, healthy, and as many for each kind of change");
   add("windows", po::value(&options.windows), "of scores: false alarms, and delays beside a CUSUM");
   add("rate", po::value(&options.sampling), "of the samples [Hz]; default 50");
   add("two", po::bool_switch(&options.two), "inertias, with an encoder on either side, of each joint");
@@ -309,6 +311,7 @@ int main(int argc, char** argv) {
     }
     if (options.hours > 0) healthy(options);
     if (options.onsets > 0) onsets(options);
+    if (options.arms > 0) study_arms(options.arms, options.seed, options.rate);
     if (options.windows > 0) study_windows(options.windows, options.seed);
     return 0;
   } catch (const std::exception& error) {

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How often a healthy arm is called changed, and how often a change of one is told by its name and joint.
+#pragma once
+
+#include <cstdint>
+
+namespace backlash::change_study {
+
+/// `arms` of them healthy, and as many for each kind of change; `rate`: false alarms allowed per hour.
+void study_arms(int arms, std::uint64_t seed, double rate);
+
+}  // namespace backlash::change_study
