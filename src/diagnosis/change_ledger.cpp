@@ -23,7 +23,8 @@ const std::pair<ChangeState, const char*> kStates[] = {{ChangeState::suspected, 
                                                        {ChangeState::withdrawn, "withdrawn"}};
 
 bool same_event(const FoundChange& a, const FoundChange& b) {
-  return a.since_from - kSameEvent <= b.since_to && b.since_from - kSameEvent <= a.since_to;
+  return a.joint == b.joint && a.since_from - kSameEvent <= b.since_to &&
+         b.since_from - kSameEvent <= a.since_to;
 }
 
 const FoundSize* size_of(const FoundChange& change, const std::string& name) {
@@ -49,7 +50,9 @@ bool near(double a, double b, const FoundSize& x, const FoundSize& y) {
 
 /// Whether the second takes away what the first added: the opposite size, or of a sine the opposite phase.
 bool undoes(const FoundChange& first, const FoundChange& second) {
-  if (first.effect != second.effect || first.size.empty() || second.size.empty()) return false;
+  if (first.effect != second.effect || first.joint != second.joint || first.size.empty() ||
+      second.size.empty())
+    return false;
   const FoundSize &a = first.size.front(), &b = second.size.front();
   const FoundSize *phase = size_of(first, "phase"), *other = size_of(second, "phase");
   if (!phase || !other) return near(a.value, -b.value, a, b);

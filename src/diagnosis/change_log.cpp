@@ -51,9 +51,10 @@ std::string line_of(const KnownChange& k) {
   std::string alike;
   for (const std::string& e : f.equivalent_to) alike += (alike.empty() ? "" : "; ") + e;
   return to_text(k.seen) + "," + utc_time(k.seen) + "," + std::to_string(k.id) + "," + to_string(k.state) +
-         "," + f.effect + "," + to_text(f.since) + "," + to_text(f.since_from) + "," + to_text(f.since_to) +
-         "," + (f.until ? to_text(*f.until) : "") + "," + size_text(f) + "," + alike + "," + cell(f.gain) +
-         "," + cell(f.error_before) + "," + cell(f.error_after) + ",\n";  // a cut line lacks the last comma
+         "," + (f.joint.empty() ? "" : f.joint + " ") + f.effect + "," + to_text(f.since) + "," +
+         to_text(f.since_from) + "," + to_text(f.since_to) + "," + (f.until ? to_text(*f.until) : "") + "," +
+         size_text(f) + "," + alike + "," + cell(f.gain) + "," + cell(f.error_before) + "," +
+         cell(f.error_after) + ",\n";  // a cut line lacks the last comma
 }
 
 double number(const std::string& text, const std::string& where) {
@@ -86,7 +87,9 @@ KnownChange change_from(const std::string& line, const std::string& where) {
   if (!state || k.id < 1) throw BadData(where, "'" + printable(cells[2] + "," + cells[3]) + "': no change");
   k.state = *state;
   FoundChange& f = k.found;
-  f.effect = cells[4];
+  const std::size_t space = cells[4].rfind(' ');  // "JOINT EFFECT" of an arm
+  if (space != std::string::npos) f.joint = cells[4].substr(0, space);
+  f.effect = cells[4].substr(space + 1);
   f.since = number(cells[5], where);
   f.since_from = number(cells[6], where);
   f.since_to = number(cells[7], where);

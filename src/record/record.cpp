@@ -99,4 +99,21 @@ Record Record::slice(double from, double to) const {
   return part;
 }
 
+Record samples_at(const Record& record, const std::vector<double>& times) {
+  Record part;
+  part.name = record.name;
+  part.warnings = record.warnings;
+  part.origin = record.origin;
+  part.time = times;
+  std::size_t k = 0;
+  for (const double t : times) {
+    while (k < record.size() && record.time[k] < t) ++k;
+    if (k == record.size() || record.time[k] > t)
+      throw InvalidParameter("time", t, "is of no sample of " + record.name);
+    for (const Channel channel : kChannels)
+      if (record.has(channel)) part.column(channel).push_back(record.column(channel)[k]);
+  }
+  return part;
+}
+
 }  // namespace backlash::record

@@ -41,12 +41,15 @@ std::string time_of_day(double time) {
 
 }  // namespace
 
-diagnosis::ChangeLook read_changes(const std::string& path, double origin) {
+diagnosis::ChangeLook read_changes(const std::string& path, double origin, bool of_arm) {
   std::ifstream in = open_input(path);
   try {
     const Json json = Json::parse(in);
     diagnosis::ChangeLook look;
-    for (const Json& change : json.at("changes")) look.changes.push_back(change_from(change, origin));
+    for (const Json& change : json.at("changes")) {
+      look.changes.push_back(change_from(change, origin));
+      if (of_arm) look.changes.back().joint = change.at("joint");
+    }
     look.different = json.at("different_from_beginning").get<std::vector<std::string>>();
     look.windows = json.at("windows");
     look.warnings = json.at("warnings").get<std::vector<std::string>>();
@@ -57,8 +60,9 @@ diagnosis::ChangeLook read_changes(const std::string& path, double origin) {
 }
 
 std::string change_text(const diagnosis::FoundChange& change) {
-  std::string text = change.effect + " since " + utc_time(change.since) + " (" +
-                     time_of_day(change.since_from) + " to " + time_of_day(change.since_to) + ")";
+  std::string text = (change.joint.empty() ? "" : change.joint + ": ") + change.effect + " since " +
+                     utc_time(change.since) + " (" + time_of_day(change.since_from) + " to " +
+                     time_of_day(change.since_to) + ")";
   if (change.until) text += ", until " + utc_time(*change.until);
   for (const diagnosis::FoundSize& s : change.size)
     text += fmt::format(": {} {:.4g} +- {:.2g} {}", s.name, s.value, s.standard_error, s.unit);

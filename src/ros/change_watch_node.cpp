@@ -20,8 +20,13 @@ constexpr double kTick = 1;  // s of wall time from one report on /diagnostics t
 
 std::vector<record::ChannelMap> channels_of(const std::vector<WatchSettings>& joints) {
   std::vector<record::ChannelMap> maps;
-  for (const WatchSettings& joint : joints) maps.push_back(joint.joint.channels());
+  for (const WatchSettings& joint : joints)
+    for (record::ChannelMap& map : joint.channels()) maps.push_back(std::move(map));
   return maps;
+}
+
+std::string joint_of(const diagnosis::KnownChange& change, const JointWatch& watch) {
+  return change.found.joint.empty() ? watch.joint() : change.found.joint;
 }
 
 /// The changes that the joint has now, in words; empty: none.
@@ -41,8 +46,10 @@ ChangeWatchNode::ChangeWatchNode(const ros::NodeHandle& handle, const ros::NodeH
       inputs_(channels_of(settings.joints)),
       updater_(handle, private_handle) {
   for (const std::string& topic : inputs_.topics()) topics_.push_back(handle_.resolveName(topic));
-  updater_.setHardwareID(settings.joints.front().joint.rig.rig.name);
+  const WatchSettings& first = settings.joints.front();
+  updater_.setHardwareID(first.arm ? first.arm->name : first.joint.rig.rig.name);
   for (const WatchSettings& joint : settings.joints) {
+    for (std::size_t j = 0; j < joint.channels().size(); ++j) places_.push_back({joints_.size(), j});
     joints_.push_back(std::make_unique<JointWatch>(joint));
     updater_.add(joints_.back()->joint() + ": model",
                  [this, watch = joints_.back().get()](Status& status) { describe(*watch, status); });
@@ -83,7 +90,8 @@ void ChangeWatchNode::on_joint_state(std::size_t topic, const sensor_msgs::Joint
   inputs_.take(topic, message,
                [&](std::size_t joint, const ros::Time& stamp, const record::ChannelValues& values,
                    const std::string& problem) {
-                 if (!joints_[joint]->take(stamp, values, problem, topics_[topic])) return;
+                 const Place& place = places_[joint];
+                 if (!joints_[place.watch]->take(stamp, values, problem, topics_[topic], place.joint)) return;
                  const std::lock_guard<std::mutex> lock(mutex_);
                  due_ = true;
                  due_changed_.notify_all();
@@ -117,13 +125,13 @@ void ChangeWatchNode::publish(const std::vector<diagnosis::KnownChange>& news, c
   backlash_diagnosis::ChangeReport message;
   message.header.stamp = to_stamp(of.state().to);
   for (const diagnosis::KnownChange& change : news) {
-    message.news.push_back(to_message(change, of.joint()));
+    message.news.push_back(to_message(change, joint_of(change, of)));
     ROS_WARN("%s: %s: %s", of.joint().c_str(), diagnosis::to_string(change.state),
              report::change_text(change.found).c_str());
   }
   for (const auto& joint : joints_)
     for (const diagnosis::KnownChange& change : joint->state().changes)
-      message.changes.push_back(to_message(change, joint->joint()));
+      message.changes.push_back(to_message(change, joint_of(change, *joint)));
   changes_.publish(message);
 }
 

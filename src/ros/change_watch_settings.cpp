@@ -38,7 +38,8 @@ usage: rosrun backlash_diagnosis change_watch [_PARAMETER:=VALUE ...] [NAME:=REM
 
 parameters (private)
   rig       path of the rig file of a joint of one inertia (mesh: rigid) or of two (rigid couplings, a free
-            link), whose backlash is watched where load_position is among its channels; or
+            link), whose backlash is watched where load_position is among its channels; or of an arm (urdf),
+            whose joints are watched together, and what it carries; or
   rig_folder  folder with a rig file for each joint of a robot; of others it says that it cannot tell
   joints    list of joint names; default: the joint of the rig file, or all of rig_folder
   channels/CHANNEL/...   topic, name, field, scale, offset: where the robot publishes that channel, as
@@ -52,7 +53,8 @@ parameters (private)
             '1 per month' (also hour, day, week, year)
   window    s that a look sees; default 300, at least 60
   check_interval   s of stamps from one look to the next; default 60
-  JOINT/rig, JOINT/channels, JOINT/healthy   the same for one of several joints
+  JOINT/rig, JOINT/channels, JOINT/healthy   the same for one of several joints; of an arm JOINT/channels
+            only, default: position and effort of JOINT
   folder    where JOINT_healthy.csv is kept, the record that was learned from: delete it to learn anew;
             default: backlash_diagnosis in ROS_HOME (~/.ros)
   history   folder, which must exist, for a file JOINT_changes.csv with all that was told; default: none
@@ -69,6 +71,32 @@ publishes
   /diagnostics   diagnostic_msgs/DiagnosticArray: "JOINT: model", OK, WARN (changed), STALE (cannot tell)
 )";
 }
+
+namespace {
+
+/// What ~rig, ~rig_folder and ~joints name: joints, each by a rig file of its own, or an arm by one.
+std::vector<WatchSettings> watched(Parameters& parameters) {
+  std::vector<WatchSettings> all;
+  const std::string rig = parameters.text("rig", "");
+  if (rig.empty() || !arm::is_arm_rig(rig)) {
+    for (JointRig& joint : load_joint_rigs(parameters)) {
+      all.emplace_back();
+      all.back().joint = std::move(joint);
+    }
+    return all;
+  }
+  WatchSettings one;
+  one.arm = arm::load_arm_rig(rig);
+  one.joint.joint = one.arm->name;
+  for (const std::string& joint : one.arm->joint_names()) {
+    const auto own = read_channels(parameters, joint + "/channels", joint);
+    one.arm_joints.push_back(own ? *own : robot_channels(joint, one.arm->channel));
+  }
+  all.push_back(std::move(one));
+  return all;
+}
+
+}  // namespace
 
 ChangeWatchSettings load_change_watch_settings(const ros::NodeHandle& private_handle) {
   Parameters parameters(private_handle);
@@ -88,14 +116,17 @@ ChangeWatchSettings load_change_watch_settings(const ros::NodeHandle& private_ha
   settings.queue = static_cast<int>(parameters.integer("queue", settings.queue, 1, 10'000'000));
   settings.stale = parameters.number("stale", settings.stale, Range::positive());
   parameters.allow("diagnostic_period");  // of diagnostic_updater
-  const std::vector<JointRig> joints = load_joint_rigs(parameters);
-  for (const JointRig& joint : joints) {
+  std::vector<WatchSettings> all = watched(parameters);
+  for (WatchSettings& what : all) {
     WatchSettings watch = common;
-    watch.joint = joint;
-    watch.healthy = parameters.texts(joint.joint + "/healthy", common.healthy);
-    watch.learned = joint_path(folder.path(), joint.joint, "_healthy.csv");
-    if (!history.empty()) watch.log = joint_path(history, joint.joint, "_changes.csv");
-    watch.rate = diagnosis::rate_of_look(rate, watch.window, watch.check_interval, joints.size());
+    watch.joint = std::move(what.joint);
+    watch.arm = std::move(what.arm);
+    watch.arm_joints = std::move(what.arm_joints);
+    const std::string& name = watch.joint.joint;
+    watch.healthy = parameters.texts(name + "/healthy", common.healthy);
+    watch.learned = joint_path(folder.path(), name, "_healthy.csv");
+    if (!history.empty()) watch.log = joint_path(history, name, "_changes.csv");
+    watch.rate = diagnosis::rate_of_look(rate, watch.window, watch.check_interval, all.size());
     settings.joints.push_back(std::move(watch));
   }
   parameters.finish();

@@ -9,9 +9,7 @@
 #include "backlash_diagnosis/ros/rig_folder.h"
 
 namespace backlash::ros_bridge {
-namespace {
 
-/// The channel map under ~NAME; nothing where there is none.
 std::optional<record::ChannelMap> read_channels(Parameters& parameters, const std::string& name,
                                                 const std::string& joint) {
   if (!parameters.has(name)) return std::nullopt;
@@ -40,6 +38,24 @@ std::optional<record::ChannelMap> read_channels(Parameters& parameters, const st
   }
   return map;
 }
+
+record::ChannelMap robot_channels(const std::string& joint, record::Channel effort) {
+  record::ChannelMap map;
+  map.joint = joint;
+  map.declared = true;
+  for (const auto& [channel, field] : {std::pair{record::Channel::motor_position, record::Field::position},
+                                       std::pair{record::Channel::motor_velocity, record::Field::velocity},
+                                       std::pair{effort, record::Field::effort}}) {
+    record::ChannelSource source;
+    source.channel = channel;
+    source.name = joint;
+    source.field = field;
+    map.sources.push_back(source);
+  }
+  return map;
+}
+
+namespace {
 
 /// What is said of all joints.
 struct Rigs {

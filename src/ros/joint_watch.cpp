@@ -30,11 +30,15 @@ bool has(const record::ChannelMap& map, record::Channel channel) {
 
 record::RingSettings ring_settings(const WatchSettings& settings) {
   record::RingSettings ring;
+  ring.window = settings.learn;
+  if (settings.arm) {
+    ring.channels = {settings.arm->channel, record::Channel::motor_position};
+    return ring;
+  }
   ring.channels = {record::Channel::motor_torque, record::Channel::motor_position};
   const bool rigid = settings.joint.rig.rig.mesh.rigid;
   if (!rigid && has(settings.joint.channels(), record::Channel::load_position))
     ring.channels.push_back(record::Channel::load_position);
-  ring.window = settings.learn;
   return ring;
 }
 
@@ -58,19 +62,19 @@ double since_1970(const ros::Time& stamp) {
 
 JointWatch::JointWatch(WatchSettings settings)
     : settings_(std::move(settings)),
-      ring_(ring_settings(settings_)),
+      rings_(settings_.channels().size(), record::SampleRing(ring_settings(settings_))),
       healthy_(settings_.healthy),
-      impossible_(reason_against(settings_.joint)) {
+      impossible_(settings_.arm ? "" : reason_against(settings_.joint)) {
   for (const std::string& path : healthy_)
     if (!std::filesystem::exists(path))
       throw MissingInput("~healthy: " + path + ": cannot be opened: No such file or directory");
   if (healthy_.empty() && std::filesystem::exists(settings_.learned)) healthy_ = {settings_.learned};
-  ring_.set_window(look_length());
+  for (record::SampleRing& ring : rings_) ring.set_window(look_length());
   if (!settings_.log.empty()) ledger_.restore(diagnosis::read_change_log(settings_.log));
 }
 
 bool JointWatch::take(const ros::Time& stamp, const record::ChannelValues& values, const std::string& problem,
-                      const std::string& topic) {
+                      const std::string& topic, std::size_t joint) {
   const std::lock_guard<std::mutex> lock(mutex_);
   state_.last_arrival = ros::WallTime::now();
   if (!problem.empty() || stamp.isZero()) {
@@ -78,11 +82,12 @@ bool JointWatch::take(const ros::Time& stamp, const record::ChannelValues& value
     state_.last_problem = BadData(topic, stamp.isZero() ? "the header stamp is zero" : problem).what();
     return false;
   }
-  const long run = ring_.counters().restarts;
   const double time = clock_.seconds(stamp);
-  if (!ring_.add(time, values)) return false;
+  const record::SampleRing& first = rings_.front();
+  const long run = first.counters().restarts;
+  if (!rings_[joint].add(time, values) || joint > 0) return false;
   state_.any_sample = true;
-  if (ring_.counters().restarts != run) {
+  if (first.counters().restarts != run) {
     ledger_.restart();
     next_.reset();
     due_ = false;
@@ -92,7 +97,7 @@ bool JointWatch::take(const ros::Time& stamp, const record::ChannelValues& value
   if (time < *next_) return false;
   const double enough =
       healthy_.empty() ? kAll * settings_.learn : std::min(kLeastLook, kAll * settings_.window);
-  if (ring_.length() < enough) return false;
+  if (first.length() < enough) return false;
   // One look for each interval at most: that is what the rate of false alarms counts on.
   next_ = time + settings_.check_interval;
   if (due_ || looking_) {
@@ -108,23 +113,50 @@ std::optional<JointWatch::Task> JointWatch::begin_look() {
   due_ = false;
   looking_ = true;
   Task task;
-  task.record = ring_.kept();
-  task.record.name = joint();
+  task.run = rings_.front().counters().restarts;
+  task.joints = kept();
+  if (task.joints.front().record.size() == 0) return task;
   // The record's own time begins at 0, its name for 0 is the stamp of the first sample.
-  const double first = task.record.time.front();
+  const double first = task.joints.front().record.time.front();
   task.origin = since_1970(clock_.stamp(first));
-  for (double& t : task.record.time) t -= first;
-  task.run = ring_.counters().restarts;
+  for (record::JointRecord& j : task.joints)
+    for (double& t : j.record.time) t -= first;
   task.healthy = healthy_;
   return task;
+}
+
+/// Samples of the stamps that all joints have.
+std::vector<record::JointRecord> JointWatch::kept() const {
+  std::vector<record::JointRecord> joints;
+  for (std::size_t j = 0; j < rings_.size(); ++j)
+    joints.push_back({settings_.arm ? settings_.arm->joints[j].name : joint(),
+                      rings_[j].empty() ? record::Record() : rings_[j].kept()});
+  std::vector<double> times = joints.front().record.time;
+  for (const record::JointRecord& j : joints) {
+    std::vector<double> both;
+    std::set_intersection(times.begin(), times.end(), j.record.time.begin(), j.record.time.end(),
+                          std::back_inserter(both));
+    times = std::move(both);
+  }
+  for (record::JointRecord& j : joints)
+    if (j.record.size() != times.size()) j.record = record::samples_at(j.record, times);
+  return joints;
+}
+
+void JointWatch::write(const std::vector<record::JointRecord>& joints, const std::string& path) const {
+  if (settings_.arm)
+    record::write_joints_csv(joints, path);
+  else
+    record::write_csv(joints.front().record, path);
 }
 
 diagnosis::ChangeLook JointWatch::found(const Task& task, const Progress& go_on) const {
   const ScratchFolder scratch;
   const std::string record = scratch.path("newest.csv"), json = scratch.path("changes.json");
-  record::write_csv(task.record, record);
+  write(task.joints, record);
   Job job;
-  job.words = {command_path("detect_changes"), "--rig", file_of(settings_.joint.rig, scratch), "--healthy"};
+  job.words = {command_path("detect_changes"), "--rig",
+               settings_.arm ? settings_.arm->source : file_of(settings_.joint.rig, scratch), "--healthy"};
   job.words.insert(job.words.end(), task.healthy.begin(), task.healthy.end());
   job.words.insert(job.words.end(),
                    {"--false-alarms-per-hour", to_text(settings_.rate), "--json", json, record});
@@ -132,9 +164,9 @@ diagnosis::ChangeLook JointWatch::found(const Task& task, const Progress& go_on)
   job.memory = settings_.job_memory;
   job.progress = go_on;
   run_job(job);
-  diagnosis::ChangeLook look = report::read_changes(json, task.origin);
+  diagnosis::ChangeLook look = report::read_changes(json, task.origin, settings_.arm.has_value());
   look.from = task.origin;
-  look.to = task.origin + task.record.time.back();
+  look.to = task.origin + task.length();
   return look;
 }
 
@@ -143,6 +175,8 @@ std::vector<diagnosis::KnownChange> JointWatch::look(const Progress& go_on) {
   if (!task) return {};
   std::vector<diagnosis::KnownChange> news;
   try {
+    if (task->joints.front().record.size() == 0)
+      throw CannotIdentify("no stamp has samples of all joints: they must come in one message");
     if (task->healthy.empty())
       learn(*task, go_on);
     else
@@ -167,25 +201,27 @@ void JointWatch::cannot_tell(const std::string& why) {
 /// healthy, must find nothing in the whole. The whole by itself would take a change for a scatter of its
 /// values.
 void JointWatch::learn(const Task& task, const Progress& go_on) {
-  const double middle = task.record.time.back() / 2;
+  const double middle = task.length() / 2;
   for (const auto& [from, to] : {std::pair(0.0, middle), std::pair(middle, 2 * middle)}) {
     const ScratchFolder scratch;
     Task half = task;
     half.healthy = {scratch.path("half_of_what_is_learned.csv")};
-    record::write_csv(task.record.slice(from, to), half.healthy.front());
+    std::vector<record::JointRecord> part = task.joints;
+    for (record::JointRecord& j : part) j.record = j.record.slice(from, to);
+    write(part, half.healthy.front());
     const diagnosis::ChangeLook look = found(half, go_on);
     if (look.changes.empty()) continue;
     cannot_tell("the samples to learn the healthy machine from change within themselves: " +
                 report::change_text(look.changes.front()));
     return;
   }
-  record::write_csv(task.record, settings_.learned);
+  write(task.joints, settings_.learned);
   const std::lock_guard<std::mutex> lock(mutex_);
   healthy_ = {settings_.learned};
-  ring_.set_window(look_length());
+  for (record::SampleRing& ring : rings_) ring.set_window(look_length());
   state_.why_not.clear();
-  ROS_INFO("%s: the healthy machine is learned, from %.0f s of samples: %s", joint().c_str(),
-           task.record.time.back(), settings_.learned.c_str());
+  ROS_INFO("%s: the healthy machine is learned, from %.0f s of samples: %s", joint().c_str(), task.length(),
+           settings_.learned.c_str());
 }
 
 std::vector<diagnosis::KnownChange> JointWatch::judge(const Task& task, const diagnosis::ChangeLook& look) {
@@ -193,7 +229,7 @@ std::vector<diagnosis::KnownChange> JointWatch::judge(const Task& task, const di
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     // Of another run of the clock: its times mean nothing any more.
-    if (ring_.counters().restarts != task.run) return {};
+    if (rings_.front().counters().restarts != task.run) return {};
     ++state_.judged;
     state_.why_not.clear();
     state_.from = look.from;
@@ -216,16 +252,16 @@ std::vector<diagnosis::KnownChange> JointWatch::judge(const Task& task, const di
 WatchState JointWatch::state() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   WatchState state = state_;
-  state.counters = ring_.counters();
+  state.counters = rings_.front().counters();
   state.healthy = joined(healthy_);
-  state.learning = ring_.length();
+  state.learning = rings_.front().length();
   state.changes = ledger_.told();
   state.different = ledger_.unexplained_difference();
   if (!impossible_.empty())
     state.why_not = impossible_;
-  else if (healthy_.empty() && ring_.length() < kAll * settings_.learn)
+  else if (healthy_.empty() && rings_.front().length() < kAll * settings_.learn)
     state.why_not = fmt::format("the healthy machine is being learned, {:.0f} of {:.0f} s so far",
-                                ring_.length(), settings_.learn) +
+                                rings_.front().length(), settings_.learn) +
                     (state.why_not.empty() ? "" : "; last: " + state.why_not);
   else if (state.why_not.empty() && state.judged == 0)
     state.why_not = "nothing was looked at yet";

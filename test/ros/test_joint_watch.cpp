@@ -6,8 +6,10 @@
 #include <cmath>
 #include <filesystem>
 #include <random>
+#include <set>
 #include <utility>
 
+#include "arm/arm_machines.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/scratch_folder.h"
@@ -169,6 +171,60 @@ TEST(JointWatch, SaysWhyItCannotTell) {
   WatchSettings missing = settings(folder);
   missing.healthy = {"/nowhere/monday.csv"};
   EXPECT_THROW(JointWatch{missing}, MissingInput);
+}
+
+/// An arm's record as messages, each joint one sample of a stamp.
+void play(const arm::ArmRecord& record, record::Channel channel, double start, JointWatch& watch,
+          std::vector<diagnosis::KnownChange>& news) {
+  for (std::size_t k = 0; k < record.joints.front().size(); ++k) {
+    bool due = false;
+    for (std::size_t j = 0; j < record.joints.size(); ++j) {
+      const record::Record& joint = record.joints[j];
+      record::ChannelValues values;
+      values.fill(kNaN);
+      for (const record::Channel c :
+           {channel, record::Channel::motor_position, record::Channel::motor_velocity})
+        values[static_cast<std::size_t>(c)] = joint.column(c)[k];
+      due = watch.take(ros::Time(kStart + start + joint.time[k]), values, "", "/joint_states", j) || due;
+    }
+    if (!due) continue;
+    for (const diagnosis::KnownChange& change : watch.look(nullptr)) news.push_back(change);
+  }
+}
+
+// Two joints of the same arm change at once: each is told of its own joint.
+TEST(JointWatch, AnArmIsWatchedAsOneMachine) {
+  const ScratchFolder folder;
+  const test::Machine machine(4);
+  test::Machine worn = machine;
+  worn.drives[2].terms[std::size_t(arm::DriveTerm::coulomb)] *= 1.4;
+  worn.drives[3].terms[std::size_t(arm::DriveTerm::coulomb)] *= 1.4;
+  WatchSettings s;
+  s.arm = machine.declared;
+  s.joint.joint = machine.declared.name;
+  for (const std::string& joint : machine.declared.joint_names())
+    s.arm_joints.push_back(robot_channels(joint, machine.declared.channel));
+  s.learned = folder.path("arm_healthy.csv");
+  s.log = folder.path("arm_changes.csv");
+  s.learn = s.window = 60;
+  s.check_interval = 15;
+  JointWatch watch(s);
+  std::vector<diagnosis::KnownChange> news;
+  play(machine.record(41, 62), machine.declared.channel, 0, watch, news);
+  EXPECT_TRUE(std::filesystem::exists(s.learned)) << watch.state().why_not;
+  EXPECT_TRUE(news.empty());
+  play(machine.record(42, 75, worn, 25), machine.declared.channel, 62, watch, news);
+  std::set<std::string> told;
+  for (const diagnosis::KnownChange& change : watch.state().changes) {
+    told.insert(change.found.joint + " " + change.found.effect);
+    EXPECT_LE(change.found.since_from, kStart + 87);
+    EXPECT_GE(change.found.since_to, kStart + 87);
+  }
+  EXPECT_EQ(told, (std::set<std::string>{"elbow_joint motor_coulomb", "wrist_1_joint motor_coulomb"}))
+      << watch.state().why_not;
+  const std::vector<diagnosis::KnownChange> restored = JointWatch(s).state().changes;
+  ASSERT_EQ(restored.size(), 2U);
+  EXPECT_EQ(restored[0].found.joint, watch.state().changes[0].found.joint);
 }
 
 TEST(ChangeWatch, RateIsReadAsItIsSaid) {

@@ -25,6 +25,7 @@ struct FoundSize {
 /// Times are seconds since 1970, as the stamps.
 struct FoundChange {
   std::string effect;                        // id of an effect, name of a declared value, or "unknown"
+  std::string joint;                         // of an arm; else empty
   double since = 0;                          // s
   double since_from = 0, since_to = 0;       // s, 95 % interval
   std::optional<double> until;               // s; absent: it goes on

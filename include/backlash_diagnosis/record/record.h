@@ -76,4 +76,7 @@ class Record {
   std::array<std::vector<double>, kChannelCount> columns_;
 };
 
+/// The samples of these times [s], which must all be there, in order.
+Record samples_at(const Record& record, const std::vector<double>& times);
+
 }  // namespace backlash::record

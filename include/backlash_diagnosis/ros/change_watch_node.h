@@ -55,9 +55,13 @@ class ChangeWatchNode {
   ros::NodeHandle handle_;
   double stale_;                                     // s
   std::vector<std::unique_ptr<JointWatch>> joints_;  // as many as at the start
-  JointInputs inputs_;                               // of the same joints
-  std::vector<std::string> topics_;                  // of inputs_, resolved
-  ros::CallbackQueue sample_queue_;                  // samples have a thread of their own
+  JointInputs inputs_;                               // of all joints
+  struct Place {
+    std::size_t watch, joint;  // of an arm
+  };
+  std::vector<Place> places_;        // of the joints of inputs_
+  std::vector<std::string> topics_;  // of inputs_, resolved
+  ros::CallbackQueue sample_queue_;  // samples have a thread of their own
   std::vector<ros::Subscriber> subscribers_;
   ros::Publisher changes_;
   diagnostic_updater::Updater updater_;

@@ -3,6 +3,7 @@
 // channels.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,13 @@ struct JointRig {
 
 /// Throws InvalidParameter, BadData, MissingInput.
 std::vector<JointRig> load_joint_rigs(Parameters& parameters);
+
+/// The channel map under ~NAME; nothing where there is none. Throws InvalidParameter.
+std::optional<record::ChannelMap> read_channels(Parameters& parameters, const std::string& name,
+                                                const std::string& joint);
+
+/// As a robot publishes a joint of its URDF: position, velocity, and as effort that channel.
+record::ChannelMap robot_channels(const std::string& joint, record::Channel effort);
 
 /// Path of a file of a joint in a folder: a joint's name may have parts, a file's name may not.
 std::string joint_path(const std::string& folder, std::string joint, const std::string& ending);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One joint as the change watch sees it: its newest samples, the healthy machine that it learns or is given,
-// and what looks at the samples have found. Samples come from one thread, looks are done in another; what a
-// look computes, the command detect_changes computes in a process of its own.
+// One joint, or the joints of an arm, as the change watch sees it: its newest samples, the healthy machine
+// that it learns or is given, and what looks at the samples have found. Samples come from one thread, looks
+// are done in another; what a look computes, the command detect_changes computes in a process of its own.
 #pragma once
 
 #include <mutex>
@@ -9,8 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/arm/arm_rig.h"
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/diagnosis/change_ledger.h"
+#include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/record/sample_ring.h"
 #include "backlash_diagnosis/ros/job.h"
 #include "backlash_diagnosis/ros/joint_rigs.h"
@@ -19,15 +21,22 @@
 namespace backlash::ros_bridge {
 
 struct WatchSettings {
-  JointRig joint;
-  std::vector<std::string> healthy;  // records of the healthy machine; empty: it is learned
-  std::string learned;               // record that is written where it is learned, and taken where it exists
-  std::string log;                   // of diagnosis/change_log.h; empty: none
-  double learn = 600;                // s of samples that the healthy machine is learned from, > 0
-  double window = 300;               // s that a look sees, > 0
-  double check_interval = 60;        // s from one look to the next, > 0
-  double rate = 1.0 / 720;           // 1/h, of one look (diagnosis::rate_of_look)
-  double job_memory = kJobMemory;    // GB
+  JointRig joint;                              // of an arm only its name
+  std::optional<arm::ArmRig> arm;              // an arm, whose joints are watched together
+  std::vector<record::ChannelMap> arm_joints;  // where they are published
+  std::vector<std::string> healthy;            // records of the healthy machine; empty: it is learned
+  std::string learned;             // record that is written where it is learned, and taken where it exists
+  std::string log;                 // of diagnosis/change_log.h; empty: none
+  double learn = 600;              // s of samples that the healthy machine is learned from, > 0
+  double window = 300;             // s that a look sees, > 0
+  double check_interval = 60;      // s from one look to the next, > 0
+  double rate = 1.0 / 720;         // 1/h, of one look (diagnosis::rate_of_look)
+  double job_memory = kJobMemory;  // GB
+
+  /// Of the joint, or of each of the arm's.
+  std::vector<record::ChannelMap> channels() const {
+    return arm ? arm_joints : std::vector<record::ChannelMap>{joint.channels()};
+  }
 };
 
 struct WatchState {
@@ -56,9 +65,10 @@ class JointWatch {
   const std::string& joint() const { return settings_.joint.joint; }
   const WatchSettings& settings() const { return settings_; }
 
-  /// Takes a sample, or what is wrong with a message. True where a look is due from now on.
+  /// Takes a sample, or what is wrong with a message. True where a look is due from now on. `joint`: of an
+  /// arm.
   bool take(const ros::Time& stamp, const record::ChannelValues& values, const std::string& problem,
-            const std::string& topic);
+            const std::string& topic, std::size_t joint = 0);
 
   /// Looks, where a look is due: learns the healthy machine, or holds the newest samples against it. Changes
   /// that are new or better known. Ends with Cancelled where `go_on` says so.
@@ -68,14 +78,17 @@ class JointWatch {
 
  private:
   struct Task {
-    record::Record record;
-    double origin = 0;  // s since 1970
-    long run = 0;       // of the clock
+    std::vector<record::JointRecord> joints;  // on one time base
+    double origin = 0;                        // s since 1970
+    double length() const { return joints.front().record.time.back(); }
+    long run = 0;  // of the clock
     std::vector<std::string> healthy;
   };
 
   double look_length() const { return healthy_.empty() ? settings_.learn : settings_.window; }
   std::optional<Task> begin_look();
+  std::vector<record::JointRecord> kept() const;
+  void write(const std::vector<record::JointRecord>& joints, const std::string& path) const;
   /// What the command finds in a task's record. Throws what it could not do.
   diagnosis::ChangeLook found(const Task& task, const Progress& go_on) const;
   void learn(const Task& task, const Progress& go_on);
@@ -85,7 +98,7 @@ class JointWatch {
   WatchSettings settings_;
   mutable std::mutex mutex_;
   StampClock clock_;
-  record::SampleRing ring_;
+  std::vector<record::SampleRing> rings_;  // of the joint, or of each of the arm's
   std::vector<std::string> healthy_;
   diagnosis::ChangeLedger ledger_;
   WatchState state_;

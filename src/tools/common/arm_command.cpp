@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/report/report_page.h"
 #include "backlash_diagnosis/ros/bag_record.h"
+#include "backlash_diagnosis/ros/joint_rigs.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/feedback.h"
 #include "tools/common/progress_bar.h"
@@ -20,22 +21,6 @@ namespace backlash::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-record::ChannelMap stock_channels(const std::string& joint, record::Channel effort) {
-  record::ChannelMap map;
-  map.joint = joint;
-  map.declared = true;
-  for (const auto& [channel, field] : {std::pair{record::Channel::motor_position, record::Field::position},
-                                       std::pair{record::Channel::motor_velocity, record::Field::velocity},
-                                       std::pair{effort, record::Field::effort}}) {
-    record::ChannelSource source;
-    source.channel = channel;
-    source.name = joint;
-    source.field = field;
-    map.sources.push_back(source);
-  }
-  return map;
-}
 
 report::Provenance provenance_of(const arm::ArmRig& rig, const findings::TraceInputs& inputs,
                                  const std::string& folder) {
@@ -99,8 +84,8 @@ arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) 
   std::vector<record::JointRecord> joints;
   if (fs::path(path).extension() != ".csv") {
     for (const arm::JointDrive& joint : rig.joints)
-      joints.push_back(
-          {joint.name, ros_bridge::read_robot_bag(path, stock_channels(joint.name, rig.channel))});
+      joints.push_back({joint.name, ros_bridge::read_robot_bag(
+                                        path, ros_bridge::robot_channels(joint.name, rig.channel))});
   } else {
     joints = record::read_joints_csv(path);
   }
