@@ -43,9 +43,10 @@ class ArmChanges {
   void set_search(ArmJoint& joint) const;
   void search(const arm::ArmRecord& record);
   void take(const FoundChainChange& found, const arm::ArmRecord& record);
-  void carry(const FoundChainChange& found, bool from_beginning, const arm::ArmRecord& record);
+  void differ(const FoundChainChange& found, bool from_beginning, const arm::ArmRecord& record);
   void tell_apart(FoundChainChange& of_chain, const ArmJoint& joint, FoundChange& own) const;
   bool is_of_chain(const ArmJoint& joint, std::size_t place, const FoundChange& next) const;
+  void add_constant_error(const ArmJoint& joint, Change& change) const;
   bool is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const;
   void tell_joint(const ArmJoint& joint, std::size_t place);
   Change told(const FoundChainChange& f) const;
@@ -55,8 +56,9 @@ class ArmChanges {
   const Progress& progress_;
   arm::ArmFit healthy_;
   std::deque<ArmJoint> joints_;
-  std::vector<FoundChainChange> chain_;
-  std::vector<CarriedBody> carried_;
+  std::vector<FoundChainChange> chain_;    // told
+  std::vector<FoundChainChange> earlier_;  // and those that the record has from its beginning
+  std::vector<ChainDifference> differences_;
   Changes out_;
 };
 
@@ -170,16 +172,21 @@ void ArmChanges::read(const std::vector<arm::ArmRecord>& healthy, const arm::Arm
   if (joints_.empty()) throw CannotIdentify(joined(out_.warnings));
 }
 
-/// What the arm carries loads its gears too.
-void ArmChanges::carry(const FoundChainChange& found, bool from_beginning, const arm::ArmRecord& record) {
+/// What the arm carries loads its gears too, and a joint that stands elsewhere bears another load.
+void ArmChanges::differ(const FoundChainChange& found, bool from_beginning, const arm::ArmRecord& record) {
   const double start = joints_.front().motion.start, end = record.joints.front().time.back();
   const bool to_end = found.to == joints_.front().search->blocks();
-  carried_.push_back({found.effect.joint,
-                      from_beginning ? start : start + settings_.block * double(found.from),
-                      to_end ? end + 1 : start + settings_.block * double(found.to),
-                      arm::BodyParameters(found.score.values)});
+  ChainDifference d;
+  d.joint = found.effect.joint;
+  d.from = from_beginning ? start : start + settings_.block * double(found.from);
+  d.to = to_end ? end + 1 : start + settings_.block * double(found.to);
+  if (found.effect.values > 1)
+    d.body = found.score.values;
+  else
+    d.slip = found.score.values[0];
+  differences_.push_back(d);
   std::vector<std::string> told_before;
-  const ChainMotion motion = chain_motion(healthy_, record, carried_, settings_.most_rate, told_before);
+  const ChainMotion motion = chain_motion(healthy_, record, differences_, settings_.most_rate, told_before);
   for (ArmJoint& joint : joints_) {
     joint.motion = motion_by(joint.model, motion.joints[joint.index], settings_);
     set_chain_columns(motion, joint.index, joint.motion);
@@ -189,7 +196,7 @@ void ArmChanges::carry(const FoundChainChange& found, bool from_beginning, const
 /// A change of the chain stands beside those of each joint from then on.
 void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& record) {
   const bool from_beginning = found.low <= 0;
-  if (found.effect.values > 1) carry(found, from_beginning, record);
+  differ(found, from_beginning, record);
   std::size_t j = 0;
   for (ArmJoint& joint : joints_) {
     FoundChange beside{found.effect.at_joint(), found.from, found.to, {}, found.inflation, 0, {}};
@@ -199,6 +206,7 @@ void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& recor
     joint.beside.push_back(beside);
     set_search(joint);
   }
+  earlier_.push_back(found);
   if (!from_beginning) {
     chain_.push_back(found);
     return;
@@ -247,8 +255,8 @@ void ArmChanges::search(const arm::ArmRecord& record) {
         clearest = j;
     }
     std::optional<FoundChainChange> of_chain;
-    if (chain_.size() < static_cast<std::size_t>(settings_.most_changes))
-      of_chain = ChainSearch(joints_, rig_.chain, settings_).best(chain_);
+    if (earlier_.size() < static_cast<std::size_t>(settings_.most_changes))
+      of_chain = ChainSearch(joints_, rig_.chain, settings_).best(earlier_);
     if (of_chain && clearest < joints_.size()) tell_apart(*of_chain, joints_[clearest], *next[clearest]);
     if (of_chain && (clearest == joints_.size() || of_chain->score.gain > next[clearest]->score.gain)) {
       take(*of_chain, record);
@@ -281,6 +289,15 @@ bool ArmChanges::is_left_by_chain(const ArmJoint& joint, std::size_t place, cons
          });
 }
 
+/// Torques are as well known as the constants that they follow from.
+void ArmChanges::add_constant_error(const ArmJoint& joint, Change& change) const {
+  const double relative =
+      std::hypot(healthy_.rig.common_error, healthy_.rig.joints[joint.index].constant_error);
+  for (ChangeSize& s : change.size)
+    if (s.name != "phase" && s.name != "order" && s.unit.find("N m") != std::string::npos)
+      s.measured.standard_error = std::hypot(s.measured.standard_error, relative * s.measured.value);
+}
+
 void ArmChanges::tell_joint(const ArmJoint& joint, std::size_t place) {
   Changes one;
   for (const FoundChange& f : joint.found) one.changes.push_back(joint.search->told(f, joint.found, false));
@@ -289,6 +306,7 @@ void ArmChanges::tell_joint(const ArmJoint& joint, std::size_t place) {
   const auto named = [&](const std::string& text) { return joint.name + ": " + text; };
   for (Change& c : one.changes) {
     c.joint = joint.name;
+    add_constant_error(joint, c);
     if (is_left_by_chain(joint, place, c)) {
       one.warnings.push_back("since " + to_text(std::round(c.since)) +
                              " s the record follows no effect, beside " +

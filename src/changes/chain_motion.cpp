@@ -65,22 +65,30 @@ void add_rows(const arm::Chain& chain, const arm::ArmMotion& m, std::size_t stri
   }
 }
 
-arm::Chain chain_at(const arm::Chain& chain, const std::vector<CarriedBody>& carried, double time) {
-  arm::Chain loaded = chain;
-  for (const CarriedBody& b : carried)
-    if (time >= b.from && time < b.to) loaded.links[b.link] += b.parameters;
-  return loaded;
+/// What the chain takes at sample k.
+arm::Joints torque_at(const arm::Chain& chain, const std::vector<ChainDifference>& differences,
+                      const arm::ArmMotion& m, std::size_t k) {
+  const auto row = static_cast<Eigen::Index>(k);
+  arm::Joints q = m.q.row(row);
+  if (differences.empty()) return inverse_dynamics(chain, q, m.v.row(row), m.a.row(row));
+  arm::Chain changed = chain;
+  for (const ChainDifference& d : differences) {
+    if (m.time[k] < d.from || m.time[k] >= d.to) continue;
+    changed.links[d.joint] += d.body;
+    q[static_cast<Eigen::Index>(d.joint)] -= d.slip;
+  }
+  return inverse_dynamics(changed, q, m.v.row(row), m.a.row(row));
 }
 
-void add_joints(const arm::ArmRig& rig, const arm::Chain& chain, const std::vector<CarriedBody>& carried,
-                const arm::ArmRecord& record, const arm::ArmMotion& m, ChainMotion& out) {
+void add_joints(const arm::ArmRig& rig, const arm::Chain& chain,
+                const std::vector<ChainDifference>& differences, const arm::ArmRecord& record,
+                const arm::ArmMotion& m, ChainMotion& out) {
   std::vector<Interpolated> signals;
   for (const record::Record& joint : record.joints)
     signals.emplace_back(joint.time, joint.column(rig.channel));
   for (std::size_t k = 0; k < m.time.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
-    const arm::Joints torque = inverse_dynamics(carried.empty() ? chain : chain_at(chain, carried, m.time[k]),
-                                                m.q.row(row), m.v.row(row), m.a.row(row));
+    const arm::Joints torque = torque_at(chain, differences, m, k);
     for (std::size_t j = 0; j < out.joints.size(); ++j) {
       const auto c = static_cast<Eigen::Index>(j);
       record::Record& r = out.joints[j];
@@ -104,7 +112,7 @@ std::vector<ChainEffect> chain_effects(std::size_t joints) {
 }
 
 ChainMotion chain_motion(const arm::ArmFit& healthy, const arm::ArmRecord& record,
-                         const std::vector<CarriedBody>& carried, double most_rate,
+                         const std::vector<ChainDifference>& differences, double most_rate,
                          std::vector<std::string>& warnings) {
   const arm::ArmRig& rig = healthy.rig;
   const arm::Chain chain = loaded_chain(rig);
@@ -114,7 +122,7 @@ ChainMotion chain_motion(const arm::ArmFit& healthy, const arm::ArmRecord& recor
   out.slip.resize(chain.size());
   for (std::size_t j = 0; j < chain.size(); ++j) out.joints[j].name = record.name + ", " + rig.joints[j].name;
   for (const arm::ArmMotion& m : kinematics_of(record, rig, warnings)) {
-    add_joints(rig, chain, carried, record, m, out);
+    add_joints(rig, chain, differences, record, m, out);
     const double stride = std::floor(1 / (m.interval * most_rate));
     add_rows(chain, m, static_cast<std::size_t>(std::max(1.0, stride)), out);
   }

@@ -34,16 +34,17 @@ struct ChainMotion {
   std::vector<Eigen::MatrixXd> body, slip;  // per joint: 10 columns per link, one per encoder [N m per unit]
 };
 
-/// A body that the arm carries for a while.
-struct CarriedBody {
-  std::size_t link = 0;
-  double from = 0, to = 0;  // s of the record
-  arm::BodyParameters parameters;
+/// By what the chain is another one for a while.
+struct ChainDifference {
+  std::size_t joint = 0;
+  double from = 0, to = 0;                                 // s of the record
+  arm::BodyParameters body = arm::BodyParameters::Zero();  // that its link carries
+  double slip = 0;                                         // rad, that its encoder shows more
 };
 
 /// Throws BadData.
 ChainMotion chain_motion(const arm::ArmFit& healthy, const arm::ArmRecord& record,
-                         const std::vector<CarriedBody>& carried, double most_rate,
+                         const std::vector<ChainDifference>& differences, double most_rate,
                          std::vector<std::string>& warnings);
 
 /// Puts the columns of all chain effects at a joint where effect_columns() finds them.

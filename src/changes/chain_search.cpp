@@ -77,6 +77,8 @@ FoundChainChange ChainSearch::scanned(std::size_t effect) const {
   FoundChainChange best{effects_[effect], 0, blocks_, {}, {}, 1, 0, 0, {}};
   for (const ArmJoint& j : joints_) best.inflation = std::max(best.inflation, j.chain_inflation[effect]);
   const Sums sums = sums_of(best.effect);
+  // From the beginning: it came in with another tool.
+  best.score = score(sums, 0, blocks_, best.effect);
   for (std::size_t k = margin_; k + margin_ < blocks_; k += 5) {
     EffectSums::Score s = score(sums, k, blocks_, best.effect);
     if (s.gain <= best.score.gain) continue;
@@ -152,10 +154,11 @@ void ChainSearch::set_onset(FoundChainChange& f, const Sums& sums) const {
   f.high = settings_.block * double(high) + least;
 }
 
-/// A body that an arm may carry, or may have lost: its mass is told, and within reach.
+/// A body that an arm may carry, or may have lost: its mass is told, and within reach. A slip that is small
+/// enough for its slope to be straight.
 bool ChainSearch::plausible(const FoundChainChange& f) const {
   if (f.score.values.size() == 0) return false;
-  if (f.effect.values == 1) return true;
+  if (f.effect.values == 1) return std::fabs(f.score.values[0]) < settings_.largest_slip;
   const Eigen::VectorXd& x = f.score.values;
   return std::fabs(x[0]) > settings_.errors_of_mass * f.error(0) &&
          x.segment(1, 3).norm() < settings_.farthest_centre * std::fabs(x[0]);

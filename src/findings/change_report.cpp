@@ -53,6 +53,10 @@ std::string change_summary(const changes::Changes& found) {
     text += (text.empty() ? "cannot tell: " : "what else has changed cannot be told: ") + found.cannot_tell +
             "\n";
   if (text.empty()) text = "no change found\n";
+  if (!found.different.empty())
+    text +=
+        "from its beginning the record differs from the healthy ones, so that since when cannot be told: " +
+        joined(found.different) + "\n";
   return text + fmt::format("{} windows of motion judged\n", found.windows);
 }
 

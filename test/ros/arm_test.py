@@ -12,7 +12,9 @@ import rosbag
 import rospy
 import rostest
 import yaml
+from backlash_diagnosis.msg import ChangeReport
 from backlash_diagnosis.srv import SetBacklash
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from diagnoser_support import run_tool
 from sensor_msgs.msg import JointState
 from simulator_support import Inbox, Simulator, TIMEOUT, latched, nanoseconds, package_folder, steps
@@ -94,6 +96,23 @@ class ArmTest(unittest.TestCase):
                 self.assertAlmostEqual(sign * have, want, delta=1e-12)
             for have, want in ((moved.x, x), (moved.y, 0), (moved.z, 0)):
                 self.assertAlmostEqual(have, want, delta=1e-12)
+
+    def test_a_healthy_arm_is_watched_as_one_machine(self):
+        folder = rospy.get_param("/watched/change_watch/folder")
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        reports = Inbox("/watched/changes", ChangeReport)
+
+        def looked(messages):
+            """The status once three looks could tell."""
+            for status in (s for m in reversed(messages) for s in m.status if s.name.endswith("two_link_arm: model")):
+                values = {v.key: v.value for v in status.values}
+                return (status, values) if int(values["Looks that could tell"]) >= 3 else None
+            return None
+        status, values = Inbox("/diagnostics", DiagnosticArray).wait_for(looked, "looks")
+        self.assertEqual((status.level, reports.messages), (DiagnosticStatus.OK, []), status.message)
+        self.assertGreater(int(values["Windows of motion judged"]), 5)
+        with open(os.path.join(folder, "two_link_arm_healthy.csv")) as file:
+            self.assertEqual(file.readline().strip().split(",")[:2], ["time", "shoulder/motor_torque"])
 
     def test_live_is_as_offline_and_a_recorded_bag_tells_both_plays(self):
         bag, offline = (os.path.join(self.folder, name) for name in ("live.bag", "offline.bag"))

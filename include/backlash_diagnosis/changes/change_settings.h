@@ -68,6 +68,7 @@ struct ChangeSettings {
   double least_with_other = 1e-3;  // - of the gain of the other channel's change of the same event. Choice
   double least_beside = 0.25;      // - of the gain of the other that a second one of an event has. Choice
   double errors_of_mass = 4;       // standard errors, by which a payload has a mass. Choice
+  double largest_slip = 0.3;       // rad, of an encoder. Theory: its sine is 1.5 % smaller
   double farthest_centre = 2;      // m from its joint, that a payload's centre may be. Choice
   int most_changes = 4;            // Choice
   double onset_drop = 8;      // of twice the log likelihood, as wide as the onset is uncertain. Simulation
