@@ -22,8 +22,8 @@ class ArmChanges {
       : rig_(rig), settings_(settings), progress_(progress) {
     settings_.cutoff = rig.identification.torque_cutoff;
     settings_.position_cutoff = rig.identification.kinematics_cutoff;
-    // The joints share the rate, and the chain is one more.
-    settings_.false_alarms_per_hour /= double(rig.joints.size() + 1);
+    // The joints share the rate, with two channels each, and the chain is one more.
+    settings_.false_alarms_per_hour /= double(2 * rig.joints.size() + 1);
   }
 
   Changes run(const std::vector<arm::ArmRecord>& healthy, const arm::ArmRecord& record);
@@ -35,11 +35,12 @@ class ArmChanges {
   void fit(const std::vector<arm::ArmRecord>& healthy);
   void tell_pushes(const arm::ArmRecord& record);
   void read(const std::vector<arm::ArmRecord>& healthy, const arm::ArmRecord& record);
-  void add_joint(std::size_t index, const std::vector<ChainMotion>& healthy, const ChainMotion& record);
-  MotionSampling sampling_of_joint(std::size_t index, const std::vector<ChainMotion>& healthy,
-                                   const ChainMotion& record) const;
-  std::vector<record::Record> long_enough(std::size_t index, const std::vector<ChainMotion>& healthy,
-                                          const MotionSampling& sampling) const;
+  void add_joint(std::size_t index);
+  MotionSampling sampling_of_joint(std::size_t index) const;
+  std::vector<record::Record> long_enough(std::size_t index, const MotionSampling& sampling) const;
+  void search_deflection(std::size_t index);
+  void add(const std::string& joint, const Changes& one, const ChangeSearch& search,
+           const HealthyModel& model);
   void set_search(ArmJoint& joint) const;
   void search(const arm::ArmRecord& record);
   void take(const FoundChainChange& found, const arm::ArmRecord& record);
@@ -55,6 +56,8 @@ class ArmChanges {
   ChangeSettings settings_;
   const Progress& progress_;
   arm::ArmFit healthy_;
+  std::vector<ChainMotion> healthy_motions_;
+  ChainMotion record_;  // with what the chain was found to be another by
   std::deque<ArmJoint> joints_;
   std::vector<FoundChainChange> chain_;    // told
   std::vector<FoundChainChange> earlier_;  // and those that the record has from its beginning
@@ -92,22 +95,19 @@ void ArmChanges::tell_pushes(const arm::ArmRecord& record) {
       "nothing else");
 }
 
-MotionSampling ArmChanges::sampling_of_joint(std::size_t index, const std::vector<ChainMotion>& healthy,
-                                             const ChainMotion& record) const {
-  std::vector<const record::Record*> all = {&record.joints[index]};
-  for (const ChainMotion& h : healthy) all.push_back(&h.joints[index]);
+MotionSampling ArmChanges::sampling_of_joint(std::size_t index) const {
+  std::vector<const record::Record*> all = {&record_.joints[index]};
+  for (const ChainMotion& h : healthy_motions_) all.push_back(&h.joints[index]);
   MotionSampling sampling = sampling_of(all, settings_);
   sampling.chain = true;
   return sampling;
 }
 
 /// A joint rests while others move: the healthy records in which it moves.
-std::vector<record::Record> ArmChanges::long_enough(std::size_t index,
-                                                    const std::vector<ChainMotion>& healthy,
-                                                    const MotionSampling& sampling) const {
+std::vector<record::Record> ArmChanges::long_enough(std::size_t index, const MotionSampling& sampling) const {
   std::vector<record::Record> all;
   std::string why;
-  for (const ChainMotion& h : healthy) {
+  for (const ChainMotion& h : healthy_motions_) {
     try {
       sampled_motion(h.joints[index], sampling, settings_);
       all.push_back(h.joints[index]);
@@ -119,15 +119,14 @@ std::vector<record::Record> ArmChanges::long_enough(std::size_t index,
   return all;
 }
 
-void ArmChanges::add_joint(std::size_t index, const std::vector<ChainMotion>& healthy,
-                           const ChainMotion& record) {
+void ArmChanges::add_joint(std::size_t index) {
   const std::string& name = rig_.joints[index].name;
   std::vector<record::Record> of_joint;
   try {
-    const MotionSampling sampling = sampling_of_joint(index, healthy, record);
-    of_joint = long_enough(index, healthy, sampling);
+    const MotionSampling sampling = sampling_of_joint(index);
+    of_joint = long_enough(index, sampling);
     HealthyModel model = commission_healthy(of_joint, sampling, settings_);
-    SampledMotion motion = motion_by(model, record.joints[index], settings_);
+    SampledMotion motion = motion_by(model, record_.joints[index], settings_);
     joints_.emplace_back();
     ArmJoint& joint = joints_.back();
     joint.name = name;
@@ -140,10 +139,10 @@ void ArmChanges::add_joint(std::size_t index, const std::vector<ChainMotion>& he
   }
   ArmJoint& joint = joints_.back();
   joint.candidates = candidates_of(joint.model, of_joint, settings_);
-  set_chain_columns(record, index, joint.motion);
+  set_chain_columns(record_, index, joint.motion);
   const std::vector<ChainEffect> effects = chain_effects(rig_.joints.size());
   joint.chain_inflation.assign(effects.size(), 1);
-  for (const ChainMotion& h : healthy) {
+  for (const ChainMotion& h : healthy_motions_) {
     SampledMotion motion = motion_by(joint.model, h.joints[index], settings_);
     set_chain_columns(h, index, motion);
     const Eigen::VectorXd residual = residual_of(joint.model, motion, settings_).residual;
@@ -160,14 +159,46 @@ void ArmChanges::set_search(ArmJoint& joint) const {
   joint.search.emplace(joint.model, joint.motion, joint.candidates, joint.beside, settings_, progress_);
 }
 
+/// With a second encoder behind the gap: the deflection of each joint under the load that the chain puts on
+/// its teeth.
+void ArmChanges::search_deflection(std::size_t index) {
+  const record::Record& record = record_.joints[index];
+  bool measured = record.has(record::Channel::load_position);
+  for (const ChainMotion& h : healthy_motions_)
+    measured = measured && h.joints[index].has(record::Channel::load_position);
+  if (!measured) return;
+  MotionSampling sampling = sampling_of_joint(index);
+  sampling.channel = ChangeChannel::deflection;
+  double largest = 0;
+  for (const ChainMotion& h : healthy_motions_)
+    for (const double torque : h.joints[index].column(record::Channel::output_torque))
+      largest = std::max(largest, std::fabs(torque));
+  sampling.mesh = MeshLoad();
+  sampling.mesh->least = settings_.least_load * largest;
+  const std::string& name = rig_.joints[index].name;
+  try {
+    const std::vector<record::Record> healthy = long_enough(index, sampling);
+    const HealthyModel model = commission_healthy(healthy, sampling, settings_);
+    const SampledMotion motion = motion_by(model, record, settings_);
+    ChangeSearch search(model, motion, candidates_of(model, healthy, settings_), {}, settings_, progress_);
+    const std::vector<FoundChange> found = search.run();
+    Changes one;
+    for (const FoundChange& f : found) one.changes.push_back(search.told(f, found, false));
+    tell_unexplained(search, found, true, settings_, one);
+    take_out_short(settings_, one);
+    add(name, one, search, model);
+  } catch (const CannotIdentify& error) {
+    out_.warnings.push_back("changes of the backlash of " + name + " cannot be told: " + error.what());
+  }
+}
+
 void ArmChanges::read(const std::vector<arm::ArmRecord>& healthy, const arm::ArmRecord& record) {
-  std::vector<ChainMotion> motions;
   for (const arm::ArmRecord& h : healthy)
-    motions.push_back(chain_motion(healthy_, h, {}, settings_.most_rate, out_.warnings));
-  const ChainMotion motion = chain_motion(healthy_, record, {}, settings_.most_rate, out_.warnings);
+    healthy_motions_.push_back(chain_motion(healthy_, h, {}, settings_.most_rate, out_.warnings));
+  record_ = chain_motion(healthy_, record, {}, settings_.most_rate, out_.warnings);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     tell(0.2 + 0.3 * double(j) / double(rig_.joints.size()), "commissioning " + rig_.joints[j].name);
-    add_joint(j, motions, motion);
+    add_joint(j);
   }
   if (joints_.empty()) throw CannotIdentify(joined(out_.warnings));
 }
@@ -186,10 +217,10 @@ void ArmChanges::differ(const FoundChainChange& found, bool from_beginning, cons
     d.slip = found.score.values[0];
   differences_.push_back(d);
   std::vector<std::string> told_before;
-  const ChainMotion motion = chain_motion(healthy_, record, differences_, settings_.most_rate, told_before);
+  record_ = chain_motion(healthy_, record, differences_, settings_.most_rate, told_before);
   for (ArmJoint& joint : joints_) {
-    joint.motion = motion_by(joint.model, motion.joints[joint.index], settings_);
-    set_chain_columns(motion, joint.index, joint.motion);
+    joint.motion = motion_by(joint.model, record_.joints[joint.index], settings_);
+    set_chain_columns(record_, joint.index, joint.motion);
   }
 }
 
@@ -289,6 +320,25 @@ bool ArmChanges::is_left_by_chain(const ArmJoint& joint, std::size_t place, cons
          });
 }
 
+/// What one channel of a joint shows.
+void ArmChanges::add(const std::string& joint, const Changes& one, const ChangeSearch& search,
+                     const HealthyModel& model) {
+  const auto named = [&](const std::string& text) { return joint + ": " + text; };
+  for (const Change& c : one.changes) {
+    out_.changes.push_back(c);
+    out_.changes.back().joint = joint;
+  }
+  for (const std::string& warning : one.warnings) out_.warnings.push_back(named(warning));
+  for (const std::string& name : search.different()) {
+    out_.different.push_back(named(name));
+    out_.warnings.push_back(named("from its beginning the record differs from the healthy ones by " + name +
+                                  ": that is no change within it"));
+  }
+  for (const ChangeEffect& e : model.further) out_.healthy_terms.push_back(named(e.name()));
+  if (!one.cannot_tell.empty())
+    out_.cannot_tell += (out_.cannot_tell.empty() ? "" : "; ") + named(one.cannot_tell);
+}
+
 /// Torques are as well known as the constants that they follow from.
 void ArmChanges::add_constant_error(const ArmJoint& joint, Change& change) const {
   const double relative =
@@ -303,29 +353,20 @@ void ArmChanges::tell_joint(const ArmJoint& joint, std::size_t place) {
   for (const FoundChange& f : joint.found) one.changes.push_back(joint.search->told(f, joint.found, false));
   tell_unexplained(*joint.search, joint.found, false, settings_, one);
   take_out_short(settings_, one);
-  const auto named = [&](const std::string& text) { return joint.name + ": " + text; };
+  std::vector<Change> kept;
   for (Change& c : one.changes) {
-    c.joint = joint.name;
     add_constant_error(joint, c);
-    if (is_left_by_chain(joint, place, c)) {
+    // Who leans on a moving arm adds a torque to a joint, as does friction that differs by direction.
+    if (c.effect == "asymmetric_coulomb") c.alike.emplace_back("external_torque");
+    if (is_left_by_chain(joint, place, c))
       one.warnings.push_back("since " + to_text(std::round(c.since)) +
                              " s the record follows no effect, beside " +
                              described(chain_.front().effect, rig_.chain));
-      continue;
-    }
-    // Who leans on a moving arm adds a torque to a joint, as does friction that differs by direction.
-    if (c.effect == "asymmetric_coulomb") c.alike.emplace_back("external_torque");
-    out_.changes.push_back(c);
+    else
+      kept.push_back(c);
   }
-  for (const std::string& warning : one.warnings) out_.warnings.push_back(named(warning));
-  for (const std::string& name : joint.search->different()) {
-    out_.different.push_back(named(name));
-    out_.warnings.push_back(named("from its beginning the record differs from the healthy ones by " + name +
-                                  ": that is no change within it"));
-  }
-  for (const ChangeEffect& e : joint.model.further) out_.healthy_terms.push_back(named(e.name()));
-  if (!one.cannot_tell.empty())
-    out_.cannot_tell += (out_.cannot_tell.empty() ? "" : "; ") + named(one.cannot_tell);
+  one.changes = std::move(kept);
+  add(joint.name, one, *joint.search, joint.model);
   out_.windows = std::max(out_.windows, joint.search->windows());
   out_.threshold = joint.search->threshold(1);
   out_.noise = std::max(out_.noise, joint.model.noise);
@@ -374,6 +415,7 @@ Changes ArmChanges::run(const std::vector<arm::ArmRecord>& healthy, const arm::A
   read(healthy, record);
   search(record);
   for (std::size_t j = 0; j < joints_.size(); ++j) tell_joint(joints_[j], j);
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) search_deflection(j);
   for (const FoundChainChange& f : chain_) out_.changes.push_back(told(f));
   std::sort(out_.changes.begin(), out_.changes.end(),
             [](const Change& a, const Change& b) { return a.since < b.since; });

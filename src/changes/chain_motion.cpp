@@ -83,9 +83,13 @@ arm::Joints torque_at(const arm::Chain& chain, const std::vector<ChainDifference
 void add_joints(const arm::ArmRig& rig, const arm::Chain& chain,
                 const std::vector<ChainDifference>& differences, const arm::ArmRecord& record,
                 const arm::ArmMotion& m, ChainMotion& out) {
-  std::vector<Interpolated> signals;
-  for (const record::Record& joint : record.joints)
+  std::vector<Interpolated> signals, positions, loads;
+  for (const record::Record& joint : record.joints) {
     signals.emplace_back(joint.time, joint.column(rig.channel));
+    positions.emplace_back(joint.time, joint.column(record::Channel::motor_position));
+    const auto& load = joint.column(record::Channel::load_position);
+    loads.emplace_back(joint.time, load.empty() ? joint.column(record::Channel::motor_position) : load);
+  }
   for (std::size_t k = 0; k < m.time.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
     const arm::Joints torque = torque_at(chain, differences, m, k);
@@ -93,7 +97,9 @@ void add_joints(const arm::ArmRig& rig, const arm::Chain& chain,
       const auto c = static_cast<Eigen::Index>(j);
       record::Record& r = out.joints[j];
       r.time.push_back(m.time[k]);
-      r.column(record::Channel::motor_position).push_back(m.q(row, c));
+      r.column(record::Channel::motor_position).push_back(positions[j](m.time[k]));
+      if (record.joints[j].has(record::Channel::load_position))
+        r.column(record::Channel::load_position).push_back(loads[j](m.time[k]));
       r.column(record::Channel::output_torque).push_back(torque[c]);
       r.column(record::Channel::motor_torque)
           .push_back(own_torque(rig.joints[j], signals[j](m.time[k] + rig.joints[j].delay), m.v(row, c),

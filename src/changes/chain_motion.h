@@ -27,8 +27,8 @@ struct ChainEffect {
 std::vector<ChainEffect> chain_effects(std::size_t joints);
 
 struct ChainMotion {
-  /// motor_position; motor_torque [N m] less chain and the friction that is not linear; output_torque: the
-  /// chain.
+  /// motor_position, load_position where it is measured; motor_torque [N m] less chain and the friction that
+  /// is not linear; output_torque: the chain.
   std::vector<record::Record> joints;
   std::vector<double> time;                 // s, of the rows of the following, few
   std::vector<Eigen::MatrixXd> body, slip;  // per joint: 10 columns per link, one per encoder [N m per unit]

@@ -34,6 +34,7 @@ Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
   x.col(kJerk) = column(motion, [](const Moment& m) { return m.jerk; });
   if (motion.sampling.channel == ChangeChannel::deflection) {
     x.col(kHalfGap) = column(motion, [](const Moment& m) { return m.side(); });
+    if (motion.sampling.chain) x.col(kInertia) = column(motion, [](const Moment& m) { return m.chain; });
     x.col(kScale) = column(motion, [](const Moment& m) { return m.position; });
     return x;
   }

@@ -18,6 +18,10 @@ struct EvenSamples {
   std::vector<char> there;
 };
 
+bool needs_load(const MotionSampling& sampling) {
+  return sampling.behind > 0 || sampling.channel == ChangeChannel::deflection;
+}
+
 void check_record(const record::Record& record, bool load, const ChangeSettings& settings) {
   std::vector<record::Channel> channels = {record::Channel::motor_torque, record::Channel::motor_position};
   if (load) channels.push_back(record::Channel::load_position);
@@ -40,7 +44,7 @@ EvenSamples even_samples(const record::Record& record, double interval, const Mo
                          const ChangeSettings& settings) {
   const auto& torque = record.column(record::Channel::motor_torque);
   const auto& position = record.column(record::Channel::motor_position);
-  const auto& load_position = sampling.behind > 0 ? record.column(record::Channel::load_position) : position;
+  const auto& load_position = needs_load(sampling) ? record.column(record::Channel::load_position) : position;
   const auto& chain = record.column(record::Channel::output_torque);
   const double gap = settings.gap * std::max(interval, record.sampling_interval());
   EvenSamples out;
@@ -171,7 +175,7 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
     if (const auto& mesh = sampling.mesh)
       m.mesh = mesh->inertia * (acceleration[k] - parting[k]) + mesh->viscous * m.speed +
                mesh->coulomb * m.direction + mesh->cosine * std::cos(m.position) +
-               mesh->sine * std::sin(m.position);
+               mesh->sine * std::sin(m.position) + m.chain;
     motion.moments.push_back(m);
   }
 }
@@ -195,7 +199,7 @@ MotionSampling sampling_of(const std::vector<const record::Record*>& records,
 
 SampledMotion sampled_motion(const record::Record& record, const MotionSampling& sampling,
                              const ChangeSettings& settings) {
-  const bool load = sampling.behind > 0;
+  const bool load = needs_load(sampling);
   check_record(record, load, settings);
   const double dt = sampling.interval;
   const double own = dt / double(sampling.thinned);

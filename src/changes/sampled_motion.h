@@ -17,7 +17,8 @@ namespace backlash::changes {
 /// What is predicted: the motor's torque, or by how much its position is ahead of the load's.
 enum class ChangeChannel { torque, deflection };
 
-/// What loads the teeth between two inertias, all by the link: J a + c w + F sign(w) + g_c cos q + g_s sin q.
+/// What loads the teeth between two inertias, all by the link: J a + c w + F sign(w) + g_c cos q + g_s sin q;
+/// of an arm what the chain takes, and nothing of these.
 struct MeshLoad {
   double inertia = 0, viscous = 0, coulomb = 0, cosine = 0, sine = 0;
   double least = 0;  // N m: less presses no flank for certain

@@ -33,6 +33,10 @@ record::RingSettings ring_settings(const WatchSettings& settings) {
   ring.window = settings.learn;
   if (settings.arm) {
     ring.channels = {settings.arm->channel, record::Channel::motor_position};
+    const auto& joints = settings.arm_joints;
+    if (std::all_of(joints.begin(), joints.end(),
+                    [](const auto& joint) { return has(joint, record::Channel::load_position); }))
+      ring.channels.push_back(record::Channel::load_position);
     return ring;
   }
   ring.channels = {record::Channel::motor_torque, record::Channel::motor_position};

@@ -81,6 +81,55 @@ TEST_F(DetectChanges, TellsSinceWhenAJointOfTwoInertiasHasMorePlay) {
   EXPECT_GT(report["healthy_deflection_residual"], 0);
 }
 
+// The forearm of an arm takes up half a kilogram while the gears of its elbow are found to have 5 % more
+// play.
+TEST_F(DetectChanges, TellsWhichJointOfAnArmHasMorePlayAndWhatItCarries) {
+  const std::string folder = package_file("config/two_link_arm/"), rig = folder + "two_link_arm.yaml";
+  write("two_link_arm.urdf", content(folder + "two_link_arm.urdf"));
+  std::string text = content(rig);
+  const std::string old = "backlash_angle: 3.0e-3";
+  ASSERT_NE(text.find(old), std::string::npos);
+  text.replace(text.find(old), old.size(), "backlash_angle: 3.15e-3");
+  write("changed.yaml", text +
+                            "\npayloads:\n  - {link: forearm, mass: 0.5, centre: [0.2, 0, 0], "
+                            "inertia: [1e-3, 0, 0, 1e-3, 0, 1e-3]}\n");
+  done("simulate " + rig + " --sample-rate 200 --duration 60 --seed 1 --out healthy.csv");
+  done("simulate " + rig + " --sample-rate 200 --duration 30 --seed 2 --out before.csv");
+  done("simulate changed.yaml --sample-rate 200 --duration 30 --seed 3 --out after.csv");
+  write("record.csv", joined_records("before.csv", "after.csv"));
+  const Outcome outcome =
+      run("detect_changes --rig " + rig + " --healthy healthy.csv --json out.json record.csv");
+  ASSERT_EQ(outcome.code, 2) << outcome.out << outcome.err;
+  const Json changes = Json::parse(read("out.json"))["changes"];
+  ASSERT_EQ(changes.size(), 2u) << changes;
+  for (const Json& change : changes) {
+    const bool play = change["effect"] == "backlash";
+    EXPECT_EQ(change["effect"], play ? "backlash" : "payload");
+    EXPECT_EQ(change["joint"], "elbow");
+    EXPECT_EQ(change.contains("link"), !play);
+    EXPECT_LE(change["since_interval"][0], 31);
+    EXPECT_GE(change["since_interval"][1], 30);
+    const Json& size = change["size"][play ? "angle" : "mass"];
+    EXPECT_NEAR(size["value"].get<double>(), play ? 1.5e-4 : 0.5, 3 * size["standard_error"].get<double>());
+  }
+}
+
+// By eye the push begins at 1.84 s on the first joint; nothing before.
+TEST_F(DetectChanges, TellsAPushOnAMeasuredArmThatHoldsItsPose) {
+  const auto push = find_data("measured/ur5_arm_push.csv"), healthy = find_data("measured/ur5_arm_b.csv");
+  if (!push || !healthy) GTEST_SKIP() << "measured/ur5_arm_push.csv is not there";
+  const Outcome outcome = run("detect_changes --rig " + package_file("config/ur5_arm/ur5_arm.yaml") +
+                              " --healthy " + *healthy + " --json out.json " + *push);
+  ASSERT_EQ(outcome.code, 2) << outcome.err;
+  const Json first = Json::parse(read("out.json"))["changes"][0];
+  EXPECT_EQ(first["effect"], "external_torque");
+  EXPECT_EQ(first["joint"], "shoulder_pan_joint");
+  EXPECT_NEAR(first["since"].get<double>(), 1.84, 0.1);
+  EXPECT_LE(first["since_interval"][0], 1.84);
+  EXPECT_GE(first["since_interval"][1], 1.84);
+  EXPECT_FALSE(first["until"].is_null());
+}
+
 TEST_F(DetectChanges, AnotherTaskIsNoChangeAndWhatFollowsNoEffectIsNoHealth) {
   const std::string rig = package_file("config/simulated_robot/shoulder.yaml");
   std::ifstream in(rig);
