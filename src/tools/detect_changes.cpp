@@ -25,7 +25,8 @@ Command command() {
       "since when.";
   c.positional = {"RECORD"};
   c.options = {
-      {"rig", "RIG.yaml", "the machine as declared: one inertia (mesh: rigid) or two, or an arm (urdf)", true},
+      {"rig", "RIG.yaml", "the machine as declared: one inertia (mesh: rigid) or two, or an arm (urdf)",
+       true},
       {"healthy", "RECORD...", "records (.csv or .bag) of the healthy machine, better two tasks than one",
        true},
       {"json", "OUT.json", "changes with size, onset and intervals", true},
