@@ -139,7 +139,12 @@ double ChangeEffect::least_order() const {
   return id == "position_dependent_friction" ? kLeastFrictionOrder : kLeastOrder;
 }
 
+Eigen::Index ChangeEffect::freedom() const {
+  return static_cast<Eigen::Index>(ramp ? 1 : columns.size()) + (at_place() ? 2 : has_order() ? 1 : 0);
+}
+
 std::string ChangeEffect::name() const {
+  if (at_place()) return id + " at " + to_text(shape);
   return shape > 0 ? id + " " + to_text(shape) : id;
 }
 
@@ -179,8 +184,8 @@ Eigen::MatrixXd filtered_columns(const SampledMotion& motion, const ChangeEffect
 }  // namespace
 
 Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect) {
-  // Those of the load change with what the machine is taken for.
-  if (effect.id == "load_dependent_friction" || effect.id == "encoder_slip")
+  // Those of the load change with what the machine is taken for; those of a place are asked for once.
+  if (effect.id == "load_dependent_friction" || effect.id == "encoder_slip" || effect.at_place())
     return filtered_columns(motion, effect);
   const std::string name = effect.name() + (effect.ramp ? " ramp" : "");
   const auto known = motion.known_columns.find(name);

@@ -3,6 +3,7 @@
 // value takes.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,10 +14,15 @@ namespace backlash::changes {
 
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
-  double shape = 0;  // order [1/rad] or speed [rad/s], where the effect has one
+  double shape = 0;  // order [1/rad], speed [rad/s] or place [rad], where the effect has one
   /// Columns of one moment. Two: cosine and sine of a wave; of a ramp something and that times time.
-  std::vector<double (*)(const Moment&, double shape)> columns;
+  std::vector<std::function<double(const Moment&, double shape)>> columns;
   bool ramp = false;  // the second column grows from the onset on
+  double width = 0;   // rad, of what is at a place; 0: it is not
+
+  bool at_place() const { return width > 0; }
+  /// Values that are fitted, order, place and width among them.
+  Eigen::Index freedom() const;
 
   bool has_order() const;
   double least_order() const;  // that is tried, of one that has one

@@ -12,11 +12,14 @@
 namespace backlash::changes {
 
 ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motion,
-                           std::vector<ScannedEffect> candidates, const std::vector<FoundChange>& beside,
-                           const ChangeSettings& settings, const Progress& progress)
+                           std::vector<ScannedEffect> candidates, Inflation inflation,
+                           const std::vector<FoundChange>& beside, const ChangeSettings& settings,
+                           const Progress& progress)
     : model_(model),
       motion_(motion),
       candidates_(std::move(candidates)),
+      inflation_(std::move(inflation)),
+      screen_(motion),
       settings_(settings),
       progress_(progress),
       beside_(beside),
@@ -78,8 +81,8 @@ std::size_t ChangeSearch::windows() const {
 
 double ChangeSearch::threshold(Eigen::Index values) const {
   const double hours = motion_.moments.back().time / 3600;
-  const double probability =
-      std::clamp(settings_.false_alarms_per_hour * hours / double(candidates_.size()), 1e-14, 0.1);
+  const double effects = double(candidates_.size() + screen_.count());
+  const double probability = std::clamp(settings_.false_alarms_per_hour * hours / effects, 1e-14, 0.1);
   const double fewest = double(margin_), most = double(windows()) * settings_.window / settings_.block;
   return gain_by_chance(probability, double(values), fewest, std::max(fewest, most));
 }
@@ -117,6 +120,8 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
       throw Cancelled();
     all.push_back(scanned(candidates_[i], b, 5));
   }
+  const std::optional<FoundChange> fault = best_fault(b);
+  if (fault) all.push_back(*fault);
   // By what they explain: the inflation of one may be chance.
   const auto most = std::max_element(all.begin(), all.end(), [](const FoundChange& x, const FoundChange& y) {
     return x.score.gain < y.score.gain;
@@ -126,8 +131,7 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   const double alike = settings_.alike * most->score.gain;
   const FoundChange* simplest = &*most;
   for (const FoundChange& f : all)
-    if (f.score.gain >= alike && f.score.values.size() > 0 &&
-        f.score.values.size() < simplest->score.values.size())
+    if (f.score.gain >= alike && f.score.values.size() > 0 && f.effect.freedom() < simplest->effect.freedom())
       simplest = &f;
   FoundChange found = *simplest;
   for (const FoundChange& f : all)
@@ -147,7 +151,8 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
 
 bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   double rows = 0;
-  const double squares = left_after(b, f.from, f.to, rows), explained = f.score.gain * b.variance;
+  const double squares = f.effect.at_place() ? left_at(f, b.left(), rows) : left_after(b, f.from, f.to, rows);
+  const double explained = f.score.gain * b.variance;
   if (explained < settings_.least_explained * squares) return false;
   if (explained < rows * model_.least_change * model_.least_change) return false;
   // More noise than in the healthy records counts against it.
@@ -179,7 +184,7 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
 }
 
 void ChangeSearch::refine(FoundChange& f, const Background& b) const {
-  refine_order(f, b);
+  f.effect.at_place() ? refine_fault(f, b) : refine_order(f, b);
   const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   f.score = sums.score(f.from, f.to, b);
   for (std::size_t k = margin_; k + margin_ / 2 < f.to; ++k) {
@@ -230,7 +235,9 @@ void ChangeSearch::differ(FoundChange f) {
 bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChange>& found) const {
   for (const FoundChange& f : found) {
     const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
-    const double least = apart < settings_.same_event ? settings_.least_beside : settings_.least_further;
+    // What is left of a bump of another shape is at its place, and begins with any pass of it.
+    const bool same = apart < settings_.same_event || f.effect.at_place();
+    const double least = same ? settings_.least_beside : settings_.least_further;
     if (next.gain < least * f.gain) return false;
   }
   return std::none_of(beside_.begin(), beside_.end(), [&](const FoundChange& f) {
@@ -264,6 +271,10 @@ std::vector<FoundChange> ChangeSearch::run() {
       differ(*next);
       continue;
     }
+    if (next->effect.at_place() && !alone(*next, b)) {
+      like_fault_ = found.empty();
+      break;
+    }
     if (!further(*next, found)) break;
     find_end(*next, b);
     found.push_back(*next);
@@ -279,7 +290,7 @@ std::vector<FoundChange> ChangeSearch::run() {
 }
 
 bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
-  if (all.empty()) return true;
+  if (all.empty()) return !like_fault_;
   // So many at once are rather one of another shape.
   if (all.size() >= static_cast<std::size_t>(settings_.most_changes)) return false;
   std::size_t from = blocks_;
@@ -366,7 +377,8 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
     values *= span;
     covariance *= span * span;
   }
-  change.size = change_size(f.effect, values, covariance, linear);
+  change.size = f.effect.at_place() ? fault_size(f, b, with.left(), linear)
+                                    : change_size(f.effect, values, covariance, linear);
   if (f.effect.ramp) change.size.push_back({"span", "s", {span, settings_.block}});
   return change;
 }

@@ -27,20 +27,36 @@ struct ChannelChanges {
   Changes told;
 };
 
-std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
-                                         const std::vector<record::Record>& healthy,
-                                         const ChangeSettings& settings) {
-  std::vector<ScannedEffect> all;
-  for (const ChangeEffect& e : change_effects(model.sampling)) all.push_back({e, 1});
-  for (const record::Record& r : healthy) {
-    const SampledMotion motion = motion_by(model, r, settings);
-    const Eigen::VectorXd residual = residual_of(model, motion, settings).residual;
-    for (ScannedEffect& c : all)
-      c.inflation = std::max(c.inflation, score_inflation(motion, residual, effect_columns(motion, c.effect),
-                                                          model.noise * model.noise, settings.window));
+/// How the scores of effects scatter in the healthy records.
+class HealthyScores {
+ public:
+  HealthyScores(const HealthyModel& model, const std::vector<record::Record>& healthy,
+                const ChangeSettings& settings)
+      : variance_(model.noise * model.noise), window_(settings.window) {
+    for (const record::Record& r : healthy) {
+      motions_.push_back(motion_by(model, r, settings));
+      residuals_.push_back(residual_of(model, motions_.back(), settings).residual);
+    }
   }
-  return all;
-}
+  double inflation(const ChangeEffect& effect) const {
+    double most = 1;
+    for (std::size_t r = 0; r < motions_.size(); ++r)
+      most = std::max(most, score_inflation(motions_[r], residuals_[r], effect_columns(motions_[r], effect),
+                                            variance_, window_));
+    return most;
+  }
+  std::vector<ScannedEffect> of(const std::vector<ChangeEffect>& effects) const {
+    std::vector<ScannedEffect> all;
+    for (const ChangeEffect& e : effects) all.push_back({e, inflation(e)});
+    for (const SampledMotion& m : motions_) m.known_columns.clear();  // asked for once
+    return all;
+  }
+
+ private:
+  std::vector<SampledMotion> motions_;
+  std::vector<Eigen::VectorXd> residuals_;
+  double variance_, window_;
+};
 
 /// What the load of the teeth may be other by: what the motor's torque shows, on whichever side of the gap.
 std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
@@ -87,6 +103,7 @@ void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>
     explained += f.score.gain;
     nearest.push_back(f.effect.id);
   }
+  if (search.like_fault()) nearest.emplace_back("local_fault");
   if (search.explained(found) && !(loud && loud->excess > explained)) {
     if (loud && !found.empty())
       out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +
@@ -123,7 +140,10 @@ ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::R
   HealthyModel of_record = model;
   of_record.sampling.other_load = other_load(beside, settings.block);
   const SampledMotion motion = motion_by(of_record, record, settings);
-  ChangeSearch search(model, motion, candidates_of(model, healthy, settings), beside, settings, progress);
+  const HealthyScores scores(model, healthy, settings);
+  ChangeSearch search(
+      model, motion, scores.of(change_effects(model.sampling)),
+      [&](const ChangeEffect& e) { return scores.inflation(e); }, beside, settings, progress);
   ChannelChanges result;
   const std::vector<FoundChange>& found = result.found = search.run();
   result.beside = search.beside(found);

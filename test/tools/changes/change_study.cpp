@@ -26,14 +26,16 @@ constexpr double kStream = 1800;                               // s, of one join
 struct Options {
   double hours = 0, rate = 1.0 / 720;  // h, 1/h
   bool apart = false;
-  int onsets = 0;
+  double least_explained = changes::ChangeSettings().least_explained;
+  OnsetOptions onsets;
   long windows = 0;
   unsigned long seed = 1;
   MadeOptions made;
 };
 
-changes::ChangeSettings settings_of(double rate) {
+changes::ChangeSettings settings_of(double rate, double least_explained) {
   changes::ChangeSettings settings;
+  settings.least_explained = least_explained;
   settings.false_alarms_per_hour = rate;
   return settings;
 }
@@ -73,8 +75,8 @@ void healthy(const Options& options) {
       const double from = std::max(0.0, to - kWindow);
       ++looks;
       try {
-        const auto found =
-            changes::detect_changes(joint.rig(), learned, stream.slice(from, to), settings_of(rate));
+        const auto found = changes::detect_changes(joint.rig(), learned, stream.slice(from, to),
+                                                   settings_of(rate, options.least_explained));
         suspected += !found.changes.empty();
         cannot += found.changes.empty() && !found.cannot_tell.empty();
         ledger.take(look_of(found, from, to));
@@ -118,8 +120,8 @@ void healthy_apart(const Options& options) {
     const record::Record stream = joint.record(random, kStream, true, true);
     for (double from = 0; from + kWindow <= kStream; from += kWindow) {
       const record::Record look = slice_of_motion(stream, from, options.made.sampling);
-      const changes::Changes found =
-          changes::detect_changes(joint.rig(), learned, look, settings_of(options.rate));
+      const changes::Changes found = changes::detect_changes(
+          joint.rig(), learned, look, settings_of(options.rate, options.least_explained));
       ++looks;
       windows += static_cast<long>(found.windows);
       wrong += !found.changes.empty();
@@ -152,7 +154,12 @@ int main(int argc, char** argv) {
   add("healthy-hours", po::value(&options.hours), "of healthy joints");
   add("false-alarms-per-hour", po::value(&options.rate), "that are allowed; default 1/720");
   add("apart", po::bool_switch(&options.apart), "looks that share no samples, each an alarm by itself");
-  add("onsets", po::value(&options.onsets), "joints that change once");
+  add("least-explained", po::value(&options.least_explained),
+      "of the squares, see ChangeSettings; default 0.1");
+  add("onsets", po::value(&options.onsets.count), "joints that change once");
+  add("only", po::value(&options.onsets.only), "this kind of change");
+  add("look-alikes", po::bool_switch(&options.onsets.look_alikes),
+      "changes that might be taken for a local fault");
   add("windows", po::value(&options.windows), "of scores: false alarms, and delays beside a CUSUM");
   add("rate", po::value(&options.made.sampling), "of the samples [Hz]; default 50");
   add("two", po::bool_switch(&options.made.two), "inertias, with an encoder on either side, of each joint");
@@ -169,9 +176,10 @@ int main(int argc, char** argv) {
       return 0;
     }
     if (options.hours > 0) options.apart ? healthy_apart(options) : healthy(options);
-    if (options.onsets > 0)
-      study_onsets(options.onsets, options.seed + 1000, options.made,
-                   backlash::diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1));
+    if (options.onsets.count > 0) {
+      options.onsets.rate_of_look = backlash::diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1);
+      study_onsets(options.onsets, options.seed + 1000, options.made);
+    }
     if (options.windows > 0) study_windows(options.windows, options.seed);
     return 0;
   } catch (const std::exception& error) {

@@ -10,6 +10,7 @@ namespace {
 constexpr double kEncoderNoise = 2e-6, kTurn = 0.05;  // rad; N m over which the gap is crossed
 constexpr double kStep = 1e-3;                        // s, of differences
 constexpr double kPayloadArm = 0.5;                   // m, at which a payload hangs
+constexpr double kPush = 1.5;                         // s
 constexpr double kEarth = 9.81;                       // m/s^2
 
 double sign(double w) {
@@ -34,8 +35,20 @@ class Coloured {
 /// Of a damaged tooth, 1 in the middle.
 double bump(const Added& a, double q) {
   const double x = (q - a.place) / a.width;
-  return std::exp(-0.5 * x * x);
+  return a.flat ? (std::fabs(x) < 1 ? 1 : 0) : std::exp(-0.5 * x * x);
 }
+
+/// Bristles (Dahl 1968): friction that comes late after a reversal, -1..1.
+class Bristles {
+ public:
+  double next(double way, double stiffness) {
+    state_ += stiffness * (way - std::fabs(way) * state_);
+    return state_ = std::clamp(state_, -1.0, 1.0);
+  }
+
+ private:
+  double state_ = 0;
+};
 
 }  // namespace
 
@@ -51,7 +64,7 @@ double Task::operator()(double t, int order) const {
   double sum = 0;
   for (int i = 0; i < 3; ++i) {
     const double w = 2 * M_PI * f_[i];
-    sum += kAmplitudes[i] * std::pow(w, order) * std::sin(w * t + phase_ * (i + 1) + order * M_PI / 2);
+    sum += amplitudes_[i] * std::pow(w, order) * std::sin(w * t + phase_ * (i + 1) + order * M_PI / 2);
   }
   return sum;
 }
@@ -77,7 +90,8 @@ Joint::Joint(Random& random, const MadeOptions& made)
 record::Record Joint::record(Random& random, double duration, bool cold, bool rests,
                              const Added& added) const {
   std::normal_distribution<double> white(0, noise), encoder(0, kEncoderNoise);
-  const Task task(random);
+  const Task task(random, options.cyclic && added.since < duration);
+  Bristles bristles;
   const double rate = options.sampling;
   Coloured coloured(random, 1 / rate, colour_time);
   record::Record r;
@@ -87,12 +101,14 @@ record::Record Joint::record(Random& random, double duration, bool cold, bool re
     const double t = k / rate;
     const double temperature = 1 + (cold ? warm * std::exp(-stamp / cooling) : 0) +
                                options.wander * std::sin(2 * M_PI * stamp / 600 + task.phase());
+    const double late = added.of("presliding", t) *
+                        (bristles.next(task(t) - task(t - 1 / rate), 1 / added.width) - sign(task(t, 1)));
     const double slip = added.of("encoder_slip", t);
     const double shown = motor(task, t, temperature, added) + (options.two ? 0 : slip);
     r.time.push_back(stamp);
     r.column(record::Channel::motor_position).push_back(shown + encoder(random));
     r.column(record::Channel::motor_torque)
-        .push_back(torque(task, t, temperature, added) + white(random) +
+        .push_back(torque(task, t, temperature, added) + late + white(random) +
                    options.coloured * noise * coloured.next(random));
     if (options.two) r.column(record::Channel::load_position).push_back(task(t) + slip + encoder(random));
     stamp += 1 / rate;
@@ -138,6 +154,8 @@ double Joint::load(const Task& task, double t, double temperature, const Added& 
   return free + temperature * (viscous * w + coulomb * sign(w)) +
          (a.of("load_viscous", t) + (options.two ? 0 : a.of("motor_viscous", t))) * w + dry * sign(w) +
          fault + a.of("cogging", t) * std::sin(a.order * q + a.phase) +
+         (t < a.since + kPush ? a.of("push", t) : 0) +
+         a.of("stribeck", t) * sign(w) * std::exp(-w * w / 0.1) +
          a.of("rubbed_wave", t) * sign(w) * std::sin(a.order * q + a.phase);
 }
 

@@ -18,6 +18,7 @@ struct MadeOptions {
   double sampling = 50;   // Hz
   bool two = false;       // inertias
   double wander = 0.02;   // - of friction, up and down in ten minutes
+  bool cyclic = false;    // tasks of one sine, of the record that is judged
   double coloured = 0.5;  // - of the white noise, rms of first order noise beside it
 };
 
@@ -30,6 +31,7 @@ struct Added {
   double size = 0;
   double order = 0, phase = 0;       // 1/rad, rad, of waves
   double place = 0, width = 1;       // rad, of local faults: exp(-((q - place) / width)^2 / 2)
+  bool flat = false;                 // the bump is, from place - width to place + width
   double forward = 1, backward = 1;  // - of `size`, that moving so shows of a local fault
 
   /// `size` where this is `kind` and has begun.
@@ -41,15 +43,17 @@ struct Added {
 /// Sums of sines.
 class Task {
  public:
-  explicit Task(Random& random)
-      : f_{uniform(random, 0.09, 0.13), uniform(random, 0.15, 0.2), uniform(random, 0.25, 0.33)},
+  /// `cyclic`: one sine, whose reversals are always at the same places.
+  Task(Random& random, bool cyclic)
+      : amplitudes_{cyclic ? 0 : 0.8, cyclic ? 1 : 0.6, cyclic ? 0 : 0.3},
+        f_{uniform(random, 0.09, 0.13), uniform(random, 0.15, 0.2), uniform(random, 0.25, 0.33)},
         phase_(uniform(random, 0, 2 * M_PI)) {}
   double phase() const { return phase_; }
   /// Position or a derivative of it.
   double operator()(double t, int order = 0) const;
 
  private:
-  static constexpr double kAmplitudes[] = {0.8, 0.6, 0.3};  // rad
+  double amplitudes_[3];  // rad
   double f_[3], phase_;
 };
 

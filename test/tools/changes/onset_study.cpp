@@ -67,6 +67,21 @@ const std::vector<Drawn>& two_inertias() {
   return all;
 }
 
+/// What might be taken for a local fault, or a fault of another shape. Named right: by an effect that is
+/// near.
+const std::vector<Drawn>& look_alikes() {
+  static const std::vector<Drawn> all = {
+      {"cogging", {1, 2, 4}, Drawn::noise, "cogging", "amplitude", {}},
+      {"rubbed_wave", {1, 2, 4}, Drawn::noise, "position_dependent_friction", "amplitude", {}},
+      {"presliding", {2, 4, 8}, Drawn::noise, "stribeck", "", {"motor_coulomb", "motor_viscous"}},
+      {"stribeck", {2, 4, 8}, Drawn::noise, "stribeck", "", {}},
+      {"push", {5, 10, 40}, Drawn::noise, "unknown", "", {}},
+      {"local_fault", {2, 4, 8}, Drawn::noise, "local_fault", "forward", {}},
+      {"flat_fault", {2, 4, 8}, Drawn::noise, "local_fault", "forward", {}},
+  };
+  return all;
+}
+
 struct Row {
   int drawn = 0, found = 0, named = 0, wrong = 0, unknown = 0, cannot = 0, onset = 0, size = 0;
   double width = 0;
@@ -79,6 +94,10 @@ bool contains(const std::vector<std::string>& all, const std::string& one) {
 Added added_to(const Joint& joint, const Drawn& drawn, int size, Random& random) {
   Added a;
   a.effect = drawn.kind;
+  if (a.effect == "flat_fault") {
+    a.effect = "local_fault";
+    a.flat = true;
+  }
   a.since = uniform(random, 60, 240);
   a.end = kLook;
   const double unit = drawn.unit == Drawn::healthy ? joint.value(drawn.kind)
@@ -131,16 +150,23 @@ void judge(const changes::Changes& found, const Drawn& drawn, const Added& added
 
 }  // namespace
 
-void study_onsets(int count, unsigned long seed, const MadeOptions& made, double rate_of_look) {
+void study_onsets(const OnsetOptions& options, unsigned long seed, const MadeOptions& made) {
   Random random(seed);
-  const std::vector<Drawn>& kinds = made.two ? two_inertias() : one_inertia();
+  std::vector<Drawn> kinds = options.look_alikes ? look_alikes() : made.two ? two_inertias() : one_inertia();
+  if (!options.only.empty())
+    kinds.erase(
+        std::remove_if(kinds.begin(), kinds.end(), [&](const Drawn& d) { return d.kind != options.only; }),
+        kinds.end());
+  if (kinds.empty()) throw InvalidParameter("only", 0, "must be one of the kinds of the table");
   std::map<std::pair<std::size_t, int>, Row> rows;
   changes::ChangeSettings settings;
-  settings.false_alarms_per_hour = rate_of_look;
-  for (int i = 0; i < count; ++i) {
+  settings.false_alarms_per_hour = options.rate_of_look;
+  for (int i = 0; i < options.count; ++i) {
     const std::size_t kind = static_cast<std::size_t>(i) % kinds.size();
     const int size = i / static_cast<int>(kinds.size()) % 3;
-    const Joint joint(random, made);
+    MadeOptions of_joint = made;
+    of_joint.cyclic = options.look_alikes && i / static_cast<int>(kinds.size()) % 2 == 1;
+    const Joint joint(random, of_joint);
     const Added added = added_to(joint, kinds[kind], size, random);
     const std::vector<record::Record> learned = {joint.record(random, kLearn, true, false)};
     const record::Record record = joint.record(random, kLook, false, false, added);
