@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,9 +26,13 @@ struct ChangeEffect {
   Eigen::Index freedom() const;
 
   bool has_order() const;
+  bool has_scale() const;       // `shape` is a speed or a way that is fitted by factors
   double least_order() const;  // that is tried, of one that has one
   std::string name() const;    // with its shape
 };
+
+/// What is carried weighs and is inert: gravity with a third column. None of other effects.
+std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect);
 
 /// Simple ones first. Orders whose wave the filter would take away leave columns of nothing.
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling);

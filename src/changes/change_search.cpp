@@ -184,7 +184,9 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
 }
 
 void ChangeSearch::refine(FoundChange& f, const Background& b) const {
-  f.effect.at_place() ? refine_fault(f, b) : refine_order(f, b);
+  if (f.effect.at_place()) refine_fault(f, b);
+  if (f.effect.has_scale()) refine_scale(f, b);
+  refine_order(f, b);
   const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   f.score = sums.score(f.from, f.to, b);
   for (std::size_t k = margin_; k + margin_ / 2 < f.to; ++k) {
@@ -193,6 +195,18 @@ void ChangeSearch::refine(FoundChange& f, const Background& b) const {
     f.from = k;
     f.score = std::move(s);
   }
+  f.gain = f.score.gain / f.inflation;
+}
+
+/// A payload is inert as well: where the record shows it, gravity alone would have a wrong size.
+void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
+  const std::optional<ChangeEffect> e = with_inertia(f.effect);
+  if (!e) return;
+  EffectSums::Score s =
+      EffectSums(motion_, effect_columns(motion_, *e), b, settings_.block, false).score(f.from, f.to, b);
+  if (s.values.size() == 0 || s.gain < f.score.gain + settings_.onset_drop * f.inflation) return;
+  f.effect = *e;
+  f.score = std::move(s);
   f.gain = f.score.gain / f.inflation;
 }
 
@@ -250,7 +264,8 @@ bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChang
 void ChangeSearch::unite(std::vector<FoundChange>& found) const {
   for (FoundChange& f : found)
     for (auto later = found.begin(); later != found.end(); ++later) {
-      const bool same = f.effect.name() == later->effect.name() && !f.effect.ramp;
+      const bool same = f.effect.name() == later->effect.name() && !f.effect.ramp &&
+                        f.score.values.size() == later->score.values.size();
       if (!same || f.from >= later->from || f.to <= later->from) continue;
       if ((f.score.values + later->score.values).norm() > settings_.undone * f.score.values.norm()) continue;
       f.to = later->from;
@@ -276,6 +291,7 @@ std::vector<FoundChange> ChangeSearch::run() {
       break;
     }
     if (!further(*next, found)) break;
+    add_inertia(*next, b);
     find_end(*next, b);
     found.push_back(*next);
     // Each anew beside the others.
@@ -371,14 +387,18 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   change.error_after = std::sqrt(after);
   Eigen::VectorXd values = f.score.values;
   Eigen::MatrixXd covariance = f.score.covariance * f.inflation * std::max(1.0, after / b.variance);
-  covariance.diagonal().array() += std::pow(settings_.model_error * values.norm(), 2);
+  const Eigen::Index wave = std::min<Eigen::Index>(values.size(), 2);
+  covariance.diagonal().head(wave).array() += std::pow(settings_.model_error * values.head(wave).norm(), 2);
+  for (Eigen::Index i = wave; i < values.size(); ++i)
+    covariance(i, i) += std::pow(settings_.model_error * values[i], 2);
   const double span = settings_.block * double(f.to - f.from);
   if (f.effect.ramp) {
     values *= span;
     covariance *= span * span;
   }
-  change.size = f.effect.at_place() ? fault_size(f, b, with.left(), linear)
-                                    : change_size(f.effect, values, covariance, linear);
+  change.size = f.effect.at_place()    ? fault_size(f, b, with.left(), linear)
+                : f.effect.has_scale() ? scaled_size(f, b, after / b.variance, linear)
+                                       : change_size(f.effect, values, covariance, linear);
   if (f.effect.ramp) change.size.push_back({"span", "s", {span, settings_.block}});
   return change;
 }

@@ -65,12 +65,16 @@ class ChangeSearch {
   bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
+  void refine_scale(FoundChange& f, const Background& b) const;
+  void add_inertia(FoundChange& f, const Background& b) const;
   // Faults at a place
   std::optional<FoundChange> best_fault(const Background& b) const;
   void refine_fault(FoundChange& f, const Background& b) const;
   bool repeats(const FoundChange& f, const Background& b) const;
   bool alone(const FoundChange& f, const Background& b) const;
   double left_at(const FoundChange& f, const Eigen::VectorXd& left, double& rows) const;
+  std::vector<ChangeSize> scaled_size(const FoundChange& f, const Background& b, double noisier,
+                                      bool linear) const;
   std::vector<ChangeSize> fault_size(const FoundChange& f, const Background& b, const Eigen::VectorXd& left,
                                      bool linear) const;
   void find_end(FoundChange& f, const Background& b) const;

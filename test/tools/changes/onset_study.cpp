@@ -73,7 +73,7 @@ const std::vector<Drawn>& look_alikes() {
   static const std::vector<Drawn> all = {
       {"cogging", {1, 2, 4}, Drawn::noise, "cogging", "amplitude", {}},
       {"rubbed_wave", {1, 2, 4}, Drawn::noise, "position_dependent_friction", "amplitude", {}},
-      {"presliding", {2, 4, 8}, Drawn::noise, "stribeck", "", {"motor_coulomb", "motor_viscous"}},
+      {"presliding", {2, 4, 8}, Drawn::noise, "presliding", "torque", {}},
       {"stribeck", {2, 4, 8}, Drawn::noise, "stribeck", "", {}},
       {"push", {5, 10, 40}, Drawn::noise, "unknown", "", {}},
       {"local_fault", {2, 4, 8}, Drawn::noise, "local_fault", "forward", {}},

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Of the search for changes what is about faults at one place.
+// Of the search for changes what is about faults at one place, and effects of a speed or a way that is
+// fitted.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -12,11 +13,13 @@ namespace {
 
 constexpr double kScreened = 0.5;  // - of the threshold, of what is looked at closer. Choice: bumps that the
                                    // filter broadens, and nuisances, make a matched filter miss a part
-constexpr int kRounds = 8;         // of Gauss-Newton. Simulation: 3 to 5 do
-constexpr double kStep = 0.5;      // widths that one of them goes at most. Choice
-constexpr double kBetter = 1e-3;   // - of the gain, by which another round is worth it. Choice
-constexpr double kShape = 0.1;     // - standard error of A and width, as bumps have other shapes. Theory: the
-                                   // bump that fits a flat one best is sqrt(2) erf(0.97) = 1.17 times as high
+constexpr double kFactors[] = {1.3, 1.1, 1.03};  // of a scale, then finer ones. Choice
+constexpr double kSlope = 0.1;                   // - of a scale, of a difference over it. Choice
+constexpr int kRounds = 8;                       // of Gauss-Newton. Simulation: 3 to 5 do
+constexpr double kStep = 0.5;                    // widths that one of them goes at most. Choice
+constexpr double kBetter = 1e-3;                 // - of the gain, by which another round is worth it. Choice
+constexpr double kShape = 0.1;  // - standard error of A and width, as bumps have other shapes. Theory: the
+                                // bump that fits a flat one best is sqrt(2) erf(0.97) = 1.17 times as high
 constexpr double kOthers =
     0.25;  // - of the gain that another place may have: more is no fault of one. Choice
 
@@ -61,6 +64,43 @@ void ChangeSearch::refine_fault(FoundChange& f, const Background& b) const {
     }
     if (f.score.gain < (1 + kBetter) * before) return;
   }
+}
+
+void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
+  for (const double factor : kFactors)
+    for (const double by : {factor, 1 / factor})
+      for (int i = 0; i < 3; ++i) {
+        ChangeEffect e = f.effect;
+        e.shape *= by;
+        EffectSums::Score s =
+            EffectSums(motion_, effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
+        if (s.gain <= f.score.gain) break;
+        f.effect = e;
+        f.score = std::move(s);
+      }
+}
+
+/// With what the scale may be other by: its slope stands beside.
+std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Background& b, double noisier,
+                                                  bool linear) const {
+  ChangeEffect more = f.effect, less = f.effect;
+  more.shape *= 1 + kSlope;
+  less.shape *= 1 - kSlope;
+  const Eigen::VectorXd z = effect_columns(motion_, f.effect);
+  Eigen::MatrixXd both(z.size(), 2);
+  both << z,
+      f.score.values[0] / (2 * kSlope) * (effect_columns(motion_, more) - effect_columns(motion_, less));
+  const EffectSums::Score s = EffectSums(motion_, both, b, settings_.block, false).score(f.from, f.to, b);
+  Eigen::Matrix2d covariance = Eigen::Vector2d(f.score.values.squaredNorm(), 1).asDiagonal();  // not told
+  if (s.values.size() == 2) covariance = s.covariance * f.inflation * std::max(1.0, noisier);
+  covariance(0, 0) += std::pow(settings_.model_error * f.score.values[0], 2);
+  std::vector<ChangeSize> size =
+      change_size(f.effect, f.score.values, covariance.topLeftCorner<1, 1>(), linear);
+  const bool speed = f.effect.id == "stribeck";
+  size.push_back({speed ? "speed" : "distance",
+                  model::axis_unit(speed ? "rad/s" : "rad", linear),
+                  {f.effect.shape, f.effect.shape * std::min(1.0, std::sqrt(covariance(1, 1)))}});
+  return size;
 }
 
 /// Told by passes through its place without the one that says most: a push is at one place as well.
