@@ -26,7 +26,7 @@ struct ChangeEffect {
   Eigen::Index freedom() const;
 
   bool has_order() const;
-  bool has_scale() const;       // `shape` is a speed or a way that is fitted by factors
+  bool has_scale() const;      // `shape` is a speed or a way that is fitted by factors
   double least_order() const;  // that is tried, of one that has one
   std::string name() const;    // with its shape
 };

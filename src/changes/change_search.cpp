@@ -305,43 +305,6 @@ std::vector<FoundChange> ChangeSearch::run() {
   return found;
 }
 
-bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
-  if (all.empty()) return !like_fault_;
-  // So many at once are rather one of another shape.
-  if (all.size() >= static_cast<std::size_t>(settings_.most_changes)) return false;
-  std::size_t from = blocks_;
-  for (const FoundChange& f : all) from = std::min(from, f.from);
-  const Background before = background({}), after = background(all);
-  double rows = 0, rows_before = 0;
-  const double left = left_after(after, from, blocks_, rows);
-  const double squares = left_after(before, from, blocks_, rows);
-  const double noise =
-      std::max(left_after(after, 0, from, rows_before) / std::max(rows_before, 1.0), before.variance);
-  return left - 2 * noise * rows < settings_.unknown_left * squares;
-}
-
-std::optional<LoudStretch> ChangeSearch::loud(const std::vector<FoundChange>& all) const {
-  const Eigen::VectorXd left = background(all).left(), expected = expected_squares(model_, motion_);
-  std::vector<double> times, squares;
-  for (Eigen::Index r = 0; r < left.size(); ++r) {
-    times.push_back(motion_.time(r));
-    squares.push_back(left[r] * left[r] / expected[r]);
-  }
-  return loud_stretch(times, squares, settings_);
-}
-
-Change ChangeSearch::unknown(const LoudStretch& stretch) const {
-  Change change;
-  change.effect = "unknown";
-  change.gain = stretch.gain;
-  change.since = motion_.start + stretch.from;
-  change.since_from = change.since - settings_.window;
-  change.since_to = change.since + settings_.window;
-  if (!stretch.to_end) change.until = motion_.start + stretch.to;
-  change.error_before = change.error_after = model_.noise * std::sqrt(stretch.times);
-  return change;
-}
-
 void ChangeSearch::onset_interval(const FoundChange& f, const Background& b, Change& change) const {
   const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   double rows = 0;

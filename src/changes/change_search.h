@@ -48,12 +48,16 @@ class ChangeSearch {
   bool like_fault() const { return like_fault_; }
   /// What is left beside these is louder than the healthy machine.
   std::optional<LoudStretch> loud(const std::vector<FoundChange>& all) const;
+  /// The same over the rest of the record, in motion alike.
+  std::optional<LoudStretch> louder(const std::vector<FoundChange>& all) const;
   Change unknown(const LoudStretch& stretch) const;
   const std::vector<std::string>& different() const { return different_; }
   /// Values of the columns that stand beside, `found` being so.
   std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
 
  private:
+  std::vector<double> times() const;
+  std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all) const;
   Background background(const std::vector<FoundChange>& others) const;
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;

@@ -93,6 +93,23 @@ void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<
       "motion of this kind";
 }
 
+/// Where it is louder than in the rest, though less than that.
+void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& found,
+                 const std::string& nearest, Changes& out) {
+  const std::optional<LoudStretch> louder = search.louder(found);
+  if (!louder) return;
+  const Change unknown = search.unknown(*louder);
+  const std::string until = unknown.until ? " to " + whole_seconds(*unknown.until) : "";
+  const std::string what =
+      "since " + whole_seconds(unknown.since) + until + " the record is " +
+      to_text(rounded(std::sqrt(louder->times))) +
+      " times as far from the healthy ones, farther than in the rest of it in motion alike";
+  if (found.empty())
+    out.cannot_tell = what + ", and follows no effect";
+  else
+    out.warnings.push_back(what + ", beside " + nearest);
+}
+
 /// What no effect explains is no health.
 void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
                       const ChangeSettings& settings, Changes& out) {
@@ -110,6 +127,8 @@ void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>
                              " the record follows no effect, beside " + joined(nearest));
     else if (loud)
       tell_loud(search, *loud, {}, of_two, settings, out);
+    else
+      tell_louder(search, found, joined(nearest), out);
     return;
   }
   out.changes.clear();

@@ -62,9 +62,11 @@ double Added::growth_of(const char* kind, double t) const {
 
 double Task::operator()(double t, int order) const {
   double sum = 0;
+  const double times = t < since_ ? 1 : times_, along = t < since_ ? t : since_ + times_ * (t - since_);
   for (int i = 0; i < 3; ++i) {
     const double w = 2 * M_PI * f_[i];
-    sum += amplitudes_[i] * std::pow(w, order) * std::sin(w * t + phase_ * (i + 1) + order * M_PI / 2);
+    sum += amplitudes_[i] * std::pow(times * w, order) *
+           std::sin(w * along + phase_ * (i + 1) + order * M_PI / 2);
   }
   return sum;
 }
@@ -90,7 +92,8 @@ Joint::Joint(Random& random, const MadeOptions& made)
 record::Record Joint::record(Random& random, double duration, bool cold, bool rests,
                              const Added& added) const {
   std::normal_distribution<double> white(0, noise), encoder(0, kEncoderNoise);
-  const Task task(random, options.cyclic && added.since < duration);
+  Task task(random, options.cyclic && added.since < duration);
+  if (added.effect == "other_task") task.change_speed(added.since, added.size);
   Bristles bristles;
   const double rate = options.sampling;
   Coloured coloured(random, 1 / rate, colour_time);
@@ -156,6 +159,7 @@ double Joint::load(const Task& task, double t, double temperature, const Added& 
          fault + a.of("cogging", t) * std::sin(a.order * q + a.phase) +
          (t < a.since + kPush ? a.of("push", t) : 0) +
          a.of("stribeck", t) * sign(w) * std::exp(-w * w / 0.1) +
+         a.of("swing", t) * sign(w) * std::sin(M_PI * t) + options.wave * noise * sign(w) * std::sin(25 * q) +
          a.of("rubbed_wave", t) * sign(w) * std::sin(a.order * q + a.phase);
 }
 

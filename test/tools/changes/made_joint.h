@@ -18,6 +18,7 @@ struct MadeOptions {
   double sampling = 50;   // Hz
   bool two = false;       // inertias
   double wander = 0.02;   // - of friction, up and down in ten minutes
+  double wave = 0;        // of the white noise: friction 25 times per rad that no effect has, when healthy
   bool cyclic = false;    // tasks of one sine, of the record that is judged
   double coloured = 0.5;  // - of the white noise, rms of first order noise beside it
 };
@@ -49,12 +50,18 @@ class Task {
         f_{uniform(random, 0.09, 0.13), uniform(random, 0.15, 0.2), uniform(random, 0.25, 0.33)},
         phase_(uniform(random, 0, 2 * M_PI)) {}
   double phase() const { return phase_; }
+  /// Another task from then on: the same path at another speed.
+  void change_speed(double since, double times) {
+    since_ = since;
+    times_ = times;
+  }
   /// Position or a derivative of it.
   double operator()(double t, int order = 0) const;
 
  private:
   double amplitudes_[3];  // rad
   double f_[3], phase_;
+  double since_ = 1e300, times_ = 1;
 };
 
 /// Of one inertia, or of two: then these are the load's, and a motor is before the gap, which is crossed

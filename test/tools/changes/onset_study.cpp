@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kLearn = 300, kLook = 300;  // s
 constexpr const char* kSizes[] = {"small", "middle", "large"};
+constexpr double kWave = 1.5;    // of the noise, that a machine in another task has when healthy
 constexpr double kHolds = 1.96;  // standard errors of a 95 % interval
 
 /// What is drawn, and what it is right to call it.
@@ -76,6 +77,8 @@ const std::vector<Drawn>& look_alikes() {
       {"presliding", {2, 4, 8}, Drawn::noise, "presliding", "torque", {}},
       {"stribeck", {2, 4, 8}, Drawn::noise, "stribeck", "", {}},
       {"push", {5, 10, 40}, Drawn::noise, "unknown", "", {}},
+      {"swing", {0.5, 1, 2}, Drawn::noise, "unknown", "", {}},
+      {"other_task", {0.5, 0.7, 1.15}, Drawn::absolute, "nothing", "", {}},
       {"local_fault", {2, 4, 8}, Drawn::noise, "local_fault", "forward", {}},
       {"flat_fault", {2, 4, 8}, Drawn::noise, "local_fault", "forward", {}},
   };
@@ -165,6 +168,7 @@ void study_onsets(const OnsetOptions& options, unsigned long seed, const MadeOpt
     const std::size_t kind = static_cast<std::size_t>(i) % kinds.size();
     const int size = i / static_cast<int>(kinds.size()) % 3;
     MadeOptions of_joint = made;
+    if (kinds[kind].name == std::string("nothing")) of_joint.wave = kWave;
     of_joint.cyclic = options.look_alikes && i / static_cast<int>(kinds.size()) % 2 == 1;
     const Joint joint(random, of_joint);
     const Added added = added_to(joint, kinds[kind], size, random);
