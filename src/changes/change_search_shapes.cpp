@@ -107,7 +107,7 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
 bool ChangeSearch::repeats(const FoundChange& f, const Background& b) const {
   const double from = settings_.block * double(f.from), to = settings_.block * double(f.to);
   return f.effect.width < screen_.widest() &&
-         repeated_gain(motion_, f.effect, b.left(), b.variance, from, to) / f.inflation > threshold(2);
+         repeated_gain(motion_, f.effect, b.left(), from, to) > threshold(2);
 }
 
 /// A wave that no effect has shows at several places.

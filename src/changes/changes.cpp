@@ -93,21 +93,21 @@ void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<
       "motion of this kind";
 }
 
-/// Where it is louder than in the rest, though less than that.
-void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& found,
-                 const std::string& nearest, Changes& out) {
+/// Where it is louder than in the rest, though less than that. More than the changes explain is no shape of
+/// theirs.
+void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& found, double explained,
+                 Changes& out) {
   const std::optional<LoudStretch> louder = search.louder(found);
-  if (!louder) return;
+  if (!louder || louder->excess < explained) return;
   const Change unknown = search.unknown(*louder);
   const std::string until = unknown.until ? " to " + whole_seconds(*unknown.until) : "";
-  const std::string what =
+  out.cannot_tell =
       "since " + whole_seconds(unknown.since) + until + " the record is " +
       to_text(rounded(std::sqrt(louder->times))) +
-      " times as far from the healthy ones, farther than in the rest of it in motion alike";
-  if (found.empty())
-    out.cannot_tell = what + ", and follows no effect";
-  else
-    out.warnings.push_back(what + ", beside " + nearest);
+      " times as far from the healthy ones, farther than in the rest of it in motion alike, and "
+      "follows no effect";
+  for (const FoundChange& f : found) out.cannot_tell += ", nearest: " + f.effect.id;
+  out.changes.clear();
 }
 
 /// What no effect explains is no health.
@@ -128,7 +128,7 @@ void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>
     else if (loud)
       tell_loud(search, *loud, {}, of_two, settings, out);
     else
-      tell_louder(search, found, joined(nearest), out);
+      tell_louder(search, found, explained, out);
     return;
   }
   out.changes.clear();

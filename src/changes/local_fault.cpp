@@ -13,7 +13,8 @@ constexpr double kShows = 2;                  // widths, within which it shows
 constexpr double kPass = 3;                   // intervals of rows that no pass is interrupted by
 constexpr int kOfEachWidth = 2;               // places. Choice
 constexpr double kOnsets = 1;                 // s. Choice
-constexpr int kLeastPasses = 3;               // beside the one that says most. Choice
+constexpr int kLeastPasses = 3;               // beside those that say most. Choice
+constexpr double kLeastScatter = 5;           // degrees of freedom of a direction's scatter. Choice
 
 /// Whether it moves so, or is pressed so; between, while it turns.
 double forward(ChangeChannel channel, const Moment& m) {
@@ -67,8 +68,9 @@ namespace {
 
 struct Pass {
   double score[2] = {0, 0}, squares[2] = {0, 0};  // forward, backward
-  double entered = 0, last = 0;                   // chords
-  bool through() const { return entered * last < 0; }
+  double entered = 0, left = 0;                   // chords
+  double time = 0;                                // s
+  bool through() const { return entered * left < 0; }
 };
 
 double gain_of(const double (&score)[2], const double (&squares)[2], double variance) {
@@ -78,14 +80,15 @@ double gain_of(const double (&score)[2], const double (&squares)[2], double vari
   return gain;
 }
 
+/// Those through the place.
 std::vector<Pass> passes_of(const SampledMotion& motion, const ChangeEffect& fault,
-                            const Eigen::VectorXd& left, double from, double to) {
+                            const Eigen::VectorXd& left) {
   const Eigen::MatrixXd columns = effect_columns(motion, fault);
   std::vector<Pass> passes;
   double last = -1e300;
   for (Eigen::Index r = 0; r < motion.size(); ++r) {
     const Moment& m = motion.moment(r);
-    if (m.time < from || m.time >= to || !shows_fault(fault, m)) continue;
+    if (!shows_fault(fault, m)) continue;
     const double c = chord(m.position, fault.shape);
     if (m.time - last > kPass * motion.row_interval) {
       passes.emplace_back();
@@ -93,40 +96,61 @@ std::vector<Pass> passes_of(const SampledMotion& motion, const ChangeEffect& fau
     }
     last = m.time;
     Pass& pass = passes.back();
-    pass.last = c;
+    pass.left = c;
+    pass.time = m.time;
     for (int d = 0; d < 2; ++d) {
-      const double z = columns(r, d);
-      pass.score[d] += z * left[r];
-      pass.squares[d] += z * z;
+      pass.score[d] += columns(r, d) * left[r];
+      pass.squares[d] += columns(r, d) * columns(r, d);
     }
   }
+  passes.erase(std::remove_if(passes.begin(), passes.end(), [](const Pass& p) { return !p.through(); }),
+               passes.end());
   return passes;
+}
+
+double mean(const std::vector<double>& all) {
+  double sum = 0;
+  for (const double x : all) sum += x;
+  return sum / double(all.size());
+}
+
+/// Squares about the mean, and how many of them are independent.
+void add_scatter(const std::vector<double>& all, double& squares, double& count) {
+  if (all.empty()) return;
+  const double middle = mean(all);
+  for (const double x : all) squares += (x - middle) * (x - middle);
+  count += double(all.size()) - 1;
+}
+
+void take_out_largest(std::vector<double>& all) {
+  if (all.empty()) return;
+  all.erase(std::max_element(all.begin(), all.end(),
+                             [](double a, double b) { return std::fabs(a) < std::fabs(b); }));
 }
 
 }  // namespace
 
 double repeated_gain(const SampledMotion& motion, const ChangeEffect& fault, const Eigen::VectorXd& left,
-                     double variance, double from, double to) {
-  std::vector<Pass> passes = passes_of(motion, fault, left, from, to);
-  passes.erase(std::remove_if(passes.begin(), passes.end(), [](const Pass& p) { return !p.through(); }),
-               passes.end());
-  if (passes.size() <= kLeastPasses) return 0;
-  Pass all;
-  for (const Pass& p : passes)
-    for (int d = 0; d < 2; ++d) {
-      all.score[d] += p.score[d];
-      all.squares[d] += p.squares[d];
-    }
-  double least = gain_of(all.score, all.squares, variance);
-  for (const Pass& p : passes) {
-    Pass rest = all;
-    for (int d = 0; d < 2; ++d) {
-      rest.score[d] -= p.score[d];
-      rest.squares[d] -= p.squares[d];
-    }
-    least = std::min(least, gain_of(rest.score, rest.squares, variance));
+                     double from, double to) {
+  std::vector<double> inside[2], outside[2];  // A of passes, forward, backward
+  for (const Pass& p : passes_of(motion, fault, left)) {
+    const int d = p.squares[0] > p.squares[1] ? 0 : 1;
+    if (!(p.squares[d] > 0)) continue;
+    (p.time >= from && p.time < to ? inside : outside)[d].push_back(p.score[d] / p.squares[d]);
   }
-  return least;
+  double gain = 0, passes = 0, counted = 0;
+  for (int d = 0; d < 2; ++d) {
+    take_out_largest(inside[d]);
+    double squares = 0, count = 0;
+    add_scatter(inside[d], squares, count);
+    add_scatter(outside[d], squares, count);
+    if (inside[d].empty() || count < kLeastScatter) continue;
+    const double middle = mean(inside[d]);
+    gain += middle * middle * double(inside[d].size()) * count / squares;
+    passes += double(inside[d].size());
+    counted += count;
+  }
+  return passes < kLeastPasses || counted < 2 * kLeastScatter ? 0 : gain;
 }
 
 struct FaultScreen::Bins {

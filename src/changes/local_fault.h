@@ -22,11 +22,13 @@ ChangeEffect fault_with_slopes(ChangeChannel channel, const ChangeEffect& fault,
 /// Rows about a fault, where it shows.
 bool shows_fault(const ChangeEffect& fault, const Moment& moment);
 
-/// Twice the log likelihood ratio of white noise that is left where the passes of a fault that tell least
-/// of it by chance or a push do not count: those that turn back at the place, and the one that says most. 0
-/// where fewer than three others are left in [from, to) [s]. `left`: of the residual, without the fault.
+/// Square of what passes through the place show in [from, to) [s], in standard errors: each pass counts as
+/// one value of A, as slow ones have many rows of the same coloured noise, and scatters by what passes do in
+/// all of the record. Passes that turn back there do not count, nor does the one of each direction that says
+/// most: a push is at one place as well. 0 where too few are left. `left`: of the residual, without the
+/// fault.
 double repeated_gain(const SampledMotion& motion, const ChangeEffect& fault, const Eigen::VectorXd& left,
-                     double variance, double from, double to);
+                     double from, double to);
 
 /// Where a fault may be: residuals by bins of position, for all places, widths and onsets. A matched filter
 /// without the nuisances and the filter of the signals: it says where to look closer, not what is there.

@@ -134,7 +134,8 @@ std::optional<LoudStretch> louder_stretch(const std::vector<double>& times,
     if (std::fabs(moved.difference(from, to)) > settings.alike_errors) return std::nullopt;
   }
   const double inside = loudness.mean(from, to);
-  return LoudStretch{w.begin[from], to < n ? w.begin[to] : times.back(), from == 0, to == n, inside, 0, most};
+  const double end = to < n ? w.begin[to] : times.back(), excess = w.sum(from, to) - w.count(from, to);
+  return LoudStretch{w.begin[from], end, from == 0, to == n, inside, excess, most};
 }
 
 }  // namespace backlash::changes

@@ -61,12 +61,17 @@ double Added::growth_of(const char* kind, double t) const {
 }
 
 double Task::operator()(double t, int order) const {
+  // q(x), x the time along the task: q' x', q'' x'^2 + q' x''
+  const double u = std::clamp((t - since_) / kSlowly, 0.0, 1.0), more = times_ - 1;
+  const double x = t + more * (kSlowly * u * u * u * (1 - u / 2) + std::max(0.0, t - since_ - kSlowly));
+  const double speed = 1 + more * u * u * (3 - 2 * u), speeds_up = more * 6 * u * (1 - u) / kSlowly;
   double sum = 0;
-  const double times = t < since_ ? 1 : times_, along = t < since_ ? t : since_ + times_ * (t - since_);
   for (int i = 0; i < 3; ++i) {
-    const double w = 2 * M_PI * f_[i];
-    sum += amplitudes_[i] * std::pow(times * w, order) *
-           std::sin(w * along + phase_ * (i + 1) + order * M_PI / 2);
+    const double w = 2 * M_PI * f_[i], angle = w * x + phase_ * (i + 1);
+    const double position = std::sin(angle), first = w * std::cos(angle), second = -w * w * position;
+    sum += amplitudes_[i] * (order == 0   ? position
+                             : order == 1 ? first * speed
+                                          : second * speed * speed + first * speeds_up);
   }
   return sum;
 }

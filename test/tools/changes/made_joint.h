@@ -55,12 +55,13 @@ class Task {
     since_ = since;
     times_ = times;
   }
-  /// Position or a derivative of it.
+  /// Position or its derivative of order 1 or 2.
   double operator()(double t, int order = 0) const;
 
  private:
   double amplitudes_[3];  // rad
   double f_[3], phase_;
+  static constexpr double kSlowly = 3;  // s, over which the speed changes
   double since_ = 1e300, times_ = 1;
 };
 
