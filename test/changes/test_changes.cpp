@@ -204,14 +204,6 @@ void expect_no_name(Added added) {
   for (const Change& c : changes_of(made(30, 200, added)).changes) EXPECT_EQ(c.effect, "unknown");
 }
 
-TEST(Changes, APushIsNoLocalFault) {
-  expect_no_name([](const Motion& m) { return m.t < kOnset || m.t > kOnset + 0.5 ? 0 : 0.5; });
-}
-
-TEST(Changes, AWaveThatNoEffectHasIsNoLocalFault) {
-  expect_no_name([](const Motion& m) { return m.t < kOnset ? 0 : 0.06 * std::sin(25 * m.q) * sign(m.w); });
-}
-
 TEST(Changes, TwoDamagedTeethAreNotOne) {
   expect_no_name([](const Motion& m) { return m.t < kOnset ? 0 : 0.1 * (bump(m.q) + bump(m.q + 0.8)); });
 }
