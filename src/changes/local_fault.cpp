@@ -235,7 +235,9 @@ std::vector<ChangeEffect> FaultScreen::likeliest(const Eigen::VectorXd& left, do
       if (most == tried_.size()) break;
       chosen.push_back(local_fault(motion_.sampling.channel, tried_[most].place, width));
       for (std::size_t i = 0; i < tried_.size(); ++i)  // the same one beside
-        if (std::fabs(chord(tried_[i].place, tried_[most].place)) < kShows * width) best[i] = 0;
+        if (tried_[i].width == width &&
+            std::fabs(chord(tried_[i].place, tried_[most].place)) < kShows * width)
+          best[i] = 0;
     }
   return chosen;
 }
