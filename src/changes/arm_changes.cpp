@@ -138,7 +138,8 @@ void ArmChanges::add_joint(std::size_t index) {
     return;
   }
   ArmJoint& joint = joints_.back();
-  joint.candidates = candidates_of(joint.model, of_joint, settings_);
+  joint.scores.emplace(joint.model, of_joint, settings_);
+  joint.candidates = joint.scores->of(change_effects(joint.model.sampling));
   set_chain_columns(record_, index, joint.motion);
   const std::vector<ChainEffect> effects = chain_effects(rig_.joints.size());
   joint.chain_inflation.assign(effects.size(), 1);
@@ -156,7 +157,10 @@ void ArmChanges::add_joint(std::size_t index) {
 }
 
 void ArmChanges::set_search(ArmJoint& joint) const {
-  joint.search.emplace(joint.model, joint.motion, joint.candidates, joint.beside, settings_, progress_);
+  joint.search.emplace(
+      joint.model, joint.motion, joint.candidates,
+      [scores = &*joint.scores](const ChangeEffect& e) { return scores->inflation(e); }, joint.beside,
+      settings_, progress_);
 }
 
 /// With a second encoder behind the gap: the deflection of each joint under the load that the chain puts on
@@ -180,7 +184,10 @@ void ArmChanges::search_deflection(std::size_t index) {
     const std::vector<record::Record> healthy = long_enough(index, sampling);
     const HealthyModel model = commission_healthy(healthy, sampling, settings_);
     const SampledMotion motion = motion_by(model, record, settings_);
-    ChangeSearch search(model, motion, candidates_of(model, healthy, settings_), {}, settings_, progress_);
+    const HealthyScores scores(model, healthy, settings_);
+    ChangeSearch search(
+        model, motion, scores.of(change_effects(sampling)),
+        [&](const ChangeEffect& e) { return scores.inflation(e); }, {}, settings_, progress_);
     const std::vector<FoundChange> found = search.run();
     Changes one;
     for (const FoundChange& f : found) one.changes.push_back(search.told(f, found, false));

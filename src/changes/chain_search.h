@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "chain_motion.h"
-#include "change_search.h"
+#include "channel_changes.h"
 
 namespace backlash::changes {
 
@@ -19,6 +19,7 @@ struct ArmJoint {
   std::size_t index = 0;  // in the chain
   HealthyModel model;
   SampledMotion motion;
+  std::optional<HealthyScores> scores;
   std::vector<ScannedEffect> candidates;
   std::vector<double> chain_inflation;  // of the scores of each of chain_effects()
   std::vector<FoundChange> beside;      // of the chain, as this joint shows them

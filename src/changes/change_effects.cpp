@@ -18,6 +18,9 @@ constexpr double kMostFrictionOrder = 12;            // 1/rad. Choice
 constexpr double kFluctuationSpeeds[] = {0.4, 0.7, 1, 1.4, 1.8, 2.3};  // - of the rms speed. Choice
 constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};                  // - of the rms speed. Choice
 
+// Ways over which dry friction builds up after a reversal: shorter ones are over before anything counts.
+constexpr double kBristles[] = {0.02, 0.05, 0.12};  // s, times the rms speed. Choice
+
 constexpr double kMostKnown = 1e7;  // rows of columns that are kept, 160 MB at most. Choice
 
 double direction(const Moment& m, double) {
@@ -65,6 +68,10 @@ double drag(const Moment& m, double) {
 double stribeck(const Moment& m, double ws) {
   return m.direction * std::exp(-m.speed * m.speed / (ws * ws));
 }
+/// What Dahl's law lacks of dry friction after a reversal.
+double late_friction(const Moment& m, double distance) {
+  return -2 * m.direction * std::exp(-m.way / distance);
+}
 double drift(const Moment& m, double) {
   return m.direction * m.time;
 }
@@ -101,7 +108,8 @@ constexpr Declared kDeclared[] = {{"motor_coulomb", "N m", "motor_coulomb"},
                                   {"load_inertia", "kg m^2", "load_inertia"},
                                   {"mesh_stiffness", "rad/(N m)", "compliance"},
                                   {"encoder_skew", "s", "encoder_skew"},
-                                  {"encoder_slip", "rad", "offset"}};
+                                  {"encoder_slip", "rad", "offset"},
+                                  {"presliding", "N m", "torque"}};
 
 std::string unit_of(const std::string& id, const std::string& parameter) {
   for (const Declared& d : kDeclared)
@@ -135,11 +143,22 @@ bool ChangeEffect::has_order() const {
   return id == "cogging" || id == "position_dependent_friction" || id == "transmission_error";
 }
 
+bool ChangeEffect::has_scale() const {
+  return id == "stribeck" || id == "presliding";
+}
+
 double ChangeEffect::least_order() const {
   return id == "position_dependent_friction" ? kLeastFrictionOrder : kLeastOrder;
 }
 
+Eigen::Index ChangeEffect::freedom() const {
+  return static_cast<Eigen::Index>(ramp ? 1 : columns.size()) + (at_place()                   ? 2
+                                                                 : has_order() || has_scale() ? 1
+                                                                                              : 0);
+}
+
 std::string ChangeEffect::name() const {
+  if (at_place()) return id + " at " + to_text(shape);
   return shape > 0 ? id + " " + to_text(shape) : id;
 }
 
@@ -160,11 +179,19 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
   for (const double share : kFluctuationSpeeds)
     all.push_back({"load_dependent_friction", share * sampling.speed, {fluctuating_load_rub}});
   for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});
+  for (const double way : kBristles) all.push_back({"presliding", way * sampling.speed, {late_friction}});
   for (double n = kLeastFrictionOrder; n <= kMostFrictionOrder; n += kOrderStep)
     all.push_back({"position_dependent_friction", n, {rubbed_cosine, rubbed_sine}});
   for (double n = kLeastOrder; n <= kMostOrder; n += kOrderStep)
     all.push_back({"cogging", n, {cosine, sine}});
   return all;
+}
+
+std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect) {
+  if (effect.id != "gravity" || effect.columns.size() != 2) return std::nullopt;
+  ChangeEffect e = effect;
+  e.columns.emplace_back(acceleration);
+  return e;
 }
 
 namespace {
@@ -180,11 +207,12 @@ Eigen::MatrixXd filtered_columns(const SampledMotion& motion, const ChangeEffect
 }  // namespace
 
 Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect) {
-  // Those of the load change with what the machine is taken for; those of a chain are given.
+  // Those of a chain are given; those of the load change with what the machine is taken for; those of a place
+  // are asked for once.
   if (effect.columns.empty()) return motion.known_columns.at(effect.name());
-  if (effect.id == "load_dependent_friction" || effect.id == "encoder_slip")
+  if (effect.id == "load_dependent_friction" || effect.id == "encoder_slip" || effect.at_place())
     return filtered_columns(motion, effect);
-  const std::string name = effect.name() + (effect.ramp ? " ramp" : "");
+  const std::string name = effect.name() + " " + std::to_string(effect.columns.size());
   const auto known = motion.known_columns.find(name);
   if (known != motion.known_columns.end()) return known->second;
   Eigen::MatrixXd columns = filtered_columns(motion, effect);
@@ -201,16 +229,18 @@ std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::Vec
   };
   if (values.size() == 1) {
     add(value_name(effect.id), values[0], std::sqrt(covariance(0, 0)));
-    if (effect.id == "stribeck") add("speed", effect.shape, effect.shape);
     if (effect.id == "load_dependent_friction" && effect.shape > 0)
       add("fluctuation_speed", effect.shape, effect.shape);
     return out;
   }
   // c cos x + s sin x = A sin(x + p)
   const double amplitude = std::hypot(values[0], values[1]);
-  const Eigen::Vector2d along = values / amplitude, across(along[1], -along[0]);
-  add("amplitude", amplitude, std::sqrt(along.dot(covariance * along)));
-  add("phase", std::atan2(values[0], values[1]), std::sqrt(across.dot(covariance * across)) / amplitude);
+  const Eigen::Matrix2d of_wave = covariance.topLeftCorner<2, 2>();
+  const Eigen::Vector2d along = values.head<2>() / amplitude, across(along[1], -along[0]);
+  add("amplitude", amplitude, std::sqrt(along.dot(of_wave * along)));
+  add("phase", std::atan2(values[0], values[1]), std::sqrt(across.dot(of_wave * across)) / amplitude);
+  if (values.size() == 3)
+    out.push_back({"inertia", model::axis_unit("kg m^2", linear), {values[2], std::sqrt(covariance(2, 2))}});
   if (effect.has_order()) add("order", effect.shape, 0);
   return out;
 }

@@ -3,6 +3,8 @@
 // value takes.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,15 +15,24 @@ namespace backlash::changes {
 
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
-  double shape = 0;  // order [1/rad] or speed [rad/s], where the effect has one
+  double shape = 0;  // order [1/rad], speed [rad/s] or place [rad], where the effect has one
   /// Columns of one moment. Two: cosine and sine of a wave; of a ramp something and that times time.
-  std::vector<double (*)(const Moment&, double shape)> columns;
+  std::vector<std::function<double(const Moment&, double shape)>> columns;
   bool ramp = false;  // the second column grows from the onset on
+  double width = 0;   // rad, of what is at a place; 0: it is not
+
+  bool at_place() const { return width > 0; }
+  /// Values that are fitted, order, place and width among them.
+  Eigen::Index freedom() const;
 
   bool has_order() const;
+  bool has_scale() const;      // `shape` is a speed or a way that is fitted by factors
   double least_order() const;  // that is tried, of one that has one
   std::string name() const;    // with its shape
 };
+
+/// What is carried weighs and is inert: gravity with a third column. None of other effects.
+std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect);
 
 /// Simple ones first. Orders whose wave the filter would take away leave columns of nothing.
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling);

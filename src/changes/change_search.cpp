@@ -12,11 +12,14 @@
 namespace backlash::changes {
 
 ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motion,
-                           std::vector<ScannedEffect> candidates, const std::vector<FoundChange>& beside,
-                           const ChangeSettings& settings, const Progress& progress)
+                           std::vector<ScannedEffect> candidates, Inflation inflation,
+                           const std::vector<FoundChange>& beside, const ChangeSettings& settings,
+                           const Progress& progress)
     : model_(model),
       motion_(motion),
       candidates_(std::move(candidates)),
+      inflation_(std::move(inflation)),
+      screen_(motion),
       settings_(settings),
       progress_(progress),
       beside_(beside),
@@ -79,8 +82,8 @@ std::size_t ChangeSearch::windows() const {
 
 double ChangeSearch::threshold(Eigen::Index values) const {
   const double hours = motion_.moments.back().time / 3600;
-  const double probability =
-      std::clamp(settings_.false_alarms_per_hour * hours / double(candidates_.size()), 1e-14, 0.1);
+  const double effects = double(candidates_.size() + screen_.count());
+  const double probability = std::clamp(settings_.false_alarms_per_hour * hours / effects, 1e-14, 0.1);
   const double fewest = double(margin_), most = double(windows()) * settings_.window / settings_.block;
   return gain_by_chance(probability, double(values), fewest, std::max(fewest, most));
 }
@@ -118,6 +121,8 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
       throw Cancelled();
     all.push_back(scanned(candidates_[i], b, 5));
   }
+  const std::optional<FoundChange> fault = best_fault(b);
+  if (fault) all.push_back(*fault);
   // By what they explain: the inflation of one may be chance.
   const auto most = std::max_element(all.begin(), all.end(), [](const FoundChange& x, const FoundChange& y) {
     return x.score.gain < y.score.gain;
@@ -127,8 +132,7 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   const double alike = settings_.alike * most->score.gain;
   const FoundChange* simplest = &*most;
   for (const FoundChange& f : all)
-    if (f.score.gain >= alike && f.score.values.size() > 0 &&
-        f.score.values.size() < simplest->score.values.size())
+    if (f.score.gain >= alike && f.score.values.size() > 0 && f.effect.freedom() < simplest->effect.freedom())
       simplest = &f;
   FoundChange found = *simplest;
   for (const FoundChange& f : all)
@@ -148,7 +152,8 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
 
 bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   double rows = 0;
-  const double squares = left_after(b, f.from, f.to, rows), explained = f.score.gain * b.variance;
+  const double squares = f.effect.at_place() ? left_at(f, b.left(), rows) : left_after(b, f.from, f.to, rows);
+  const double explained = f.score.gain * b.variance;
   if (explained < settings_.least_explained * squares) return false;
   if (explained < rows * model_.least_change * model_.least_change) return false;
   // More noise than in the healthy records counts against it.
@@ -180,6 +185,8 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
 }
 
 void ChangeSearch::refine(FoundChange& f, const Background& b) const {
+  if (f.effect.at_place()) refine_fault(f, b);
+  if (f.effect.has_scale()) refine_scale(f, b);
   refine_order(f, b);
   const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   f.score = sums.score(f.from, f.to, b);
@@ -189,6 +196,18 @@ void ChangeSearch::refine(FoundChange& f, const Background& b) const {
     f.from = k;
     f.score = std::move(s);
   }
+  f.gain = f.score.gain / f.inflation;
+}
+
+/// A payload is inert as well: where the record shows it, gravity alone would have a wrong size.
+void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
+  const std::optional<ChangeEffect> e = with_inertia(f.effect);
+  if (!e) return;
+  EffectSums::Score s =
+      EffectSums(motion_, effect_columns(motion_, *e), b, settings_.block, false).score(f.from, f.to, b);
+  if (s.values.size() == 0 || s.gain < f.score.gain + settings_.onset_drop * f.inflation) return;
+  f.effect = *e;
+  f.score = std::move(s);
   f.gain = f.score.gain / f.inflation;
 }
 
@@ -231,7 +250,9 @@ void ChangeSearch::differ(FoundChange f) {
 bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChange>& found) const {
   for (const FoundChange& f : found) {
     const double apart = std::fabs(double(next.from) - double(f.from)) * settings_.block;
-    const double least = apart < settings_.same_event ? settings_.least_beside : settings_.least_further;
+    // What is left of a bump of another shape is at its place, and begins with any pass of it.
+    const bool same = apart < settings_.same_event || f.effect.at_place();
+    const double least = same ? settings_.least_beside : settings_.least_further;
     if (next.gain < least * f.gain) return false;
   }
   return std::none_of(beside_.begin(), beside_.end(), [&](const FoundChange& f) {
@@ -244,7 +265,8 @@ bool ChangeSearch::further(const FoundChange& next, const std::vector<FoundChang
 void ChangeSearch::unite(std::vector<FoundChange>& found) const {
   for (FoundChange& f : found)
     for (auto later = found.begin(); later != found.end(); ++later) {
-      const bool same = f.effect.name() == later->effect.name() && !f.effect.ramp;
+      const bool same = f.effect.name() == later->effect.name() && !f.effect.ramp &&
+                        f.score.values.size() == later->score.values.size();
       if (!same || f.from >= later->from || f.to <= later->from) continue;
       if ((f.score.values + later->score.values).norm() > settings_.undone * f.score.values.norm()) continue;
       f.to = later->from;
@@ -264,7 +286,12 @@ std::optional<FoundChange> ChangeSearch::next(const std::vector<FoundChange>& fo
       differ(*next);
       continue;
     }
+    if (next->effect.at_place() && !alone(*next, b)) {
+      like_fault_ = found.empty();
+      return std::nullopt;
+    }
     if (!further(*next, found)) return std::nullopt;
+    add_inertia(*next, b);
     find_end(*next, b);
     return next;
   }
@@ -290,49 +317,6 @@ std::vector<FoundChange> ChangeSearch::run() {
     add(std::move(*one), found);
   }
   return found;
-}
-
-bool ChangeSearch::explained(const std::vector<FoundChange>& all) const {
-  if (all.empty()) return true;
-  // So many at once are rather one of another shape.
-  if (all.size() >= static_cast<std::size_t>(settings_.most_changes)) return false;
-  std::size_t from = blocks_;
-  for (const FoundChange& f : all) from = std::min(from, f.from);
-  const Background before = background({}), after = background(all);
-  double rows = 0, rows_before = 0;
-  const double left = left_after(after, from, blocks_, rows);
-  const double squares = left_after(before, from, blocks_, rows);
-  const double noise =
-      std::max(left_after(after, 0, from, rows_before) / std::max(rows_before, 1.0), before.variance);
-  return left - 2 * noise * rows < settings_.unknown_left * squares;
-}
-
-std::optional<LoudStretch> ChangeSearch::loud(const std::vector<FoundChange>& all) const {
-  const Background b = background(all);
-  const Eigen::VectorXd left = b.left();
-  Eigen::VectorXd expected = expected_squares(model_, motion_);
-  // What stands beside is as well known as its shape.
-  const Eigen::VectorXd beside = b.columns.middleCols(beside_column_, beside_columns_) *
-                                 b.estimate.segment(beside_column_, beside_columns_);
-  expected += (settings_.model_error * beside).cwiseAbs2();
-  std::vector<double> times, squares;
-  for (Eigen::Index r = 0; r < left.size(); ++r) {
-    times.push_back(motion_.time(r));
-    squares.push_back(left[r] * left[r] / expected[r]);
-  }
-  return loud_stretch(times, squares, settings_);
-}
-
-Change ChangeSearch::unknown(const LoudStretch& stretch) const {
-  Change change;
-  change.effect = "unknown";
-  change.gain = stretch.gain;
-  change.since = motion_.start + stretch.from;
-  change.since_from = change.since - settings_.window;
-  change.since_to = change.since + settings_.window;
-  if (!stretch.to_end) change.until = motion_.start + stretch.to;
-  change.error_before = change.error_after = model_.noise * std::sqrt(stretch.times);
-  return change;
 }
 
 void ChangeSearch::onset_interval(const FoundChange& f, const Background& b, Change& change) const {
@@ -380,13 +364,18 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   change.error_after = std::sqrt(after);
   Eigen::VectorXd values = f.score.values;
   Eigen::MatrixXd covariance = f.score.covariance * f.inflation * std::max(1.0, after / b.variance);
-  covariance.diagonal().array() += std::pow(settings_.model_error * values.norm(), 2);
+  const Eigen::Index wave = std::min<Eigen::Index>(values.size(), 2);
+  covariance.diagonal().head(wave).array() += std::pow(settings_.model_error * values.head(wave).norm(), 2);
+  for (Eigen::Index i = wave; i < values.size(); ++i)
+    covariance(i, i) += std::pow(settings_.model_error * values[i], 2);
   const double span = settings_.block * double(f.to - f.from);
   if (f.effect.ramp) {
     values *= span;
     covariance *= span * span;
   }
-  change.size = change_size(f.effect, values, covariance, linear);
+  change.size = f.effect.at_place()    ? fault_size(f, b, with.left(), linear)
+                : f.effect.has_scale() ? scaled_size(f, b, after / b.variance, linear)
+                                       : change_size(f.effect, values, covariance, linear);
   if (f.effect.ramp) change.size.push_back({"span", "s", {span, settings_.block}});
   return change;
 }

@@ -9,6 +9,7 @@
 
 #include "backlash_diagnosis/changes/changes.h"
 #include "change_scan.h"
+#include "local_fault.h"
 #include "unexplained.h"
 
 namespace backlash::changes {
@@ -26,12 +27,16 @@ struct ScannedEffect {
   double inflation = 1;
 };
 
+/// By how much the scores of an effect scatter in the healthy records, see score_inflation().
+using Inflation = std::function<double(const ChangeEffect&)>;
+
 /// One channel of a record against a healthy machine.
 class ChangeSearch {
  public:
   /// `beside`: changes that another channel shows, of which this one may show any share.
+  /// `inflation` is asked for effects at a place, which are not among the candidates: too many.
   ChangeSearch(const HealthyModel& model, const SampledMotion& motion, std::vector<ScannedEffect> candidates,
-               const std::vector<FoundChange>& beside, const ChangeSettings& settings,
+               Inflation inflation, const std::vector<FoundChange>& beside, const ChangeSettings& settings,
                const Progress& progress);
 
   std::vector<FoundChange> run();
@@ -45,14 +50,20 @@ class ChangeSearch {
   std::size_t windows() const;
   Change told(const FoundChange& found, const std::vector<FoundChange>& all, bool linear) const;
   bool explained(const std::vector<FoundChange>& all) const;
+  /// A change is there of which a fault at one place is the nearest, and others have a share in it.
+  bool like_fault() const { return like_fault_; }
   /// What is left beside these is louder than the healthy machine.
   std::optional<LoudStretch> loud(const std::vector<FoundChange>& all) const;
+  /// The same over the rest of the record, in motion alike.
+  std::optional<LoudStretch> louder(const std::vector<FoundChange>& all) const;
   Change unknown(const LoudStretch& stretch) const;
   const std::vector<std::string>& different() const { return different_; }
   /// Values of the columns that stand beside, `found` being so.
   std::vector<signal::Measured> beside(const std::vector<FoundChange>& found) const;
 
  private:
+  std::vector<double> times() const;
+  std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all) const;
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;
   FoundChange scanned(const ScannedEffect& c, const Background& b, std::size_t step) const;
@@ -63,6 +74,18 @@ class ChangeSearch {
   bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
+  void refine_scale(FoundChange& f, const Background& b) const;
+  void add_inertia(FoundChange& f, const Background& b) const;
+  // Faults at a place
+  std::optional<FoundChange> best_fault(const Background& b) const;
+  void refine_fault(FoundChange& f, const Background& b) const;
+  bool repeats(const FoundChange& f, const Background& b) const;
+  bool alone(const FoundChange& f, const Background& b) const;
+  double left_at(const FoundChange& f, const Eigen::VectorXd& left, double& rows) const;
+  std::vector<ChangeSize> scaled_size(const FoundChange& f, const Background& b, double noisier,
+                                      bool linear) const;
+  std::vector<ChangeSize> fault_size(const FoundChange& f, const Background& b, const Eigen::VectorXd& left,
+                                     bool linear) const;
   void find_end(FoundChange& f, const Background& b) const;
   void unite(std::vector<FoundChange>& found) const;
   void onset_interval(const FoundChange& f, const Background& b, Change& change) const;
@@ -71,12 +94,15 @@ class ChangeSearch {
   const HealthyModel& model_;
   const SampledMotion& motion_;
   const std::vector<ScannedEffect> candidates_;
+  const Inflation inflation_;
+  const FaultScreen screen_;
   const ChangeSettings& settings_;
   const Progress& progress_;
   const std::vector<FoundChange> beside_;
   Whitened first_;
   Eigen::Index beside_column_ = 0, beside_columns_ = 0;  // the first of what stands beside, and how many
   std::vector<std::string> different_;                   // effects that the record has from its beginning
+  bool like_fault_ = false;
   const std::size_t margin_, blocks_;
 };
 

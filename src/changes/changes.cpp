@@ -7,19 +7,10 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
-#include "change_search.h"
 #include "channel_changes.h"
 
 namespace backlash::changes {
 namespace {
-
-std::string whole_seconds(double time) {
-  return to_text(std::round(time)) + " s";
-}
-
-double rounded(double x) {
-  return std::round(10 * x) / 10;
-}
 
 /// What one channel shows.
 struct ChannelChanges {
@@ -27,25 +18,6 @@ struct ChannelChanges {
   std::vector<signal::Measured> beside;  // columns of what stood beside
   Changes told;
 };
-
-}  // namespace
-
-std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
-                                         const std::vector<record::Record>& healthy,
-                                         const ChangeSettings& settings) {
-  std::vector<ScannedEffect> all;
-  for (const ChangeEffect& e : change_effects(model.sampling)) all.push_back({e, 1});
-  for (const record::Record& r : healthy) {
-    const SampledMotion motion = motion_by(model, r, settings);
-    const Eigen::VectorXd residual = residual_of(model, motion, settings).residual;
-    for (ScannedEffect& c : all)
-      c.inflation = std::max(c.inflation, score_inflation(motion, residual, effect_columns(motion, c.effect),
-                                                          model.noise * model.noise, settings.window));
-  }
-  return all;
-}
-
-namespace {
 
 /// What the load of the teeth may be other by: what the motor's torque shows, on whichever side of the gap.
 std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& changes, double block) {
@@ -63,73 +35,16 @@ std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& 
   };
 }
 
-/// Where the record is louder than the healthy machine. Of two inertias another task alone may do that, up to
-/// a limit: their teeth cross the gap more often or harder.
-void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<std::string> nearest,
-               bool of_two, const ChangeSettings& settings, Changes& out) {
-  Change unknown = search.unknown(loud);
-  if (!loud.from_beginning && (!of_two || loud.times >= settings.unknown_of_two)) {
-    unknown.alike = std::move(nearest);
-    out.changes.push_back(unknown);
-    return;
-  }
-  const std::string since =
-                        loud.from_beginning ? "from its beginning" : "since " + whole_seconds(unknown.since),
-                    until = unknown.until ? " to " + whole_seconds(*unknown.until) : "";
-  out.cannot_tell =
-      since + until + " the record follows no effect, " + to_text(rounded(std::sqrt(loud.times))) +
-      " times as far from it as the healthy records; if its task is another one, commission with "
-      "motion of this kind";
-}
-
-}  // namespace
-
-void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
-                      const ChangeSettings& settings, Changes& out) {
-  std::optional<LoudStretch> loud = search.loud(found);
-  double explained = 0;
-  std::vector<std::string> nearest;
-  for (const FoundChange& f : found) {
-    explained += f.score.gain;
-    nearest.push_back(f.effect.id);
-  }
-  if (search.explained(found) && !(loud && loud->excess > explained)) {
-    if (loud && !found.empty())
-      out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +
-                             " the record follows no effect, beside " + joined(nearest));
-    else if (loud)
-      tell_loud(search, *loud, {}, of_two, settings, out);
-    return;
-  }
-  out.changes.clear();
-  loud = search.loud({});
-  if (loud)
-    tell_loud(search, *loud, nearest, of_two, settings, out);
-  else
-    out.cannot_tell = "the record differs from the healthy ones in a way that no effect explains (nearest: " +
-                      joined(nearest) + "): commission with more motion of this kind";
-}
-
-void take_out_short(const ChangeSettings& settings, Changes& out) {
-  const double shortest = double(settings.least_windows) * settings.window;
-  const auto is_short = [&](const Change& c) { return c.until && *c.until - c.since < shortest; };
-  for (const Change& c : out.changes)
-    if (is_short(c) && out.cannot_tell.empty())
-      out.cannot_tell =
-          "from " + whole_seconds(c.since) + " to " + whole_seconds(*c.until) +
-          " the record differs from the healthy ones, too short to tell by what (nearest: " + c.effect + ")";
-  out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
-}
-
-namespace {
-
 ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::Record>& healthy,
                           const record::Record& record, const std::vector<FoundChange>& beside, bool linear,
                           const ChangeSettings& settings, const Progress& progress) {
   HealthyModel of_record = model;
   of_record.sampling.other_load = other_load(beside, settings.block);
   const SampledMotion motion = motion_by(of_record, record, settings);
-  ChangeSearch search(model, motion, candidates_of(model, healthy, settings), beside, settings, progress);
+  const HealthyScores scores(model, healthy, settings);
+  ChangeSearch search(
+      model, motion, scores.of(change_effects(model.sampling)),
+      [&](const ChangeEffect& e) { return scores.inflation(e); }, beside, settings, progress);
   ChannelChanges result;
   const std::vector<FoundChange>& found = result.found = search.run();
   result.beside = search.beside(found);

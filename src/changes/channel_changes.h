@@ -1,17 +1,31 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What all channels share, be they of a joint or of the joints of an arm: which effects are tried, and what
-// is told of what they leave.
+// What all channels share, be they of a joint or of the joints of an arm: how the scores of the effects that
+// are tried scatter, and what is told of what they leave.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "change_search.h"
 
 namespace backlash::changes {
 
-std::vector<ScannedEffect> candidates_of(const HealthyModel& model,
-                                         const std::vector<record::Record>& healthy,
-                                         const ChangeSettings& settings);
+/// "37 s"
+std::string whole_seconds(double time);
+
+/// How the scores of effects scatter in the healthy records.
+class HealthyScores {
+ public:
+  HealthyScores(const HealthyModel& model, const std::vector<record::Record>& healthy,
+                const ChangeSettings& settings);
+  double inflation(const ChangeEffect& effect) const;
+  std::vector<ScannedEffect> of(const std::vector<ChangeEffect>& effects) const;
+
+ private:
+  std::vector<SampledMotion> motions_;
+  std::vector<Eigen::VectorXd> residuals_;
+  double variance_, window_;
+};
 
 /// What no effect explains is no health. `of_two`: inertias.
 void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kThinned = 0.25;  // - of the rate that is kept, where its filter ends. Theory: below a half
 
+constexpr double kFar = 1e3;  // rad, since a reversal that was before the record
+
 struct EvenSamples {
   std::vector<double> torque, position, deflection, chain;
   std::vector<char> there;
@@ -159,7 +161,9 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
       squares_about(jerk, static_cast<std::size_t>(std::lround(settings.rough / dt)));
   const std::vector<double> parting =
       signal::derivative(signal::derivative(filtered(even.deflection), dt), dt);
+  double way = kFar;
   for (std::size_t k = 0; k < position.size(); ++k) {
+    if (k > 0) way = speed[k] * speed[k - 1] < 0 ? 0 : way + std::fabs(position[k] - position[k - 1]);
     Moment m = {double(k) * dt,
                 position[k],
                 speed[k],
@@ -167,6 +171,7 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
                 jerk[k],
                 roughness[k],
                 std::tanh(speed[k] / turn),
+                way,
                 0,
                 0,
                 0,

@@ -51,6 +51,7 @@ struct Moment {
   double jerk;          // rad/s^3
   double roughness;     // rad^2/s^6, mean square of that about the moment
   double direction;     // -1..1
+  double way;           // rad, since the last reversal
   double load;          // N m, that the healthy machine's load takes
   double load_slope;    // N m/rad, of its gravity
   double fluctuation;   // N m s/rad, by which that may fluctuate per speed, faster than the record shows

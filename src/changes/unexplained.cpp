@@ -32,6 +32,44 @@ Windows windows_of(const std::vector<double>& times, const std::vector<double>& 
   return w;
 }
 
+/// Sums of one value per window before each, and of their squares.
+struct Sums {
+  explicit Sums(const std::vector<double>& values) {
+    for (const double x : values) {
+      sum.push_back(sum.back() + x);
+      squares.push_back(squares.back() + x * x);
+    }
+  }
+  std::size_t size() const { return sum.size() - 1; }
+  double mean(std::size_t from, std::size_t to) const { return (sum[to] - sum[from]) / double(to - from); }
+  double mean_outside(std::size_t from, std::size_t to) const {
+    return (sum[size()] - sum[to] + sum[from]) / double(size() - to + from);
+  }
+  /// Inside over outside, in standard errors.
+  double difference(std::size_t from, std::size_t to) const {
+    const auto in = double(to - from), out = double(size()) - in;
+    const double a = mean(from, to), b = mean_outside(from, to);
+    const double spread_in = (squares[to] - squares[from]) / in - a * a;
+    const double spread_out = (squares[size()] - squares[to] + squares[from]) / out - b * b;
+    return (a - b) / std::sqrt(std::max(spread_in / in + spread_out / out, 1e-300));
+  }
+  std::vector<double> sum = {0}, squares = {0};
+};
+
+std::vector<double> means_of(const Windows& w) {
+  std::vector<double> means;
+  for (std::size_t k = 0; k < w.begin.size(); ++k) means.push_back(w.mean_of(k));
+  return means;
+}
+
+/// Without the two that are loudest.
+double mean_but_two(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  double sum = 0;
+  for (std::size_t k = 0; k + 2 < values.size(); ++k) sum += values[k];
+  return sum / double(values.size() - 2);
+}
+
 double log_mean(double sum, double rows) {
   return rows > 0 ? rows * std::log(std::max(sum / rows, 1e-300)) : 0;
 }
@@ -69,6 +107,35 @@ std::optional<LoudStretch> loud_stretch(const std::vector<double>& times, const 
     }
   }
   return best;
+}
+
+std::optional<LoudStretch> louder_stretch(const std::vector<double>& times,
+                                          const std::vector<double>& squares, const Eigen::MatrixXd& motion,
+                                          const ChangeSettings& settings) {
+  const Windows w = windows_of(times, squares, settings.window);
+  const std::vector<double> means = means_of(w);
+  const Sums loudness(means);
+  const std::size_t n = means.size(), least = settings.louder_windows;
+  std::size_t from = 0, to = 0;
+  double most = settings.louder_errors;
+  for (std::size_t i = 0; i + least <= n; ++i)
+    for (std::size_t j = i + least; j <= n && n - j + i >= least; ++j) {
+      const double outside = std::max(1.0, loudness.mean_outside(i, j));
+      if (loudness.mean(i, j) < settings.louder * outside || loudness.difference(i, j) <= most) continue;
+      const auto at = [&](std::size_t k) { return means.begin() + static_cast<std::ptrdiff_t>(k); };
+      if (mean_but_two({at(i), at(j)}) < settings.louder * outside) continue;
+      most = loudness.difference(i, j);
+      from = i, to = j;
+    }
+  if (to == 0) return std::nullopt;
+  for (Eigen::Index c = 0; c < motion.cols(); ++c) {
+    const std::vector<double> values(motion.col(c).begin(), motion.col(c).end());
+    const Sums moved(means_of(windows_of(times, values, settings.window)));
+    if (std::fabs(moved.difference(from, to)) > settings.alike_errors) return std::nullopt;
+  }
+  const double inside = loudness.mean(from, to);
+  const double end = to < n ? w.begin[to] : times.back(), excess = w.sum(from, to) - w.count(from, to);
+  return LoudStretch{w.begin[from], end, from == 0, to == n, inside, excess, most};
 }
 
 }  // namespace backlash::changes

@@ -3,6 +3,7 @@
 // effect that was tried explains it.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <vector>
 
@@ -23,5 +24,13 @@ struct LoudStretch {
 /// ChangeSettings::unknown_louder times as loud as a healthy machine, and as the rest of the record.
 std::optional<LoudStretch> loud_stretch(const std::vector<double>& times, const std::vector<double>& squares,
                                         const ChangeSettings& settings);
+
+/// A stretch of at least ChangeSettings::louder_windows windows that is ChangeSettings::louder times as loud
+/// as a healthy machine and as the rest of the record, while the means of `motion`, a row of values each
+/// time, do not differ between the two. Weaker than loud_stretch(), so that it needs the record itself to
+/// compare with.
+std::optional<LoudStretch> louder_stretch(const std::vector<double>& times,
+                                          const std::vector<double>& squares, const Eigen::MatrixXd& motion,
+                                          const ChangeSettings& settings);
 
 }  // namespace backlash::changes

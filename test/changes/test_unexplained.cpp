@@ -65,5 +65,51 @@ TEST(LoudStretch, OnePushIsNone) {
   EXPECT_FALSE(stretch_of(5, [](double t) { return t > 90 && t < 93 ? 200 : 1; }));
 }
 
+/// A record of 300 s louder by `louder(t)`, its motion a sine whose size goes by `moves(t)`.
+std::optional<LoudStretch> louder_of(
+    unsigned seed, const std::function<double(double)>& louder,
+    const std::function<double(double)>& moves = [](double) { return 1; }) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> times, squares;
+  for (int k = 0; k < int(300 * kRate); ++k) {
+    const double x = normal(random);
+    times.push_back(k / kRate);
+    squares.push_back(louder(times.back()) * x * x);
+  }
+  Eigen::MatrixXd motion(static_cast<Eigen::Index>(times.size()), 1);
+  for (Eigen::Index r = 0; r < motion.rows(); ++r) {
+    const double t = times[static_cast<std::size_t>(r)];
+    motion(r, 0) = moves(t) * std::fabs(std::sin(1.7 * t));
+  }
+  return louder_stretch(times, squares, motion, {});
+}
+
+TEST(LouderStretch, HealthyNoiseHasNone) {
+  // 3200 squares in the shortest stretch: a mean of 1.5 is 20 standard deviations away.
+  for (unsigned seed = 1; seed <= 20; ++seed) EXPECT_FALSE(louder_of(seed, [](double) { return 1; }));
+}
+
+TEST(LouderStretch, IsToldFarBelowALoudOne) {
+  const auto found = louder_of(2, [](double t) { return t > 150 && t < 260 ? 2 : 1; });
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->from, 150, 4);  // a window
+  EXPECT_NEAR(found->to, 260, 4);
+  EXPECT_NEAR(found->times, 2, 0.1);  // 5500 squares: 0.04 standard deviations, and a window at either end
+}
+
+TEST(LouderStretch, AnotherTaskIsNone) {
+  EXPECT_FALSE(louder_of(
+      2, [](double t) { return t > 150 ? 2 : 1; }, [](double t) { return t > 150 ? 1.3 : 1; }));
+}
+
+TEST(LouderStretch, AllOfTheRecordIsNone) {
+  EXPECT_FALSE(louder_of(3, [](double) { return 3; }));
+}
+
+TEST(LouderStretch, TwoPushesAreNone) {
+  EXPECT_FALSE(louder_of(4, [](double t) { return (t > 101 && t < 103) || (t > 141 && t < 143) ? 40 : 1; }));
+}
+
 }  // namespace
 }  // namespace backlash::changes

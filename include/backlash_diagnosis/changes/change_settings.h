@@ -77,9 +77,15 @@ struct ChangeSettings {
   // Squares of the residual over those of healthy motion as rough, of what no effect explains: it cannot be
   // told, or is a change. Choices. Simulation of healthy machines in other tasks: one inertia 2, two 5.
   double unknown_louder = 4, unknown_of_two = 16;
-  std::size_t least_windows = 4;  // that it lasts. Choice: a push is no change of the machine
-  double same_link = 0.3;  // share of the squares left by which a payload at another link does better. Choice
-  double alike = 0.97;     // - of the best gain: effects that fit alike. Choice
+  // The same of a long stretch over the rest of the record, in motion alike: too little to be a change, too
+  // much to be healthy. Choices.
+  double louder = 1.5;              // - of the squares
+  double louder_errors = 6;         // standard errors that this differs by
+  double alike_errors = 3;          // standard errors that means of the motion may differ by
+  std::size_t louder_windows = 16;  // of the stretch, and of the rest
+  std::size_t least_windows = 4;    // that it lasts. Choice: a push is no change of the machine
+  double same_link = 0.3;     // - of the squares left by which a payload at another link does better. Choice
+  double alike = 0.97;        // - of the best gain: effects that fit alike. Choice
   double model_error = 0.03;  // - of a size, as the shape of an effect is an idealisation. Choice
 };
 

@@ -2,181 +2,42 @@
 // How often a healthy joint is called changed, and how often the intervals of a change's onset and size hold:
 // draws joints of one inertia or two, writes down their torque along random tasks, and looks as
 // `change_watch` does. Deterministic for its arguments.
-//
-// Joints are inverse dynamics with gravity, friction that warms up and wanders by some percent, white noise;
-// tasks are sums of three sines, with rests. Shares no code with the search but the record.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/program_options.hpp>
 #include <cmath>
+#include <cstdio>
 #include <iostream>
-#include <random>
 
 #include "arm_study.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/changes/changes.h"
 #include "backlash_diagnosis/diagnosis/change_ledger.h"
+#include "made_joint.h"
+#include "onset_study.h"
 #include "window_study.h"
 
 namespace backlash::change_study {
 namespace {
-
-using Random = std::mt19937_64;
 
 constexpr double kLearn = 300, kWindow = 300, kInterval = 60;  // s
 constexpr double kStream = 1800;                               // s, of one joint
 
 struct Options {
   double hours = 0, rate = 1.0 / 720;  // h, 1/h
-  int onsets = 0, arms = 0;
+  bool apart = false;
+  double least_explained = changes::ChangeSettings().least_explained;
+  OnsetOptions onsets;
+  int arms = 0;
   long windows = 0;
   unsigned long seed = 1;
-  double sampling = 50;  // Hz
-  bool two = false;      // inertias
-  double wander = 0.02;  // - of friction, up and down in ten minutes
+  MadeOptions made;
 };
 
-double uniform(Random& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
-
-/// A value that is larger from a time on.
-struct Added {
-  std::string effect;
-  double since = 1e300, size = 0;
-
-  double of(const char* value, double t) const { return t >= since && effect == value ? size : 0; }
-};
-
-/// Sums of sines.
-class Task {
- public:
-  explicit Task(Random& random)
-      : f_{uniform(random, 0.09, 0.13), uniform(random, 0.15, 0.2), uniform(random, 0.25, 0.33)},
-        phase_(uniform(random, 0, 2 * M_PI)) {}
-  double phase() const { return phase_; }
-  /// Position or a derivative of it.
-  double operator()(double t, int order = 0) const {
-    double sum = 0;
-    for (int i = 0; i < 3; ++i) {
-      const double w = 2 * M_PI * f_[i];
-      sum += kAmplitudes[i] * std::pow(w, order) * std::sin(w * t + phase_ * (i + 1) + order * M_PI / 2);
-    }
-    return sum;
-  }
-
- private:
-  static constexpr double kAmplitudes[] = {0.8, 0.6, 0.3};  // rad
-  double f_[3], phase_;
-};
-
-double sign(double w) {
-  return std::tanh(w / 0.01);
-}
-
-/// Of one inertia, or of two: then these are the load's, and a motor is before the gap, which is crossed
-/// smoothly while the torque of the teeth turns.
-struct Joint {
-  double inertia, viscous, coulomb, gravity, warm, cooling, noise, wander;
-  bool two = false;
-  double motor_inertia = 0, motor_coulomb = 0, backlash = 0, compliance = 0;
-
-  Joint(Random& random, const Options& options)
-      : inertia(uniform(random, 0.3, 0.6)),
-        viscous(uniform(random, 0.6, 1.5)),
-        coulomb(uniform(random, 0.5, 1)),
-        gravity(uniform(random, 1, 4)),
-        warm(uniform(random, 0, 0.35)),
-        cooling(uniform(random, 60, 150)),
-        noise(uniform(random, 0.02, 0.06)),
-        wander(options.wander),
-        two(options.two) {
-    if (!two) return;
-    inertia *= 3;
-    motor_inertia = inertia * uniform(random, 0.1, 0.6);
-    motor_coulomb = coulomb * uniform(random, 1, 3);
-    backlash = uniform(random, 2e-4, 1.5e-3);
-    compliance = uniform(random, 2e-5, 1e-4);
-  }
-
-  /// `cold`: whether it begins so. Friction wanders up and down in ten minutes.
-  record::Record record(Random& random, double duration, double rate, bool cold, bool rests,
-                        const Added& added = {}) const {
-    std::normal_distribution<double> white(0, noise), encoder(0, kEncoderNoise);
-    const Task task(random);
-    record::Record r;
-    r.name = "made";
-    double stamp = 0, next_rest = rests ? uniform(random, 200, 600) : 1e300;
-    for (int k = 0; k < int(duration * rate); ++k) {
-      const double t = k / rate;
-      const double temperature = 1 + (cold ? warm * std::exp(-stamp / cooling) : 0) +
-                                 wander * std::sin(2 * M_PI * stamp / 600 + task.phase());
-      r.time.push_back(stamp);
-      r.column(record::Channel::motor_position)
-          .push_back(motor(task, t, temperature, added) + encoder(random));
-      r.column(record::Channel::motor_torque).push_back(torque(task, t, temperature, added) + white(random));
-      if (two) r.column(record::Channel::load_position).push_back(task(t) + encoder(random));
-      stamp += 1 / rate;
-      if (t > next_rest) {  // nothing is published
-        stamp += uniform(random, 20, 120);
-        next_rest = t + uniform(random, 200, 600);
-      }
-    }
-    return r;
-  }
-
-  model::Rig rig() const {
-    model::Rig rig;
-    rig.mesh.rigid = !two;
-    rig.motor.inertia = motor_inertia;
-    rig.link.inertia = inertia;
-    rig.link.coulomb_friction = coulomb;
-    rig.link.viscous_damping = viscous;
-    return rig;
-  }
-
-  /// What a change of an effect is measured by.
-  double value(const std::string& effect) const {
-    return effect == "motor_coulomb"    ? motor_coulomb + (two ? 0 : coulomb)
-           : effect == "motor_viscous"  ? viscous
-           : effect == "load_coulomb"   ? coulomb
-           : effect == "gravity"        ? gravity
-           : effect == "backlash"       ? backlash
-           : effect == "mesh_stiffness" ? compliance
-                                        : inertia;
-  }
-
- private:
-  static constexpr double kEncoderNoise = 2e-6, kTurn = 0.05;  // rad; N m over which the gap is crossed
-  static constexpr double kStep = 1e-3;                        // s, of differences
-
-  /// That the load takes.
-  double load(const Task& task, double t, double temperature, const Added& a) const {
-    const double q = task(t), w = task(t, 1);
-    const double dry = coulomb + a.of("load_coulomb", t) + (two ? 0 : a.of("motor_coulomb", t));
-    const double heavy = inertia + a.of("load_inertia", t) + a.of("motor_inertia", t);
-    return heavy * task(t, 2) + temperature * (viscous * w + coulomb * sign(w)) +
-           a.of("motor_viscous", t) * w + (dry - coulomb) * sign(w) +
-           (gravity + a.of("gravity", t)) * std::sin(q);
-  }
-  double motor(const Task& task, double t, double temperature, const Added& a) const {
-    if (!two) return task(t);
-    const double bears = load(task, t, temperature, a);
-    return task(t) + (backlash + a.of("backlash", t)) / 2 * std::tanh(bears / kTurn) +
-           (compliance + a.of("mesh_stiffness", t)) * bears;
-  }
-  double torque(const Task& task, double t, double temperature, const Added& a) const {
-    const double bears = load(task, t, temperature, a);
-    if (!two) return bears;
-    const double before = motor(task, t - kStep, temperature, a), now = motor(task, t, temperature, a),
-                 after = motor(task, t + kStep, temperature, a);
-    return bears + motor_inertia * (after - 2 * now + before) / (kStep * kStep) +
-           (temperature * motor_coulomb + a.of("motor_coulomb", t)) * sign(task(t, 1));
-  }
-};
-
-changes::ChangeSettings settings_of(double rate) {
+changes::ChangeSettings settings_of(double rate, double least_explained) {
   changes::ChangeSettings settings;
+  settings.least_explained = least_explained;
   settings.false_alarms_per_hour = rate;
   return settings;
 }
@@ -208,16 +69,16 @@ void healthy(const Options& options) {
   double seconds = 0;
   const double rate = diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1);
   while (seconds < 3600 * options.hours) {
-    const Joint joint(random, options);
-    const std::vector<record::Record> learned = {joint.record(random, kLearn, options.sampling, true, false)};
-    const record::Record stream = joint.record(random, kStream, options.sampling, false, true);
+    const Joint joint(random, options.made);
+    const std::vector<record::Record> learned = {joint.record(random, kLearn, true, false)};
+    const record::Record stream = joint.record(random, kStream, false, true);
     diagnosis::ChangeLedger ledger;
     for (double to = kInterval; to < stream.time.back(); to += kInterval) {
       const double from = std::max(0.0, to - kWindow);
       ++looks;
       try {
-        const auto found =
-            changes::detect_changes(joint.rig(), learned, stream.slice(from, to), settings_of(rate));
+        const auto found = changes::detect_changes(joint.rig(), learned, stream.slice(from, to),
+                                                   settings_of(rate, options.least_explained));
         suspected += !found.changes.empty();
         cannot += found.changes.empty() && !found.cannot_tell.empty();
         ledger.take(look_of(found, from, to));
@@ -242,44 +103,44 @@ void healthy(const Options& options) {
       seconds / 3600, looks, cannot, options.rate * seconds / 3600, suspected, told, different);
 }
 
-/// Joints that change once: whether it is named, and whether the intervals hold the truth.
-void onsets(const Options& options) {
-  Random random(options.seed + 1000);
-  const std::vector<std::string> effects =
-      options.two ? std::vector<std::string>{"backlash", "motor_coulomb", "load_coulomb", "mesh_stiffness",
-                                             "load_inertia"}
-                  : std::vector<std::string>{"motor_coulomb", "motor_viscous", "motor_inertia", "gravity"};
-  int found_any = 0, named = 0, onset = 0, size = 0, others = 0;
-  double width = 0;
-  for (int i = 0; i < options.onsets; ++i) {
-    const Joint joint(random, options);
-    const std::string& effect = effects[static_cast<std::size_t>(i) % effects.size()];
-    const Added added{effect, uniform(random, 60, 240), joint.value(effect) * uniform(random, 0.15, 0.4)};
-    const std::vector<record::Record> learned = {joint.record(random, kLearn, options.sampling, true, false)};
-    const record::Record record = joint.record(random, kWindow, options.sampling, false, false, added);
-    const auto found =
-        changes::detect_changes(joint.rig(), learned, record,
-                                settings_of(diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1)));
-    found_any += !found.changes.empty();
-    others += found.changes.size() > 1;
-    for (const changes::Change& c : found.changes)
-      if (c.effect != effect)
-        fmt::print("told {} ({}) at {:.1f} s, gain {:.3g}; true: {} at {:.1f} s\n", c.effect,
-                   fmt::join(c.alike, " "), c.since, c.gain, effect, added.since);
-    for (const changes::Change& c : found.changes) {
-      if (c.effect != effect) continue;
-      ++named;
-      onset += c.since_from <= added.since && added.since <= c.since_to;
-      width += c.since_to - c.since_from;
-      const signal::Measured& m = c.size.front().measured;
-      size += std::fabs(m.value - added.size) <= 1.96 * m.standard_error;
-      break;
+/// The samples of so much motion, rests among them.
+record::Record slice_of_motion(const record::Record& stream, double from, double sampling) {
+  const auto first = static_cast<std::size_t>(std::lround(from * sampling));
+  const auto last =
+      std::min(stream.size(), first + static_cast<std::size_t>(std::lround(kWindow * sampling))) - 1;
+  return stream.slice(stream.time[first], stream.time[last]);
+}
+
+/// Looks at healthy joints that share no sample, six to a joint, each by itself: what one look finds is an
+/// alarm. A look may be wrong `rate` times an hour.
+void healthy_apart(const Options& options) {
+  Random random(options.seed);
+  long looks = 0, wrong = 0, cannot = 0, windows = 0;
+  while (double(looks) * kWindow < 3600 * options.hours) {
+    const Joint joint(random, options.made);
+    const std::vector<record::Record> learned = {joint.record(random, kLearn, true, false)};
+    const record::Record stream = joint.record(random, kStream, true, true);
+    for (double from = 0; from + kWindow <= kStream; from += kWindow) {
+      const record::Record look = slice_of_motion(stream, from, options.made.sampling);
+      const changes::Changes found = changes::detect_changes(
+          joint.rig(), learned, look, settings_of(options.rate, options.least_explained));
+      ++looks;
+      windows += static_cast<long>(found.windows);
+      wrong += !found.changes.empty();
+      cannot += found.changes.empty() && !found.cannot_tell.empty();
+      for (const changes::Change& c : found.changes)
+        fmt::print("look {}: {} since {:.1f} s, gain {:.3g} of {:.3g}\n", looks, c.effect, c.since, c.gain,
+                   found.threshold);
+    }
+    if (looks % 60 == 0) {
+      fmt::print("{} looks, {} wrong, {} cannot tell\n", looks, wrong, cannot);
+      std::fflush(stdout);
     }
   }
   fmt::print(
-      "onsets: {} changes, {} found, {} by their name, {} with others beside; of those named the interval "
-      "of the onset holds {} ({:.1f} s wide on average), that of the size {}\n",
-      options.onsets, found_any, named, others, onset, width / std::max(named, 1), size);
+      "healthy, looks that share nothing: {} looks at {} windows; {:.4g} false alarms allowed, {} found, {} "
+      "cannot tell\n",
+      looks, windows, options.rate * kWindow / 3600 * double(looks), wrong, cannot);
 }
 
 }  // namespace
@@ -294,12 +155,20 @@ int main(int argc, char** argv) {
   add("help,h", "this text");
   add("healthy-hours", po::value(&options.hours), "of healthy joints");
   add("false-alarms-per-hour", po::value(&options.rate), "that are allowed; default 1/720");
-  add("onsets", po::value(&options.onsets), "joints that change once");
+  add("apart", po::bool_switch(&options.apart), "looks that share no samples, each an alarm by itself");
+  add("least-explained", po::value(&options.least_explained),
+      "of the squares, see ChangeSettings; default 0.1");
+  add("onsets", po::value(&options.onsets.count), "joints that change once");
   add("arms", po::value(&options.arms), "of six joints, healthy, and as many for each kind of change");
+  add("only", po::value(&options.onsets.only), "this kind of change");
+  add("look-alikes", po::bool_switch(&options.onsets.look_alikes),
+      "changes that might be taken for a local fault");
   add("windows", po::value(&options.windows), "of scores: false alarms, and delays beside a CUSUM");
-  add("rate", po::value(&options.sampling), "of the samples [Hz]; default 50");
-  add("two", po::bool_switch(&options.two), "inertias, with an encoder on either side, of each joint");
-  add("wander", po::value(&options.wander), "of friction, share up and down in ten minutes; default 0.02");
+  add("rate", po::value(&options.made.sampling), "of the samples [Hz]; default 50");
+  add("two", po::bool_switch(&options.made.two), "inertias, with an encoder on either side, of each joint");
+  add("wander", po::value(&options.made.wander),
+      "of friction, share up and down in ten minutes; default 0.02");
+  add("coloured", po::value(&options.made.coloured), "noise of first order, share of the white; default 0.5");
   add("seed", po::value(&options.seed), "default 1");
   try {
     po::variables_map given;
@@ -309,8 +178,11 @@ int main(int argc, char** argv) {
       std::cout << all;
       return 0;
     }
-    if (options.hours > 0) healthy(options);
-    if (options.onsets > 0) onsets(options);
+    if (options.hours > 0) options.apart ? healthy_apart(options) : healthy(options);
+    if (options.onsets.count > 0) {
+      options.onsets.rate_of_look = backlash::diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1);
+      study_onsets(options.onsets, options.seed + 1000, options.made);
+    }
     if (options.arms > 0) study_arms(options.arms, options.seed, options.rate);
     if (options.windows > 0) study_windows(options.windows, options.seed);
     return 0;

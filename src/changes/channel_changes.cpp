@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "channel_changes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/text.h"
+
+namespace backlash::changes {
+
+std::string whole_seconds(double time) {
+  return to_text(std::round(time)) + " s";
+}
+
+namespace {
+
+double rounded(double x) {
+  return std::round(10 * x) / 10;
+}
+
+/// Where the record is louder than the healthy machine. Of two inertias another task alone may do that, up to
+/// a limit: their teeth cross the gap more often or harder.
+void tell_loud(const ChangeSearch& search, const LoudStretch& loud, std::vector<std::string> nearest,
+               bool of_two, const ChangeSettings& settings, Changes& out) {
+  Change unknown = search.unknown(loud);
+  if (!loud.from_beginning && (!of_two || loud.times >= settings.unknown_of_two)) {
+    unknown.alike = std::move(nearest);
+    out.changes.push_back(unknown);
+    return;
+  }
+  const std::string since =
+                        loud.from_beginning ? "from its beginning" : "since " + whole_seconds(unknown.since),
+                    until = unknown.until ? " to " + whole_seconds(*unknown.until) : "";
+  out.cannot_tell =
+      since + until + " the record follows no effect, " + to_text(rounded(std::sqrt(loud.times))) +
+      " times as far from it as the healthy records; if its task is another one, commission with "
+      "motion of this kind";
+}
+
+/// Where it is louder than in the rest, though less than that. More than the changes explain is no shape of
+/// theirs.
+void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& found, double explained,
+                 Changes& out) {
+  const std::optional<LoudStretch> louder = search.louder(found);
+  if (!louder || louder->excess < explained) return;
+  const Change unknown = search.unknown(*louder);
+  const std::string until = unknown.until ? " to " + whole_seconds(*unknown.until) : "";
+  out.cannot_tell =
+      "since " + whole_seconds(unknown.since) + until + " the record is " +
+      to_text(rounded(std::sqrt(louder->times))) +
+      " times as far from the healthy ones, farther than in the rest of it in motion alike, and "
+      "follows no effect";
+  for (const FoundChange& f : found) out.cannot_tell += ", nearest: " + f.effect.id;
+  out.changes.clear();
+}
+
+}  // namespace
+
+HealthyScores::HealthyScores(const HealthyModel& model, const std::vector<record::Record>& healthy,
+                             const ChangeSettings& settings)
+    : variance_(model.noise * model.noise), window_(settings.window) {
+  for (const record::Record& r : healthy) {
+    motions_.push_back(motion_by(model, r, settings));
+    residuals_.push_back(residual_of(model, motions_.back(), settings).residual);
+  }
+}
+
+double HealthyScores::inflation(const ChangeEffect& effect) const {
+  double most = 1;
+  for (std::size_t r = 0; r < motions_.size(); ++r)
+    most = std::max(most, score_inflation(motions_[r], residuals_[r], effect_columns(motions_[r], effect),
+                                          variance_, window_));
+  return most;
+}
+
+std::vector<ScannedEffect> HealthyScores::of(const std::vector<ChangeEffect>& effects) const {
+  std::vector<ScannedEffect> all;
+  for (const ChangeEffect& e : effects) all.push_back({e, inflation(e)});
+  for (const SampledMotion& m : motions_) m.known_columns.clear();  // asked for once
+  return all;
+}
+
+void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
+                      const ChangeSettings& settings, Changes& out) {
+  std::optional<LoudStretch> loud = search.loud(found);
+  double explained = 0;
+  std::vector<std::string> nearest;
+  for (const FoundChange& f : found) {
+    explained += f.score.gain;
+    nearest.push_back(f.effect.id);
+  }
+  if (search.like_fault()) nearest.emplace_back("local_fault");
+  if (search.explained(found) && !(loud && loud->excess > explained)) {
+    if (loud && !found.empty())
+      out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +
+                             " the record follows no effect, beside " + joined(nearest));
+    else if (loud)
+      tell_loud(search, *loud, {}, of_two, settings, out);
+    else
+      tell_louder(search, found, explained, out);
+    return;
+  }
+  out.changes.clear();
+  loud = search.loud({});
+  if (loud)
+    tell_loud(search, *loud, nearest, of_two, settings, out);
+  else
+    out.cannot_tell = "the record differs from the healthy ones in a way that no effect explains (nearest: " +
+                      joined(nearest) + "): commission with more motion of this kind";
+}
+
+void take_out_short(const ChangeSettings& settings, Changes& out) {
+  const double shortest = double(settings.least_windows) * settings.window;
+  const auto is_short = [&](const Change& c) { return c.until && *c.until - c.since < shortest; };
+  for (const Change& c : out.changes)
+    if (is_short(c) && out.cannot_tell.empty())
+      out.cannot_tell =
+          "from " + whole_seconds(c.since) + " to " + whole_seconds(*c.until) +
+          " the record differs from the healthy ones, too short to tell by what (nearest: " + c.effect + ")";
+  out.changes.erase(std::remove_if(out.changes.begin(), out.changes.end(), is_short), out.changes.end());
+}
+
+}  // namespace backlash::changes
