@@ -305,6 +305,7 @@ class Solver {
     s.prior_cost = fit.prior_cost(machine);
     s.covariance = Eigen::MatrixXd::Zero(kGlobalValues, kGlobalValues);
     s.covariance(fit.fitted(), fit.fitted()) = covariance;
+    s.information = fit.information(), s.fitted = fit.fitted(), s.wider = wider;
     s.priors = priors, s.common_scale = settings_.common_scale;
     s.finest = settings_.finest(), s.unit = settings_.angular ? "rad" : "m";
     for (int c = 0; c < channels(); ++c) s.misfit[c] = misfit(fit, static_cast<WaveformChannel>(c));

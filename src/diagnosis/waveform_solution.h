@@ -26,6 +26,9 @@ struct WaveformSolution {
   std::vector<double> values;  // in their units
   double prior_cost = 0;       // chi^2 of all values but the gap, against what was known
   Eigen::MatrixXd covariance;  // of all values, in spreads; 0 where a value is not fitted
+  Eigen::MatrixXd information;  // of those that are fitted, in their order, with what was known: its inverse
+  std::vector<int> fitted;
+  double wider = 1;  // -, times which the covariance is that inverse
   WaveformPriors priors;
   double common_scale = 0;
   double finest = kNaN;      // half width of the narrowest interval, in `unit`

@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/changes/changes_of_rig.h"
 #include "backlash_diagnosis/findings/change_report.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
@@ -73,7 +74,7 @@ int detect(const Arguments& arguments) {
   changes::Changes found;
   try {
     ProgressBar bar;
-    found = changes::detect_changes(rig.rig, healthy, record, settings, bar.progress());
+    found = changes::detect_changes(rig, healthy, record, settings, bar.progress());
   } catch (const CannotIdentify& error) {
     std::cerr << "detect_changes: " << error.what() << '\n';
     return kInconclusive;
