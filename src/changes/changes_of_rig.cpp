@@ -16,7 +16,7 @@ namespace {
 
 using record::Channel;
 
-constexpr int kStretches = 16;  // spread over the record at first. Choice: time
+constexpr int kStretches = 12;  // spread over the record at first. Choice: time
 constexpr int kMostRefinements =
     24;                              // further ones about onsets. Choice: five halves each, and room for more
 constexpr std::size_t kFewest = 6;   // stretches that must fit. Choice

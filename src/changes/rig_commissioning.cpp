@@ -14,9 +14,9 @@
 namespace backlash::changes {
 namespace {
 
-constexpr int kStretches = 10, kLeastOfRecord = 4;  // of all healthy records, of one. Choices: time
-constexpr int kFirstTries = 3;                      // stretches that may tell the machine first. Choice
-constexpr std::size_t kFewest = 4;                  // that must fit. Choice: their scatter is needed
+constexpr int kStretches = 8, kLeastOfRecord = 4;  // of all healthy records, of one. Choices: time
+constexpr int kFirstTries = 3;                     // stretches that may tell the machine first. Choice
+constexpr std::size_t kFewest = 4;                 // that must fit. Choice: their scatter is needed
 // Choices, what a stretch may be off by itself:
 constexpr double kJitter = 0.002;                         // of a value, as the equations are no better
 constexpr double kFinestJitter = 0.1;                     // of the finest backlash that can be told
@@ -153,15 +153,17 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
   const Eigen::VectorXd free = Eigen::VectorXd::Ones(count);
   Eigen::VectorXd least = Eigen::VectorXd::Constant(count, 1e300), most = -least;
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(count);
+  double of_all = 0;
   for (const auto& of_record : fits) {
     const auto judged = judged_of(of_record);
     all.insert(all.end(), judged.begin(), judged.end());
     const Eigen::VectorXd own = mean_of(judged, free);
     least = least.cwiseMin(own), most = most.cwiseMax(own);
-    for (const FittedStretch* f : judged)
-      squares += (f->score - f->information * own)
-                     .cwiseAbs2()
-                     .cwiseQuotient(f->information.diagonal().cwiseMax(1e-300));
+    for (const FittedStretch* f : judged) {
+      const Eigen::VectorXd left = f->score - f->information * own;
+      squares += left.cwiseAbs2().cwiseQuotient(f->information.diagonal().cwiseMax(1e-300));
+      of_all += gain_of_all(left, f->information);
+    }
   }
   if (all.size() < kFewest)
     throw CannotIdentify(
@@ -173,6 +175,8 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
                  std::pow(settings.prior_factor * (most[i] - least[i]) / 2, 2);
   const double degrees = double(all.size()) - double(fits.size());
   rig.inflation = (squares / signal::chi_square_quantile(kSureOfScatter, degrees)).cwiseMax(1.0);
+  rig.inflation_of_all =
+      std::max(1.0, of_all / signal::chi_square_quantile(kSureOfScatter, degrees * double(count)));
 }
 
 }  // namespace

@@ -12,7 +12,6 @@ namespace {
 
 constexpr int kShapes = 2;                  // step and ramp share the false alarms with the values
 constexpr int kRampOnsets = 48;             // Choice: the onset of a growth is no sharper
-constexpr double kChangeSpread = 30;        // in coordinates: a change of all values, as good as free. Choice
 constexpr double kLeastInformation = 1e-9;  // - of its information that a change must have for itself. Choice
 constexpr std::size_t kFewestAfter = 2, kFewestBefore = 2;  // stretches. Choice: one may be odd
 
@@ -98,9 +97,7 @@ RigChange RigScan::scored(Eigen::Index value, const RigShape& shape,
 
 double RigScan::all_gain(const RigShape& shape, const std::vector<RigChange>& beside) const {
   const Sums s = sums(shape, system(beside));
-  Eigen::MatrixXd information = s.information;
-  information.diagonal().array() += 1 / (kChangeSpread * kChangeSpread);
-  return s.score.dot(signal::solve_symmetric(information, s.score).col(0));
+  return gain_of_all(s.score, s.information);
 }
 
 std::vector<RigShape> RigScan::shapes() const {

@@ -24,8 +24,9 @@ constexpr double kOtherLevel =
 constexpr double kLouder = 1.5;  // times the healthy residual, that follows no machine. Choice
 constexpr double kModelError = 0.002;  // of the swing, as in the fit: no model is better
 constexpr double kMoreLeftOut =
-    0.25;                    // of the reversals, more than of the healthy machine. Choice: two of eight
-constexpr double kWide = 3;  // spread of the logarithm of the backlash: as good as free. Choice
+    0.25;  // of the reversals, more than of the healthy machine. Choice: two of eight
+constexpr double kChangeSpread = 30;  // in coordinates, of a change of all values: as good as free. Choice
+constexpr double kWide = 3;           // spread of the logarithm of the backlash: as good as free. Choice
 
 /// First sample on another side than before.
 std::vector<std::size_t> reversals_of(const std::vector<double>& torque, double level) {
@@ -119,6 +120,12 @@ std::vector<Stretch> StretchCutter::spread(int count) const {
     if (chosen.empty() || s.from >= chosen.back().to) chosen.push_back(s);
   }
   return chosen;
+}
+
+double gain_of_all(const Eigen::VectorXd& score, const Eigen::MatrixXd& information) {
+  Eigen::MatrixXd with_spread = information;
+  with_spread.diagonal().array() += 1 / (kChangeSpread * kChangeSpread);
+  return score.dot(signal::solve_symmetric(with_spread, score).col(0));
 }
 
 double drive_level(const record::Record& record) {

@@ -54,8 +54,9 @@ struct HealthyRig {
   double residual[2] = {0, 0}, swing[2] = {0, 0};  // as in WaveformValues; 0: not yet known
   double left_out = 0;                             // share of the reversals
   double least_level = 0, most_level = 0;          // N m, of the torque that drives
-  Eigen::VectorXd mean, day;  // of the healthy records about `settings`; variance from record to record
-  Eigen::VectorXd inflation;  // of scores, >= 1
+  Eigen::VectorXd mean, day;    // of the healthy records about `settings`; variance from record to record
+  Eigen::VectorXd inflation;    // of the gain of each value, >= 1: how healthy stretches scatter
+  double inflation_of_all = 1;  // of that of all together
 };
 
 struct FittedStretch {
@@ -68,6 +69,9 @@ struct FittedStretch {
   Eigen::VectorXd score;  // log likelihood per coordinate at the healthy machine
   Eigen::MatrixXd information;
 };
+
+/// Twice the log likelihood ratio of other values, all free.
+double gain_of_all(const Eigen::VectorXd& score, const Eigen::MatrixXd& information);
 
 /// Median of the size of the motor's torque, N m.
 double drive_level(const record::Record& record);

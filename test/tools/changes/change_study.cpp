@@ -15,6 +15,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/changes/changes.h"
 #include "backlash_diagnosis/diagnosis/change_ledger.h"
+#include "rig_study.h"
 #include "window_study.h"
 
 namespace backlash::change_study {
@@ -288,6 +289,8 @@ int main(int argc, char** argv) {
   using namespace backlash::change_study;
   namespace po = boost::program_options;
   Options options;
+  RigStudy rigs;
+  bool torque_alone = false;
   po::options_description all("change_study [options]");
   auto add = all.add_options();
   add("help,h", "this text");
@@ -298,6 +301,8 @@ int main(int argc, char** argv) {
   add("rate", po::value(&options.sampling), "of the samples [Hz]; default 50");
   add("two", po::bool_switch(&options.two), "inertias, with an encoder on either side, of each joint");
   add("wander", po::value(&options.wander), "of friction, share up and down in ten minutes; default 0.02");
+  add("rig", po::value(&rigs.rig), "file of a rig with a torque sensor, instead: machines like it");
+  add("torque-alone", po::bool_switch(&torque_alone), "of such rigs, no position");
   add("seed", po::value(&options.seed), "default 1");
   try {
     po::variables_map given;
@@ -305,6 +310,12 @@ int main(int argc, char** argv) {
     po::notify(given);
     if (given.count("help") != 0) {
       std::cout << all;
+      return 0;
+    }
+    if (!rigs.rig.empty()) {
+      rigs.changes = options.onsets, rigs.healthy_hours = options.hours, rigs.rate = options.rate;
+      rigs.position = !torque_alone, rigs.seed = options.seed;
+      study_rigs(rigs);
       return 0;
     }
     if (options.hours > 0) healthy(options);
