@@ -70,7 +70,7 @@ void take_machine(const record::Record& record, const ChangeSettings& settings, 
   diagnosis::WaveformValues found;
   std::string reason;
   for (const Stretch& at : StretchCutter(record).spread(kFirstTries)) {
-    found = diagnosis::waveform_values(record.slice(at.from, at.to), rig.settings);
+    found = diagnosis::waveform_values(with_context(record, at), at.from, at.to, rig.settings);
     reason = found.status == diagnosis::Status::ok ? found.doubt : found.reason;
     if (reason.empty()) break;
   }

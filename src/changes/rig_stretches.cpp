@@ -18,7 +18,8 @@ using record::Channel;
 
 constexpr std::size_t kReversals = 8;  // of a stretch. Choice: with more the errors hardly shrink
 constexpr double kTurned = 0.3;        // of the middle size, beyond which the torque is on a side. Choice
-constexpr double kGap = 2.5;           // intervals between samples that are none. Choice
+constexpr double kContext = 2;  // of a stretch, to either side: tells where a square wave reverses. Choice
+constexpr double kGap = 2.5;    // intervals between samples that are none. Choice
 constexpr double kOtherLevel =
     1.25;                        // times the drive of the healthy records that is extrapolated to. Choice
 constexpr double kLouder = 1.5;  // times the healthy residual, that follows no machine. Choice
@@ -134,11 +135,15 @@ double drive_level(const record::Record& record) {
   return size.empty() ? 0 : signal::median(size);
 }
 
+record::Record with_context(const record::Record& record, const Stretch& at) {
+  const double reach = kContext * (at.to - at.from);
+  return record.slice(at.from - reach, at.to + reach);
+}
+
 FittedStretch fit_stretch(const record::Record& record, const Stretch& at, const HealthyRig& rig) {
   FittedStretch out;
   out.at = at;
-  const record::Record part = record.slice(at.from, at.to);
-  out.level = drive_level(part);
+  out.level = drive_level(record.slice(at.from, at.to));
   if (rig.most_level > 0 &&
       !(out.level <= kOtherLevel * rig.most_level && kOtherLevel * out.level >= rig.least_level)) {
     out.reason = fmt::format("driven by {:.2g} N m, the healthy records by {:.2g} to {:.2g} N m", out.level,
@@ -146,9 +151,10 @@ FittedStretch fit_stretch(const record::Record& record, const Stretch& at, const
     return out;
   }
   const double near = std::max(rig.backlash, rig.settings.finest());
-  take(diagnosis::waveform_values(part, rig.settings, near, kWide), rig, out);
+  const record::Record around = with_context(record, at);
+  take(diagnosis::waveform_values(around, at.from, at.to, rig.settings, near, kWide), rig, out);
   // What is far from the healthy machine may need a search from everywhere.
-  if (out.unexplained) take(diagnosis::waveform_values(part, rig.settings), rig, out);
+  if (out.unexplained) take(diagnosis::waveform_values(around, at.from, at.to, rig.settings), rig, out);
   return out;
 }
 

@@ -76,6 +76,9 @@ double gain_of_all(const Eigen::VectorXd& score, const Eigen::MatrixXd& informat
 /// Median of the size of the motor's torque, N m.
 double drive_level(const record::Record& record);
 
+/// The stretch and some of what is beside it.
+record::Record with_context(const record::Record& record, const Stretch& at);
+
 /// Of the coordinates about `rig.settings`. What is not yet known of the healthy machine is not judged.
 FittedStretch fit_stretch(const record::Record& record, const Stretch& at, const HealthyRig& rig);
 

@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "refusal.h"
 #include "waveform_solution.h"
+#include "waveform_windows.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -61,12 +62,16 @@ void fill(const WaveformSolution& s, const WaveformSettings& settings, WaveformV
 
 }  // namespace
 
-WaveformValues waveform_values(const record::Record& record, const WaveformSettings& settings,
-                               double backlash, double spread) {
+WaveformValues waveform_values(const record::Record& record, double from, double to,
+                               const WaveformSettings& settings, double backlash, double spread) {
   WaveformValues out;
   try {
-    check_waveform(record, settings);
-    fill(solve_waveform(record, settings, backlash / 2, spread), settings, out);
+    const record::Record part = record.slice(from, to);
+    check_waveform(part, settings);
+    std::vector<double> places = waveform_reversals(record.column(record::Channel::motor_torque));
+    const auto before = std::lower_bound(record.time.begin(), record.time.end(), from) - record.time.begin();
+    for (double& place : places) place -= static_cast<double>(before);
+    fill(solve_waveform(part, settings, backlash / 2, spread, places), settings, out);
   } catch (const Refusal& refusal) {
     out.status = refusal.status;
     out.reason = refusal.reason;

@@ -32,9 +32,12 @@ struct WaveformValues {
   int windows = 0, left_out = 0;      ///< reversals, and those that the fit does not catch
 };
 
-/// `backlash` > 0 [m], from where the search starts, with the spread of its logarithm > 0; NaN: nothing is
-/// known of it, which takes longer. Throws InvalidParameter for settings out of range.
-WaveformValues waveform_values(const record::Record& record, const WaveformSettings& settings,
-                               double backlash = kNaN, double spread = kNaN);
+/// Of the samples from `from` to `to` [s]. Those beside them only tell more finely where a square wave
+/// reverses: a record a few times as long is best. `backlash` > 0 [m], from where the search starts, with the
+/// spread of its logarithm > 0; NaN: nothing is known of it, which takes longer. Throws InvalidParameter for
+/// settings out of range.
+WaveformValues waveform_values(const record::Record& record, double from, double to,
+                               const WaveformSettings& settings, double backlash = kNaN,
+                               double spread = kNaN);
 
 }  // namespace backlash::diagnosis
