@@ -19,7 +19,7 @@ using record::Channel;
 constexpr int kStretches = 12;  // spread over the record at first. Choice: time
 constexpr int kMostRefinements =
     24;                              // further ones about onsets. Choice: five halves each, and room for more
-constexpr std::size_t kFewest = 6;   // stretches that must fit. Choice
+constexpr std::size_t kFewest = 4;   // stretches that must fit. Choice
 constexpr double kLeftByName = 0.2;  // of what all values together explain, that a name may leave. Choice
 constexpr double kSureOfLeft = 0.999;  // chance that the others together explain no more than this of nothing
 constexpr double kMostUnexplained = 1.0 / 3;   // of the stretches, beside those that are told. Choice
@@ -115,28 +115,29 @@ class RigChanges {
     return best;
   }
 
+  /// Of a gain its change.
   std::vector<ChangeSize> size_of(const RigChange& c) const {
-    const auto at = static_cast<std::size_t>(c.value);
-    const RigValue& v = rig_.values[at];
-    double value = 0, slope = 0;  // in the unit, and its derivative by the coordinate
-    if (at == 0) {
+    const RigEffect& effect = rig_.effects[c.effect];
+    const bool gap = effect.value == 0;
+    static const RigValue gain{"", "", true, 1, 1};
+    const RigValue& v = effect.value < 0 ? gain : rig_.values[static_cast<std::size_t>(effect.value)];
+    double value = v.spread * c.size, slope = v.spread;  // in the unit, and its derivative by the size
+    if (gap) {
       value = v.value * c.size, slope = v.value;
     } else if (v.factor) {
-      const double healthy = v.value * std::exp(v.spread * rig_.mean[c.value]);
-      const double factor = std::exp(v.spread * c.size);
+      const double mean = effect.value < 0 ? 0 : rig_.mean[effect.value];
+      const double healthy = v.value * std::exp(v.spread * mean), factor = std::exp(v.spread * c.size);
       value = healthy * (factor - 1), slope = healthy * factor * v.spread;
-    } else {
-      value = v.spread * c.size, slope = v.spread;
     }
     const double error =
         std::hypot(slope * std::sqrt(c.variance), std::hypot(settings_.model_error, v.scale_error) * value);
     std::vector<ChangeSize> out;
     const double radius = rig_.settings.base_radius;
-    if (at == 0 && !rig_.settings.angular) out.push_back({"backlash", v.unit, {value, error}});
-    if (at == 0)
+    if (gap && !rig_.settings.angular) out.push_back({"backlash", effect.unit, {value, error}});
+    if (gap)
       out.push_back({"angle", "rad", {value / radius, error / radius}});
     else
-      out.push_back({v.name, v.unit, {value, error}});
+      out.push_back({effect.name, effect.unit, {value, error}});
     if (c.shape.ramp) {
       const double span = record_.time.back() - c.shape.since;
       out.push_back({"span", "s", {span, settings_.onset_least}});
@@ -152,20 +153,20 @@ class RigChanges {
     change.since_from = onset.from, change.since_to = onset.to;
     if (std::isfinite(c.shape.until)) change.until = c.shape.until;
     change.error_before = change.error_after = rig_.residual[0];
-    const std::string& name = rig_.values[static_cast<std::size_t>(c.value)].name;
-    const double all = scan.all_gain(c.shape, others), inflation = rig_.inflation[c.value];
+    const std::string& name = rig_.effects[c.effect].name;
+    const double all = scan.all_gain(c.shape, others), own = rig_.effects[c.effect].inflation * c.gain;
     const double chance =
-        rig_.inflation.maxCoeff() * signal::chi_square_quantile(kSureOfLeft, double(rig_.values.size()));
-    if (all - inflation * c.gain > kLeftByName * all + chance) {
+        rig_.inflation_of_all * signal::chi_square_quantile(kSureOfLeft, double(rig_.values.size()));
+    if (all - own > kLeftByName * all + chance) {
       change.effect = "unknown";
       change.alike = {name};
       return change;
     }
     change.effect = name;
     change.size = size_of(c);
-    for (Eigen::Index v = 0; v < rig_.day.size(); ++v)
-      if (v != c.value && scan.scored(v, c.shape, others).gain >= settings_.alike * c.gain)
-        change.alike.push_back(rig_.values[static_cast<std::size_t>(v)].name);
+    for (std::size_t e = 0; e < rig_.effects.size(); ++e)
+      if (e != c.effect && scan.scored(e, c.shape, others).gain >= settings_.alike * c.gain)
+        change.alike.push_back(rig_.effects[e].name);
     return change;
   }
 
@@ -236,7 +237,7 @@ class RigChanges {
       out.changes.push_back(told(s, found[i], others));
     }
     if (const auto d = s.different(found)) {
-      const std::string& name = rig_.values[static_cast<std::size_t>(d->value)].name;
+      const std::string& name = rig_.effects[d->effect].name;
       out.different.push_back(name);
       out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
                              ": that is no change within it");

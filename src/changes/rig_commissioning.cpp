@@ -48,6 +48,7 @@ RigValue machine_value(const HealthyRig& rig, std::size_t quantity, double sprea
   RigValue v;
   v.name = q.name, v.unit = q.unit_in(rig.settings);
   v.factor = q.factor, v.value = rig.settings.*q.at, v.spread = spread;
+  v.power = diagnosis::scale_power(q, rig.settings);
   const bool wander = wanders(v.name);
   const double off = wander ? s.wander : kJitter, day = wander ? s.drift : s.prior_share;
   if (q.factor) {
@@ -95,6 +96,32 @@ void take_machine(const record::Record& record, const ChangeSettings& settings, 
     const auto k = static_cast<Eigen::Index>(i) + 1;
     if (q.factor) rig.values.back().scale_error = found.spread[i + 1] * std::sqrt(known(k, k));
   }
+}
+
+/// The values one by one, and:
+///   motor_torque_gain    the motor's torque is 1/k of what is recorded: all torques of the machine times k,
+///   and
+///                        the sensor's gain over k, move as it does
+///   motor_position_gain  by the symmetry of waveform.h: values times k^-power show k times the position
+std::vector<RigEffect> effects_of(const HealthyRig& rig, const ChangeSettings& settings) {
+  const auto count = static_cast<Eigen::Index>(rig.values.size());
+  std::vector<RigEffect> all;
+  RigEffect torque{"motor_torque_gain", "-", Eigen::VectorXd::Zero(count), settings.prior_share},
+      position{"motor_position_gain", "-", Eigen::VectorXd::Zero(count), settings.prior_share};
+  position.direction[0] = rig.backlash / rig.values[0].value;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const RigValue& v = rig.values[static_cast<std::size_t>(i)];
+    all.push_back({v.name, v.unit, Eigen::VectorXd::Unit(count, i), v.least, 1, static_cast<int>(i)});
+    if (i == 0) continue;
+    const double one = (v.factor ? 1 : v.value) / v.spread;
+    position.direction[i] = -v.power * one;
+    const bool no_torque = v.name == "friction_speed" || v.name == "contact_loss" ||
+                           v.name == "sensor_delay" || v.name == "sensor_time_constant";
+    torque.direction[i] = v.name == "sensor_gain" ? -one : no_torque ? 0 : one;
+  }
+  all.push_back(torque);
+  if (rig.residual[1] > 0) all.push_back(position);
+  return all;
 }
 
 using Fits = std::vector<std::vector<FittedStretch>>;
@@ -152,7 +179,7 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
   std::vector<const FittedStretch*> all;
   const Eigen::VectorXd free = Eigen::VectorXd::Ones(count);
   Eigen::VectorXd least = Eigen::VectorXd::Constant(count, 1e300), most = -least;
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count);
+  std::vector<double> squares(rig.effects.size(), 0);
   double of_all = 0;
   for (const auto& of_record : fits) {
     const auto judged = judged_of(of_record);
@@ -161,7 +188,11 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
     least = least.cwiseMin(own), most = most.cwiseMax(own);
     for (const FittedStretch* f : judged) {
       const Eigen::VectorXd left = f->score - f->information * own;
-      squares += left.cwiseAbs2().cwiseQuotient(f->information.diagonal().cwiseMax(1e-300));
+      for (std::size_t i = 0; i < squares.size(); ++i) {
+        const Eigen::VectorXd& d = rig.effects[i].direction;
+        const double information = d.dot(f->information * d);
+        if (information > 0) squares[i] += std::pow(d.dot(left), 2) / information;
+      }
       of_all += gain_of_all(left, f->information);
     }
   }
@@ -174,7 +205,9 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
     rig.day[i] = std::pow(rig.values[static_cast<std::size_t>(i)].day, 2) +
                  std::pow(settings.prior_factor * (most[i] - least[i]) / 2, 2);
   const double degrees = double(all.size()) - double(fits.size());
-  rig.inflation = (squares / signal::chi_square_quantile(kSureOfScatter, degrees)).cwiseMax(1.0);
+  for (std::size_t i = 0; i < squares.size(); ++i)
+    rig.effects[i].inflation =
+        std::max(1.0, squares[i] / signal::chi_square_quantile(kSureOfScatter, degrees));
   rig.inflation_of_all =
       std::max(1.0, of_all / signal::chi_square_quantile(kSureOfScatter, degrees * double(count)));
 }
@@ -188,6 +221,7 @@ HealthyRig commission_rig(const std::vector<record::Record>& healthy,
   take_machine(healthy.front(), settings, rig);
   const Fits fits = fit_all(healthy, rig);
   take_residuals(fits, rig);
+  rig.effects = effects_of(rig, settings);
   take_statistics(fits, settings, rig);
   return rig;
 }

@@ -33,7 +33,7 @@ struct RigScan::Sums {
 RigScan::RigScan(const HealthyRig& rig, std::vector<FittedStretch> stretches, double probability,
                  const ChangeSettings& settings)
     : rig_(rig), stretches_(std::move(stretches)), settings_(settings) {
-  const double each = std::clamp(probability / (kShapes * double(rig.values.size())), 1e-14, 0.1);
+  const double each = std::clamp(probability / (kShapes * double(rig.effects.size())), 1e-14, 0.1);
   threshold_ = gain_by_chance(each, 1, 1, std::max(2.0, double(stretches_.size())));
 }
 
@@ -46,7 +46,8 @@ RigScan::Beside RigScan::system(const std::vector<RigChange>& beside) const {
   shape.leftCols(values).setIdentity();
   for (const FittedStretch& s : stretches_) {
     for (std::size_t i = 0; i < beside.size(); ++i)
-      shape(beside[i].value, values + static_cast<Eigen::Index>(i)) = beside[i].shape.weight(s.at, end());
+      shape.col(values + static_cast<Eigen::Index>(i)) =
+          beside[i].shape.weight(s.at, end()) * rig_.effects[beside[i].effect].direction;
     const Eigen::MatrixXd moved = signal::product(s.information, shape);
     all += signal::transposed_product(shape, moved);
     score += shape.transpose() * (s.score - s.information * rig_.mean);
@@ -70,29 +71,30 @@ RigScan::Sums RigScan::sums(const RigShape& shape, const Beside& beside) const {
     mixed.topRows(values) += h * s.information;
     for (std::size_t i = 0; i < beside.changes.size(); ++i)
       mixed.row(values + static_cast<Eigen::Index>(i)) +=
-          h * beside.changes[i].shape.weight(s.at, end()) * s.information.row(beside.changes[i].value);
+          h * beside.changes[i].shape.weight(s.at, end()) *
+          (s.information * rig_.effects[beside.changes[i].effect].direction).transpose();
   }
   out.score -= mixed.transpose() * beside.estimate;
   out.information -= signal::transposed_product(mixed, signal::product(beside.inverse, mixed));
   return out;
 }
 
-RigChange RigScan::of(Eigen::Index value, const RigShape& shape, const Sums& sums) const {
+RigChange RigScan::of(std::size_t effect, const RigShape& shape, const Sums& sums) const {
+  const RigEffect& e = rig_.effects[effect];
   RigChange change;
-  change.value = value, change.shape = shape;
-  const double information = sums.information(value, value);
-  const double jitter = rig_.values[static_cast<std::size_t>(value)].least;
+  change.effect = effect, change.shape = shape;
+  const double information = e.direction.dot(sums.information * e.direction);
   // Of what the record does not tell there is nothing to score.
-  if (!(information * jitter * jitter > kLeastInformation)) return change;
-  change.size = sums.score[value] / information;
-  change.variance = rig_.inflation[value] / information;
+  if (!(information * e.least * e.least > kLeastInformation)) return change;
+  change.size = e.direction.dot(sums.score) / information;
+  change.variance = e.inflation / information;
   change.gain = change.size * change.size / change.variance;
   return change;
 }
 
-RigChange RigScan::scored(Eigen::Index value, const RigShape& shape,
+RigChange RigScan::scored(std::size_t effect, const RigShape& shape,
                           const std::vector<RigChange>& beside) const {
-  return of(value, shape, sums(shape, system(beside)));
+  return of(effect, shape, sums(shape, system(beside)));
 }
 
 double RigScan::all_gain(const RigShape& shape, const std::vector<RigChange>& beside) const {
@@ -118,8 +120,7 @@ std::vector<RigShape> RigScan::shapes() const {
 }
 
 bool RigScan::believed(const RigChange& change) const {
-  const RigValue& value = rig_.values[static_cast<std::size_t>(change.value)];
-  return change.gain > threshold_ && std::fabs(change.size) > value.least;
+  return change.gain > threshold_ && std::fabs(change.size) > rig_.effects[change.effect].least;
 }
 
 std::optional<RigChange> RigScan::best(const std::vector<RigChange>& beside) const {
@@ -127,7 +128,7 @@ std::optional<RigChange> RigScan::best(const std::vector<RigChange>& beside) con
   const Beside nuisances = system(beside);
   for (const RigShape& shape : shapes()) {
     const Sums s = sums(shape, nuisances);
-    for (Eigen::Index v = 0; v < rig_.day.size(); ++v) {
+    for (std::size_t v = 0; v < rig_.effects.size(); ++v) {
       const RigChange change = of(v, shape, s);
       if (believed(change) && (!found || change.gain > found->gain)) found = change;
     }
@@ -141,7 +142,7 @@ void RigScan::find_end(RigChange& change, const std::vector<RigChange>& beside) 
   const Beside nuisances = system(beside);
   RigChange best = change;
   const auto look = [&](const RigShape& shape) {
-    const RigChange next = of(change.value, shape, sums(shape, nuisances));
+    const RigChange next = of(change.effect, shape, sums(shape, nuisances));
     if (next.gain > best.gain && believed(next)) best = next;
   };
   const double enough = change.gain + threshold_;
@@ -178,7 +179,7 @@ std::vector<RigChange> RigScan::run() const {
     for (std::size_t i = 0; found.size() > 1 && i < found.size(); ++i) {
       std::vector<RigChange> others = found;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-      found[i] = scored(found[i].value, found[i].shape, others);
+      found[i] = scored(found[i].effect, found[i].shape, others);
     }
   }
   return found;
@@ -195,7 +196,7 @@ Stretch RigScan::onset_interval(const RigChange& change, const std::vector<RigCh
   for (RigShape shape : shapes()) {
     if (shape.ramp != change.shape.ramp || shape.since >= change.shape.until) continue;
     shape.until = change.shape.until;
-    if (of(change.value, shape, sums(shape, nuisances)).gain < change.gain - drop) continue;
+    if (of(change.effect, shape, sums(shape, nuisances)).gain < change.gain - drop) continue;
     out.from = std::min(out.from, shape.ramp ? shape.since : before(shape.since).at.from);
     out.to = std::max(out.to, shape.ramp ? shape.since : after(shape.since).at.to);
   }
@@ -207,7 +208,7 @@ std::optional<RigChange> RigScan::different(const std::vector<RigChange>& beside
   whole.since = -std::numeric_limits<double>::infinity();
   const Sums s = sums(whole, system(beside));
   std::optional<RigChange> found;
-  for (Eigen::Index v = 0; v < rig_.day.size(); ++v) {
+  for (std::size_t v = 0; v < rig_.effects.size(); ++v) {
     const RigChange change = of(v, whole, s);
     if (believed(change) && (!found || change.gain > found->gain)) found = change;
   }

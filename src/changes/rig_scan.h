@@ -24,10 +24,10 @@ struct RigShape {
 };
 
 struct RigChange {
-  Eigen::Index value = 0;  // which
+  std::size_t effect = 0;  // of HealthyRig::effects
   RigShape shape;
-  double size = 0, variance = 0;  // in the coordinate, of weight 1
-  double gain = 0;                // twice the log likelihood ratio, over the inflation of the value
+  double size = 0, variance = 0;  // of weight 1
+  double gain = 0;                // twice the log likelihood ratio, over the inflation of the effect
 };
 
 class RigScan {
@@ -40,7 +40,7 @@ class RigScan {
   std::vector<RigChange> run() const;
   /// What all values together explain at a shape, in the unit of a change's gain.
   double all_gain(const RigShape& shape, const std::vector<RigChange>& beside) const;
-  RigChange scored(Eigen::Index value, const RigShape& shape, const std::vector<RigChange>& beside) const;
+  RigChange scored(std::size_t effect, const RigShape& shape, const std::vector<RigChange>& beside) const;
   /// From when to when the change may have begun.
   Stretch onset_interval(const RigChange& change, const std::vector<RigChange>& beside) const;
   /// A value that is another one over the whole record, by more than from record to record; nothing: none.
@@ -58,7 +58,7 @@ class RigScan {
   struct Sums;
   Beside system(const std::vector<RigChange>& beside) const;
   Sums sums(const RigShape& shape, const Beside& beside) const;
-  RigChange of(Eigen::Index value, const RigShape& shape, const Sums& sums) const;
+  RigChange of(std::size_t effect, const RigShape& shape, const Sums& sums) const;
   std::vector<RigShape> shapes() const;
   std::optional<RigChange> best(const std::vector<RigChange>& beside) const;
   bool believed(const RigChange& change) const;

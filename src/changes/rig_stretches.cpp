@@ -18,8 +18,9 @@ using record::Channel;
 
 constexpr std::size_t kReversals = 8;  // of a stretch. Choice: with more the errors hardly shrink
 constexpr double kTurned = 0.3;        // of the middle size, beyond which the torque is on a side. Choice
-constexpr double kContext = 2;  // of a stretch, to either side: tells where a square wave reverses. Choice
-constexpr double kGap = 2.5;    // intervals between samples that are none. Choice
+constexpr double kContext = 2;   // of a stretch, to either side: tells where a square wave reverses. Choice
+constexpr double kUneven = 0.1;  // of an interval, error of a stamp. Choice: the fit asks for less
+constexpr double kGap = 2.5;     // intervals between samples that are none. Choice
 constexpr double kOtherLevel =
     1.25;                        // times the drive of the healthy records that is extrapolated to. Choice
 constexpr double kLouder = 1.5;  // times the healthy residual, that follows no machine. Choice
@@ -39,6 +40,15 @@ std::vector<std::size_t> reversals_of(const std::vector<double>& torque, double 
     state = now;
   }
   return found;
+}
+
+/// Stamps that are no clock's say nothing of the machine.
+bool even(const record::Record& record, const Stretch& at) {
+  const double interval = record.sampling_interval();
+  const auto first = std::lower_bound(record.time.begin(), record.time.end(), at.from);
+  for (auto t = first; t != record.time.end() && *t < at.to; ++t)
+    if (std::fabs(*t - *first - double(t - first) * interval) > kUneven * interval) return false;
+  return true;
 }
 
 bool explained(const FittedStretch& s, const HealthyRig& rig) {
@@ -148,6 +158,10 @@ FittedStretch fit_stretch(const record::Record& record, const Stretch& at, const
       !(out.level <= kOtherLevel * rig.most_level && kOtherLevel * out.level >= rig.least_level)) {
     out.reason = fmt::format("driven by {:.2g} N m, the healthy records by {:.2g} to {:.2g} N m", out.level,
                              rig.least_level, rig.most_level);
+    return out;
+  }
+  if (!even(record, at)) {
+    out.reason = "the samples are not evenly spaced in time";
     return out;
   }
   const double near = std::max(rig.backlash, rig.settings.finest());

@@ -36,14 +36,24 @@ class StretchCutter {
 };
 
 /// One value of the machine. Coordinate of the score: of the backlash a share of `value`, of a factor the
-/// logarithm in spreads, else the value in spreads.
+/// logarithm in spreads, else the value in spreads. Behind them gains that move many values at once.
 struct RigValue {
   std::string name, unit;
   bool factor = false;
   double value = 0, spread = 1;  // of the healthy machine, spread as in WaveformQuantity
   // In the coordinate: what a stretch may be off by itself, a record from the next, and what is no change.
   double jitter = 0, day = 0, least = 0;
+  double power = 0;        // in the factor of the symmetry of waveform.h
   double scale_error = 0;  // of the logarithm of `value`: what declared values leave open
+};
+
+/// A change that can be told: a value of the machine, or the gain of a sensor that scales many of them.
+struct RigEffect {
+  std::string name, unit;
+  Eigen::VectorXd direction;  // of the coordinates, per unit of its size
+  double least = 0;           // of its size, below which it is no change
+  double inflation = 1;       // of its gain, >= 1: how healthy stretches scatter
+  int value = -1;             // of the machine; -1: a gain, whose size is its logarithm
 };
 
 /// The machine as the healthy records show it.
@@ -54,9 +64,9 @@ struct HealthyRig {
   double residual[2] = {0, 0}, swing[2] = {0, 0};  // as in WaveformValues; 0: not yet known
   double left_out = 0;                             // share of the reversals
   double least_level = 0, most_level = 0;          // N m, of the torque that drives
-  Eigen::VectorXd mean, day;    // of the healthy records about `settings`; variance from record to record
-  Eigen::VectorXd inflation;    // of the gain of each value, >= 1: how healthy stretches scatter
-  double inflation_of_all = 1;  // of that of all together
+  Eigen::VectorXd mean, day;  // of the healthy records about `settings`; variance from record to record
+  std::vector<RigEffect> effects;
+  double inflation_of_all = 1;  // of the gain of all values together, as of RigEffect
 };
 
 struct FittedStretch {

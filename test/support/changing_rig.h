@@ -57,7 +57,8 @@ inline record::Record settled(const rig_file::RigFile& file, double duration) {
   record::Record r = simulation::simulate_record(file.rig, file.simulation, start + duration);
   const double half = 0.5 / file.simulation.sensors.sampling_rate;
   r = r.slice(start - half, start + duration - half);
-  for (double& t : r.time) t -= start;
+  const double first = r.time.front();
+  for (double& t : r.time) t -= first;  // less than a sample of the period is lost
   r.column(record::Channel::load_position).clear();
   return r;
 }
@@ -76,7 +77,7 @@ inline record::Record changing_record(const rig_file::RigFile& file, double dura
     record::Record part = settled(changed, step);
     if (event.name == "sensor_gain") scale(part, record::Channel::sensor_torque, 1 + event.share);
     if (event.name == "motor_torque_gain") scale(part, record::Channel::motor_torque, 1 + event.share);
-    if (event.name == "position_gain") scale(part, record::Channel::motor_position, 1 + event.share);
+    if (event.name == "motor_position_gain") scale(part, record::Channel::motor_position, 1 + event.share);
     // Where a free link is, is of no run.
     const double moved = file.rig.link_locked ? 0
                                               : all.column(record::Channel::motor_position).back() -

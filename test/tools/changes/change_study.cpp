@@ -302,6 +302,7 @@ int main(int argc, char** argv) {
   add("two", po::bool_switch(&options.two), "inertias, with an encoder on either side, of each joint");
   add("wander", po::value(&options.wander), "of friction, share up and down in ten minutes; default 0.02");
   add("rig", po::value(&rigs.rig), "file of a rig with a torque sensor, instead: machines like it");
+  add("rig-change", po::value(&rigs.only), "of such rigs, by its name; default: all");
   add("torque-alone", po::bool_switch(&torque_alone), "of such rigs, no position");
   add("seed", po::value(&options.seed), "default 1");
   try {

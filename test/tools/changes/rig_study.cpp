@@ -92,12 +92,19 @@ void print_found(const changes::Changes& found, const std::string& label, double
 }
 
 std::vector<test::RigEvent> events_of(const model::Rig& rig) {
-  std::vector<test::RigEvent> all = {{"backlash", 0.1},           {"backlash", 0.2},
-                                     {"backlash", 0.4},           {"backlash", 0.4, 1},
-                                     {"contact_stiffness", -0.3}, {"sensor_stiffness", -0.15},
-                                     {"motor_viscous", 0.3},      {"motor_coulomb", 0.06},
-                                     {"sensor_gain", -0.1},       {"motor_torque_gain", 0.1, 0, false},
-                                     {"noise", 2, 0, false},      {"drive", 0.15, 0, false}};
+  std::vector<test::RigEvent> all = {{"backlash", 0.1},
+                                     {"backlash", 0.2},
+                                     {"backlash", 0.4},
+                                     {"backlash", 0.4, 1},
+                                     {"contact_stiffness", -0.3},
+                                     {"sensor_stiffness", -0.15},
+                                     {"motor_viscous", 0.3},
+                                     {"motor_coulomb", 0.06},
+                                     {"sensor_gain", -0.1},
+                                     {"motor_torque_gain", 0.1},
+                                     {"motor_position_gain", 0.1},
+                                     {"noise", 2, 0, false},
+                                     {"drive", 0.15, 0, false}};
   if (!rig.link_locked) all.push_back({"load_inertia", 0.2});
   return all;
 }
@@ -110,6 +117,11 @@ void study_rigs(const RigStudy& study) {
   settings.false_alarms_per_hour = study.rate;
   Random random(study.seed, 1);
   std::vector<test::RigEvent> events = events_of(declared.rig);
+  if (!study.only.empty())
+    events.erase(std::remove_if(events.begin(), events.end(),
+                                [&](const test::RigEvent& e) { return e.name != study.only; }),
+                 events.end());
+  if (events.empty()) throw InvalidParameter("rig-change", study.only, "no such change");
   std::map<std::string, Tally> tallies;
   int refused = 0, alarms = 0, cannot = 0, looks = 0;
   const auto look = [&](const Machine& m, const record::Record& r) -> std::optional<changes::Changes> {

@@ -11,6 +11,7 @@ struct RigStudy {
   double healthy_hours = 0;  // of records that do not
   double rate = 1.0 / 720;   // 1/h, false alarms that are allowed
   bool position = true;      // of the motor is in the records
+  std::string only;          // change by its name; empty: all
   unsigned long seed = 1;
   double duration = 150;  // s, of a record
 };
