@@ -16,7 +16,6 @@ namespace {
 
 using record::Channel;
 
-constexpr int kStretches = 12;  // spread over the record at first. Choice: time
 constexpr int kMostRefinements =
     24;                              // further ones about onsets. Choice: five halves each, and room for more
 constexpr std::size_t kFewest = 4;   // stretches that must fit. Choice
@@ -37,8 +36,8 @@ class RigChanges {
       : rig_(rig), record_(record), settings_(settings), progress_(progress), cutter_(record) {}
 
   Changes find() {
-    fit(cutter_.spread(kStretches));
-    for (int i = 0; i < kMostRefinements; ++i) {
+    fit(cutter_.spread(settings_.rig_stretches));
+    for (int i = 0; i < settings_.rig_refinements; ++i) {
       const std::optional<Stretch> next = next_stretch();
       if (!next) break;
       fit({*next});
@@ -50,7 +49,9 @@ class RigChanges {
   void fit(const std::vector<Stretch>& at) {
     for (const Stretch& s : at) {
       ++done_;
-      if (progress_ && !progress_(std::min(0.99, done_ / double(kStretches + kMostRefinements)), "fitting"))
+      if (progress_ &&
+          !progress_(std::min(0.99, done_ / double(settings_.rig_stretches + settings_.rig_refinements)),
+                     "fitting"))
         throw Cancelled();
       all_.push_back(fit_stretch(record_, s, rig_));
     }
@@ -94,10 +95,12 @@ class RigChanges {
     const RigScan s = scan();
     std::vector<Stretch> edges;
     const auto around = [&](double t) { edges.push_back({s.before(t).at.from, s.after(t).at.to}); };
-    for (const RigChange& c : s.run()) {
+    const RigScan::Found found = s.run();
+    for (const RigChange& c : found.changes) {
       if (!c.shape.ramp) around(c.shape.since);
       if (std::isfinite(c.shape.until)) around(c.shape.until);
     }
+    if (const auto unexplained = s.unexplained(found)) around(unexplained->since);
     for (const UnknownRun& r : unknown_runs()) {
       if (r.first > 0) edges.push_back({all_[r.first - 1].at.from, all_[r.first].at.to});
       if (r.last + 1 < all_.size()) edges.push_back({all_[r.last].at.from, all_[r.last + 1].at.to});
@@ -226,21 +229,27 @@ class RigChanges {
 
   Changes told() const {
     const RigScan s = scan();
-    const std::vector<RigChange> found = s.run();
+    const RigScan::Found found = s.run();
     Changes out;
     out.windows = s.size();
     out.threshold = s.threshold();
     out.noise = rig_.residual[0];
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      std::vector<RigChange> others = found;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-      out.changes.push_back(told(s, found[i], others));
-    }
-    if (const auto d = s.different(found)) {
-      const std::string& name = rig_.effects[d->effect].name;
+    for (std::size_t i = 0; i < found.changes.size(); ++i)
+      out.changes.push_back(told(s, found.changes[i], found.beside(i)));
+    for (const RigChange& d : found.different) {
+      const std::string& name = rig_.effects[d.effect].name;
       out.different.push_back(name);
       out.warnings.push_back("from its beginning the record differs from the healthy ones by " + name +
                              ": that is no change within it");
+    }
+    if (const auto unexplained = s.unexplained(found)) {
+      Change change;
+      change.effect = "unknown";
+      change.since = unexplained->since;
+      change.since_from = s.before(change.since).at.from, change.since_to = s.after(change.since).at.to;
+      change.gain = s.all_gain(*unexplained, found.all());
+      change.error_before = change.error_after = rig_.residual[0];
+      out.changes.push_back(change);
     }
     tell_unknown(out);
     tell_left(out);
@@ -281,10 +290,11 @@ Changes changes_of_rig(const diagnosis::WaveformSettings& machine, const std::ve
       if (!r.has(needed)) throw CannotIdentify(r.name + ": needs " + record::channel_name(needed));
     return r;
   };
+  const record::Record looked_at = used(record);
   std::vector<record::Record> learned;
   for (const record::Record& r : healthy) learned.push_back(used(r));
   const HealthyRig rig = commission_rig(learned, machine, settings);
-  return RigChanges(rig, used(record), settings, progress).find();
+  return RigChanges(rig, looked_at, settings, progress).find();
 }
 
 Changes detect_changes(const rig_file::RigFile& file, const std::vector<record::Record>& healthy,

@@ -14,9 +14,9 @@
 namespace backlash::changes {
 namespace {
 
-constexpr int kStretches = 8, kLeastOfRecord = 4;  // of all healthy records, of one. Choices: time
-constexpr int kFirstTries = 3;                     // stretches that may tell the machine first. Choice
-constexpr std::size_t kFewest = 4;                 // that must fit. Choice: their scatter is needed
+constexpr int kLeastOfRecord = 4;   // stretches. Choice
+constexpr int kFirstTries = 3;      // stretches that may tell the machine first. Choice
+constexpr std::size_t kFewest = 4;  // that must fit. Choice: their scatter is needed
 // Choices, what a stretch may be off by itself:
 constexpr double kJitter = 0.002;                         // of a value, as the equations are no better
 constexpr double kFinestJitter = 0.1;                     // of the finest backlash that can be told
@@ -133,9 +133,9 @@ std::vector<const FittedStretch*> judged_of(const std::vector<FittedStretch>& fi
   return out;
 }
 
-Fits fit_all(const std::vector<record::Record>& healthy, const HealthyRig& rig) {
+Fits fit_all(const std::vector<record::Record>& healthy, const HealthyRig& rig, int stretches) {
   Fits all;
-  const int each = std::max(kLeastOfRecord, kStretches / static_cast<int>(healthy.size()));
+  const int each = std::max(kLeastOfRecord, stretches / static_cast<int>(healthy.size()));
   for (const record::Record& record : healthy) {
     all.emplace_back();
     std::string reason;
@@ -219,7 +219,7 @@ HealthyRig commission_rig(const std::vector<record::Record>& healthy,
   HealthyRig rig;
   rig.settings = machine;
   take_machine(healthy.front(), settings, rig);
-  const Fits fits = fit_all(healthy, rig);
+  const Fits fits = fit_all(healthy, rig, settings.rig_healthy_stretches);
   take_residuals(fits, rig);
   rig.effects = effects_of(rig, settings);
   take_statistics(fits, settings, rig);

@@ -32,7 +32,7 @@ struct RigScan::Sums {
 
 RigScan::RigScan(const HealthyRig& rig, std::vector<FittedStretch> stretches, double probability,
                  const ChangeSettings& settings)
-    : rig_(rig), stretches_(std::move(stretches)), settings_(settings) {
+    : rig_(rig), stretches_(std::move(stretches)), settings_(settings), probability_(probability) {
   const double each = std::clamp(probability / (kShapes * double(rig.effects.size())), 1e-14, 0.1);
   threshold_ = gain_by_chance(each, 1, 1, std::max(2.0, double(stretches_.size())));
 }
@@ -160,29 +160,82 @@ void RigScan::find_end(RigChange& change, const std::vector<RigChange>& beside) 
   change = best;
 }
 
-std::vector<RigChange> RigScan::run() const {
-  std::vector<RigChange> found;
-  while (static_cast<int>(found.size()) < settings_.most_changes) {
-    std::optional<RigChange> next = best(found);
+std::vector<RigChange> RigScan::Found::all() const {
+  std::vector<RigChange> out = different;
+  out.insert(out.end(), changes.begin(), changes.end());
+  return out;
+}
+
+std::vector<RigChange> RigScan::Found::beside(std::size_t but) const {
+  std::vector<RigChange> out = all();
+  out.erase(out.begin() + static_cast<std::ptrdiff_t>(different.size() + but));
+  return out;
+}
+
+/// Whether an onset, or an end, is of the same event as another.
+bool RigScan::near(double onset, const std::vector<RigChange>& changes) const {
+  return std::any_of(changes.begin(), changes.end(), [&](const RigChange& c) {
+    for (const double t : {c.shape.since, c.shape.until})
+      if (onset >= before(t).at.from && onset <= after(t).at.to) return true;
+    return false;
+  });
+}
+
+/// A step that a later one takes back is one change with an end.
+void RigScan::unite(Found& found) const {
+  std::vector<RigChange>& all = found.changes;
+  const auto open = [](const RigChange& c) { return !c.shape.ramp && std::isinf(c.shape.until); };
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      if (i == k || all[i].effect != all[k].effect || !open(all[i]) || !open(all[k])) continue;
+      if (all[k].shape.since < all[i].shape.since ||
+          std::fabs(all[i].size + all[k].size) > settings_.undone * std::fabs(all[i].size))
+        continue;
+      all[i].shape.until = all[k].shape.since;
+      const RigShape shape = all[i].shape;
+      const std::size_t effect = all[i].effect, place = k > i ? i : i - 1;
+      all.erase(all.begin() + static_cast<std::ptrdiff_t>(k));
+      all[place] = scored(effect, shape, found.beside(place));
+      return;
+    }
+}
+
+RigScan::Found RigScan::run() const {
+  Found found;
+  while (static_cast<int>(found.all().size()) < settings_.most_changes) {
+    std::optional<RigChange> next = best(found.all());
     if (!next) break;
-    find_end(*next, found);
+    RigShape whole;
+    whole.since = -std::numeric_limits<double>::infinity();
+    const RigChange always = scored(next->effect, whole, found.all());
+    if (always.gain > next->gain - settings_.onset_drop) {
+      found.different.push_back(always);
+      continue;
+    }
+    find_end(*next, found.all());
     // What is left about the onset of another one is of the same event: whether that one explains it is asked
     // elsewhere.
-    const auto same = [&](const RigChange& f) {
-      const auto near = [&](double a, double b) {
-        return a == b || (a >= before(b).at.from && a <= after(b).at.to);
-      };
-      return near(next->shape.since, f.shape.since) || near(next->shape.since, f.shape.until);
-    };
-    if (std::any_of(found.begin(), found.end(), same)) break;
-    found.push_back(*next);
-    for (std::size_t i = 0; found.size() > 1 && i < found.size(); ++i) {
-      std::vector<RigChange> others = found;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-      found[i] = scored(found[i].effect, found[i].shape, others);
-    }
+    if (near(next->shape.since, found.changes)) break;
+    found.changes.push_back(*next);
+    for (std::size_t i = 0; found.changes.size() > 1 && i < found.changes.size(); ++i)
+      found.changes[i] = scored(found.changes[i].effect, found.changes[i].shape, found.beside(i));
+    unite(found);
   }
   return found;
+}
+
+std::optional<RigShape> RigScan::unexplained(const Found& found) const {
+  const auto values = static_cast<double>(rig_.values.size());
+  const double most = rig_.inflation_of_all * gain_by_chance(std::clamp(probability_, 1e-14, 0.1), values, 1,
+                                                             std::max(2.0, double(stretches_.size())));
+  std::optional<RigShape> worst;
+  double largest = most;
+  for (const RigShape& shape : shapes()) {
+    if (shape.ramp || near(shape.since, found.changes)) continue;
+    const double gain = all_gain(shape, found.all());
+    if (gain > largest) largest = gain, worst = shape;
+  }
+  return worst;
 }
 
 Stretch RigScan::onset_interval(const RigChange& change, const std::vector<RigChange>& beside) const {
@@ -201,18 +254,6 @@ Stretch RigScan::onset_interval(const RigChange& change, const std::vector<RigCh
     out.to = std::max(out.to, shape.ramp ? shape.since : after(shape.since).at.to);
   }
   return out;
-}
-
-std::optional<RigChange> RigScan::different(const std::vector<RigChange>& beside) const {
-  RigShape whole;
-  whole.since = -std::numeric_limits<double>::infinity();
-  const Sums s = sums(whole, system(beside));
-  std::optional<RigChange> found;
-  for (std::size_t v = 0; v < rig_.effects.size(); ++v) {
-    const RigChange change = of(v, whole, s);
-    if (believed(change) && (!found || change.gain > found->gain)) found = change;
-  }
-  return found;
 }
 
 const FittedStretch& RigScan::before(double time) const {

@@ -36,15 +36,21 @@ class RigScan {
   RigScan(const HealthyRig& rig, std::vector<FittedStretch> stretches, double probability,
           const ChangeSettings& settings);
 
+  struct Found {
+    std::vector<RigChange> changes;
+    std::vector<RigChange> different;  // from the beginning of the record: no changes in it
+    std::vector<RigChange> beside(std::size_t but) const;  // all but one of the changes
+    std::vector<RigChange> all() const;
+  };
   /// Several, one after the other, as long as they are believed.
-  std::vector<RigChange> run() const;
+  Found run() const;
+  /// Where all values together are others that no found change is; nothing: nowhere.
+  std::optional<RigShape> unexplained(const Found& found) const;
   /// What all values together explain at a shape, in the unit of a change's gain.
   double all_gain(const RigShape& shape, const std::vector<RigChange>& beside) const;
   RigChange scored(std::size_t effect, const RigShape& shape, const std::vector<RigChange>& beside) const;
   /// From when to when the change may have begun.
   Stretch onset_interval(const RigChange& change, const std::vector<RigChange>& beside) const;
-  /// A value that is another one over the whole record, by more than from record to record; nothing: none.
-  std::optional<RigChange> different(const std::vector<RigChange>& beside) const;
   /// The last stretch before a time and the first after it.
   const FittedStretch& before(double time) const;
   const FittedStretch& after(double time) const;
@@ -62,12 +68,14 @@ class RigScan {
   std::vector<RigShape> shapes() const;
   std::optional<RigChange> best(const std::vector<RigChange>& beside) const;
   bool believed(const RigChange& change) const;
+  void unite(Found& found) const;
+  bool near(double onset, const std::vector<RigChange>& changes) const;
   void find_end(RigChange& change, const std::vector<RigChange>& beside) const;
 
   const HealthyRig& rig_;
   const std::vector<FittedStretch> stretches_;
   const ChangeSettings& settings_;
-  double threshold_;
+  double probability_, threshold_;
 };
 
 }  // namespace backlash::changes

@@ -67,12 +67,13 @@ inline record::Record settled(const rig_file::RigFile& file, double duration) {
 inline record::Record changing_record(const rig_file::RigFile& file, double duration, const RigEvent& event,
                                       double since) {
   record::Record all = settled(file, std::min(since, duration));
-  const int steps = event.span > 0 ? 16 : 1;
+  constexpr double kStep = 2;  // s, of what grows
   const double whole = duration - since;
+  const int steps = event.span > 0 ? static_cast<int>(whole / kStep) : 1;
   for (int i = 0; i < steps && whole > 0; ++i) {
     rig_file::RigFile changed = file;
     changed.simulation.sensors.seed += 1000 + static_cast<std::uint64_t>(i);
-    const double step = event.span > 0 ? std::round(whole / steps) : whole;
+    const double step = event.span > 0 ? kStep : whole;
     apply(event, event.span > 0 ? (i + 0.5) * step / event.span : 1, changed);
     record::Record part = settled(changed, step);
     if (event.name == "sensor_gain") scale(part, record::Channel::sensor_torque, 1 + event.share);
