@@ -23,7 +23,8 @@ Command command() {
       "since when.";
   c.positional = {"RECORD"};
   c.options = {
-      {"rig", "RIG.yaml", "the machine as declared: one inertia (mesh: rigid) or two", true},
+      {"rig", "RIG.yaml",
+       "the machine as declared: one inertia (mesh: rigid), two, or a torque sensor before the gear", true},
       {"healthy", "RECORD...", "records (.csv or .bag) of the healthy machine, better two tasks than one",
        true},
       {"json", "OUT.json", "changes with size, onset and intervals", true},
@@ -34,7 +35,12 @@ Command command() {
       "Records need motor_torque and motor_position, of two inertias also load_position where the backlash "
       "is asked; ordinary motion will do, but must be no faster than in the healthy records. Warm-up as in "
       "the healthy records, and slow drift of friction by up to 10 %, is no "
-      "change. Sizes are what was added at the onset. A change that no effect explains is called unknown.";
+      "change. Sizes are what was added at the onset. A change that no effect explains is called unknown. Of "
+      "a "
+      "rig with a torque sensor (elastic input_coupling) they need motor_torque that reverses and "
+      "sensor_torque, better motor_position too: the whole motion is fitted at some twenty places, which "
+      "takes "
+      "half a minute of a processor.";
   c.examples = {
       "detect_changes --rig config/ur5_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
       "today.csv"};
