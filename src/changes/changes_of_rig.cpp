@@ -243,13 +243,10 @@ class RigChanges {
                              ": that is no change within it");
     }
     if (const auto unexplained = s.unexplained(found)) {
-      Change change;
-      change.effect = "unknown";
-      change.since = unexplained->since;
-      change.since_from = s.before(change.since).at.from, change.since_to = s.after(change.since).at.to;
-      change.gain = s.all_gain(*unexplained, found.all());
-      change.error_before = change.error_after = rig_.residual[0];
-      out.changes.push_back(change);
+      const std::string text =
+          fmt::format("since {:.0f} s the values of the machine together are others, though none alone is",
+                      unexplained->since);
+      (out.changes.empty() ? out.cannot_tell : out.warnings.emplace_back()) = text;
     }
     tell_unknown(out);
     tell_left(out);

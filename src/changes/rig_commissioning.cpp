@@ -95,6 +95,9 @@ void take_machine(const record::Record& record, const ChangeSettings& settings, 
         machine_value(rig, found.quantities[i], found.spread[i + 1], level, interval, settings));
     const auto k = static_cast<Eigen::Index>(i) + 1;
     if (q.factor) rig.values.back().scale_error = found.spread[i + 1] * std::sqrt(known(k, k));
+    // From torque alone a length is known as well as this; where there is no play, its logarithm is not.
+    if (q.at == &diagnosis::WaveformSettings::sensor_stiffness)
+      rig.values[0].scale_error = std::min(found.log_error, rig.values.back().scale_error);
   }
 }
 
@@ -180,7 +183,7 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
   const Eigen::VectorXd free = Eigen::VectorXd::Ones(count);
   Eigen::VectorXd least = Eigen::VectorXd::Constant(count, 1e300), most = -least;
   std::vector<double> squares(rig.effects.size(), 0);
-  double of_all = 0;
+  double of_all = 0, most_of_all = 0;
   for (const auto& of_record : fits) {
     const auto judged = judged_of(of_record);
     all.insert(all.end(), judged.begin(), judged.end());
@@ -193,7 +196,8 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
         const double information = d.dot(f->information * d);
         if (information > 0) squares[i] += std::pow(d.dot(left), 2) / information;
       }
-      of_all += gain_of_all(left, f->information);
+      const double gain = gain_of_all(left, f->information);
+      of_all += gain, most_of_all = std::max(most_of_all, gain);
     }
   }
   if (all.size() < kFewest)
@@ -208,8 +212,10 @@ void take_statistics(const Fits& fits, const ChangeSettings& settings, HealthyRi
   for (std::size_t i = 0; i < squares.size(); ++i)
     rig.effects[i].inflation =
         std::max(1.0, squares[i] / signal::chi_square_quantile(kSureOfScatter, degrees));
+  const double values = double(count);
   rig.inflation_of_all =
-      std::max(1.0, of_all / signal::chi_square_quantile(kSureOfScatter, degrees * double(count)));
+      std::max({1.0, of_all / signal::chi_square_quantile(kSureOfScatter, degrees * values),
+                most_of_all / signal::chi_square_quantile(1 - kSureOfScatter / double(all.size()), values)});
 }
 
 }  // namespace

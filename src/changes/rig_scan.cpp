@@ -176,7 +176,8 @@ std::vector<RigChange> RigScan::Found::beside(std::size_t but) const {
 bool RigScan::near(double onset, const std::vector<RigChange>& changes) const {
   return std::any_of(changes.begin(), changes.end(), [&](const RigChange& c) {
     for (const double t : {c.shape.since, c.shape.until})
-      if (onset >= before(t).at.from && onset <= after(t).at.to) return true;
+      if (onset >= before(t).at.from - settings_.same_event && onset <= after(t).at.to + settings_.same_event)
+        return true;
     return false;
   });
 }
@@ -202,7 +203,7 @@ void RigScan::unite(Found& found) const {
 
 RigScan::Found RigScan::run() const {
   Found found;
-  while (static_cast<int>(found.all().size()) < settings_.most_changes) {
+  for (int i = 0; i < settings_.most_changes; ++i) {
     std::optional<RigChange> next = best(found.all());
     if (!next) break;
     RigShape whole;
@@ -217,8 +218,8 @@ RigScan::Found RigScan::run() const {
     // elsewhere.
     if (near(next->shape.since, found.changes)) break;
     found.changes.push_back(*next);
-    for (std::size_t i = 0; found.changes.size() > 1 && i < found.changes.size(); ++i)
-      found.changes[i] = scored(found.changes[i].effect, found.changes[i].shape, found.beside(i));
+    for (std::size_t k = 0; found.changes.size() > 1 && k < found.changes.size(); ++k)
+      found.changes[k] = scored(found.changes[k].effect, found.changes[k].shape, found.beside(k));
     unite(found);
   }
   return found;

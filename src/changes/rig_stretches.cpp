@@ -28,7 +28,8 @@ constexpr double kModelError = 0.002;  // of the swing, as in the fit: no model 
 constexpr double kMoreLeftOut =
     0.25;  // of the reversals, more than of the healthy machine. Choice: two of eight
 constexpr double kChangeSpread = 30;  // in coordinates, of a change of all values: as good as free. Choice
-constexpr double kWide = 3;           // spread of the logarithm of the backlash: as good as free. Choice
+constexpr double kLeastPlay = 0.1;  // of the finest backlash that can be told, or of the healthy one. Choice
+constexpr double kWide = 3;         // spread of the logarithm of the backlash: as good as free. Choice
 
 /// First sample on another side than before.
 std::vector<std::size_t> reversals_of(const std::vector<double>& torque, double level) {
@@ -66,7 +67,8 @@ void take_score(const diagnosis::WaveformValues& found, const HealthyRig& rig, F
   const Eigen::Index count = found.z.size();
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(count), at = found.z, jitter(count);
   const double unit = rig.values[0].value;
-  scale[0] = unit / (found.backlash * found.spread[0]);
+  // Where there is next to no play, its logarithm is anything.
+  scale[0] = unit / (std::max(found.backlash, kLeastPlay * unit) * found.spread[0]);
   at[0] = (found.backlash - rig.backlash) / unit;
   for (Eigen::Index i = 0; i < count; ++i)
     jitter[i] = std::pow(rig.values[static_cast<std::size_t>(i)].jitter, 2);
