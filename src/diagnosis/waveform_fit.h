@@ -81,6 +81,8 @@ class WaveformFit {
 
   /// Covariance of the shared values that are fitted, in spreads, in the order of fitted().
   Eigen::MatrixXd covariance() const;
+  /// Its inverse, which is better told where some values are known a thousand times better than others.
+  const Eigen::MatrixXd& information() const { return information_; }
   const std::vector<int>& fitted() const { return fitted_; }
 
   /// Measured minus moved, of one window that the last stage used, and of one channel.

@@ -52,10 +52,11 @@ constexpr Look kLast = {12, 0, 15, true};
 
 class Solver {
  public:
-  Solver(const record::Record& record, const WaveformSettings& settings, double told, double told_error)
+  Solver(const record::Record& record, const WaveformSettings& settings, double told, double told_error,
+         const std::vector<double>& places)
       : settings_(settings), ring_(waveform_ring(settings)), told_gap_(told), told_error_(told_error) {
     const bool free = settings.output != WaveformOutput::locked;
-    data_.windows = waveform_windows(record, ring_, kMostWindows, free);
+    data_.windows = waveform_windows(record, ring_, kMostWindows, free, places);
     data_.torque = record.column(record::Channel::sensor_torque);
     data_.position = record.column(record::Channel::motor_position);
     time_ = record.time;
@@ -305,6 +306,7 @@ class Solver {
     s.prior_cost = fit.prior_cost(machine);
     s.covariance = Eigen::MatrixXd::Zero(kGlobalValues, kGlobalValues);
     s.covariance(fit.fitted(), fit.fitted()) = covariance;
+    s.information = fit.information(), s.fitted = fit.fitted(), s.wider = wider;
     s.priors = priors, s.common_scale = settings_.common_scale;
     s.finest = settings_.finest(), s.unit = settings_.angular ? "rad" : "m";
     for (int c = 0; c < channels(); ++c) s.misfit[c] = misfit(fit, static_cast<WaveformChannel>(c));
@@ -360,8 +362,8 @@ const char* waveform_value_name(int which) {
 }
 
 WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings, double told,
-                                double told_error) {
-  return Solver(record, settings, told, told_error).solve();
+                                double told_error, const std::vector<double>& places) {
+  return Solver(record, settings, told, told_error, places).solve();
 }
 
 }  // namespace backlash::diagnosis

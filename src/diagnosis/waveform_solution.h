@@ -20,12 +20,15 @@ struct WaveformMisfit {
 };
 
 struct WaveformSolution {
-  double half_gap = kNaN;      // m
-  double log_error = kNaN;     // standard error of its logarithm
-  std::vector<double> z;       // values in spreads from the declared ones
-  std::vector<double> values;  // in their units
-  double prior_cost = 0;       // chi^2 of all values but the gap, against what was known
-  Eigen::MatrixXd covariance;  // of all values, in spreads; 0 where a value is not fitted
+  double half_gap = kNaN;       // m
+  double log_error = kNaN;      // standard error of its logarithm
+  std::vector<double> z;        // values in spreads from the declared ones
+  std::vector<double> values;   // in their units
+  double prior_cost = 0;        // chi^2 of all values but the gap, against what was known
+  Eigen::MatrixXd covariance;   // of all values, in spreads; 0 where a value is not fitted
+  Eigen::MatrixXd information;  // of those that are fitted, in their order, with what was known: its inverse
+  std::vector<int> fitted;
+  double wider = 1;  // -, times which the covariance is that inverse
   WaveformPriors priors;
   double common_scale = 0;
   double finest = kNaN;      // half width of the narrowest interval, in `unit`
@@ -41,8 +44,10 @@ struct WaveformSolution {
 
 /// Throws Refusal where the record cannot be used.
 /// `told`: half gap, m, by itself, with the standard deviation of its logarithm; NaN: not told.
+/// `places`: as of waveform_windows().
 WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings,
-                                double told = kNaN, double told_error = kNaN);
+                                double told = kNaN, double told_error = kNaN,
+                                const std::vector<double>& places = {});
 
 /// Throws Refusal for a record without the channels, InvalidParameter for settings out of range.
 void check_waveform(const record::Record& record, const WaveformSettings& settings);

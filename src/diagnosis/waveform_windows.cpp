@@ -21,7 +21,8 @@ constexpr double kBetween = 0.5;         // of the level; what is below is on it
 constexpr double kTurned = 0.3;          // of the middle size of a smooth torque: choice
 constexpr double kMostBetween = 0.05;    // share of samples: a sine has 0.23, noise of a fifth 0.006
 constexpr double kLargestSpread = 0.25;  // of the level, standard deviation about it: choice; a sine has 0.3
-constexpr std::size_t kFewest = 4;       // windows: choice
+constexpr double kSamePlace = 1.5;  // samples, of a reversal in two records: theory, one and its rounding
+constexpr std::size_t kFewest = 4;  // windows: choice
 
 void check_even(const record::Record& record) {
   const double dt = record.sampling_interval();
@@ -95,6 +96,7 @@ double middle_size(const std::vector<double>& values) {
 /// Where each reversal was, in samples, from a line through them all: a steady period that is no whole number
 /// of samples is then known more finely than one.
 std::vector<double> steady(const std::vector<int>& reversals) {
+  if (reversals.size() < 2) return {reversals.begin(), reversals.end()};
   const auto n = static_cast<double>(reversals.size());
   double mean = 0, slope = 0, squares = 0;
   for (const int r : reversals) mean += r / n;
@@ -111,7 +113,23 @@ std::vector<double> steady(const std::vector<int>& reversals) {
   return line;
 }
 
+/// Those of `places` that are these reversals, or what these tell themselves.
+std::vector<double> known_places(const std::vector<int>& reversals, const std::vector<double>& places) {
+  std::vector<double> at;
+  for (const int r : reversals)
+    for (const double place : places)
+      if (std::fabs(place - r) < kSamePlace) {
+        at.push_back(place);
+        break;
+      }
+  return at.size() == reversals.size() ? at : steady(reversals);
+}
+
 }  // namespace
+
+std::vector<double> waveform_reversals(const std::vector<double>& torque) {
+  return steady(torque_of(torque).reversals);
+}
 
 int waveform_lead(double ring, double interval) {
   return static_cast<int>(std::lround(kLeadRings * ring / interval));
@@ -122,7 +140,8 @@ int waveform_length(const WaveformWindow& window, double rings, double ring, dou
   return std::min(window.samples, wanted);
 }
 
-std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free) {
+std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free,
+                                             const std::vector<double>& places) {
   const double dt = record.sampling_interval();
   if (!(dt * kSamplesPerRing < ring))
     throw Refusal{Status::out_of_domain,
@@ -136,7 +155,8 @@ std::vector<WaveformWindow> waveform_windows(const record::Record& record, doubl
   if (!torque.square) torque.reversals = turns(turning, kTurned * middle_size(turning));
   if (torque.reversals.size() < kFewest)
     throw Refusal{Status::insufficient_data, "fewer than four reversals of the torque"};
-  const std::vector<double> at = steady(torque.reversals);
+  const std::vector<double> at =
+      torque.square ? known_places(torque.reversals, places) : steady(torque.reversals);
   const int lead = waveform_lead(ring, dt), tail = static_cast<int>(std::lround(kTailRings * ring / dt));
   std::vector<WaveformWindow> all;
   for (std::size_t k = 0; k < at.size(); ++k) {

@@ -13,9 +13,16 @@ namespace backlash::diagnosis {
 /// are uneven or too few.
 ///   ring     s, cycle of the motor against the pinion: sets the scale of all times
 ///   longest  the most windows to return, spread evenly over the record
+///   places   of the reversals of a square wave, in samples, as waveform_reversals() tells them from a longer
+///            record; empty: told from this one
 ///   free     whether the link is, so that a smooth torque turns on the teeth at another time than at the
 ///   motor
-std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free);
+std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free,
+                                             const std::vector<double>& places = {});
+
+/// Where a square wave reverses, in samples, more finely than one where its period is steady. Throws Refusal
+/// for a torque that never reverses.
+std::vector<double> waveform_reversals(const std::vector<double>& torque);
 
 /// Samples before the reversal, and after it for a stage of the fit that looks `rings` cycles far.
 int waveform_lead(double ring, double interval);

@@ -37,9 +37,10 @@ const char* change_watch_help() {
 usage: rosrun backlash_diagnosis change_watch [_PARAMETER:=VALUE ...] [NAME:=REMAPPED ...]
 
 parameters (private)
-  rig       path of the rig file of a joint of one inertia (mesh: rigid) or of two (rigid couplings, a free
-            link), whose backlash is watched where load_position is among its channels; or of an arm (urdf),
-            whose joints are watched together, and what it carries; or
+  rig       path of the rig file of a joint of one inertia (mesh: rigid), of two (rigid couplings, a free
+            link), whose backlash is watched where load_position is among its channels, of a pinion with a
+            torque sensor (elastic input_coupling), which needs sensor_torque, or of an arm (urdf), whose
+            joints are watched together, and what it carries; or
   rig_folder  folder with a rig file for each joint of a robot; of others it says that it cannot tell
   joints    list of joint names; default: the joint of the rig file, or all of rig_folder
   channels/CHANNEL/...   topic, name, field, scale, offset: where the robot publishes that channel, as

@@ -28,6 +28,12 @@ bool has(const record::ChannelMap& map, record::Channel channel) {
                      [&](const record::ChannelSource& s) { return s.channel == channel; });
 }
 
+/// A torque sensor before the gear, with which the whole motion is fitted.
+bool has_sensor(const JointRig& joint) {
+  const model::Rig& rig = joint.rig.rig;
+  return !rig.mesh.rigid && !model::has_two_inertias(rig) && joint.rig.diagnosis.waveform;
+}
+
 record::RingSettings ring_settings(const WatchSettings& settings) {
   record::RingSettings ring;
   ring.window = settings.learn;
@@ -41,7 +47,9 @@ record::RingSettings ring_settings(const WatchSettings& settings) {
   }
   ring.channels = {record::Channel::motor_torque, record::Channel::motor_position};
   const bool rigid = settings.joint.rig.rig.mesh.rigid;
-  if (!rigid && has(settings.joint.channels(), record::Channel::load_position))
+  if (has_sensor(settings.joint))
+    ring.channels.push_back(record::Channel::sensor_torque);
+  else if (!rigid && has(settings.joint.channels(), record::Channel::load_position))
     ring.channels.push_back(record::Channel::load_position);
   return ring;
 }
@@ -49,11 +57,15 @@ record::RingSettings ring_settings(const WatchSettings& settings) {
 /// Why no look at such a joint can tell anything; empty: it can.
 std::string reason_against(const JointRig& joint) {
   const model::Rig& rig = joint.rig.rig;
-  if (!rig.mesh.rigid && !model::has_two_inertias(rig))
-    return "changes are told of joints of one inertia (mesh: rigid) and of two (rigid couplings, a free "
-           "link), "
-           "which its rig file does not declare";
-  for (const record::Channel wanted : {record::Channel::motor_torque, record::Channel::motor_position})
+  if (!rig.mesh.rigid && !model::has_two_inertias(rig) && !has_sensor(joint))
+    return "changes are told of joints of one inertia (mesh: rigid), of two (rigid couplings, a free link) "
+           "and "
+           "of a pinion with a torque sensor (an elastic input_coupling) that waveform fits, which its rig "
+           "file "
+           "does not declare";
+  std::vector<record::Channel> needed = {record::Channel::motor_torque, record::Channel::motor_position};
+  if (has_sensor(joint)) needed.push_back(record::Channel::sensor_torque);
+  for (const record::Channel wanted : needed)
     if (!has(joint.channels(), wanted)) return "its channels have no " + record::channel_name(wanted);
   return "";
 }

@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/arm/arm_rig.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/changes/arm_changes.h"
+#include "backlash_diagnosis/changes/changes_of_rig.h"
 #include "backlash_diagnosis/findings/change_report.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/arm_command.h"
@@ -25,7 +26,9 @@ Command command() {
       "since when.";
   c.positional = {"RECORD"};
   c.options = {
-      {"rig", "RIG.yaml", "the machine as declared: one inertia (mesh: rigid) or two, or an arm (urdf)",
+      {"rig", "RIG.yaml",
+       "the machine as declared: one inertia (mesh: rigid), two, a torque sensor before the gear, or an arm "
+       "(urdf)",
        true},
       {"healthy", "RECORD...", "records (.csv or .bag) of the healthy machine, better two tasks than one",
        true},
@@ -37,7 +40,12 @@ Command command() {
       "Records need motor_torque and motor_position, of two inertias also load_position where the backlash "
       "is asked; ordinary motion will do, but must be no faster than in the healthy records. Warm-up as in "
       "the healthy records, and slow drift of friction by up to 10 %, is no "
-      "change. Sizes are what was added at the onset. A change that no effect explains is called unknown.";
+      "change. Sizes are what was added at the onset. A change that no effect explains is called unknown. Of "
+      "a "
+      "rig with a torque sensor (elastic input_coupling) they need motor_torque that reverses and "
+      "sensor_torque, better motor_position too: the whole motion is fitted at some twenty places, which "
+      "takes "
+      "half a minute of a processor.";
   c.examples = {
       "detect_changes --rig config/ur5_joint.yaml --healthy monday.csv tuesday.csv --json changes.json "
       "today.csv"};
@@ -65,7 +73,7 @@ changes::Changes changes_of_joint(findings::ChangeInputs& inputs, const changes:
   std::vector<record::Record> healthy;
   for (const std::string& file : inputs.healthy) healthy.push_back(read(file, rig, warnings));
   const record::Record record = read(inputs.record, rig, warnings);
-  changes::Changes found = changes::detect_changes(rig.rig, healthy, record, settings, progress);
+  changes::Changes found = changes::detect_changes(rig, healthy, record, settings, progress);
   found.warnings.insert(found.warnings.begin(), warnings.begin(), warnings.end());
   return found;
 }

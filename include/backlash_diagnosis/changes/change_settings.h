@@ -52,6 +52,12 @@ struct ChangeSettings {
                               // 0.2 %/K)
   double rest = 10;           // s without motion, after which the machine has another temperature. Choice
 
+  // Machines with a torque sensor before the gear: stretches of some reversals that are fitted, each of which
+  // takes about a second of a processor. Choices.
+  int rig_healthy_stretches = 8;  // of all healthy records
+  int rig_stretches = 12;         // spread over the record
+  int rig_refinements = 16;       // further ones about onsets, at most: five halves each, and room for more
+
   // Changes
   double window = 4;   // s, over which scores are summed. Choice: longer than the residual remembers
   double block = 0.2;  // s, resolution of the onset. Choice

@@ -16,6 +16,7 @@
 #include "backlash_diagnosis/diagnosis/change_ledger.h"
 #include "made_joint.h"
 #include "onset_study.h"
+#include "rig_study.h"
 #include "window_study.h"
 
 namespace backlash::change_study {
@@ -150,6 +151,8 @@ int main(int argc, char** argv) {
   using namespace backlash::change_study;
   namespace po = boost::program_options;
   Options options;
+  RigStudy rigs;
+  bool torque_alone = false;
   po::options_description all("change_study [options]");
   auto add = all.add_options();
   add("help,h", "this text");
@@ -169,6 +172,9 @@ int main(int argc, char** argv) {
   add("wander", po::value(&options.made.wander),
       "of friction, share up and down in ten minutes; default 0.02");
   add("coloured", po::value(&options.made.coloured), "noise of first order, share of the white; default 0.5");
+  add("rig", po::value(&rigs.rig), "file of a rig with a torque sensor, instead: machines like it");
+  add("rig-change", po::value(&rigs.only), "of such rigs, by its name; default: all");
+  add("torque-alone", po::bool_switch(&torque_alone), "of such rigs, no position");
   add("seed", po::value(&options.seed), "default 1");
   try {
     po::variables_map given;
@@ -176,6 +182,12 @@ int main(int argc, char** argv) {
     po::notify(given);
     if (given.count("help") != 0) {
       std::cout << all;
+      return 0;
+    }
+    if (!rigs.rig.empty()) {
+      rigs.changes = options.onsets.count, rigs.healthy_hours = options.hours, rigs.rate = options.rate;
+      rigs.position = !torque_alone, rigs.seed = options.seed;
+      study_rigs(rigs);
       return 0;
     }
     if (options.hours > 0) options.apart ? healthy_apart(options) : healthy(options);
