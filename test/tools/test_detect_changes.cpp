@@ -174,10 +174,10 @@ TEST_F(DetectChanges, AnotherTaskIsNoChangeAndWhatFollowsNoEffectIsNoHealth) {
 
 TEST_F(DetectChanges, RefusesOtherGearTrains) {
   write("record.csv", "time,motor_torque,motor_position\n0,0,0\n0.1,0,0\n0.2,0,0\n");
-  const Outcome outcome = run("detect_changes --rig " + package_file("config/sarkar_1997.yaml") +
+  const Outcome outcome = run("detect_changes --rig " + package_file("config/cycloidal.yaml") +
                               " --healthy record.csv --json out.json record.csv");
   EXPECT_EQ(outcome.code, 3);
-  expect_contains(outcome.err, "of one inertia (mesh: rigid) and of two");
+  expect_contains(outcome.err, "has no torque sensor before the gear");
   EXPECT_FALSE(exists("out.json"));
 }
 
