@@ -138,7 +138,7 @@ void ArmChanges::add_joint(std::size_t index) {
     return;
   }
   ArmJoint& joint = joints_.back();
-  joint.scores.emplace(joint.model, of_joint, settings_);
+  joint.scores.emplace(joint.model, settings_);
   joint.candidates = joint.scores->of(change_effects(joint.model.sampling));
   set_chain_columns(record_, index, joint.motion);
   const std::vector<ChainEffect> effects = chain_effects(rig_.joints.size());
@@ -184,7 +184,7 @@ void ArmChanges::search_deflection(std::size_t index) {
     const std::vector<record::Record> healthy = long_enough(index, sampling);
     const HealthyModel model = commission_healthy(healthy, sampling, settings_);
     const SampledMotion motion = motion_by(model, record, settings_);
-    const HealthyScores scores(model, healthy, settings_);
+    const HealthyScores scores(model, settings_);
     ChangeSearch search(
         model, motion, scores.of(change_effects(sampling)),
         [&](const ChangeEffect& e) { return scores.inflation(e); }, {}, settings_, progress_);

@@ -35,13 +35,13 @@ std::function<double(const Moment&)> other_load(const std::vector<FoundChange>& 
   };
 }
 
-ChannelChanges changes_in(const HealthyModel& model, const std::vector<record::Record>& healthy,
-                          const record::Record& record, const std::vector<FoundChange>& beside, bool linear,
-                          const ChangeSettings& settings, const Progress& progress) {
+ChannelChanges changes_in(const HealthyModel& model, const record::Record& record,
+                          const std::vector<FoundChange>& beside, bool linear, const ChangeSettings& settings,
+                          const Progress& progress) {
   HealthyModel of_record = model;
   of_record.sampling.other_load = other_load(beside, settings.block);
   const SampledMotion motion = motion_by(of_record, record, settings);
-  const HealthyScores scores(model, healthy, settings);
+  const HealthyScores scores(model, settings);
   ChangeSearch search(
       model, motion, scores.of(change_effects(model.sampling)),
       [&](const ChangeEffect& e) { return scores.inflation(e); }, beside, settings, progress);
@@ -147,7 +147,7 @@ Changes changes_of_two(const model::Rig& rig, double behind, const std::vector<r
   const HealthyModel whole = commission_healthy(healthy, sampling, settings);
   sampling.mesh = mesh_load(whole, rig.link, behind, healthy, settings);
   const auto search = [&](const HealthyModel& model, const std::vector<FoundChange>& beside) {
-    return changes_in(model, healthy, record, beside, rig.linear, settings, progress);
+    return changes_in(model, record, beside, rig.linear, settings, progress);
   };
   const ChannelChanges torque = search(commission_healthy(healthy, sampling, settings), {});
   Changes all = torque.told;
@@ -181,7 +181,7 @@ Changes detect_changes(const model::Rig& rig, const std::vector<record::Record>&
   Changes out;
   if (rig.mesh.rigid) {
     const HealthyModel model = commission_healthy(healthy, sampling, settings);
-    out = changes_in(model, healthy, record, {}, rig.linear, settings, progress).told;
+    out = changes_in(model, record, {}, rig.linear, settings, progress).told;
   } else {
     out = changes_of_two(rig, behind, healthy, record, sampling, settings, progress);
     unite_unknown(settings, out);

@@ -56,27 +56,26 @@ void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& fou
 
 }  // namespace
 
-HealthyScores::HealthyScores(const HealthyModel& model, const std::vector<record::Record>& healthy,
-                             const ChangeSettings& settings)
-    : variance_(model.noise * model.noise), window_(settings.window) {
-  for (const record::Record& r : healthy) {
-    motions_.push_back(motion_by(model, r, settings));
-    residuals_.push_back(residual_of(model, motions_.back(), settings).residual);
-  }
+HealthyScores::HealthyScores(const HealthyModel& model, const ChangeSettings& settings)
+    : records_(model.records), variance_(model.noise * model.noise), window_(settings.window) {
+  for (const SampledMotion& motion : *records_)
+    residuals_.push_back(residual_of(model, motion, settings).residual);
 }
 
 double HealthyScores::inflation(const ChangeEffect& effect) const {
   double most = 1;
-  for (std::size_t r = 0; r < motions_.size(); ++r)
-    most = std::max(most, score_inflation(motions_[r], residuals_[r], effect_columns(motions_[r], effect),
-                                          variance_, window_));
+  for (std::size_t r = 0; r < records_->size(); ++r) {
+    const SampledMotion& motion = (*records_)[r];
+    most = std::max(
+        most, score_inflation(motion, residuals_[r], effect_columns(motion, effect), variance_, window_));
+  }
   return most;
 }
 
 std::vector<ScannedEffect> HealthyScores::of(const std::vector<ChangeEffect>& effects) const {
   std::vector<ScannedEffect> all;
   for (const ChangeEffect& e : effects) all.push_back({e, inflation(e)});
-  for (const SampledMotion& m : motions_) m.known_columns.clear();  // asked for once
+  for (const SampledMotion& m : *records_) m.known_columns.clear();  // needed no more
   return all;
 }
 

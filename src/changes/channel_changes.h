@@ -16,13 +16,12 @@ std::string whole_seconds(double time);
 /// How the scores of effects scatter in the healthy records.
 class HealthyScores {
  public:
-  HealthyScores(const HealthyModel& model, const std::vector<record::Record>& healthy,
-                const ChangeSettings& settings);
+  HealthyScores(const HealthyModel& model, const ChangeSettings& settings);
   double inflation(const ChangeEffect& effect) const;
   std::vector<ScannedEffect> of(const std::vector<ChangeEffect>& effects) const;
 
  private:
-  std::vector<SampledMotion> motions_;
+  std::shared_ptr<const std::vector<SampledMotion>> records_;
   std::vector<Eigen::VectorXd> residuals_;
   double variance_, window_;
 };

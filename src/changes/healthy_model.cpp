@@ -257,6 +257,8 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   set_expected_squares(data, fit, settings, model);
   if (sampling.mesh) model.least_change = settings.least_of_two * rms_about_offset(data, fit);
   model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
+  for (SampledMotion& motion : data.motions) set_loads(fit.values, motion);
+  model.records = std::make_shared<const std::vector<SampledMotion>>(std::move(data.motions));
   return model;
 }
 

@@ -3,6 +3,7 @@
 // values.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct HealthyModel {
   double rough = 0;         // what each rad^2/s^6 of the motion's roughness adds to them
   double drift = 0;         // N m, spread of a linear drift of dry friction over a record
   double least_change = 0;  // N m or rad, rms of what a change has to explain
+  std::shared_ptr<const std::vector<SampledMotion>> records;  // that it was commissioned with
 };
 
 /// Throws CannotIdentify.

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
@@ -43,6 +44,7 @@ ChangeWatchNode::ChangeWatchNode(const ros::NodeHandle& handle, const ros::NodeH
                                  const ChangeWatchSettings& settings)
     : handle_(handle),
       stale_(settings.stale),
+      look_share_(settings.look_share),
       inputs_(channels_of(settings.joints)),
       updater_(handle, private_handle) {
   for (const std::string& topic : inputs_.topics()) topics_.push_back(handle_.resolveName(topic));
@@ -113,12 +115,22 @@ void ChangeWatchNode::look() {
       due_ = false;
     }
     try {
-      for (const auto& joint : joints_)
+      for (const auto& joint : joints_) {
+        const ros::WallTime begin = ros::WallTime::now();
         if (const auto news = joint->look(go_on); !news.empty()) publish(news, *joint);
+        if (!pause_after((ros::WallTime::now() - begin).toSec())) return;
+      }
     } catch (const Cancelled&) {
       return;
     }
   }
+}
+
+/// Waits so that looks run no more than their share of the time. False where the node ends.
+bool ChangeWatchNode::pause_after(double seconds) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const std::chrono::duration<double> pause(seconds * (1 / look_share_ - 1));
+  return !due_changed_.wait_for(lock, pause, [this] { return stop_; });
 }
 
 void ChangeWatchNode::publish(const std::vector<diagnosis::KnownChange>& news, const JointWatch& of) {

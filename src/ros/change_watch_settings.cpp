@@ -61,6 +61,8 @@ parameters (private)
   history   folder, which must exist, for a file JOINT_changes.csv with all that was told; default: none
   queue     messages waiting at most; default 20000
   stale     s of wall time without a message before /diagnostics says so; default 2
+  look_share   of one processor's time that looks may take, one after the other; default 0.5. Where joints are
+            too many for that, each is looked at less often than check_interval
   job_memory   GB that the process of a look may use; default 4
 
 subscribes
@@ -116,6 +118,7 @@ ChangeWatchSettings load_change_watch_settings(const ros::NodeHandle& private_ha
   const std::string history = read_history_folder(parameters);
   settings.queue = static_cast<int>(parameters.integer("queue", settings.queue, 1, 10'000'000));
   settings.stale = parameters.number("stale", settings.stale, Range::positive());
+  settings.look_share = parameters.number("look_share", settings.look_share, Range::between(0.01, 1));
   parameters.allow("diagnostic_period");  // of diagnostic_updater
   std::vector<WatchSettings> all = watched(parameters);
   for (WatchSettings& what : all) {

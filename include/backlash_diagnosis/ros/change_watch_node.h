@@ -22,8 +22,9 @@ namespace backlash::ros_bridge {
 /// Parameters of the node, validated.
 struct ChangeWatchSettings {
   std::vector<WatchSettings> joints;
-  int queue = 20000;  // messages waiting at most
-  double stale = 2;   // s of wall time without a message
+  int queue = 20000;        // messages waiting at most
+  double stale = 2;         // s of wall time without a message
+  double look_share = 0.5;  // - of the time, that looks may run
 };
 
 /// Throws InvalidParameter, BadData, MissingInput, CannotWrite (the folder of what is learned).
@@ -49,11 +50,13 @@ class ChangeWatchNode {
 
   void on_joint_state(std::size_t topic, const sensor_msgs::JointState& message);
   void look();
+  bool pause_after(double seconds);
   void publish(const std::vector<diagnosis::KnownChange>& news, const JointWatch& of);
   void describe(const JointWatch& joint, Status& status) const;
 
   ros::NodeHandle handle_;
-  double stale_;                                     // s
+  double stale_;  // s
+  double look_share_;
   std::vector<std::unique_ptr<JointWatch>> joints_;  // as many as at the start
   JointInputs inputs_;                               // of all joints
   struct Place {
