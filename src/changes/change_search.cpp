@@ -135,8 +135,10 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
     if (f.score.gain >= alike && f.score.values.size() > 0 && f.effect.freedom() < simplest->effect.freedom())
       simplest = &f;
   FoundChange found = *simplest;
+  // A weak change is told apart from others by noise alone.
+  const double not_told = std::min(alike, most->score.gain - settings_.told_apart * most->inflation);
   for (const FoundChange& f : all)
-    if (f.score.gain >= alike && f.effect.id != found.effect.id) {
+    if (f.score.gain >= not_told && f.effect.id != found.effect.id) {
       const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
       if (!told) found.alike.push_back(f.effect.id);
     }

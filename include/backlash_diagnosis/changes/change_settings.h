@@ -90,7 +90,9 @@ struct ChangeSettings {
   double alike_errors = 3;          // standard errors that means of the motion may differ by
   std::size_t louder_windows = 16;  // of the stretch, and of the rest
   std::size_t least_windows = 4;    // that it lasts. Choice: a push is no change of the machine
-  double same_link = 0.3;     // - of the squares left by which a payload at another link does better. Choice
+  double same_link = 0.3;  // - of the squares left by which a payload at another link does better. Choice
+  double told_apart =
+      8;  // of twice the log likelihood, by which effects are told apart. Theory: 2.8 deviations
   double alike = 0.97;        // - of the best gain: effects that fit alike. Choice
   double model_error = 0.03;  // - of a size, as the shape of an effect is an idealisation. Choice
 };
