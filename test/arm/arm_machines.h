@@ -108,7 +108,8 @@ struct Machine {
   arm::ArmRig declared = arm::load_arm_rig(package_file("config/ur5_arm/ur5_arm.yaml"));
   arm::Chain chain = declared.chain;
   std::vector<arm::JointDrive> drives = declared.joints;
-  double noise = 0.02;                                                         // A, white
+  double noise = 0.02;  // A, white
+  double cold = 0;      // - by which dry and viscous friction is larger at t = 0, for some 80 s
   arm::Joints slip = arm::Joints::Zero(Eigen::Index(declared.joints.size()));  // rad, encoders show more
 
   /// Links, constants and friction off by some ten percent.
@@ -171,7 +172,8 @@ struct Machine {
         r.column(record::Channel::motor_position).push_back(std::round(now[0][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_velocity).push_back(std::round(now[1][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_current)
-            .push_back(torque(drive, load, earlier[1][k], earlier[2][k]) / drive.constant +
+            .push_back(torque(drive, load, earlier[1][k], earlier[2][k], 1 + cold * std::exp(-t / 80)) /
+                           drive.constant +
                        noise * random.normal());
       }
     }
@@ -179,11 +181,11 @@ struct Machine {
   }
 
  private:
-  static double torque(const arm::JointDrive& drive, double load, double v, double a) {
+  static double torque(const arm::JointDrive& drive, double load, double v, double a, double friction) {
     const auto& f = drive.terms;
     const double sign = std::tanh(v / 0.01);
-    return load + f[0] * a + f[1] * sign + f[2] * v + f[3] * v * std::fabs(v) + f[4] * v * v * v + f[5] +
-           f[6] * sign * std::fabs(load);
+    return load + f[0] * a + friction * (f[1] * sign + f[2] * v) + f[3] * v * std::fabs(v) +
+           f[4] * v * v * v + f[5] + f[6] * sign * std::fabs(load);
   }
 };
 

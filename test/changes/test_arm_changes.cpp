@@ -133,6 +133,34 @@ TEST(ArmChanges, AnotherDayAndAnotherToolAreNoChangeWithinTheRecord) {
       << told(found);
 }
 
+// Friction is 30 % larger and falls while the robot warms up, as it did when it was learned from cold.
+TEST(ArmChanges, WarmingUpIsNoChange) {
+  const test::Machine machine(6);
+  test::Machine cold = machine;
+  cold.cold = 0.3;
+  const Changes found =
+      detect_changes(machine.declared, {cold.record(61, 60), machine.record(62, 40)}, cold.record(63, 60));
+  EXPECT_TRUE(found.changes.empty()) << told(found);
+}
+
+// Taken up and put down again and again, each time for 20 s: too much for one record, but nothing else is
+// told.
+TEST(ArmChanges, WhatIsTakenUpAndPutDownAgainAndAgainIsNothingElse) {
+  const test::Machine machine(7);
+  arm::ArmRecord record = machine.record(71, 130);
+  const arm::ArmRecord loaded = carrying(machine, 5, 2).record(71, 130);
+  for (std::size_t j = 0; j < record.joints.size(); ++j)
+    for (std::size_t k = 0; k < record.joints[j].size(); ++k)
+      if (int(record.joints[j].time[k] / 20) % 2 == 1)
+        record.joints[j].column(record::Channel::motor_current)[k] =
+            loaded.joints[j].column(record::Channel::motor_current)[k];
+  const Changes found =
+      detect_changes(machine.declared, {machine.record(72, 40), machine.record(73, 40)}, record);
+  EXPECT_FALSE(found.changes.empty() && found.cannot_tell.empty()) << told(found);
+  for (const Change& c : found.changes)
+    EXPECT_TRUE(c.effect == "payload" || c.effect == "unknown") << told(found);
+}
+
 TEST(ArmChanges, AnArmThatDoesNotMoveEnoughIsRefused) {
   const test::Machine machine(1);
   EXPECT_THROW(detect_changes(machine.declared, {machine.record(1, 40)}, machine.record(2, 7)),
