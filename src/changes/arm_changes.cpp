@@ -363,8 +363,7 @@ void ArmChanges::tell_joint(const ArmJoint& joint, std::size_t place) {
   std::vector<Change> kept;
   for (Change& c : one.changes) {
     add_constant_error(joint, c);
-    // Who leans on a moving arm adds a torque to a joint, as does friction that differs by direction.
-    if (c.effect == "asymmetric_coulomb") c.alike.emplace_back("external_torque");
+    if (may_be_external_torque(c.effect)) c.alike.emplace_back("external_torque");
     if (is_left_by_chain(joint, place, c))
       one.warnings.push_back("since " + to_text(std::round(c.since)) +
                              " s the record follows no effect, beside " +

@@ -147,6 +147,14 @@ bool ChangeEffect::has_scale() const {
   return id == "stribeck" || id == "presliding";
 }
 
+std::pair<const char*, const char*> ChangeEffect::scale() const {
+  return id == "stribeck" ? std::pair("speed", "rad/s") : std::pair("distance", "rad");
+}
+
+bool may_be_external_torque(const std::string& effect) {
+  return effect == "asymmetric_coulomb";
+}
+
 double ChangeEffect::least_order() const {
   return id == "position_dependent_friction" ? kLeastFrictionOrder : kLeastOrder;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/changes/changes.h"
@@ -26,10 +27,14 @@ struct ChangeEffect {
   Eigen::Index freedom() const;
 
   bool has_order() const;
-  bool has_scale() const;      // `shape` is a speed or a way that is fitted by factors
-  double least_order() const;  // that is tried, of one that has one
-  std::string name() const;    // with its shape
+  bool has_scale() const;                             // `shape` is a speed or a way that is fitted by factors
+  std::pair<const char*, const char*> scale() const;  // name and unit of that
+  double least_order() const;                         // that is tried, of one that has one
+  std::string name() const;                           // with its shape
 };
+
+/// Whether who leans on a moving machine shows as this effect, too.
+bool may_be_external_torque(const std::string& effect);
 
 /// What is carried weighs and is inert: gravity with a third column. None of other effects.
 std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect);

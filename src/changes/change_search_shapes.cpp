@@ -96,9 +96,9 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   covariance(0, 0) += std::pow(settings_.model_error * f.score.values[0], 2);
   std::vector<ChangeSize> size =
       change_size(f.effect, f.score.values, covariance.topLeftCorner<1, 1>(), linear);
-  const bool speed = f.effect.id == "stribeck";
-  size.push_back({speed ? "speed" : "distance",
-                  model::axis_unit(speed ? "rad/s" : "rad", linear),
+  const auto [name, unit] = f.effect.scale();
+  size.push_back({name,
+                  model::axis_unit(unit, linear),
                   {f.effect.shape, f.effect.shape * std::min(1.0, std::sqrt(covariance(1, 1)))}});
   return size;
 }

@@ -88,7 +88,7 @@ void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>
     explained += f.score.gain;
     nearest.push_back(f.effect.id);
   }
-  if (search.like_fault()) nearest.emplace_back("local_fault");
+  if (search.like_fault()) nearest.emplace_back(kLocalFault);
   if (search.explained(found) && !(loud && loud->excess > explained)) {
     if (loud && !found.empty())
       out.warnings.push_back("since " + whole_seconds(search.unknown(*loud).since) +

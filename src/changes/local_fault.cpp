@@ -35,8 +35,10 @@ double bump(double position, double place, double width) {
 
 }  // namespace
 
+const char* const kLocalFault = "local_fault";
+
 ChangeEffect local_fault(ChangeChannel channel, double place, double width) {
-  ChangeEffect e{"local_fault", place, {}, false, width};
+  ChangeEffect e{kLocalFault, place, {}, false, width};
   e.columns = {
       [=](const Moment& m, double q0) { return forward(channel, m) * bump(m.position, q0, width); },
       [=](const Moment& m, double q0) { return backward(channel, m) * bump(m.position, q0, width); }};

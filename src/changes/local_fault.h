@@ -12,6 +12,8 @@
 
 namespace backlash::changes {
 
+extern const char* const kLocalFault;  // its id
+
 /// Columns: A forward, A backward.
 ChangeEffect local_fault(ChangeChannel channel, double place, double width);
 

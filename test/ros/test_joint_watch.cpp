@@ -167,7 +167,11 @@ TEST(JointWatch, SaysWhyItCannotTell) {
       << odd.watch.state().why_not;
   WatchSettings sensor = settings(folder);
   sensor.joint.rig = rig_file::default_rig_file();
-  EXPECT_NE(Robot(sensor).watch.state().why_not.find("does not declare"), std::string::npos);
+  sensor.learned = folder.path("sensor_healthy.csv");
+  EXPECT_NE(Robot(sensor).watch.state().why_not.find("being learned"), std::string::npos);
+  WatchSettings locked = settings(folder);
+  locked.joint.rig = rig_file::load_rig_file(BACKLASH_DIAGNOSIS_SOURCE_DIR "/config/cycloidal.yaml");
+  EXPECT_NE(Robot(locked).watch.state().why_not.find("does not declare"), std::string::npos);
   WatchSettings missing = settings(folder);
   missing.healthy = {"/nowhere/monday.csv"};
   EXPECT_THROW(JointWatch{missing}, MissingInput);
