@@ -61,7 +61,7 @@ parameters (private)
   history   folder, which must exist, for a file JOINT_changes.csv with all that was told; default: none
   queue     messages waiting at most; default 20000
   stale     s of wall time without a message before /diagnostics says so; default 2
-  look_share   of one processor's time that looks may take, one after the other; default 0.5. Where joints are
+  look_share   of one processor's time that looks may take, one after the other; default 1. Where joints are
             too many for that, each is looked at less often than check_interval
   job_memory   GB that the process of a look may use; default 4
 

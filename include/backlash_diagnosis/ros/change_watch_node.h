@@ -22,9 +22,9 @@ namespace backlash::ros_bridge {
 /// Parameters of the node, validated.
 struct ChangeWatchSettings {
   std::vector<WatchSettings> joints;
-  int queue = 20000;        // messages waiting at most
-  double stale = 2;         // s of wall time without a message
-  double look_share = 0.5;  // - of the time, that looks may run
+  int queue = 20000;      // messages waiting at most
+  double stale = 2;       // s of wall time without a message
+  double look_share = 1;  // - of the time, that looks may run
 };
 
 /// Throws InvalidParameter, BadData, MissingInput, CannotWrite (the folder of what is learned).
