@@ -146,11 +146,11 @@ void ArmChanges::add_joint(std::size_t index) {
   for (const ChainMotion& h : healthy_motions_) {
     SampledMotion motion = motion_by(joint.model, h.joints[index], settings_);
     set_chain_columns(h, index, motion);
-    const Eigen::VectorXd residual = residual_of(joint.model, motion, settings_).residual;
+    const Eigen::VectorXd left = left_of(joint.model, motion, settings_);
     for (std::size_t e = 0; e < effects.size(); ++e)
       joint.chain_inflation[e] =
           std::max(joint.chain_inflation[e],
-                   score_inflation(motion, residual, effect_columns(motion, effects[e].at_joint()),
+                   score_inflation(motion, left, effect_columns(motion, effects[e].at_joint()),
                                    joint.model.noise * joint.model.noise, settings_.window));
   }
   set_search(joint);

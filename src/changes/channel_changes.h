@@ -22,7 +22,7 @@ class HealthyScores {
 
  private:
   std::shared_ptr<const std::vector<SampledMotion>> records_;
-  std::vector<Eigen::VectorXd> residuals_;
+  std::vector<Eigen::VectorXd> left_;
   double variance_, window_;
 };
 

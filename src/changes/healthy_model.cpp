@@ -203,18 +203,31 @@ Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const C
   return spread;
 }
 
-/// The line of squares over roughness, both of its values >= 0.
-void set_expected_squares(const HealthyData& data, const PooledFit& fit, const ChangeSettings& settings,
-                          HealthyModel& model) {
-  std::vector<double> rough, squares;
-  for (std::size_t r = 0; r < data.motions.size(); ++r) {
-    const Eigen::VectorXd left = data.motions[r].target - data.columns[r] * fit.values;
-    for (Eigen::Index i = 0; i < left.size(); ++i) {
-      rough.push_back(data.motions[r].moment(i).roughness);
-      squares.push_back(left[i] * left[i]);
+/// What the healthy machine leaves beside what may differ from record to record and wander within one: the
+/// noise that scores are measured by. Twice, as the first round takes the wander for noise.
+void set_noise(const PooledFit& fit, const ChangeSettings& settings, HealthyModel& model) {
+  model.noise = std::sqrt(fit.squares / double(fit.rows));
+  for (int round = 0; round < 2; ++round) {
+    model.left.clear();
+    double squares = 0;
+    for (const SampledMotion& motion : *model.records) {
+      model.left.push_back(left_of(model, motion, settings));
+      squares += model.left.back().squaredNorm();
     }
+    model.noise = std::sqrt(squares / double(fit.rows));
   }
-  const Eigen::Map<const Eigen::ArrayXd> x(rough.data(), fit.rows), y(squares.data(), fit.rows);
+}
+
+/// The line of squares over roughness, both of its values >= 0.
+void set_expected_squares(const ChangeSettings& settings, HealthyModel& model) {
+  std::vector<double> rough, squares;
+  for (std::size_t r = 0; r < model.left.size(); ++r)
+    for (Eigen::Index i = 0; i < model.left[r].size(); ++i) {
+      rough.push_back((*model.records)[r].moment(i).roughness);
+      squares.push_back(model.left[r][i] * model.left[r][i]);
+    }
+  const auto rows = static_cast<Eigen::Index>(rough.size());
+  const Eigen::Map<const Eigen::ArrayXd> x(rough.data(), rows), y(squares.data(), rows);
   const double most = (1 - settings.least_steady) * y.mean() / x.mean();
   const double slope = ((x - x.mean()) * y).sum() / (x - x.mean()).square().sum();
   model.rough = std::isfinite(slope) ? std::clamp(slope, 0.0, most) : 0;
@@ -253,12 +266,12 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   const PooledFit fit = pooled(data);
   model.values = fit.values;
   model.spread = spread_of(data, fit, settings);
-  model.noise = std::sqrt(fit.squares / double(fit.rows));
-  set_expected_squares(data, fit, settings, model);
   if (sampling.mesh) model.least_change = settings.least_of_two * rms_about_offset(data, fit);
   model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
   for (SampledMotion& motion : data.motions) set_loads(fit.values, motion);
   model.records = std::make_shared<const std::vector<SampledMotion>>(std::move(data.motions));
+  set_noise(fit, settings, model);
+  set_expected_squares(settings, model);
   return model;
 }
 
@@ -340,6 +353,18 @@ void add_wander(Whitened& out, const HealthyModel& model, const SampledMotion& m
 }
 
 }  // namespace
+
+Eigen::VectorXd left_of(const HealthyModel& model, const SampledMotion& motion,
+                        const ChangeSettings& settings) {
+  const Whitened whitened = residual_of(model, motion, settings);
+  Background b;
+  b.residual = whitened.residual;
+  b.columns = whitened.nuisances;
+  b.spread = whitened.spread;
+  b.variance = model.noise * model.noise;
+  b.solve();
+  return b.left();
+}
 
 Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
   Whitened out;
