@@ -139,7 +139,6 @@ void ArmChanges::add_joint(std::size_t index) {
   }
   ArmJoint& joint = joints_.back();
   joint.scores.emplace(joint.model, settings_);
-  joint.candidates = joint.scores->of(change_effects(joint.model.sampling));
   set_chain_columns(record_, index, joint.motion);
   const std::vector<ChainEffect> effects = chain_effects(rig_.joints.size());
   joint.chain_inflation.assign(effects.size(), 1);
@@ -150,7 +149,7 @@ void ArmChanges::add_joint(std::size_t index) {
     for (std::size_t e = 0; e < effects.size(); ++e)
       joint.chain_inflation[e] =
           std::max(joint.chain_inflation[e],
-                   score_inflation(motion, left, effect_columns(motion, effects[e].at_joint()),
+                   score_inflation(motion, left, *effect_columns(motion, effects[e].at_joint()),
                                    joint.model.noise * joint.model.noise, settings_.window));
   }
   set_search(joint);
@@ -158,7 +157,7 @@ void ArmChanges::add_joint(std::size_t index) {
 
 void ArmChanges::set_search(ArmJoint& joint) const {
   joint.search.emplace(
-      joint.model, joint.motion, joint.candidates,
+      joint.model, joint.motion, change_effects(joint.model.sampling),
       [scores = &*joint.scores](const ChangeEffect& e) { return scores->inflation(e); }, joint.beside,
       settings_, progress_);
 }
@@ -186,7 +185,7 @@ void ArmChanges::search_deflection(std::size_t index) {
     const SampledMotion motion = motion_by(model, record, settings_);
     const HealthyScores scores(model, settings_);
     ChangeSearch search(
-        model, motion, scores.of(change_effects(sampling)),
+        model, motion, change_effects(sampling),
         [&](const ChangeEffect& e) { return scores.inflation(e); }, {}, settings_, progress_);
     const std::vector<FoundChange> found = search.run();
     Changes one;

@@ -139,9 +139,7 @@ void set_chain_columns(const ChainMotion& chain, std::size_t joint, SampledMotio
   const auto column_of = [&](const Eigen::MatrixXd& all, Eigen::Index c) {
     const std::vector<double> values(all.col(c).data(), all.col(c).data() + all.rows());
     Interpolated at(chain.time, values);
-    std::vector<double> of_moments;
-    for (const Moment& m : motion.moments) of_moments.push_back(at(motion.start + m.time));
-    return column(motion, std::move(of_moments));
+    return column(motion, [&](const Moment& m) { return at(motion.start + m.time); });
   };
   for (const ChainEffect& e : chain_effects(chain.joints.size())) {
     Eigen::MatrixXd columns(motion.size(), e.values);
@@ -149,7 +147,8 @@ void set_chain_columns(const ChainMotion& chain, std::size_t joint, SampledMotio
     for (Eigen::Index c = 0; c < columns.cols(); ++c)
       columns.col(c) = column_of(body ? chain.body[joint] : chain.slip[joint],
                                  static_cast<Eigen::Index>(e.joint) * e.values + c);
-    motion.known_columns.emplace(e.at_joint().name(), std::move(columns));
+    motion.known_columns.emplace(e.at_joint().name(),
+                                 std::make_shared<const Eigen::MatrixXd>(std::move(columns)));
   }
 }
 

@@ -43,7 +43,7 @@ ChainSearch::ChainSearch(const std::deque<ArmJoint>& joints, const arm::Chain& c
 ChainSearch::Sums ChainSearch::sums_of(const ChainEffect& effect) const {
   Sums sums;
   for (std::size_t j = 0; j < joints_.size(); ++j)
-    sums.joints.emplace_back(joints_[j].motion, effect_columns(joints_[j].motion, effect.at_joint()),
+    sums.joints.emplace_back(joints_[j].motion, *effect_columns(joints_[j].motion, effect.at_joint()),
                              backgrounds_[j], settings_.block, false);
   return sums;
 }

@@ -20,7 +20,6 @@ struct ArmJoint {
   HealthyModel model;
   SampledMotion motion;
   std::optional<HealthyScores> scores;
-  std::vector<ScannedEffect> candidates;
   std::vector<double> chain_inflation;  // of the scores of each of chain_effects()
   std::vector<FoundChange> beside;      // of the chain, as this joint shows them
   std::optional<ChangeSearch> search;   // beside these

@@ -21,8 +21,6 @@ constexpr double kStribeckSpeeds[] = {0.1, 0.2, 0.4};                  // - of t
 // Ways over which dry friction builds up after a reversal: shorter ones are over before anything counts.
 constexpr double kBristles[] = {0.02, 0.05, 0.12};  // s, times the rms speed. Choice
 
-constexpr double kMostKnown = 1e7;  // rows of columns that are kept, 160 MB at most. Choice
-
 double direction(const Moment& m, double) {
   return m.direction;
 }
@@ -38,17 +36,11 @@ double one(const Moment&, double) {
 double speed_size(const Moment& m, double) {
   return std::fabs(m.speed);
 }
-double cosine(const Moment& m, double n) {
-  return std::cos(n * m.position);
+double cosine(const Moment& m, double) {
+  return std::cos(m.position);
 }
-double sine(const Moment& m, double n) {
-  return std::sin(n * m.position);
-}
-double rubbed_cosine(const Moment& m, double n) {
-  return m.direction * std::cos(n * m.position);
-}
-double rubbed_sine(const Moment& m, double n) {
-  return m.direction * std::sin(n * m.position);
+double sine(const Moment& m, double) {
+  return std::sin(m.position);
 }
 double load_rub(const Moment& m, double) {
   return m.direction * std::fabs(m.load);
@@ -92,13 +84,6 @@ double less_position(const Moment& m, double) {
 double less_one(const Moment&, double) {
   return -1;
 }
-double less_cosine(const Moment& m, double n) {
-  return -std::cos(n * m.position);
-}
-double less_sine(const Moment& m, double n) {
-  return -std::sin(n * m.position);
-}
-
 struct Declared {
   const char *name, *unit, *value;
 };
@@ -126,6 +111,16 @@ std::string value_name(const std::string& id) {
   return model::term_type(id).search->strength;
 }
 
+ChangeEffect wave(const std::string& id, double order, const Wave& wave) {
+  ChangeEffect e = {id, order, {}};
+  for (const bool is_sine : {false, true})
+    e.columns.emplace_back([wave, is_sine](const Moment& m, double n) {
+      return wave.factor(m) * (is_sine ? std::sin(n * m.position) : std::cos(n * m.position));
+    });
+  e.wave = wave;
+  return e;
+}
+
 /// Of the deflection: motor ahead of load.
 std::vector<ChangeEffect> deflection_effects() {
   std::vector<ChangeEffect> all = {
@@ -133,7 +128,7 @@ std::vector<ChangeEffect> deflection_effects() {
       {"encoder_slip", 0, {less_one}},       {"encoder_skew", 0, {speed}},
       {"encoder_scale", 0, {less_position}}, {"backlash", 0, {half_side, half_side_drift}, true}};
   for (double n = kLeastOrder; n <= kMostOrder; n += kOrderStep)
-    all.push_back({"transmission_error", n, {less_cosine, less_sine}});
+    all.push_back(wave("transmission_error", n, {-1, false}));
   return all;
 }
 
@@ -189,9 +184,9 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
   for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});
   for (const double way : kBristles) all.push_back({"presliding", way * sampling.speed, {late_friction}});
   for (double n = kLeastFrictionOrder; n <= kMostFrictionOrder; n += kOrderStep)
-    all.push_back({"position_dependent_friction", n, {rubbed_cosine, rubbed_sine}});
+    all.push_back(wave("position_dependent_friction", n, {1, true}));
   for (double n = kLeastOrder; n <= kMostOrder; n += kOrderStep)
-    all.push_back({"cogging", n, {cosine, sine}});
+    all.push_back(wave("cogging", n, {1, false}));
   return all;
 }
 
@@ -200,33 +195,6 @@ std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect) {
   ChangeEffect e = effect;
   e.columns.emplace_back(acceleration);
   return e;
-}
-
-namespace {
-
-Eigen::MatrixXd filtered_columns(const SampledMotion& motion, const ChangeEffect& effect) {
-  Eigen::MatrixXd out(motion.size(), static_cast<Eigen::Index>(effect.columns.size()));
-  for (std::size_t i = 0; i < effect.columns.size(); ++i)
-    out.col(static_cast<Eigen::Index>(i)) =
-        column(motion, [&](const Moment& m) { return effect.columns[i](m, effect.shape); });
-  return out;
-}
-
-}  // namespace
-
-Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect) {
-  // Those of a chain are given; those of the load change with what the machine is taken for; those of a place
-  // are asked for once.
-  if (effect.columns.empty()) return motion.known_columns.at(effect.name());
-  if (effect.id == "load_dependent_friction" || effect.id == "encoder_slip" || effect.at_place())
-    return filtered_columns(motion, effect);
-  const std::string name = effect.name() + " " + std::to_string(effect.columns.size());
-  const auto known = motion.known_columns.find(name);
-  if (known != motion.known_columns.end()) return known->second;
-  Eigen::MatrixXd columns = filtered_columns(motion, effect);
-  if (double(motion.known_columns.size()) * double(motion.size()) < kMostKnown)
-    motion.known_columns.emplace(name, columns);
-  return columns;
 }
 
 std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::VectorXd& values,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +15,14 @@
 
 namespace backlash::changes {
 
+/// factor * cos(shape * position), factor * sin(shape * position)
+struct Wave {
+  double sign = 1;
+  bool rubbed = false;  // against the motion
+
+  double factor(const Moment& m) const { return rubbed ? sign * m.direction : sign; }
+};
+
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
   double shape = 0;  // order [1/rad], speed [rad/s] or place [rad], where the effect has one
@@ -21,6 +30,7 @@ struct ChangeEffect {
   std::vector<std::function<double(const Moment&, double shape)>> columns;
   bool ramp = false;  // the second column grows from the onset on
   double width = 0;   // rad, of what is at a place; 0: it is not
+  std::optional<Wave> wave;  // of those whose columns are waves along the position
 
   bool at_place() const { return width > 0; }
   /// Values that are fitted, order, place and width among them.
@@ -42,7 +52,12 @@ std::optional<ChangeEffect> with_inertia(const ChangeEffect& effect);
 /// Simple ones first. Orders whose wave the filter would take away leave columns of nothing.
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling);
 
-Eigen::MatrixXd effect_columns(const SampledMotion& motion, const ChangeEffect& effect);
+/// Filtered, of the rows that count. Kept with the motion so far as there is room.
+std::shared_ptr<const Eigen::MatrixXd> effect_columns(const SampledMotion& motion,
+                                                      const ChangeEffect& effect);
+
+/// The same of many, which are faster together; those that are not kept are left out.
+void prepare_columns(const SampledMotion& motion, const std::vector<ChangeEffect>& effects);
 
 /// The values of an effect as its equation has them, from those of its columns and their covariance.
 std::vector<ChangeSize> change_size(const ChangeEffect& effect, const Eigen::VectorXd& values,

@@ -12,7 +12,7 @@
 namespace backlash::changes {
 
 ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motion,
-                           std::vector<ScannedEffect> candidates, Inflation inflation,
+                           std::vector<ChangeEffect> candidates, Inflation inflation,
                            const std::vector<FoundChange>& beside, const ChangeSettings& settings,
                            const Progress& progress)
     : model_(model),
@@ -31,10 +31,11 @@ ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motio
   first_.nuisances = with.columns;
   first_.spread = with.spread;
   beside_columns_ = first_.nuisances.cols() - beside_column_;
+  prepare_columns(motion_, candidates_);
 }
 
 Eigen::MatrixXd ChangeSearch::found_columns(const FoundChange& f) const {
-  Eigen::MatrixXd z = effect_columns(motion_, f.effect);
+  Eigen::MatrixXd z = *effect_columns(motion_, f.effect);
   const double from = settings_.block * double(f.from), to = settings_.block * double(f.to);
   if (f.effect.ramp) z = Eigen::MatrixXd(z.col(1) - from * z.col(0));
   for (Eigen::Index r = 0; r < z.rows(); ++r)
@@ -101,14 +102,13 @@ double ChangeSearch::left_after(const Background& b, std::size_t from, std::size
   return squares;
 }
 
-FoundChange ChangeSearch::scanned(const ScannedEffect& c, const Background& b, std::size_t step) const {
-  FoundChange best{c.effect, 0, blocks_, {}, c.inflation, 0, {}};
-  const EffectSums sums(motion_, effect_columns(motion_, c.effect), b, settings_.block, c.effect.ramp);
+FoundChange ChangeSearch::scanned(const ChangeEffect& e, const Background& b, std::size_t step) const {
+  FoundChange best{e, 0, blocks_, {}, 1, 0, {}};
+  const EffectSums sums(motion_, *effect_columns(motion_, e), b, settings_.block, e.ramp);
   for (std::size_t k = margin_; k + margin_ < blocks_; k += step) {
     EffectSums::Score s = sums.score(k, blocks_, b);
-    if (s.gain / c.inflation <= best.gain) continue;
+    if (s.gain <= best.score.gain) continue;
     best.from = k;
-    best.gain = s.gain / c.inflation;
     best.score = std::move(s);
   }
   return best;
@@ -117,7 +117,7 @@ FoundChange ChangeSearch::scanned(const ScannedEffect& c, const Background& b, s
 std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   std::vector<FoundChange> all;
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
-    if (progress_ && !progress_(double(i) / double(candidates_.size()), candidates_[i].effect.name()))
+    if (progress_ && !progress_(double(i) / double(candidates_.size()), candidates_[i].name()))
       throw Cancelled();
     all.push_back(scanned(candidates_[i], b, 5));
   }
@@ -135,8 +135,11 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
     if (f.score.gain >= alike && f.score.values.size() > 0 && f.effect.freedom() < simplest->effect.freedom())
       simplest = &f;
   FoundChange found = *simplest;
+  found.inflation = inflation_(found.effect);
+  found.gain = found.score.gain / found.inflation;
   // A weak change is told apart from others by noise alone.
-  const double not_told = std::min(alike, most->score.gain - settings_.told_apart * most->inflation);
+  const double not_told =
+      std::min(alike, most->score.gain - settings_.told_apart * inflation_(most->effect));
   for (const FoundChange& f : all)
     if (f.score.gain >= not_told && f.effect.id != found.effect.id) {
       const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
@@ -164,7 +167,7 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   // And so does noise that follows the effect for as long as a window.
   const Eigen::VectorXd beside = left_with(f, b);
   const double own =
-      score_inflation(motion_, beside, effect_columns(motion_, f.effect), b.variance, settings_.window);
+      score_inflation(motion_, beside, *effect_columns(motion_, f.effect), b.variance, settings_.window);
   return f.score.gain / std::max(f.inflation * noisier, own) > threshold(f.score.values.size());
 }
 
@@ -177,7 +180,7 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
       ChangeEffect e = f.effect;
       e.shape = middle + step * i;
       if (e.shape < least) continue;
-      const EffectSums sums(motion_, effect_columns(motion_, e), b, settings_.block, false);
+      const EffectSums sums(motion_, *effect_columns(motion_, e), b, settings_.block, false);
       EffectSums::Score s = sums.score(f.from, f.to, b);
       if (s.gain <= f.score.gain) continue;
       f.effect = e;
@@ -190,7 +193,7 @@ void ChangeSearch::refine(FoundChange& f, const Background& b) const {
   if (f.effect.at_place()) refine_fault(f, b);
   if (f.effect.has_scale()) refine_scale(f, b);
   refine_order(f, b);
-  const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+  const EffectSums sums(motion_, *effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   f.score = sums.score(f.from, f.to, b);
   for (std::size_t k = margin_; k + margin_ / 2 < f.to; ++k) {
     EffectSums::Score s = sums.score(k, f.to, b);
@@ -206,7 +209,7 @@ void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
   const std::optional<ChangeEffect> e = with_inertia(f.effect);
   if (!e) return;
   EffectSums::Score s =
-      EffectSums(motion_, effect_columns(motion_, *e), b, settings_.block, false).score(f.from, f.to, b);
+      EffectSums(motion_, *effect_columns(motion_, *e), b, settings_.block, false).score(f.from, f.to, b);
   if (s.values.size() == 0 || s.gain < f.score.gain + settings_.onset_drop * f.inflation) return;
   f.effect = *e;
   f.score = std::move(s);
@@ -215,7 +218,7 @@ void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
 
 /// An end, where the record with it is told clearly better.
 void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
-  const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+  const EffectSums sums(motion_, *effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   FoundChange ended = f;
   for (int round = 0; round < 3; ++round) {
     for (std::size_t k = ended.from + margin_ / 2; k + margin_ / 2 < blocks_; ++k) {
@@ -322,7 +325,7 @@ std::vector<FoundChange> ChangeSearch::run() {
 }
 
 void ChangeSearch::onset_interval(const FoundChange& f, const Background& b, Change& change) const {
-  const EffectSums sums(motion_, effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+  const EffectSums sums(motion_, *effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
   double rows = 0;
   // What the shape of the effect leaves widens it like noise.
   const double squares = left_after(b, f.from, f.to, rows) - f.score.gain * b.variance;

@@ -22,11 +22,6 @@ struct FoundChange {
   std::vector<std::string> alike;
 };
 
-struct ScannedEffect {
-  ChangeEffect effect;
-  double inflation = 1;
-};
-
 /// By how much the scores of an effect scatter in the healthy records, see score_inflation().
 using Inflation = std::function<double(const ChangeEffect&)>;
 
@@ -34,8 +29,7 @@ using Inflation = std::function<double(const ChangeEffect&)>;
 class ChangeSearch {
  public:
   /// `beside`: changes that another channel shows, of which this one may show any share.
-  /// `inflation` is asked for effects at a place, which are not among the candidates: too many.
-  ChangeSearch(const HealthyModel& model, const SampledMotion& motion, std::vector<ScannedEffect> candidates,
+  ChangeSearch(const HealthyModel& model, const SampledMotion& motion, std::vector<ChangeEffect> candidates,
                Inflation inflation, const std::vector<FoundChange>& beside, const ChangeSettings& settings,
                const Progress& progress);
 
@@ -66,7 +60,7 @@ class ChangeSearch {
   std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all) const;
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;
-  FoundChange scanned(const ScannedEffect& c, const Background& b, std::size_t step) const;
+  FoundChange scanned(const ChangeEffect& e, const Background& b, std::size_t step) const;
   Eigen::VectorXd left_with(const FoundChange& f, const Background& b) const;
   bool believed(const FoundChange& f, const Background& b) const;
   bool begins_before(const FoundChange& f, const Background& b) const;
@@ -93,7 +87,7 @@ class ChangeSearch {
 
   const HealthyModel& model_;
   const SampledMotion& motion_;
-  const std::vector<ScannedEffect> candidates_;
+  const std::vector<ChangeEffect> candidates_;
   const Inflation inflation_;
   const FaultScreen screen_;
   const ChangeSettings& settings_;

@@ -30,7 +30,7 @@ std::optional<FoundChange> ChangeSearch::best_fault(const Background& b) const {
   std::optional<FoundChange> best;
   const double least = threshold(2);
   for (const ChangeEffect& e : screen_.likeliest(b.left(), b.variance, settings_.margin, kScreened * least)) {
-    FoundChange f = scanned({e, 1}, b, 5);
+    FoundChange f = scanned(e, b, 5);
     if (f.score.values.size() > 0 && (!best || f.score.gain > best->score.gain)) best = f;
   }
   if (!best) return best;
@@ -44,7 +44,7 @@ std::optional<FoundChange> ChangeSearch::best_fault(const Background& b) const {
 void ChangeSearch::refine_fault(FoundChange& f, const Background& b) const {
   const ChangeChannel channel = motion_.sampling.channel;
   const auto score = [&](const ChangeEffect& e) {
-    return EffectSums(motion_, effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
+    return EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
   };
   for (int round = 0; round < kRounds; ++round) {
     const EffectSums::Score whole = score(fault_with_slopes(channel, f.effect, f.score.values));
@@ -73,7 +73,7 @@ void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
         ChangeEffect e = f.effect;
         e.shape *= by;
         EffectSums::Score s =
-            EffectSums(motion_, effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
+            EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
         if (s.gain <= f.score.gain) break;
         f.effect = e;
         f.score = std::move(s);
@@ -86,10 +86,10 @@ std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Ba
   ChangeEffect more = f.effect, less = f.effect;
   more.shape *= 1 + kSlope;
   less.shape *= 1 - kSlope;
-  const Eigen::VectorXd z = effect_columns(motion_, f.effect);
+  const Eigen::VectorXd z = *effect_columns(motion_, f.effect);
   Eigen::MatrixXd both(z.size(), 2);
   both << z,
-      f.score.values[0] / (2 * kSlope) * (effect_columns(motion_, more) - effect_columns(motion_, less));
+      f.score.values[0] / (2 * kSlope) * (*effect_columns(motion_, more) - *effect_columns(motion_, less));
   const EffectSums::Score s = EffectSums(motion_, both, b, settings_.block, false).score(f.from, f.to, b);
   Eigen::Matrix2d covariance = Eigen::Vector2d(f.score.values.squaredNorm(), 1).asDiagonal();  // not told
   if (s.values.size() == 2) covariance = s.covariance * f.inflation * std::max(1.0, noisier);
@@ -135,7 +135,7 @@ std::vector<ChangeSize> ChangeSearch::fault_size(const FoundChange& f, const Bac
                                                  const Eigen::VectorXd& left, bool linear) const {
   const ChangeChannel channel = motion_.sampling.channel;
   const ChangeEffect with = fault_with_slopes(channel, f.effect, f.score.values);
-  const EffectSums sums(motion_, effect_columns(motion_, with), b, settings_.block, false);
+  const EffectSums sums(motion_, *effect_columns(motion_, with), b, settings_.block, false);
   const EffectSums::Score whole = sums.score(f.from, f.to, b);
   double rows = 0;
   const double squares = left_at(f, left, rows), noisier = std::max(1.0, squares / rows / b.variance);

@@ -43,7 +43,7 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
   const SampledMotion motion = motion_by(of_record, record, settings);
   const HealthyScores scores(model, settings);
   ChangeSearch search(
-      model, motion, scores.of(change_effects(model.sampling)),
+      model, motion, change_effects(model.sampling),
       [&](const ChangeEffect& e) { return scores.inflation(e); }, beside, settings, progress);
   ChannelChanges result;
   const std::vector<FoundChange>& found = result.found = search.run();

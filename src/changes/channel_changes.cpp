@@ -67,16 +67,9 @@ double HealthyScores::inflation(const ChangeEffect& effect) const {
   for (std::size_t r = 0; r < records_->size(); ++r) {
     const SampledMotion& motion = (*records_)[r];
     most = std::max(
-        most, score_inflation(motion, left_[r], effect_columns(motion, effect), variance_, window_));
+        most, score_inflation(motion, left_[r], *effect_columns(motion, effect), variance_, window_));
   }
   return most;
-}
-
-std::vector<ScannedEffect> HealthyScores::of(const std::vector<ChangeEffect>& effects) const {
-  std::vector<ScannedEffect> all;
-  for (const ChangeEffect& e : effects) all.push_back({e, inflation(e)});
-  for (const SampledMotion& m : *records_) m.known_columns.clear();  // needed no more
-  return all;
 }
 
 void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,

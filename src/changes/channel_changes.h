@@ -18,7 +18,6 @@ class HealthyScores {
  public:
   HealthyScores(const HealthyModel& model, const ChangeSettings& settings);
   double inflation(const ChangeEffect& effect) const;
-  std::vector<ScannedEffect> of(const std::vector<ChangeEffect>& effects) const;
 
  private:
   std::shared_ptr<const std::vector<SampledMotion>> records_;

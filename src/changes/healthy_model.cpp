@@ -20,35 +20,42 @@ constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
 
 // Columns in this order: of the equation of motion; of the deflection, that under the same load.
 enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kJerk, kCommonColumns };
-enum TorqueBase { kWarmViscous = kCommonColumns, kWarmCoulomb, kBaseColumns };
+enum TorqueBase { kWarmViscous = kCommonColumns, kWarmCoulomb };
 enum DeflectionBase { kHalfGap = kCommonColumns, kScale };
-
-Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
-  Eigen::MatrixXd x(motion.size(), kBaseColumns);
-  x.col(kInertia) = column(motion, [](const Moment& m) { return m.acceleration; });
-  x.col(kViscous) = column(motion, [](const Moment& m) { return m.speed; });
-  x.col(kCoulomb) = column(motion, [](const Moment& m) { return m.direction; });
-  x.col(kOffset).setOnes();
-  x.col(kCosine) = column(motion, [](const Moment& m) { return std::cos(m.position); });
-  x.col(kSine) = column(motion, [](const Moment& m) { return std::sin(m.position); });
-  x.col(kJerk) = column(motion, [](const Moment& m) { return m.jerk; });
-  if (motion.sampling.channel == ChangeChannel::deflection) {
-    x.col(kHalfGap) = column(motion, [](const Moment& m) { return m.side(); });
-    if (motion.sampling.chain) x.col(kInertia) = column(motion, [](const Moment& m) { return m.chain; });
-    x.col(kScale) = column(motion, [](const Moment& m) { return m.position; });
-    return x;
-  }
-  x.col(kWarmViscous) =
-      column(motion, [&](const Moment& m) { return m.speed * std::exp(-m.time / warm_up); });
-  x.col(kWarmCoulomb) =
-      column(motion, [&](const Moment& m) { return m.direction * std::exp(-m.time / warm_up); });
-  return x;
-}
 
 Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   Eigen::MatrixXd out(a.rows(), a.cols() + b.cols());
   out << a, b;
   return out;
+}
+
+using OfMoment = std::function<double(const Moment&)>;
+
+Eigen::MatrixXd lasting_columns(const SampledMotion& motion) {
+  std::vector<OfMoment> all(kCommonColumns);
+  all[kInertia] = [](const Moment& m) { return m.acceleration; };
+  all[kViscous] = [](const Moment& m) { return m.speed; };
+  all[kCoulomb] = [](const Moment& m) { return m.direction; };
+  all[kOffset] = [](const Moment&) { return 1; };
+  all[kCosine] = [](const Moment& m) { return std::cos(m.position); };
+  all[kSine] = [](const Moment& m) { return std::sin(m.position); };
+  all[kJerk] = [](const Moment& m) { return m.jerk; };
+  if (motion.sampling.channel == ChangeChannel::torque) return columns(motion, all);
+  if (motion.sampling.chain) all[kInertia] = [](const Moment& m) { return m.chain; };
+  all.emplace_back([](const Moment& m) { return m.side(); });      // kHalfGap
+  all.emplace_back([](const Moment& m) { return m.position; });  // kScale
+  return columns(motion, all);
+}
+
+/// What warms up: none of the deflection.
+Eigen::MatrixXd warm_columns(const SampledMotion& motion, double warm_up) {
+  if (motion.sampling.channel == ChangeChannel::deflection) return Eigen::MatrixXd(motion.size(), 0);
+  return columns(motion, {[&](const Moment& m) { return m.speed * std::exp(-m.time / warm_up); },
+                          [&](const Moment& m) { return m.direction * std::exp(-m.time / warm_up); }});
+}
+
+Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
+  return beside(lasting_columns(motion), warm_columns(motion, warm_up));
 }
 
 struct HealthyData {
@@ -104,15 +111,18 @@ void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
 
 double best_warm_up(HealthyData& data) {
   double best = 0, least = std::numeric_limits<double>::infinity();
+  std::vector<Eigen::MatrixXd> lasting, columns;
+  for (const SampledMotion& motion : data.motions) lasting.push_back(lasting_columns(motion));
   for (const double tau : kWarmUps) {
     for (std::size_t r = 0; r < data.motions.size(); ++r)
-      data.columns[r] = base_columns(data.motions[r], tau);
+      data.columns[r] = beside(lasting[r], warm_columns(data.motions[r], tau));
     if (const double squares = pooled(data).squares; squares < least) {
       least = squares;
       best = tau;
+      columns = data.columns;
     }
   }
-  for (std::size_t r = 0; r < data.motions.size(); ++r) data.columns[r] = base_columns(data.motions[r], best);
+  data.columns = std::move(columns);
   return best;
 }
 
@@ -122,7 +132,8 @@ double squares_taken(const HealthyData& data, const std::vector<Eigen::VectorXd>
   Eigen::MatrixXd a, b;
   Eigen::VectorXd c;
   for (std::size_t r = 0; r < data.motions.size(); ++r) {
-    const Eigen::MatrixXd z = effect_columns(data.motions[r], effect);
+    const auto columns = effect_columns(data.motions[r], effect);
+    const Eigen::MatrixXd& z = *columns;
     if (r == 0) {
       a = Eigen::MatrixXd::Zero(z.cols(), z.cols());
       b = Eigen::MatrixXd::Zero(z.cols(), data.columns[r].cols());
@@ -141,6 +152,7 @@ double squares_taken(const HealthyData& data, const std::vector<Eigen::VectorXd>
 /// Adds what the healthy machine shows, the largest first.
 void add_further(HealthyData& data, HealthyModel& model, const ChangeSettings& settings) {
   const std::vector<ChangeEffect> effects = change_effects(model.sampling);
+  for (const SampledMotion& motion : data.motions) prepare_columns(motion, effects);
   for (int k = 0; k < settings.most_columns; ++k) {
     const PooledFit fit = pooled(data);
     std::vector<Eigen::VectorXd> residuals;
@@ -164,7 +176,7 @@ void add_further(HealthyData& data, HealthyModel& model, const ChangeSettings& s
     if (!best) return;
     model.further.push_back(*best);
     for (std::size_t r = 0; r < data.motions.size(); ++r)
-      data.columns[r] = beside(data.columns[r], effect_columns(data.motions[r], *best));
+      data.columns[r] = beside(data.columns[r], *effect_columns(data.motions[r], *best));
   }
 }
 
@@ -270,6 +282,7 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
   for (SampledMotion& motion : data.motions) set_loads(fit.values, motion);
   model.records = std::make_shared<const std::vector<SampledMotion>>(std::move(data.motions));
+  for (const SampledMotion& m : *model.records) m.known_columns.clear();  // of all effects: few are needed again
   set_noise(fit, settings, model);
   set_expected_squares(settings, model);
   return model;
@@ -370,7 +383,7 @@ Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, con
   Whitened out;
   out.nuisances = base_columns(motion, model.warm_up);
   for (const ChangeEffect& e : model.further)
-    out.nuisances = beside(out.nuisances, effect_columns(motion, e));
+    out.nuisances = beside(out.nuisances, *effect_columns(motion, e));
   out.residual = motion.target - out.nuisances * model.values;
   out.spread = model.spread;
   add_wander(out, model, motion, settings);

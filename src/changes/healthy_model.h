@@ -16,7 +16,7 @@ namespace backlash::changes {
 struct HealthyModel {
   MotionSampling sampling;
   double warm_up = 0;                 // s, time constant
-  std::vector<ChangeEffect> further;  // that the healthy machine shows, columns after kBaseColumns
+  std::vector<ChangeEffect> further;  // that the healthy machine shows, columns after those of the equation
   Eigen::VectorXd values;
   Eigen::VectorXd spread;   // standard deviation from record to record
   double noise = 0;         // N m or rad, rms of `left`

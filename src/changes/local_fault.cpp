@@ -85,7 +85,7 @@ double gain_of(const double (&score)[2], const double (&squares)[2], double vari
 /// Those through the place.
 std::vector<Pass> passes_of(const SampledMotion& motion, const ChangeEffect& fault,
                             const Eigen::VectorXd& left) {
-  const Eigen::MatrixXd columns = effect_columns(motion, fault);
+  const Eigen::MatrixXd columns = *effect_columns(motion, fault);
   std::vector<Pass> passes;
   double last = -1e300;
   for (Eigen::Index r = 0; r < motion.size(); ++r) {

@@ -241,18 +241,26 @@ SampledMotion sampled_motion(const record::Record& record, const MotionSampling&
   return motion;
 }
 
-Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(const Moment&)>& f) {
-  std::vector<double> all;
-  all.reserve(motion.moments.size());
-  for (const Moment& m : motion.moments) all.push_back(f(m));
-  return column(motion, std::move(all));
+Eigen::MatrixXd filtered(const SampledMotion& motion, Eigen::MatrixXd columns) {
+  signal::low_pass_columns(columns, motion.sampling.interval, motion.sampling.cutoff);
+  Eigen::MatrixXd out(motion.size(), columns.cols());
+  for (Eigen::Index c = 0; c < out.cols(); ++c)
+    for (Eigen::Index r = 0; r < out.rows(); ++r)
+      out(r, c) = columns(static_cast<Eigen::Index>(motion.rows[static_cast<std::size_t>(r)]), c);
+  return out;
 }
 
-Eigen::VectorXd column(const SampledMotion& motion, std::vector<double> values) {
-  values = signal::low_pass(values, motion.sampling.interval, motion.sampling.cutoff);
-  Eigen::VectorXd out(motion.size());
-  for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = values[motion.rows[static_cast<std::size_t>(i)]];
-  return out;
+Eigen::MatrixXd columns(const SampledMotion& motion,
+                        const std::vector<std::function<double(const Moment&)>>& f) {
+  Eigen::MatrixXd all(motion.moments.size(), f.size());
+  for (std::size_t c = 0; c < f.size(); ++c)
+    for (std::size_t k = 0; k < motion.moments.size(); ++k)
+      all(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(c)) = f[c](motion.moments[k]);
+  return filtered(motion, std::move(all));
+}
+
+Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(const Moment&)>& f) {
+  return columns(motion, {f});
 }
 
 }  // namespace backlash::changes

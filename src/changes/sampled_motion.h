@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -68,7 +69,7 @@ struct SampledMotion {
   std::vector<std::size_t> rows;  // that count, few enough for the cutoff
   Eigen::VectorXd target;         // N m or rad, of the channel, filtered, of the rows
   double row_interval = 0;        // s
-  mutable std::map<std::string, Eigen::MatrixXd>
+  mutable std::map<std::string, std::shared_ptr<const Eigen::MatrixXd>>
       known_columns;  // of effect_columns(), so far as there is room
 
   const Moment& moment(Eigen::Index row) const { return moments[rows[static_cast<std::size_t>(row)]]; }
@@ -83,10 +84,12 @@ MotionSampling sampling_of(const std::vector<const record::Record*>& records, co
 SampledMotion sampled_motion(const record::Record& record, const MotionSampling& sampling,
                              const ChangeSettings& settings);
 
-/// f of each moment, filtered, of the rows that count.
-Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(const Moment&)>& f);
+/// Values of the moments, one column each, filtered, of the rows that count.
+Eigen::MatrixXd filtered(const SampledMotion& motion, Eigen::MatrixXd columns);
 
-/// The same of values of the moments.
-Eigen::VectorXd column(const SampledMotion& motion, std::vector<double> values);
+/// The same of each f of each moment.
+Eigen::MatrixXd columns(const SampledMotion& motion,
+                        const std::vector<std::function<double(const Moment&)>>& f);
+Eigen::VectorXd column(const SampledMotion& motion, const std::function<double(const Moment&)>& f);
 
 }  // namespace backlash::changes

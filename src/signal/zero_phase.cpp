@@ -14,23 +14,11 @@ namespace {
 /// A section b (1 + z^-1)^2 / (1 + a1 z^-1 + a2 z^-2), gain 1 at rest.
 struct Section {
   double gain, a1, a2;
-  double s1 = 0, s2 = 0;
-
-  double next(double x) {
-    const double y = gain * x + s1;
-    s1 = 2 * gain * x - a1 * y + s2;
-    s2 = gain * x - a2 * y;
-    return y;
-  }
-
-  /// As if x had been applied forever.
-  void settle(double x) {
-    s2 = (gain - a2) * x;
-    s1 = (2 * gain - a1) * x + s2;
-  }
 };
 
 using Filter = std::array<Section, 2>;  // order 4
+
+constexpr std::size_t kLanes = 8;  // signals that are filtered together
 
 /// Bilinear transform of the Butterworth poles at 5/8 pi and 7/8 pi.
 Filter butterworth(double interval, double cutoff) {
@@ -44,11 +32,76 @@ Filter butterworth(double interval, double cutoff) {
   return filter;
 }
 
-void run(Filter filter, std::vector<double>& values) {
-  for (Section& section : filter) section.settle(values.front());
-  for (double& value : values)
-    for (Section& section : filter) value = section.next(value);
+/// Signals side by side, value by value: a section waits for its own last value, and meanwhile does the others.
+template <std::size_t Lanes>
+using Values = std::array<double, Lanes>;
+
+template <std::size_t Lanes>
+class Running {
+ public:
+  /// As if `first` had been applied forever.
+  Running(const Section& section, const Values<Lanes>& first) : section_(section) {
+    for (std::size_t i = 0; i < Lanes; ++i) {
+      s2_[i] = (section.gain - section.a2) * first[i];
+      s1_[i] = (2 * section.gain - section.a1) * first[i] + s2_[i];
+    }
+  }
+
+  void next(Values<Lanes>& x) {
+    for (std::size_t i = 0; i < Lanes; ++i) {
+      const double y = section_.gain * x[i] + s1_[i];
+      s1_[i] = 2 * section_.gain * x[i] - section_.a1 * y + s2_[i];
+      s2_[i] = section_.gain * x[i] - section_.a2 * y;
+      x[i] = y;
+    }
+  }
+
+ private:
+  Section section_;
+  Values<Lanes> s1_, s2_;
+};
+
+template <std::size_t Lanes>
+void run(const Filter& filter, std::vector<Values<Lanes>>& values) {
+  Running<Lanes> first(filter[0], values.front()), second(filter[1], values.front());
+  for (Values<Lanes>& x : values) {
+    first.next(x);
+    second.next(x);
+  }
 }
+
+template <std::size_t Lanes>
+void run_both_ways(const Filter& filter, std::vector<Values<Lanes>>& values) {
+  for (int pass = 0; pass < 2; ++pass) {
+    run(filter, values);
+    std::reverse(values.begin(), values.end());
+  }
+}
+
+/// Continued at both ends by point reflection.
+template <std::size_t Lanes>
+class Padded {
+ public:
+  void filter(const Filter& filter, Eigen::Index most_pad, Eigen::Ref<Eigen::MatrixXd> columns) {
+    const Eigen::Index n = columns.rows(), pad = std::min(n - 1, most_pad);
+    values_.resize(static_cast<std::size_t>(n + 2 * pad));
+    const auto at = [&](Eigen::Index k) -> Values<Lanes>& { return values_[static_cast<std::size_t>(k)]; };
+    for (std::size_t i = 0; i < Lanes; ++i) {
+      const Eigen::Ref<const Eigen::VectorXd> column = columns.col(static_cast<Eigen::Index>(i));
+      for (Eigen::Index k = 0; k < n; ++k) at(pad + k)[i] = column[k];
+      for (Eigen::Index k = 1; k <= pad; ++k) {
+        at(pad - k)[i] = 2 * column[0] - column[k];
+        at(pad + n - 1 + k)[i] = 2 * column[n - 1] - column[n - 1 - k];
+      }
+    }
+    run_both_ways(filter, values_);
+    for (std::size_t i = 0; i < Lanes; ++i)
+      for (Eigen::Index k = 0; k < n; ++k) columns.col(static_cast<Eigen::Index>(i))[k] = at(pad + k)[i];
+  }
+
+ private:
+  std::vector<Values<Lanes>> values_;
+};
 
 void require_interval(double interval) {
   if (!(interval > 0) || !std::isfinite(interval))
@@ -58,24 +111,25 @@ void require_interval(double interval) {
 }  // namespace
 
 std::vector<double> low_pass(const std::vector<double>& values, double interval, double cutoff) {
+  std::vector<double> out = values;
+  low_pass_columns(Eigen::Map<Eigen::MatrixXd>(out.data(), static_cast<Eigen::Index>(out.size()), 1), interval,
+                   cutoff);
+  return out;
+}
+
+void low_pass_columns(Eigen::Ref<Eigen::MatrixXd> columns, double interval, double cutoff) {
   require_interval(interval);
   if (!(cutoff > 0 && cutoff < 0.5 / interval))
     throw InvalidParameter("cutoff", cutoff, "must be > 0 and below half of the sampling rate");
-  if (values.size() < 2) return values;
-  const std::size_t n = values.size();
-  const std::size_t pad =
-      std::min(n - 1, static_cast<std::size_t>(std::ceil(3 / (2 * M_PI * cutoff * interval) * 4)));
-  std::vector<double> padded;
-  padded.reserve(n + 2 * pad);
-  for (std::size_t k = pad; k > 0; --k) padded.push_back(2 * values.front() - values[k]);
-  padded.insert(padded.end(), values.begin(), values.end());
-  for (std::size_t k = 1; k <= pad; ++k) padded.push_back(2 * values.back() - values[n - 1 - k]);
+  if (columns.rows() < 2) return;
   const Filter filter = butterworth(interval, cutoff);
-  for (int pass = 0; pass < 2; ++pass) {
-    run(filter, padded);
-    std::reverse(padded.begin(), padded.end());
-  }
-  return {padded.begin() + pad, padded.begin() + pad + n};
+  const auto pad = static_cast<Eigen::Index>(std::ceil(3 / (2 * M_PI * cutoff * interval) * 4));
+  Padded<kLanes> several;
+  Padded<1> one;
+  Eigen::Index k = 0;
+  constexpr auto lanes = static_cast<Eigen::Index>(kLanes);
+  for (; k + lanes <= columns.cols(); k += lanes) several.filter(filter, pad, columns.middleCols(k, lanes));
+  for (; k < columns.cols(); ++k) one.filter(filter, pad, columns.middleCols(k, 1));
 }
 
 std::vector<double> derivative(const std::vector<double>& values, double interval) {

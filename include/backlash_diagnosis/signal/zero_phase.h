@@ -2,6 +2,7 @@
 // Filters that do not delay: an evenly sampled signal of the past may be filtered forward and backward.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 namespace backlash::signal {
@@ -11,6 +12,9 @@ namespace backlash::signal {
 /// point reflection about the first and the last value over three time constants of the filter.
 /// Throws InvalidParameter for an interval <= 0 and a cutoff outside 0 < f_c < 0.5 / T.
 std::vector<double> low_pass(const std::vector<double>& values, double interval, double cutoff);
+
+/// The same of each column in place: many are faster together than one by one.
+void low_pass_columns(Eigen::Ref<Eigen::MatrixXd> columns, double interval, double cutoff);
 
 /// Central difference [unit / s]; at the ends the parabola through the last three. Error h^2 / 6 times the
 /// third derivative, zero phase. Throws InvalidParameter for fewer than three values.
