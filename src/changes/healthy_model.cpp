@@ -338,31 +338,51 @@ std::vector<Rest> rests_of(const SampledMotion& motion, const ChangeSettings& se
   return rests;
 }
 
-void add_nuisance(Whitened& out, const Eigen::VectorXd& x, double spread) {
-  out.nuisances = beside(out.nuisances, x);
-  out.spread.conservativeResize(out.spread.size() + 1);
-  out.spread[out.spread.size() - 1] = std::max(spread, kLeastSpread);
-}
+/// What may be there to some degree, and no change: its column, and its values' standard deviation.
+struct Nuisances {
+  std::vector<OfMoment> columns;
+  std::vector<double> spread;
+
+  void add(OfMoment column, double of_values) {
+    columns.push_back(std::move(column));
+    spread.push_back(std::max(of_values, kLeastSpread));
+  }
+};
 
 /// What wanders, straight between knots: dry and viscous friction; both flanks and the gap between them.
-void add_wander(Whitened& out, const HealthyModel& model, const SampledMotion& motion,
-                const ChangeSettings& settings) {
+void add_wander(const HealthyModel& model, double length, const ChangeSettings& settings, Nuisances& out) {
   const bool torque = model.sampling.channel == ChangeChannel::torque;
   const auto share = [&](int k) { return settings.wander * std::fabs(model.values[k]); };
   const double first = torque ? share(kCoulomb) : share(kHalfGap);
   const double second = torque ? share(kViscous) : first;
-  const double length = motion.moments.back().time;
   const int cells = std::max(1, static_cast<int>(std::lround(length / settings.wander_time)));
   for (int k = 0; k <= cells; ++k) {
-    const auto hat = [&](const Moment& m) {
+    const auto hat = [=](const Moment& m) {
       return std::max(0.0, 1 - std::fabs(m.time / length * cells - k));
     };
-    add_nuisance(out,
-                 column(motion, [&](const Moment& m) { return (torque ? m.direction : m.side()) * hat(m); }),
-                 first);
-    add_nuisance(out, column(motion, [&](const Moment& m) { return (torque ? m.speed : 1) * hat(m); }),
-                 second);
+    out.add([=](const Moment& m) { return (torque ? m.direction : m.side()) * hat(m); }, first);
+    out.add([=](const Moment& m) { return (torque ? m.speed : 1) * hat(m); }, second);
   }
+}
+
+/// At rest the machine cools down, and warms up again after; or the clock was set.
+void add_rest(const HealthyModel& model, const Rest& rest, Nuisances& out) {
+  const double warm_up = model.warm_up, end = rest.to;
+  const auto cooled = [=](const Moment& m) { return m.time < end ? 0 : std::exp(-(m.time - end) / warm_up); };
+  const double share = 1 - std::exp(-(rest.to - rest.from) / warm_up);
+  out.add([=](const Moment& m) { return m.direction * cooled(m); }, share * model.spread[kWarmCoulomb]);
+  out.add([=](const Moment& m) { return m.speed * cooled(m); }, share * model.spread[kWarmViscous]);
+}
+
+Nuisances nuisances_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
+  Nuisances out;
+  const double length = motion.moments.back().time;
+  add_wander(model, length, settings, out);
+  if (motion.sampling.channel == ChangeChannel::deflection) return out;
+  out.add([=](const Moment& m) { return m.direction * (m.time / length - 0.5); }, model.drift);
+  if (motion.sampling.chain) out.add([](const Moment& m) { return m.chain; }, settings.chain_share);
+  for (const Rest& rest : rests_of(motion, settings)) add_rest(model, rest, out);
+  return out;
 }
 
 }  // namespace
@@ -380,30 +400,15 @@ Eigen::VectorXd left_of(const HealthyModel& model, const SampledMotion& motion,
 }
 
 Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
+  Eigen::MatrixXd known = base_columns(motion, model.warm_up);
+  for (const ChangeEffect& e : model.further) known = beside(known, *effect_columns(motion, e));
   Whitened out;
-  out.nuisances = base_columns(motion, model.warm_up);
-  for (const ChangeEffect& e : model.further)
-    out.nuisances = beside(out.nuisances, *effect_columns(motion, e));
-  out.residual = motion.target - out.nuisances * model.values;
-  out.spread = model.spread;
-  add_wander(out, model, motion, settings);
-  if (motion.sampling.channel == ChangeChannel::deflection) return out;
-  const double length = motion.moments.back().time;
-  add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * (m.time / length - 0.5); }),
-               model.drift);
-  if (motion.sampling.chain)
-    add_nuisance(out, column(motion, [](const Moment& m) { return m.chain; }), settings.chain_share);
-  // At rest the machine cools down, and warms up again after; or the clock was set.
-  for (const Rest& rest : rests_of(motion, settings)) {
-    const auto cooled = [&](const Moment& m) {
-      return m.time < rest.to ? 0 : std::exp(-(m.time - rest.to) / model.warm_up);
-    };
-    const double share = 1 - std::exp(-(rest.to - rest.from) / model.warm_up);
-    add_nuisance(out, column(motion, [&](const Moment& m) { return m.direction * cooled(m); }),
-                 share * model.spread[kWarmCoulomb]);
-    add_nuisance(out, column(motion, [&](const Moment& m) { return m.speed * cooled(m); }),
-                 share * model.spread[kWarmViscous]);
-  }
+  out.residual = motion.target - known * model.values;
+  const Nuisances more = nuisances_of(model, motion, settings);
+  out.nuisances = beside(known, columns(motion, more.columns));
+  const auto count = static_cast<Eigen::Index>(more.spread.size());
+  out.spread.resize(model.spread.size() + count);
+  out.spread << model.spread, Eigen::Map<const Eigen::VectorXd>(more.spread.data(), count);
   return out;
 }
 

@@ -124,8 +124,9 @@ void low_pass_columns(Eigen::Ref<Eigen::MatrixXd> columns, double interval, doub
   if (columns.rows() < 2) return;
   const Filter filter = butterworth(interval, cutoff);
   const auto pad = static_cast<Eigen::Index>(std::ceil(3 / (2 * M_PI * cutoff * interval) * 4));
-  Padded<kLanes> several;
-  Padded<1> one;
+  // Kept: new memory each time would take as long as the filter.
+  static thread_local Padded<kLanes> several;
+  static thread_local Padded<1> one;
   Eigen::Index k = 0;
   constexpr auto lanes = static_cast<Eigen::Index>(kLanes);
   for (; k + lanes <= columns.cols(); k += lanes) several.filter(filter, pad, columns.middleCols(k, lanes));
