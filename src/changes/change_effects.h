@@ -28,8 +28,8 @@ struct ChangeEffect {
   double shape = 0;  // order [1/rad], speed [rad/s] or place [rad], where the effect has one
   /// Columns of one moment. Two: cosine and sine of a wave; of a ramp something and that times time.
   std::vector<std::function<double(const Moment&, double shape)>> columns;
-  bool ramp = false;  // the second column grows from the onset on
-  double width = 0;   // rad, of what is at a place; 0: it is not
+  bool ramp = false;         // the second column grows from the onset on
+  double width = 0;          // rad, of what is at a place; 0: it is not
   std::optional<Wave> wave;  // of those whose columns are waves along the position
 
   bool at_place() const { return width > 0; }

@@ -138,8 +138,7 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
   found.inflation = inflation_(found.effect);
   found.gain = found.score.gain / found.inflation;
   // A weak change is told apart from others by noise alone.
-  const double not_told =
-      std::min(alike, most->score.gain - settings_.told_apart * inflation_(most->effect));
+  const double not_told = std::min(alike, most->score.gain - settings_.told_apart * inflation_(most->effect));
   for (const FoundChange& f : all)
     if (f.score.gain >= not_told && f.effect.id != found.effect.id) {
       const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();

@@ -72,8 +72,8 @@ void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
       for (int i = 0; i < 3; ++i) {
         ChangeEffect e = f.effect;
         e.shape *= by;
-        EffectSums::Score s =
-            EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
+        EffectSums::Score s = EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false)
+                                  .score(f.from, f.to, b);
         if (s.gain <= f.score.gain) break;
         f.effect = e;
         f.score = std::move(s);

@@ -66,8 +66,8 @@ double HealthyScores::inflation(const ChangeEffect& effect) const {
   double most = 1;
   for (std::size_t r = 0; r < records_->size(); ++r) {
     const SampledMotion& motion = (*records_)[r];
-    most = std::max(
-        most, score_inflation(motion, left_[r], *effect_columns(motion, effect), variance_, window_));
+    most = std::max(most,
+                    score_inflation(motion, left_[r], *effect_columns(motion, effect), variance_, window_));
   }
   return most;
 }

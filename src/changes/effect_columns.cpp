@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Columns of effects: of all moments, filtered as the record is, of the rows that count. There are some hundred
-// of them in each look, so that they take most of its time.
+// Columns of effects: of all moments, filtered as the record is, of the rows that count. There are some
+// hundred of them in each look, so that they take most of its time.
 #include <cmath>
 
 #include "change_effects.h"
@@ -18,15 +18,15 @@ bool is_kept(const ChangeEffect& effect) {
 
 std::string key_of(const ChangeEffect& effect) {
   // Those of a chain are given.
-  return effect.columns.empty() ? effect.name()
-                                : effect.name() + " " + std::to_string(effect.columns.size());
+  return effect.columns.empty() ? effect.name() : effect.name() + " " + std::to_string(effect.columns.size());
 }
 
 bool has_room(const SampledMotion& motion) {
   return double(motion.known_columns.size()) * double(motion.size()) < kMostKnown;
 }
 
-/// cos(n q), sin(n q) of all moments, from one order to the next by a turn of each: error some 1e-16 per order.
+/// cos(n q), sin(n q) of all moments, from one order to the next by a turn of each: error some 1e-16 per
+/// order.
 class Turning {
  public:
   explicit Turning(const SampledMotion& motion) : motion_(motion) {

@@ -42,7 +42,7 @@ Eigen::MatrixXd lasting_columns(const SampledMotion& motion) {
   all[kJerk] = [](const Moment& m) { return m.jerk; };
   if (motion.sampling.channel == ChangeChannel::torque) return columns(motion, all);
   if (motion.sampling.chain) all[kInertia] = [](const Moment& m) { return m.chain; };
-  all.emplace_back([](const Moment& m) { return m.side(); });      // kHalfGap
+  all.emplace_back([](const Moment& m) { return m.side(); });    // kHalfGap
   all.emplace_back([](const Moment& m) { return m.position; });  // kScale
   return columns(motion, all);
 }
@@ -282,7 +282,8 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
   for (SampledMotion& motion : data.motions) set_loads(fit.values, motion);
   model.records = std::make_shared<const std::vector<SampledMotion>>(std::move(data.motions));
-  for (const SampledMotion& m : *model.records) m.known_columns.clear();  // of all effects: few are needed again
+  for (const SampledMotion& m : *model.records)
+    m.known_columns.clear();  // of all effects: few are needed again
   set_noise(fit, settings, model);
   set_expected_squares(settings, model);
   return model;
@@ -374,7 +375,8 @@ void add_rest(const HealthyModel& model, const Rest& rest, Nuisances& out) {
   out.add([=](const Moment& m) { return m.speed * cooled(m); }, share * model.spread[kWarmViscous]);
 }
 
-Nuisances nuisances_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
+Nuisances nuisances_of(const HealthyModel& model, const SampledMotion& motion,
+                       const ChangeSettings& settings) {
   Nuisances out;
   const double length = motion.moments.back().time;
   add_wander(model, length, settings, out);

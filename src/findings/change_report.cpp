@@ -52,7 +52,10 @@ std::string change_summary(const changes::Changes& found) {
   if (!found.cannot_tell.empty())
     text += (text.empty() ? "cannot tell: " : "what else has changed cannot be told: ") + found.cannot_tell +
             "\n";
-  if (text.empty()) text = "no change found\n";
+  if (text.empty())
+    text =
+        found.unjudged.empty() ? "no change found\n" : "no change found of the joints that could be judged\n";
+  for (const changes::Unjudged& u : found.unjudged) text += "not judged: " + u.joint + ": " + u.why + "\n";
   if (!found.different.empty())
     text +=
         "from its beginning the record differs from the healthy ones, so that since when cannot be told: " +
@@ -63,6 +66,8 @@ std::string change_summary(const changes::Changes& found) {
 std::string change_json(const changes::Changes& found, const ChangeInputs& inputs) {
   report::Json changes = report::Json::array();
   for (const changes::Change& c : found.changes) changes.push_back(change_json(c, inputs.joint));
+  report::Json unjudged = report::Json::array();
+  for (const changes::Unjudged& u : found.unjudged) unjudged.push_back({{"joint", u.joint}, {"why", u.why}});
   report::Json json = {
       {"schema_version", 1},
       {"version", version()},
@@ -78,6 +83,7 @@ std::string change_json(const changes::Changes& found, const ChangeInputs& input
       {"healthy_terms", found.healthy_terms},
       {"different_from_beginning", found.different},
       {"cannot_tell", nullptr},
+      {"unjudged", unjudged},
       {"warnings", found.warnings},
   };
   if (!found.cannot_tell.empty()) json["cannot_tell"] = found.cannot_tell;

@@ -51,6 +51,9 @@ diagnosis::ChangeLook read_changes(const std::string& path, double origin, bool 
       if (of_arm) look.changes.back().joint = change.at("joint");
     }
     look.different = json.at("different_from_beginning").get<std::vector<std::string>>();
+    for (const Json& joint : json.at("unjudged"))
+      look.unjudged.push_back(joint.at("joint").get<std::string>() + ": " +
+                              joint.at("why").get<std::string>());
     look.windows = json.at("windows");
     look.warnings = json.at("warnings").get<std::vector<std::string>>();
     return look;

@@ -166,13 +166,15 @@ void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
                                                " since before " + utc_time(state.from) +
                                                ": since when cannot be told");
   else
-    status.summary(DiagnosticStatus::OK, "as commissioned, up to " + utc_time(state.to));
+    status.summary(DiagnosticStatus::OK, "as commissioned, up to " + utc_time(state.to) +
+                                             (state.unjudged.empty() ? "" : ", but for joints not judged"));
   const WatchSettings& settings = joint.settings();
   status.add("Healthy machine", state.healthy.empty() ? "being learned" : state.healthy);
   status.addf("False alarms", "%s per hour and look", to_text(settings.rate).c_str());
   status.addf("Window", "%g s, each %g s", settings.window, settings.check_interval);
   status.add("Last look up to", state.judged > 0 ? utc_time(state.to) : "");
   status.add("Windows of motion judged", state.windows);
+  status.add("Joints not judged", joined(state.unjudged));
   status.add("Looks", state.looks);
   status.add("Looks that could tell", state.judged);
   status.add("Looks left out", state.left_out);

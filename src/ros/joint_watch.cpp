@@ -251,6 +251,7 @@ std::vector<diagnosis::KnownChange> JointWatch::judge(const Task& task, const di
     state_.from = look.from;
     state_.to = look.to;
     state_.windows = look.windows;
+    state_.unjudged = look.unjudged;
     for (const long id : ledger_.take(look)) news.push_back(ledger_.change(id));
   }
   std::string problem;

@@ -32,7 +32,8 @@ Filter butterworth(double interval, double cutoff) {
   return filter;
 }
 
-/// Signals side by side, value by value: a section waits for its own last value, and meanwhile does the others.
+/// Signals side by side, value by value: a section waits for its own last value, and meanwhile does the
+/// others.
 template <std::size_t Lanes>
 using Values = std::array<double, Lanes>;
 
@@ -112,8 +113,8 @@ void require_interval(double interval) {
 
 std::vector<double> low_pass(const std::vector<double>& values, double interval, double cutoff) {
   std::vector<double> out = values;
-  low_pass_columns(Eigen::Map<Eigen::MatrixXd>(out.data(), static_cast<Eigen::Index>(out.size()), 1), interval,
-                   cutoff);
+  low_pass_columns(Eigen::Map<Eigen::MatrixXd>(out.data(), static_cast<Eigen::Index>(out.size()), 1),
+                   interval, cutoff);
   return out;
 }
 

@@ -109,6 +109,9 @@ struct Machine {
   arm::Chain chain = declared.chain;
   std::vector<arm::JointDrive> drives = declared.joints;
   double noise = 0.02;  // A, white
+  double coloured = 0;  // A, standard deviation of noise of first order, 0.2 s
+  double wander = 0;    // - of dry and viscous friction, amplitude over two minutes, each joint by itself
+  double jitter = 0;    // s, by which the delay of a joint swings over 7 s
   double cold = 0;      // - by which dry and viscous friction is larger at t = 0, for some 80 s
   arm::Joints slip = arm::Joints::Zero(Eigen::Index(declared.joints.size()));  // rad, encoders show more
 
@@ -157,13 +160,19 @@ struct Machine {
       return std::array<arm::Joints, 3>{q, v, a};
     };
     const Torques before(chain), after(later.chain);
+    Random rough(seed + 77);
+    arm::Joints slow = arm::Joints::Zero(n), swing = arm::Joints::Zero(n);
+    for (Eigen::Index j = 0; j < n; ++j) swing[j] = rough.uniform(0, 2 * M_PI);
     for (double t = 0; t < duration; t += 0.01) {
       const Machine& machine = t < since ? *this : later;
       const auto now = state(t);
       for (std::size_t j = 0; j < drives.size(); ++j) {
         const arm::JointDrive& drive = machine.drives[j];
-        const auto earlier = state(t - drive.delay);
         const auto k = Eigen::Index(j);
+        const auto earlier = state(t - drive.delay - jitter * std::sin(2 * M_PI * t / 7 + swing[k]));
+        slow[k] += 0.05 * (-slow[k]) + std::sqrt(2 * 0.05) * coloured * rough.normal();
+        const double rubs =
+            1 + cold * std::exp(-t / 80) + wander * std::sin(2 * M_PI * t / 120 + 2 * swing[k]);
         arm::Joints q = earlier[0];
         q -= machine.slip;
         const double load = (t < since ? before : after)(q, earlier[1], earlier[2])[k];
@@ -172,8 +181,7 @@ struct Machine {
         r.column(record::Channel::motor_position).push_back(std::round(now[0][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_velocity).push_back(std::round(now[1][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_current)
-            .push_back(torque(drive, load, earlier[1][k], earlier[2][k], 1 + cold * std::exp(-t / 80)) /
-                           drive.constant +
+            .push_back(torque(drive, load, earlier[1][k], earlier[2][k], rubs) / drive.constant + slow[k] +
                        noise * random.normal());
       }
     }

@@ -3,6 +3,8 @@
 // are fixed, so that the tests are not chance: three standard errors are allowed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "arm/arm_machines.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
@@ -159,6 +161,21 @@ TEST(ArmChanges, WhatIsTakenUpAndPutDownAgainAndAgainIsNothingElse) {
   EXPECT_FALSE(found.changes.empty() && found.cannot_tell.empty()) << told(found);
   for (const Change& c : found.changes)
     EXPECT_TRUE(c.effect == "payload" || c.effect == "unknown") << told(found);
+}
+
+// A joint that stands still in this task may have changed and nobody would see it.
+TEST(ArmChanges, AJointThatDoesNotMoveIsNotCalledHealthy) {
+  const test::Machine machine(8);
+  arm::ArmRecord record = machine.record(81, 60);
+  record::Record& still = record.joints[5];
+  for (const record::Channel c :
+       {record::Channel::motor_position, record::Channel::motor_velocity, record::Channel::motor_current})
+    std::fill(still.column(c).begin(), still.column(c).end(), c == record::Channel::motor_position ? 0.3 : 0);
+  const Changes found =
+      detect_changes(machine.declared, {machine.record(82, 40), machine.record(83, 40)}, record);
+  ASSERT_EQ(found.unjudged.size(), 1U) << told(found);
+  EXPECT_EQ(found.unjudged[0].joint, "wrist_3_joint");
+  EXPECT_NE(found.unjudged[0].why.find("moves for"), std::string::npos) << found.unjudged[0].why;
 }
 
 TEST(ArmChanges, AnArmThatDoesNotMoveEnoughIsRefused) {

@@ -36,6 +36,11 @@ struct Change {
   double error_before = 0, error_after = 0;  // N m, rms of the residual after the onset
 };
 
+/// A joint of an arm of which this record tells nothing.
+struct Unjudged {
+  std::string joint, why;
+};
+
 struct Changes {
   std::vector<Change> changes;             // by onset
   std::size_t windows = 0;                 // of ChangeSettings::window that could be judged
@@ -46,6 +51,7 @@ struct Changes {
   std::vector<std::string> different;      // effects that the record has from its beginning: no change in it
   std::string
       cannot_tell;  // what no effect explains while nothing says that the machine has changed; or empty
+  std::vector<Unjudged> unjudged;
   std::vector<std::string> warnings;
 };
 

@@ -40,6 +40,7 @@ struct ChangeLook {
   double from = 0, to = 0;             // s, the stretch
   std::vector<FoundChange> changes;    // by onset
   std::vector<std::string> different;  // effects that are there from the beginning of the stretch
+  std::vector<std::string> unjudged;   // joints of an arm of which it tells nothing, and why
   long windows = 0;                    // of motion that could be judged
   std::vector<std::string> warnings;
 };

@@ -55,6 +55,7 @@ struct WatchState {
   long windows = 0;            // of motion, in it
   std::vector<diagnosis::KnownChange> changes;
   std::vector<std::string> different;  // since an unknown time
+  std::vector<std::string> unjudged;   // joints of which the last look that could tell tells nothing, and why
 };
 
 class JointWatch {

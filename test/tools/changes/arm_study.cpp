@@ -73,11 +73,20 @@ void count(const changes::Changes& found, const Truth& truth, double since, Coun
       n.size += std::fabs(s.measured.value - truth.value) < 1.96 * s.measured.standard_error;
 }
 
-void healthy(int arms, std::uint64_t seed, double rate) {
+test::Machine drawn(std::uint64_t seed, bool rough) {
+  test::Machine machine(seed);
+  if (!rough) return machine;
+  machine.coloured = 0.5 * machine.noise;
+  machine.wander = 0.03;
+  machine.jitter = 0.001;
+  return machine;
+}
+
+void healthy(int arms, std::uint64_t seed, double rate, bool rough) {
   int told = 0, cannot = 0;
   for (int i = 0; i < arms; ++i) {
     const std::uint64_t s = seed + std::uint64_t(i);
-    const test::Machine machine(s);
+    const test::Machine machine = drawn(s, rough);
     test::Machine day = machine;  // friction differs from day to day
     Random random(s + 1);
     for (arm::JointDrive& drive : day.drives)
@@ -101,15 +110,15 @@ void healthy(int arms, std::uint64_t seed, double rate) {
 
 }  // namespace
 
-void study_arms(int arms, std::uint64_t seed, double rate) {
-  healthy(arms, seed, rate);
+void study_arms(int arms, std::uint64_t seed, double rate, bool rough) {
+  healthy(arms, seed, rate, rough);
   std::map<std::string, Count> counts;
   for (int i = 0; i < arms; ++i)
     for (const char* kind : {"payload", "motor_coulomb", "motor_viscous", "encoder_slip"}) {
       const std::uint64_t s = seed + 1000 + std::uint64_t(i);
       Random random(s + 7 * std::uint64_t(kind[6]));
       const int size = i % 3;
-      const test::Machine machine(s);
+      const test::Machine machine = drawn(s, rough);
       test::Machine changed = machine;
       const Truth truth = change(changed, kind, size, random);
       const double since = random.uniform(15, 45);

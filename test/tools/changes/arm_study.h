@@ -7,6 +7,7 @@
 namespace backlash::change_study {
 
 /// `arms` of them healthy, and as many for each kind of change; `rate`: false alarms allowed per hour.
-void study_arms(int arms, std::uint64_t seed, double rate);
+/// `rough`: noise is coloured, friction wanders and delays swing.
+void study_arms(int arms, std::uint64_t seed, double rate, bool rough);
 
 }  // namespace backlash::change_study

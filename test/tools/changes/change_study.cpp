@@ -31,6 +31,7 @@ struct Options {
   double least_explained = changes::ChangeSettings().least_explained;
   OnsetOptions onsets;
   int arms = 0;
+  bool rough = false;
   long windows = 0;
   unsigned long seed = 1;
   MadeOptions made;
@@ -166,6 +167,10 @@ int main(int argc, char** argv) {
   add("only", po::value(&options.onsets.only), "this kind of change");
   add("look-alikes", po::bool_switch(&options.onsets.look_alikes),
       "changes that might be taken for a local fault");
+  add("rough", po::bool_switch(&options.rough),
+      "of arms: noise half of which is coloured (0.2 s), friction that wanders by 3 % (2 min), delays that "
+      "swing "
+      "by 1 ms (7 s)");
   add("windows", po::value(&options.windows), "of scores: false alarms, and delays beside a CUSUM");
   add("rate", po::value(&options.made.sampling), "of the samples [Hz]; default 50");
   add("two", po::bool_switch(&options.made.two), "inertias, with an encoder on either side, of each joint");
@@ -195,7 +200,7 @@ int main(int argc, char** argv) {
       options.onsets.rate_of_look = backlash::diagnosis::rate_of_look(options.rate, kWindow, kInterval, 1);
       study_onsets(options.onsets, options.seed + 1000, options.made);
     }
-    if (options.arms > 0) study_arms(options.arms, options.seed, options.rate);
+    if (options.arms > 0) study_arms(options.arms, options.seed, options.rate, options.rough);
     if (options.windows > 0) study_windows(options.windows, options.seed);
     return 0;
   } catch (const std::exception& error) {
