@@ -49,14 +49,22 @@ macro(find_yaml)
   endif()
 endmacro()
 
-# find_by_hand(NAME HEADER LIBRARY): NAME_INCLUDE and NAME_LIBRARY of what has no CMake files. REQUIRED of find_path() and
-# find_library() means nothing before CMake 3.18.
+# find_by_hand(NAME HEADER LIBRARY [FOLDER...]): NAME_INCLUDE and NAME_LIBRARY of what has no CMake files; the header may be in
+# one of the folders. REQUIRED of find_path() and find_library() means nothing before CMake 3.18.
 macro(find_by_hand name header library)
-  find_path(${name}_INCLUDE ${header})
+  find_path(${name}_INCLUDE ${header} PATH_SUFFIXES ${ARGN})
   find_library(${name}_LIBRARY ${library})
   if(NOT ${name}_INCLUDE OR NOT ${name}_LIBRARY)
     message(FATAL_ERROR "${header} or lib${library} was not found (scripts/install_dependencies.sh names the packages)")
   endif()
+endmacro()
+
+# find_urdf(): URDF_LIBRARY and URDF_INCLUDES. rosdep and CMake call the package by different names, and since 4 its headers
+# are in folders of their own.
+macro(find_urdf)
+  find_by_hand(URDF urdf_parser/urdf_parser.h urdfdom_model urdfdom)
+  find_by_hand(URDF_MODEL urdf_model/model.h urdfdom_model urdfdom_headers)
+  set(URDF_INCLUDES ${URDF_INCLUDE} ${URDF_MODEL_INCLUDE})
 endmacro()
 
 # gtest_library(VARIABLE): catkin builds gtest by itself, and names its target as it likes, where CMake finds no library.
