@@ -3,6 +3,11 @@
 # the CMake files: names of targets, versions that are too old, libraries that come from other places. For C++ the one
 # difference is src/simulation/sundials_versions.h.
 
+# Boost's own CMake files, which every system here has; CMake 3.30 and later ask which ones are meant.
+if(POLICY CMP0167)
+  cmake_policy(SET CMP0167 NEW)
+endif()
+
 # Where the system's SUNDIALS is too old (Ubuntu 20.04 has 3.1): the prefix of one that was built from source.
 set(BACKLASH_DIAGNOSIS_SUNDIALS "" CACHE PATH "Prefix of SUNDIALS 6 or 7, in place of the system's")
 
