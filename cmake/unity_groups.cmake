@@ -8,7 +8,7 @@
 option(BACKLASH_DIAGNOSIS_UNITY "Compile several files as one" ON)
 
 function(unity_groups target files_per_group)
-  if(NOT BACKLASH_DIAGNOSIS_UNITY)
+  if(NOT BACKLASH_DIAGNOSIS_UNITY OR CMAKE_VERSION VERSION_LESS 3.18)  # which knows such groups first
     return()
   endif()
   get_target_property(sources ${target} SOURCES)

@@ -22,12 +22,14 @@ fail() {
   exit 1
 }
 
-# quietly NAME COMMAND...: runs it with the output in ${WS}/log/NAME.log; shows its last lines if it fails.
+# quietly NAME COMMAND...: runs it with the output in ${WS}/log/NAME.log; shows its last lines if it fails. Exit code 77: it
+# could not be tried here.
 quietly() {
-  local log=${WS}/log/$1.log
+  local log=${WS}/log/$1.log status=0
   shift
   mkdir -p "${WS}/log"
-  "$@" >"${log}" 2>&1 </dev/null && return 0
+  "$@" >"${log}" 2>&1 </dev/null || status=$?
+  ((status != 0 && status != 77)) || return "${status}"
   tail -n 40 "${log}" >&2
   echo "$(basename "$0"): failed: $* (all of it in ${log})" >&2
   return 1

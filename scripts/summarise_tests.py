@@ -70,6 +70,7 @@ def main():
     parser.add_argument("directory", help="folder that is searched for result files")
     parser.add_argument("--passed", action="append", default=[], metavar="NAME", help="a test without a file")
     parser.add_argument("--failed", action="append", default=[], metavar="NAME: MESSAGE")
+    parser.add_argument("--skipped", action="append", default=[], metavar="NAME: REASON")
     arguments = parser.parse_args()
 
     summary = Summary()
@@ -80,9 +81,10 @@ def main():
     if not files:
         summary.failed.append((arguments.directory, "no result files: no test ran"))
     summary.passed += len(arguments.passed)
-    for text in arguments.failed:
-        name, _, message = text.partition(": ")
-        summary.failed.append((name, message))
+    for given, found in ((arguments.failed, summary.failed), (arguments.skipped, summary.skipped)):
+        for text in given:
+            name, _, message = text.partition(": ")
+            found.append((name, message))
 
     for name, reason in summary.skipped:
         print("SKIPPED %s\n%s" % (name, indented(reason)))

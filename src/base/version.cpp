@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/base/version.h"
 
-#include <sundials/sundials_config.h>
-
 #include <Eigen/Core>
 
 namespace backlash {
@@ -13,7 +11,7 @@ const char* version() {
 
 std::string built_with() {
   const auto number = [](int version) { return std::to_string(version); };
-  return "SUNDIALS " SUNDIALS_VERSION ", Eigen " + number(EIGEN_WORLD_VERSION) + "." +
+  return "SUNDIALS " BACKLASH_DIAGNOSIS_SUNDIALS_VERSION ", Eigen " + number(EIGEN_WORLD_VERSION) + "." +
          number(EIGEN_MAJOR_VERSION) + "." + number(EIGEN_MINOR_VERSION) +
 #ifdef __clang__
          ", Clang " __clang_version__;

@@ -223,7 +223,7 @@ Amount growth_since(const Baseline& b, const Amount& now, bool angular) {
     return {kNaN, now.lower - up, kInfinity};
   }
   const double growth = now.value - then.value;
-  const auto apart = [](double a, double b) { return std::isnan(a - b) ? 0 : a - b; };  // not told: exact
+  const auto apart = [](double x, double y) { return std::isnan(x - y) ? 0 : x - y; };  // not told: exact
   return {growth, growth - std::hypot(now.value - now.lower, apart(then.upper, then.value)),
           growth + std::hypot(now.upper - now.value, apart(then.value, then.lower))};
 }

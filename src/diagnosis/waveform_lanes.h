@@ -23,12 +23,13 @@ WAVEFORM_INLINE WaveformLanes lanes_power(const WaveformLanes& a, double n) {
   constexpr double kWhole = 6755399441055744.0;            // 1.5 * 2^52: its low bits hold a whole number
   constexpr std::int64_t kWholeBits = 0x4338000000000000;  // of it
   const Lanes x = a > 1e-150 ? a : Lanes{} + 1e-150;
-  const Bits bits = reinterpret_cast<const Bits&>(x);
+  // Casts of values: through references g++ 14 may read a vector before it is written.
+  const Bits bits = reinterpret_cast<Bits>(x);
   // Split so that m lies between sqrt(1/2) and sqrt(2): 0x3fe6a09e667f3bcd are the bits of sqrt(1/2).
   const Bits k = (bits - 0x3fe6a09e667f3bcd) >> 52;
   const Bits m_bits = bits - (k << 52), whole = k + kWholeBits;
-  const Lanes m = reinterpret_cast<const Lanes&>(m_bits);
-  const Lanes exponent = reinterpret_cast<const Lanes&>(whole) - kWhole;
+  const Lanes m = reinterpret_cast<Lanes>(m_bits);
+  const Lanes exponent = reinterpret_cast<Lanes>(whole) - kWhole;
   const Lanes s = (m - 1) / (m + 1), z = s * s;
   Lanes sum = Lanes{} + 1.0 / 17;
   for (const double odd : {15, 13, 11, 9, 7, 5, 3, 1}) sum = sum * z + 1 / odd;
@@ -38,8 +39,8 @@ WAVEFORM_INLINE WaveformLanes lanes_power(const WaveformLanes& a, double n) {
   const Lanes r = y - turns * kLn2High - turns * kLn2Low;
   Lanes power = Lanes{} + 1;
   for (const double i : {12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1}) power = power * r * (1 / i) + 1;
-  const Bits scaled = reinterpret_cast<const Bits&>(power) + (reinterpret_cast<const Bits&>(rounded) << 52);
-  const Lanes result = a * reinterpret_cast<const Lanes&>(scaled);
+  const Bits scaled = reinterpret_cast<Bits>(power) + (reinterpret_cast<Bits>(rounded) << 52);
+  const Lanes result = a * reinterpret_cast<Lanes>(scaled);
   return a > 1e-150 ? result : Lanes{};
 }
 

@@ -100,7 +100,8 @@ Sensing sensing(const std::vector<std::shared_ptr<const Term>>& terms) {
 std::shared_ptr<const Term> read_term(const YamlReader& yaml) {
   std::vector<std::string> ids;
   for (const TermType& type : term_types()) ids.push_back(type.id);
-  const TermType& type = term_type(yaml.choice("id", ids));
+  const std::string id = yaml.choice("id", ids);
+  const TermType& type = term_type(id);
   try {
     return created(type, read_parameters(yaml, type.parameters));
   } catch (const InvalidParameter& error) {  // of values that do not go together

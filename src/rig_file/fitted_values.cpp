@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string>
+#include <string_view>
 
 #include "backlash_diagnosis/rig_file/rig_document.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
@@ -28,8 +30,8 @@ bool is_worth_writing(const FittedValues& found, const YamlTree& tree) {
 }
 
 /// The map under "gear_train.PART".
-const YamlNode& part_of(const YamlTree& tree, const std::string& part) {
-  return *tree.root->entries.at("gear_train").value->entries.at(part).value;
+const YamlNode& part_of(const YamlTree& tree, std::string_view part) {
+  return *tree.root->entries.at("gear_train").value->entries.at(std::string(part)).value;
 }
 
 }  // namespace

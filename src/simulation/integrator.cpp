@@ -217,7 +217,7 @@ Integrator::Impl::Impl(Derivative f, std::vector<StateTolerance> t, const Solver
 }
 
 Integrator::Impl::~Impl() {
-  if (memory) multistep ? CVodeFree(&memory) : ERKStepFree(&memory);
+  if (memory) multistep ? CVodeFree(&memory) : ARKodeFree(&memory);
   if (nonlinear_solver) SUNNonlinSolFree(nonlinear_solver);
   if (linear_solver) SUNLinSolFree(linear_solver);
   if (matrix) SUNMatDestroy(matrix);
@@ -227,13 +227,13 @@ Integrator::Impl::~Impl() {
 
 void Integrator::Impl::fail(const std::string& what) const {
   double reached = time;  // where the solver is now; an error here leaves the time before
-  if (memory) multistep ? CVodeGetCurrentTime(memory, &reached) : ERKStepGetCurrentTime(memory, &reached);
+  if (memory) multistep ? CVodeGetCurrentTime(memory, &reached) : ARKodeGetCurrentTime(memory, &reached);
   throw IntegrationError(fmt::format("{}: {} at t = {:.12g} s", settings.method, what, reached));
 }
 
 void Integrator::Impl::check(int code, const char* function) const {
   if (code >= 0) return;
-  char* name = multistep ? CVodeGetReturnFlagName(code) : ERKStepGetReturnFlagName(code);
+  char* name = multistep ? CVodeGetReturnFlagName(code) : ARKodeGetReturnFlagName(code);
   const std::string word = name ? name : "?";
   free(name);
   static_assert(CV_TOO_MUCH_WORK == ARK_TOO_MUCH_WORK, "one code for both solvers");
@@ -252,9 +252,9 @@ void Integrator::Impl::create_explicit(double t) {
   } else {
     check(ERKStepSetTableNum(memory, explicit_tables().at(settings.method)), "ERKStepSetTableNum");
   }
-  check(ERKStepWFtolerances(memory, weigh), "ERKStepWFtolerances");
-  check(ERKStepSetUserData(memory, this), "ERKStepSetUserData");
-  check(ERKStepSetMaxNumSteps(memory, kMaxStepsPerCall), "ERKStepSetMaxNumSteps");
+  check(ARKodeWFtolerances(memory, weigh), "ARKodeWFtolerances");
+  check(ARKodeSetUserData(memory, this), "ARKodeSetUserData");
+  check(ARKodeSetMaxNumSteps(memory, kMaxStepsPerCall), "ARKodeSetMaxNumSteps");
 }
 
 void Integrator::Impl::create_multistep(double t) {
@@ -284,9 +284,9 @@ void Integrator::Impl::find_events() {
     check(CVodeSetRootDirection(memory, rising.data()), "CVodeSetRootDirection");
     check(CVodeSetNoInactiveRootWarn(memory), "CVodeSetNoInactiveRootWarn");
   } else {
-    check(ERKStepRootInit(memory, event_count, evaluate_events), "ERKStepRootInit");
-    check(ERKStepSetRootDirection(memory, rising.data()), "ERKStepSetRootDirection");
-    check(ERKStepSetNoInactiveRootWarn(memory), "ERKStepSetNoInactiveRootWarn");
+    check(ARKodeRootInit(memory, event_count, evaluate_events), "ARKodeRootInit");
+    check(ARKodeSetRootDirection(memory, rising.data()), "ARKodeSetRootDirection");
+    check(ARKodeSetNoInactiveRootWarn(memory), "ARKodeSetNoInactiveRootWarn");
   }
 }
 
@@ -302,9 +302,9 @@ IntegratorStatistics Integrator::Impl::since_restart() const {
       count.evaluations += for_jacobian;
     }
   } else {
-    check(ERKStepGetNumSteps(memory, &count.steps), "ERKStepGetNumSteps");
+    check(ARKodeGetNumSteps(memory, &count.steps), "ARKodeGetNumSteps");
     check(ERKStepGetNumRhsEvals(memory, &count.evaluations), "ERKStepGetNumRhsEvals");
-    check(ERKStepGetNumErrTestFails(memory, &count.error_test_failures), "ERKStepGetNumErrTestFails");
+    check(ARKodeGetNumErrTestFails(memory, &count.error_test_failures), "ARKodeGetNumErrTestFails");
   }
   return count;
 }
@@ -327,8 +327,8 @@ void Integrator::Impl::restart(double t) {
     check(CVodeSetStopTime(memory, last), "CVodeSetStopTime");
     check(CVodeSetMaxStep(memory, longest), "CVodeSetMaxStep");
   } else {
-    check(ERKStepSetStopTime(memory, last), "ERKStepSetStopTime");
-    check(ERKStepSetMaxStep(memory, longest), "ERKStepSetMaxStep");
+    check(ARKodeSetStopTime(memory, last), "ARKodeSetStopTime");
+    check(ARKodeSetMaxStep(memory, longest), "ARKodeSetMaxStep");
   }
 }
 
@@ -347,7 +347,7 @@ int Integrator::Impl::risen() const {
   if (multistep)
     check(CVodeGetRootInfo(memory, found.data()), "CVodeGetRootInfo");
   else
-    check(ERKStepGetRootInfo(memory, found.data()), "ERKStepGetRootInfo");
+    check(ARKodeGetRootInfo(memory, found.data()), "ARKodeGetRootInfo");
   return static_cast<int>(std::find(found.begin(), found.end(), 1) - found.begin());
 }
 
@@ -357,9 +357,9 @@ int Integrator::Impl::evolve(double t) {
   thrown = nullptr;
   not_finite = 0;
   const int code = multistep ? CVode(memory, std::min(t, stop), state, &reached, CV_NORMAL)
-                             : ERKStepEvolve(memory, std::min(t, stop), state, &reached, ARK_NORMAL);
+                             : ARKodeEvolve(memory, std::min(t, stop), state, &reached, ARK_NORMAL);
   if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
-  check(code, multistep ? "CVode" : "ERKStepEvolve");
+  check(code, multistep ? "CVode" : "ARKodeEvolve");
   time = reached;
   static_assert(CV_ROOT_RETURN == ARK_ROOT_RETURN, "one name for both solvers");
   return code == CV_ROOT_RETURN ? risen() : kNoEvent;

@@ -1,14 +1,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What differs between SUNDIALS 6 and 7: how a context is made, and how the library is kept from printing.
-//
-// Built and tested with 6.4.1. For 7 every call was compared with the headers of 7.3, and compiled without
-// the names that 7 removed; ERKStep's calls, which 7 calls deprecated, are there. It was not built or run
-// with 7.
+// What differs between SUNDIALS 6 and 7: how a context is made, how the library is kept from printing, and
+// that since 7.1 what all of ARKODE's steppers share is named ARKode... and no longer ERKStep....
 #pragma once
 
 #include <arkode/arkode_erkstep.h>
 #include <cvode/cvode.h>
 #include <sundials/sundials_context.h>
+
+#if SUNDIALS_VERSION_MAJOR < 7 || (SUNDIALS_VERSION_MAJOR == 7 && SUNDIALS_VERSION_MINOR < 1)
+#define ARKodeEvolve ERKStepEvolve
+#define ARKodeFree ERKStepFree
+#define ARKodeGetCurrentTime ERKStepGetCurrentTime
+#define ARKodeGetNumErrTestFails ERKStepGetNumErrTestFails
+#define ARKodeGetNumSteps ERKStepGetNumSteps
+#define ARKodeGetReturnFlagName ERKStepGetReturnFlagName
+#define ARKodeGetRootInfo ERKStepGetRootInfo
+#define ARKodeRootInit ERKStepRootInit
+#define ARKodeSetMaxHnilWarns ERKStepSetMaxHnilWarns
+#define ARKodeSetMaxNumSteps ERKStepSetMaxNumSteps
+#define ARKodeSetMaxStep ERKStepSetMaxStep
+#define ARKodeSetNoInactiveRootWarn ERKStepSetNoInactiveRootWarn
+#define ARKodeSetRootDirection ERKStepSetRootDirection
+#define ARKodeSetStopTime ERKStepSetStopTime
+#define ARKodeSetUserData ERKStepSetUserData
+#define ARKodeWFtolerances ERKStepWFtolerances
+#endif
 
 namespace backlash::simulation::sundials {
 
@@ -20,7 +36,7 @@ inline int create_context(SUNContext* context) {
   return code < 0 ? code : SUNContext_ClearErrHandlers(*context);
 }
 inline int silence_explicit(void* memory) {
-  return ERKStepSetMaxHnilWarns(memory, -1);
+  return ARKodeSetMaxHnilWarns(memory, -1);
 }
 inline int silence_multistep(void* memory) {
   return CVodeSetMaxHnilWarns(memory, -1);

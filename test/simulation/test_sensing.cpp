@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/simulation/simulation.h"
@@ -167,7 +168,7 @@ TEST(Sensing, TermsAddUp) {
 TEST(Sensing, TheSearchKnowsAStrength) {
   model::MotionRange range;
   range.deflection = 4e-4, range.from = -0.3, range.to = 0.5, range.interval = 2e-3;
-  for (const char* id : {"encoder_scale", "delay"}) {
+  for (const std::string& id : {std::string("encoder_scale"), std::string("delay")}) {
     const model::TermType& type = model::term_type(id);
     ASSERT_TRUE(type.search) << id;
     EXPECT_EQ(type.search->strength, type.parameters.front().name);
