@@ -48,6 +48,20 @@ TEST(ZeroPhase, LowPassKeepsConstantsAndRampsToTheEnds) {
   for (std::size_t k = 100; k < 400; ++k) ASSERT_NEAR(y[k], ramp[k], 1e-5) << k;
 }
 
+// Eleven: eight that go together and three that are left. Rounding of values of 1.
+TEST(ZeroPhase, ColumnsAreFilteredAsEachByItself) {
+  Eigen::MatrixXd columns(700, 11);
+  for (int c = 0; c < 11; ++c) {
+    const std::vector<double> x = sine(3 + 7 * c, 700);
+    columns.col(c) = Eigen::Map<const Eigen::VectorXd>(x.data(), 700);
+  }
+  low_pass_columns(columns, kInterval, 40);
+  for (int c = 0; c < 11; ++c) {
+    const std::vector<double> alone = low_pass(sine(3 + 7 * c, 700), kInterval, 40);
+    for (int k = 0; k < 700; ++k) ASSERT_NEAR(columns(k, c), alone[std::size_t(k)], 1e-13) << c << ", " << k;
+  }
+}
+
 TEST(ZeroPhase, DerivativeOfAParabolaIsExactAlsoAtItsEnds) {
   std::vector<double> x(20), rate(20);
   for (int k = 0; k < 20; ++k)
