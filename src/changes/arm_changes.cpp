@@ -284,9 +284,8 @@ void ArmChanges::tell_deflection(std::size_t index) {
     if (!deflection) return;
     const HealthyModel& model = deflection->model;
     const HealthyScores scores(model, settings_);
-    ChangeSearch search(
-        model, deflection->motion, change_effects(model.sampling),
-        [&](const ChangeEffect& e) { return scores.inflation(e); }, {}, settings_, progress_);
+    ChangeSearch search(model, deflection->motion, change_effects(model.sampling), scores, {}, settings_,
+                        progress_);
     const std::vector<FoundChange> found = search.run();
     Changes one;
     for (const FoundChange& f : found) one.changes.push_back(search.told(f, found, false));

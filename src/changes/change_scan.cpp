@@ -19,6 +19,18 @@ void Background::solve() {
   estimate = inverse * (columns.transpose() * residual / variance);
 }
 
+Background background_of(const HealthyModel& model, const SampledMotion& motion,
+                         const ChangeSettings& settings) {
+  Whitened whitened = residual_of(model, motion, settings);
+  Background b;
+  b.residual = std::move(whitened.residual);
+  b.columns = std::move(whitened.nuisances);
+  b.spread = std::move(whitened.spread);
+  b.variance = model.noise * model.noise;
+  b.solve();
+  return b;
+}
+
 EffectSums::EffectSums(const SampledMotion& motion, const Eigen::MatrixXd& z, const Background& background,
                        double block, bool ramp)
     : block_(block), ramp_(ramp) {

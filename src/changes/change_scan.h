@@ -29,6 +29,10 @@ struct Background {
   }
 };
 
+/// Of a record by its healthy machine.
+Background background_of(const HealthyModel& model, const SampledMotion& motion,
+                         const ChangeSettings& settings);
+
 /// An effect in a record, summed from blocks to the end.
 class EffectSums {
  public:

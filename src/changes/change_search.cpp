@@ -12,13 +12,13 @@
 namespace backlash::changes {
 
 ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motion,
-                           std::vector<ChangeEffect> candidates, Inflation inflation,
+                           std::vector<ChangeEffect> candidates, const HealthyScores& scores,
                            const std::vector<FoundChange>& beside, const ChangeSettings& settings,
                            const Progress& progress)
     : model_(model),
       motion_(motion),
       candidates_(std::move(candidates)),
-      inflation_(std::move(inflation)),
+      scores_(scores),
       screen_(motion),
       settings_(settings),
       progress_(progress),
@@ -135,10 +135,11 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
     if (f.score.gain >= alike && f.score.values.size() > 0 && f.effect.freedom() < simplest->effect.freedom())
       simplest = &f;
   FoundChange found = *simplest;
-  found.inflation = inflation_(found.effect);
+  found.inflation = scores_.inflation(found.effect);
   found.gain = found.score.gain / found.inflation;
   // A weak change is told apart from others by noise alone.
-  const double not_told = std::min(alike, most->score.gain - settings_.told_apart * inflation_(most->effect));
+  const double not_told =
+      std::min(alike, most->score.gain - settings_.told_apart * scores_.inflation(most->effect));
   for (const FoundChange& f : all)
     if (f.score.gain >= not_told && f.effect.id != found.effect.id) {
       const bool told = std::find(found.alike.begin(), found.alike.end(), f.effect.id) != found.alike.end();
@@ -167,7 +168,9 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   const Eigen::VectorXd beside = left_with(f, b);
   const double own =
       score_inflation(motion_, beside, *effect_columns(motion_, f.effect), b.variance, settings_.window);
-  return f.score.gain / std::max(f.inflation * noisier, own) > threshold(f.score.values.size());
+  const bool one = model_.sampling.chain && model_.records->size() == 1;
+  return f.score.gain / std::max(f.inflation * noisier, own) >
+         (one ? settings_.learned_from_one : 1) * threshold(f.score.values.size());
 }
 
 void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {

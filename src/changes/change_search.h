@@ -9,6 +9,7 @@
 
 #include "backlash_diagnosis/changes/changes.h"
 #include "change_scan.h"
+#include "healthy_scores.h"
 #include "local_fault.h"
 #include "unexplained.h"
 
@@ -22,16 +23,13 @@ struct FoundChange {
   std::vector<std::string> alike;
 };
 
-/// By how much the scores of an effect scatter in the healthy records, see score_inflation().
-using Inflation = std::function<double(const ChangeEffect&)>;
-
 /// One channel of a record against a healthy machine.
 class ChangeSearch {
  public:
   /// `beside`: changes that another channel shows, of which this one may show any share.
   ChangeSearch(const HealthyModel& model, const SampledMotion& motion, std::vector<ChangeEffect> candidates,
-               Inflation inflation, const std::vector<FoundChange>& beside, const ChangeSettings& settings,
-               const Progress& progress);
+               const HealthyScores& scores, const std::vector<FoundChange>& beside,
+               const ChangeSettings& settings, const Progress& progress);
 
   std::vector<FoundChange> run();
   /// The best change beside those that were found, if it is believed; what the record has from its beginning
@@ -88,7 +86,7 @@ class ChangeSearch {
   const HealthyModel& model_;
   const SampledMotion& motion_;
   const std::vector<ChangeEffect> candidates_;
-  const Inflation inflation_;
+  const HealthyScores& scores_;
   const FaultScreen screen_;
   const ChangeSettings& settings_;
   const Progress& progress_;

@@ -35,7 +35,7 @@ std::optional<FoundChange> ChangeSearch::best_fault(const Background& b) const {
   }
   if (!best) return best;
   refine_fault(*best, b);
-  best->inflation = inflation_(best->effect);
+  best->inflation = scores_.inflation(best->effect);
   best->gain = best->score.gain / best->inflation;
   if (!repeats(*best, b)) best.reset();
   return best;

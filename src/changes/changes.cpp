@@ -42,9 +42,7 @@ ChannelChanges changes_in(const HealthyModel& model, const record::Record& recor
   of_record.sampling.other_load = other_load(beside, settings.block);
   const SampledMotion motion = motion_by(of_record, record, settings);
   const HealthyScores scores(model, settings);
-  ChangeSearch search(
-      model, motion, change_effects(model.sampling),
-      [&](const ChangeEffect& e) { return scores.inflation(e); }, beside, settings, progress);
+  ChangeSearch search(model, motion, change_effects(model.sampling), scores, beside, settings, progress);
   ChannelChanges result;
   const std::vector<FoundChange>& found = result.found = search.run();
   result.beside = search.beside(found);

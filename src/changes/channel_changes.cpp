@@ -56,22 +56,6 @@ void tell_louder(const ChangeSearch& search, const std::vector<FoundChange>& fou
 
 }  // namespace
 
-HealthyScores::HealthyScores(const HealthyModel& model, const ChangeSettings& settings)
-    : records_(model.records),
-      left_(model.left),
-      variance_(model.noise * model.noise),
-      window_(settings.window) {}
-
-double HealthyScores::inflation(const ChangeEffect& effect) const {
-  double most = 1;
-  for (std::size_t r = 0; r < records_->size(); ++r) {
-    const SampledMotion& motion = (*records_)[r];
-    most = std::max(most,
-                    score_inflation(motion, left_[r], *effect_columns(motion, effect), variance_, window_));
-  }
-  return most;
-}
-
 void tell_unexplained(const ChangeSearch& search, const std::vector<FoundChange>& found, bool of_two,
                       const ChangeSettings& settings, Changes& out) {
   std::optional<LoudStretch> loud = search.loud(found);

@@ -78,7 +78,7 @@ void CommissionedArm::set_chain_inflation(ArmJoint& joint) const {
   for (const ChainMotion& h : healthy_) {
     SampledMotion motion = motion_by(joint.model, h.joints[joint.index], settings_);
     set_chain_columns(h, joint.index, motion);
-    const Eigen::VectorXd left = left_of(joint.model, motion, settings_);
+    const Eigen::VectorXd left = residual_of(joint.model, motion, settings_).residual;
     for (std::size_t e = 0; e < effects.size(); ++e)
       joint.chain_inflation[e] =
           std::max(joint.chain_inflation[e],
@@ -88,10 +88,8 @@ void CommissionedArm::set_chain_inflation(ArmJoint& joint) const {
 }
 
 void CommissionedArm::set_search(ArmJoint& joint) const {
-  joint.search.emplace(
-      joint.model, joint.motion, change_effects(joint.model.sampling),
-      [scores = &*joint.scores](const ChangeEffect& e) { return scores->inflation(e); }, joint.beside,
-      settings_, progress_);
+  joint.search.emplace(joint.model, joint.motion, change_effects(joint.model.sampling), *joint.scores,
+                       joint.beside, settings_, progress_);
 }
 
 void CommissionedArm::read(const arm::ArmRecord& record, Changes& out) {

@@ -65,6 +65,8 @@ struct ChangeSettings {
   double block = 0.2;  // s, resolution of the onset. Choice
   double margin = 8;   // s at either end in which no change begins. Choice
   double least_explained = 0.1;  // - of the squares of the residual after the onset. Choice
+  double learned_from_one = 2;   // of the threshold, of a joint of an arm of which one record is healthy: how
+                                 // far another task is from it is not known. Measured: a UR5 needs 1.6
   double least_of_two = 0.003;   // - of the rms target of two inertias, that it explains at least: teeth that
                                  // ring and cross the gap leave as much. Choice
   double errors_of_side = 4;     // standard errors of the share of friction that loads the teeth. Choice
