@@ -21,7 +21,6 @@ class ArmChanges {
       : rig_(rig), settings_(settings), progress_(progress) {
     settings_.cutoff = rig.identification.torque_cutoff;
     settings_.position_cutoff = rig.identification.kinematics_cutoff;
-    settings_.wander_time = settings.wander_time_of_arm;
     // The joints share the rate, with two channels each, and the chain is one more.
     settings_.false_alarms_per_hour /= double(2 * rig.joints.size() + 1);
   }

@@ -134,6 +134,10 @@ std::vector<ChangeEffect> deflection_effects() {
 
 }  // namespace
 
+bool ChangeEffect::of_load() const {
+  return id == "load_dependent_friction" || id == "encoder_slip";
+}
+
 bool ChangeEffect::has_order() const {
   return id == "cogging" || id == "position_dependent_friction" || id == "transmission_error";
 }

@@ -36,6 +36,7 @@ struct ChangeEffect {
   /// Values that are fitted, order, place and width among them.
   Eigen::Index freedom() const;
 
+  bool of_load() const;  // whether its columns need the load that the machine is taken to bear
   bool has_order() const;
   bool has_scale() const;                             // `shape` is a speed or a way that is fitted by factors
   std::pair<const char*, const char*> scale() const;  // name and unit of that

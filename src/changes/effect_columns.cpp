@@ -13,7 +13,7 @@ constexpr Eigen::Index kTogether = 8;
 
 bool is_kept(const ChangeEffect& effect) {
   // Those of the load change with what the machine is taken for; those of a place are asked for once.
-  return effect.id != "load_dependent_friction" && effect.id != "encoder_slip" && !effect.at_place();
+  return !effect.of_load() && !effect.at_place();
 }
 
 std::string key_of(const ChangeEffect& effect) {

@@ -226,7 +226,7 @@ TEST(Integrator, FailureNamesMethodFunctionAndCodeAndIsMendedByRestart) {
     integrator.restart(0, &y, kNever);
     const std::string text = failure([&] { integrator.integrate_to(2, &y); });
     const bool multistep = method == "bdf" || method == "adams";
-    EXPECT_EQ(text.rfind(method + (multistep ? ": CVode" : ": ERKStepEvolve") + " returned ", 0), 0u) << text;
+    EXPECT_EQ(text.rfind(method + (multistep ? ": CVode" : ": ARKodeEvolve") + " returned ", 0), 0u) << text;
     EXPECT_NE(text.find(multistep ? "CV_" : "ARK_"), std::string::npos) << text;
     EXPECT_NE(text.find("at t = "), std::string::npos) << text;
     broken = false;

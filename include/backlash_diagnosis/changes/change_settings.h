@@ -42,10 +42,8 @@ struct ChangeSettings {
   double drift = 0.1;         // - of dry friction over a record, by temperature. Choice
   // Dry and viscous friction wander from minute to minute. Bittencourt and Axelsson (LiTH-ISY-R-3058) measure
   // more by temperature alone. Choices.
-  double wander = 0.03;            // -, of each, standard deviation
-  double wander_time = 100;        // s, over which
-  double wander_time_of_arm = 30;  // s, the same of an arm's joints. Simulation: swings of 3 % over two
-                                   // minutes are told apart from changes
+  double wander = 0.03;      // -, of each, standard deviation
+  double wander_time = 100;  // s, over which
   double rough = 0.15;  // s to either side, over which the motion's roughness is taken. Simulation: teeth
                         // that cross the gap ring for as long, and so do ends of moves
   double least_steady = 0.1;  // - of the squares of the residual, that no roughness explains. Choice
