@@ -8,8 +8,8 @@
 namespace backlash::changes {
 namespace {
 
-constexpr double kMostKnown = 1e7;  // rows of columns that are kept, 160 MB at most. Choice
-constexpr Eigen::Index kTogether = 8;
+constexpr double kMostKnown = 1e7;     // rows of columns that are kept, 160 MB at most. Choice
+constexpr Eigen::Index kTogether = 8;  // as many as low_pass_columns() takes at once
 
 bool is_kept(const ChangeEffect& effect) {
   // Those of the load change with what the machine is taken for; those of a place are asked for once.

@@ -218,7 +218,7 @@ Eigen::VectorXd spread_of(const HealthyData& data, const PooledFit& fit, const C
 /// What the healthy machine leaves beside what may differ from record to record and wander within one: the
 /// noise that scores are measured by. Twice, as the first round takes the wander for noise. Of an arm, whose
 /// records are short and whose chain leaves more in another task than in those it was fitted to, all of it is
-/// noise: of the measured UR5 four of eleven pairs of healthy records were told as changed otherwise.
+/// noise: of the measured UR5 four of nine pairs of healthy records were told as changed otherwise.
 void set_noise(const PooledFit& fit, const ChangeSettings& settings, HealthyModel& model) {
   model.noise = std::sqrt(fit.squares / double(fit.rows));
   if (model.sampling.chain) {
@@ -230,7 +230,7 @@ void set_noise(const PooledFit& fit, const ChangeSettings& settings, HealthyMode
     model.left.clear();
     double squares = 0;
     for (const SampledMotion& motion : *model.records) {
-      model.left.push_back(left_of(model, motion, settings));
+      model.left.push_back(background_of(model, motion, settings).left());
       squares += model.left.back().squaredNorm();
     }
     model.noise = std::sqrt(squares / double(fit.rows));
@@ -395,11 +395,6 @@ Nuisances nuisances_of(const HealthyModel& model, const SampledMotion& motion,
 }
 
 }  // namespace
-
-Eigen::VectorXd left_of(const HealthyModel& model, const SampledMotion& motion,
-                        const ChangeSettings& settings) {
-  return background_of(model, motion, settings).left();
-}
 
 Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
   Eigen::MatrixXd known = base_columns(motion, model.warm_up);

@@ -19,13 +19,13 @@ struct HealthyModel {
   std::vector<ChangeEffect> further;  // that the healthy machine shows, columns after those of the equation
   Eigen::VectorXd values;
   Eigen::VectorXd spread;   // standard deviation from record to record
-  double noise = 0;         // N m or rad, rms of `left`
+  double noise = 0;         // N m or rad, rms of `left`; of an arm of all that the values leave
   double steady = 0;        // (N m)^2 or rad^2, squares of the residual in the smoothest motion
   double rough = 0;         // what each rad^2/s^6 of the motion's roughness adds to them
   double drift = 0;         // N m, spread of a linear drift of dry friction over a record
   double least_change = 0;  // N m or rad, rms of what a change has to explain
   std::shared_ptr<const std::vector<SampledMotion>> records;  // that it was commissioned with
-  std::vector<Eigen::VectorXd> left;                          // of each, see left_of()
+  std::vector<Eigen::VectorXd> left;                          // of each, what is noise
 };
 
 /// Throws CannotIdentify.
@@ -54,9 +54,5 @@ struct Whitened {
   Eigen::VectorXd spread;  // standard deviation of each
 };
 Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings);
-
-/// Its residual beside the best values of the nuisances.
-Eigen::VectorXd left_of(const HealthyModel& model, const SampledMotion& motion,
-                        const ChangeSettings& settings);
 
 }  // namespace backlash::changes

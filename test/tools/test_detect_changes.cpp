@@ -130,6 +130,21 @@ TEST_F(DetectChanges, TellsAPushOnAMeasuredArmThatHoldsItsPose) {
   EXPECT_FALSE(first["until"].is_null());
 }
 
+// Learned from one short record, in another task: what the model of a real arm lacks is no change.
+TEST_F(DetectChanges, HealthyTasksOfAMeasuredArmAreNoChangesOfEachOther) {
+  const std::string rig = package_file("config/ur5_arm/ur5_arm.yaml");
+  for (const auto& [learned, looked_at] :
+       {std::pair("a", "b"), std::pair("b", "a"), std::pair("a", "free"), std::pair("free", "b")}) {
+    const auto healthy = find_data("measured/ur5_arm_" + std::string(learned) + ".csv");
+    const auto record = find_data("measured/ur5_arm_" + std::string(looked_at) + ".csv");
+    if (!healthy || !record) GTEST_SKIP() << "measured/ur5_arm_" << learned << ".csv is not there";
+    const Outcome outcome =
+        run("detect_changes --rig " + rig + " --healthy " + *healthy + " --json out.json " + *record);
+    EXPECT_NE(outcome.code, 2) << learned << ", " << looked_at << ": " << outcome.out;
+    EXPECT_EQ(Json::parse(read("out.json"))["changes"].size(), 0U);
+  }
+}
+
 TEST_F(DetectChanges, AnotherTaskIsNoChangeAndWhatFollowsNoEffectIsNoHealth) {
   const std::string rig = package_file("config/simulated_robot/shoulder.yaml");
   std::ifstream in(rig);
