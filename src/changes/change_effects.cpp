@@ -50,9 +50,13 @@ double fluctuating_load_rub(const Moment& m, double w0) {
   const double t = std::fabs(m.load), a = m.fluctuation * std::max(0.0, std::fabs(m.speed) - w0);
   return m.direction * (t >= a ? t : (t * t + a * a) / (2 * a));
 }
-/// A joint that stands elsewhere than its encoder shows, by that much less: only gravity knows.
-double less_load_slope(const Moment& m, double) {
-  return -m.load_slope;
+/// A joint that stands elsewhere than its encoder shows, by s less, per s: only gravity knows.
+double load_elsewhere(const Moment& m, double s) {
+  return s == 0 ? -m.load_slope : ((std::cos(s) - 1) * m.weight - std::sin(s) * m.load_slope) / s;
+}
+/// What is recorded of a torque is more than before.
+double whole_torque(const Moment& m, double) {
+  return m.torque;
 }
 double drag(const Moment& m, double) {
   return m.speed * std::fabs(m.speed);
@@ -94,6 +98,7 @@ constexpr Declared kDeclared[] = {{"motor_coulomb", "N m", "motor_coulomb"},
                                   {"mesh_stiffness", "rad/(N m)", "compliance"},
                                   {"encoder_skew", "s", "encoder_skew"},
                                   {"encoder_slip", "rad", "offset"},
+                                  {"motor_torque_gain", "-", "gain"},
                                   {"presliding", "N m", "torque"}};
 
 std::string unit_of(const std::string& id, const std::string& parameter) {
@@ -135,7 +140,16 @@ std::vector<ChangeEffect> deflection_effects() {
 }  // namespace
 
 bool ChangeEffect::of_load() const {
-  return id == "load_dependent_friction" || id == "encoder_slip";
+  return id == "load_dependent_friction" || id == "encoder_slip" || id == "motor_torque_gain";
+}
+
+bool ChangeEffect::rubs() const {
+  return id == "load_dependent_friction" || id == "position_dependent_friction" || id == "stribeck" ||
+         id == "presliding";
+}
+
+bool ChangeEffect::is_slip() const {
+  return id == "encoder_slip" && !columns.empty();
 }
 
 bool ChangeEffect::has_order() const {
@@ -166,7 +180,7 @@ Eigen::Index ChangeEffect::freedom() const {
 
 std::string ChangeEffect::name() const {
   if (at_place()) return id + " at " + to_text(shape);
-  return shape > 0 ? id + " " + to_text(shape) : id;
+  return shape > 0 && !is_slip() ? id + " " + to_text(shape) : id;
 }
 
 std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
@@ -181,8 +195,12 @@ std::vector<ChangeEffect> change_effects(const MotionSampling& sampling) {
                                    {"quadratic_drag", 0, {drag}},
                                    {"friction_drift", 0, {direction, drift}, true}};
   // Of an arm those are effects of the chain.
-  if (!sampling.chain) all.push_back({"gravity", 1, {cosine, sine}});
-  if (!sampling.mesh && !sampling.chain) all.push_back({"encoder_slip", 0, {less_load_slope}});
+  if (!sampling.chain) {
+    all.push_back({"gravity", 1, {cosine, sine}});
+    all.push_back(*with_inertia(all.back()));
+    all.push_back({"motor_torque_gain", 0, {whole_torque}});
+  }
+  if (!sampling.mesh && !sampling.chain) all.push_back({"encoder_slip", 0, {load_elsewhere}});
   for (const double share : kFluctuationSpeeds)
     all.push_back({"load_dependent_friction", share * sampling.speed, {fluctuating_load_rub}});
   for (const double share : kStribeckSpeeds) all.push_back({"stribeck", share * sampling.speed, {stribeck}});

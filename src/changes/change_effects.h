@@ -25,7 +25,7 @@ struct Wave {
 
 struct ChangeEffect {
   std::string id;    // of the registry of terms, or the name of a declared value
-  double shape = 0;  // order [1/rad], speed [rad/s] or place [rad], where the effect has one
+  double shape = 0;  // order [1/rad], speed [rad/s], place or slip [rad], where the effect has one
   /// Columns of one moment. Two: cosine and sine of a wave; of a ramp something and that times time.
   std::vector<std::function<double(const Moment&, double shape)>> columns;
   bool ramp = false;         // the second column grows from the onset on
@@ -36,7 +36,10 @@ struct ChangeEffect {
   /// Values that are fitted, order, place and width among them.
   Eigen::Index freedom() const;
 
-  bool of_load() const;  // whether its columns need the load that the machine is taken to bear
+  bool of_load() const;  // whether its columns need what the healthy machine is taken to bear
+  bool rubs() const;     // whether it is a part of friction
+  bool is_slip()
+      const;  // of a joint by itself: `shape` is the slip [rad] whose size the columns are right for
   bool has_order() const;
   bool has_scale() const;                             // `shape` is a speed or a way that is fitted by factors
   std::pair<const char*, const char*> scale() const;  // name and unit of that

@@ -104,14 +104,25 @@ double ChangeSearch::left_after(const Background& b, std::size_t from, std::size
 
 FoundChange ChangeSearch::scanned(const ChangeEffect& e, const Background& b, std::size_t step) const {
   FoundChange best{e, 0, blocks_, {}, 1, 0, {}};
-  const EffectSums sums(motion_, *effect_columns(motion_, e), b, settings_.block, e.ramp);
+  const EffectSums sums = sums_of(best, b);
   for (std::size_t k = margin_; k + margin_ < blocks_; k += step) {
     EffectSums::Score s = sums.score(k, blocks_, b);
     if (s.gain <= best.score.gain) continue;
     best.from = k;
     best.score = std::move(s);
   }
+  refine_slip(best, b);
   return best;
+}
+
+/// Whether `most` explains a good part of what `f` leaves.
+bool ChangeSearch::leaves_more(const FoundChange& f, const FoundChange& most, const Background& b) const {
+  const double more = most.score.gain - f.score.gain;
+  if (more < settings_.told_apart * scores_.inflation(most.effect)) return false;
+  double rows = 0;
+  left_after(b, most.from, most.to, rows);
+  const double left = (b.misfit() - f.score.gain) * rows / double(motion_.size());
+  return more > settings_.least_explained * left;
 }
 
 std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
@@ -128,11 +139,12 @@ std::optional<FoundChange> ChangeSearch::best(const Background& b) const {
     return x.score.gain < y.score.gain;
   });
   if (most == all.end() || most->score.values.size() == 0) return std::nullopt;
-  // Of those that explain it alike one with fewer values.
+  // Of those that explain it alike one with fewer values, unless more values explain what it leaves.
   const double alike = settings_.alike * most->score.gain;
   const FoundChange* simplest = &*most;
   for (const FoundChange& f : all)
-    if (f.score.gain >= alike && f.score.values.size() > 0 && f.effect.freedom() < simplest->effect.freedom())
+    if (f.score.gain >= alike && f.score.values.size() > 0 &&
+        f.effect.freedom() < simplest->effect.freedom() && !leaves_more(f, *most, b))
       simplest = &f;
   FoundChange found = *simplest;
   found.inflation = scores_.inflation(found.effect);
@@ -155,10 +167,19 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
   return without - b.columns * (b.inverse * (b.columns.transpose() * without / b.variance));
 }
 
+/// Growth of friction as a healthy machine may have it; what is quicker than its wander looks larger than it
+/// is.
+bool ChangeSearch::is_drift(const FoundChange& f) const {
+  const double span = settings_.block * double(f.to - f.from);
+  return std::fabs(f.score.values[0]) * span <
+         settings_.least_ramp * std::max(1.0, settings_.wander_time / span) * model_.drift;
+}
+
 bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   double rows = 0;
   const double squares = f.effect.at_place() ? left_at(f, b.left(), rows) : left_after(b, f.from, f.to, rows);
   const double explained = f.score.gain * b.variance;
+  if (f.effect.ramp && motion_.sampling.channel == ChangeChannel::torque && is_drift(f)) return false;
   if (explained < settings_.least_explained * squares) return false;
   if (explained < rows * model_.least_change * model_.least_change) return false;
   // More noise than in the healthy records counts against it.
@@ -191,11 +212,11 @@ void ChangeSearch::refine_order(FoundChange& f, const Background& b) const {
   }
 }
 
-void ChangeSearch::refine(FoundChange& f, const Background& b) const {
-  if (f.effect.at_place()) refine_fault(f, b);
-  if (f.effect.has_scale()) refine_scale(f, b);
-  refine_order(f, b);
-  const EffectSums sums(motion_, *effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+EffectSums ChangeSearch::sums_of(const FoundChange& f, const Background& b) const {
+  return EffectSums(motion_, *effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+}
+
+void ChangeSearch::refine_onset(FoundChange& f, const EffectSums& sums, const Background& b) const {
   f.score = sums.score(f.from, f.to, b);
   for (std::size_t k = margin_; k + margin_ / 2 < f.to; ++k) {
     EffectSums::Score s = sums.score(k, f.to, b);
@@ -203,6 +224,14 @@ void ChangeSearch::refine(FoundChange& f, const Background& b) const {
     f.from = k;
     f.score = std::move(s);
   }
+}
+
+void ChangeSearch::refine(FoundChange& f, const Background& b) const {
+  if (f.effect.at_place()) refine_fault(f, b);
+  if (f.effect.has_scale()) refine_scale(f, b);
+  refine_slip(f, b);
+  refine_order(f, b);
+  refine_onset(f, sums_of(f, b), b);
   f.gain = f.score.gain / f.inflation;
 }
 
@@ -220,7 +249,7 @@ void ChangeSearch::add_inertia(FoundChange& f, const Background& b) const {
 
 /// An end, where the record with it is told clearly better.
 void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
-  const EffectSums sums(motion_, *effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+  const EffectSums sums = sums_of(f, b);
   FoundChange ended = f;
   for (int round = 0; round < 3; ++round) {
     for (std::size_t k = ended.from + margin_ / 2; k + margin_ / 2 < blocks_; ++k) {
@@ -239,7 +268,7 @@ void ChangeSearch::find_end(FoundChange& f, const Background& b) const {
 /// Whether it may have begun before the record did.
 bool ChangeSearch::begins_before(const FoundChange& f, const Background& b) const {
   Change change;
-  onset_interval(f, b, change);
+  onset_interval(f, sums_of(f, b), b, change);
   return change.since_from <= motion_.start;
 }
 
@@ -283,6 +312,7 @@ void ChangeSearch::unite(std::vector<FoundChange>& found) const {
 }
 
 std::optional<FoundChange> ChangeSearch::next(const std::vector<FoundChange>& found) {
+  left_by_shape_.reset();
   for (int k = 0; k < settings_.most_changes; ++k) {
     const Background b = background(found);
     std::optional<FoundChange> next = best(b);
@@ -297,7 +327,10 @@ std::optional<FoundChange> ChangeSearch::next(const std::vector<FoundChange>& fo
       like_fault_ = found.empty();
       return std::nullopt;
     }
-    if (!further(*next, found)) return std::nullopt;
+    if (!further(*next, found)) {
+      left_by_shape_ = std::move(next);
+      return std::nullopt;
+    }
     add_inertia(*next, b);
     find_end(*next, b);
     return next;
@@ -326,8 +359,8 @@ std::vector<FoundChange> ChangeSearch::run() {
   return found;
 }
 
-void ChangeSearch::onset_interval(const FoundChange& f, const Background& b, Change& change) const {
-  const EffectSums sums(motion_, *effect_columns(motion_, f.effect), b, settings_.block, f.effect.ramp);
+void ChangeSearch::onset_interval(const FoundChange& f, const EffectSums& sums, const Background& b,
+                                  Change& change) const {
   double rows = 0;
   // What the shape of the effect leaves widens it like noise.
   const double squares = left_after(b, f.from, f.to, rows) - f.score.gain * b.variance;
@@ -347,6 +380,29 @@ void ChangeSearch::onset_interval(const FoundChange& f, const Background& b, Cha
   change.since_to = motion_.start + settings_.block * double(high) + settings_.block + settings_.onset_least;
 }
 
+/// The onset of a change whose shape leaves something, or that comes with another too small to be told: of
+/// both together, and by itself.
+void ChangeSearch::onset_with_left(const FoundChange& f, const Background& b, Change& change) const {
+  if (!left_by_shape_ || f.effect.ramp || left_by_shape_->effect.ramp) return;
+  const double apart = std::fabs(double(left_by_shape_->from) - double(f.from)) * settings_.block;
+  if (apart >= settings_.same_event) return;
+  const Eigen::MatrixXd own = *effect_columns(motion_, f.effect),
+                        left = *effect_columns(motion_, left_by_shape_->effect);
+  Eigen::MatrixXd both(own.rows(), own.cols() + left.cols());
+  both << own, left;
+  const EffectSums sums(motion_, both, b, settings_.block, false);
+  FoundChange together = f;
+  together.inflation = std::max(f.inflation, left_by_shape_->inflation);
+  together.score = {};
+  refine_onset(together, sums, b);
+  if (together.score.values.size() == 0) return;
+  Change of_both;
+  onset_interval(together, sums, b, of_both);
+  change.since = of_both.since;
+  change.since_from = std::min(change.since_from, of_both.since_from);
+  change.since_to = std::max(change.since_to, of_both.since_to);
+}
+
 Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& all, bool linear) const {
   std::vector<FoundChange> others;
   for (const FoundChange& o : all)
@@ -356,7 +412,8 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   change.effect = f.effect.id;
   change.alike = f.alike;
   change.gain = f.gain;
-  onset_interval(f, b, change);
+  onset_interval(f, sums_of(f, b), b, change);
+  onset_with_left(f, b, change);
   // Changes of one event hold each other's onset.
   for (const FoundChange& o : others)
     if (std::fabs(double(o.from) - double(f.from)) * settings_.block < settings_.same_event) {

@@ -58,14 +58,17 @@ class ChangeSearch {
   std::vector<double> squares_over_healthy(const std::vector<FoundChange>& all) const;
   Eigen::MatrixXd found_columns(const FoundChange& f) const;
   std::optional<FoundChange> best(const Background& b) const;
+  bool leaves_more(const FoundChange& f, const FoundChange& most, const Background& b) const;
   FoundChange scanned(const ChangeEffect& e, const Background& b, std::size_t step) const;
   Eigen::VectorXd left_with(const FoundChange& f, const Background& b) const;
+  bool is_drift(const FoundChange& f) const;
   bool believed(const FoundChange& f, const Background& b) const;
   bool begins_before(const FoundChange& f, const Background& b) const;
   void differ(FoundChange f);
   bool further(const FoundChange& next, const std::vector<FoundChange>& found) const;
   void refine(FoundChange& f, const Background& b) const;
   void refine_order(FoundChange& f, const Background& b) const;
+  void refine_slip(FoundChange& f, const Background& b) const;
   void refine_scale(FoundChange& f, const Background& b) const;
   void add_inertia(FoundChange& f, const Background& b) const;
   // Faults at a place
@@ -80,7 +83,11 @@ class ChangeSearch {
                                      bool linear) const;
   void find_end(FoundChange& f, const Background& b) const;
   void unite(std::vector<FoundChange>& found) const;
-  void onset_interval(const FoundChange& f, const Background& b, Change& change) const;
+  EffectSums sums_of(const FoundChange& f, const Background& b) const;
+  void refine_onset(FoundChange& f, const EffectSums& sums, const Background& b) const;
+  void onset_interval(const FoundChange& f, const EffectSums& sums, const Background& b,
+                      Change& change) const;
+  void onset_with_left(const FoundChange& f, const Background& b, Change& change) const;
   double left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const;
 
   const HealthyModel& model_;
@@ -95,6 +102,7 @@ class ChangeSearch {
   Eigen::Index beside_column_ = 0, beside_columns_ = 0;  // the first of what stands beside, and how many
   std::vector<std::string> different_;                   // effects that the record has from its beginning
   bool like_fault_ = false;
+  std::optional<FoundChange> left_by_shape_;  // the likeliest beside those found, too little to be told
   const std::size_t margin_, blocks_;
 };
 

@@ -80,6 +80,20 @@ void ChangeSearch::refine_scale(FoundChange& f, const Background& b) const {
       }
 }
 
+/// Columns that are right for a slip of that size: gravity is no straight line.
+void ChangeSearch::refine_slip(FoundChange& f, const Background& b) const {
+  if (!f.effect.is_slip() || motion_.sampling.channel != ChangeChannel::torque) return;
+  for (int round = 0; round < kRounds && f.score.values.size() > 0; ++round) {
+    ChangeEffect e = f.effect;
+    e.shape = f.score.values[0];
+    EffectSums::Score s =
+        EffectSums(motion_, *effect_columns(motion_, e), b, settings_.block, false).score(f.from, f.to, b);
+    if (s.gain <= (1 + kBetter) * f.score.gain) return;
+    f.effect = e;
+    f.score = std::move(s);
+  }
+}
+
 /// With what the scale may be other by: its slope stands beside.
 std::vector<ChangeSize> ChangeSearch::scaled_size(const FoundChange& f, const Background& b, double noisier,
                                                   bool linear) const {

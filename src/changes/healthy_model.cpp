@@ -15,6 +15,8 @@ constexpr double kFluctuation =
     3.5;  // simulation: times rms torque over rms speed, see load_dependent_friction
 constexpr double kWarmUps[] = {20, 40, 60, 80, 110, 150, 220, 300, 400};  // s, tried. Choice
 
+constexpr double kOtherWarmUp = 0.2;   // - of its time, by which another warm-up differs. Choice
+constexpr double kMostBeside = 3;      // of dry friction, that another part of it may be. Choice: it is none
 constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
 constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
 
@@ -31,7 +33,7 @@ Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 using OfMoment = std::function<double(const Moment&)>;
 
-Eigen::MatrixXd lasting_columns(const SampledMotion& motion) {
+std::vector<OfMoment> lasting(const MotionSampling& sampling) {
   std::vector<OfMoment> all(kCommonColumns);
   all[kInertia] = [](const Moment& m) { return m.acceleration; };
   all[kViscous] = [](const Moment& m) { return m.speed; };
@@ -40,18 +42,26 @@ Eigen::MatrixXd lasting_columns(const SampledMotion& motion) {
   all[kCosine] = [](const Moment& m) { return std::cos(m.position); };
   all[kSine] = [](const Moment& m) { return std::sin(m.position); };
   all[kJerk] = [](const Moment& m) { return m.jerk; };
-  if (motion.sampling.channel == ChangeChannel::torque) return columns(motion, all);
-  if (motion.sampling.chain) all[kInertia] = [](const Moment& m) { return m.chain; };
+  if (sampling.channel == ChangeChannel::torque) return all;
+  if (sampling.chain) all[kInertia] = [](const Moment& m) { return m.chain; };
   all.emplace_back([](const Moment& m) { return m.side(); });    // kHalfGap
   all.emplace_back([](const Moment& m) { return m.position; });  // kScale
-  return columns(motion, all);
+  return all;
 }
 
 /// What warms up: none of the deflection.
+std::vector<OfMoment> warming(const MotionSampling& sampling, double warm_up) {
+  if (sampling.channel == ChangeChannel::deflection) return {};
+  return {[=](const Moment& m) { return m.speed * std::exp(-m.time / warm_up); },
+          [=](const Moment& m) { return m.direction * std::exp(-m.time / warm_up); }};
+}
+
+Eigen::MatrixXd lasting_columns(const SampledMotion& motion) {
+  return columns(motion, lasting(motion.sampling));
+}
+
 Eigen::MatrixXd warm_columns(const SampledMotion& motion, double warm_up) {
-  if (motion.sampling.channel == ChangeChannel::deflection) return Eigen::MatrixXd(motion.size(), 0);
-  return columns(motion, {[&](const Moment& m) { return m.speed * std::exp(-m.time / warm_up); },
-                          [&](const Moment& m) { return m.direction * std::exp(-m.time / warm_up); }});
+  return columns(motion, warming(motion.sampling, warm_up));
 }
 
 Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
@@ -103,9 +113,23 @@ void set_loads(const Eigen::VectorXd& values, SampledMotion& motion) {
   const double torque = motion.target.norm() / std::sqrt(double(std::max<Eigen::Index>(1, motion.size())));
   for (Moment& m : motion.moments) {
     m.fluctuation = kFluctuation * torque / motion.sampling.speed;
-    m.load = m.chain + values[kInertia] * m.acceleration + values[kCosine] * std::cos(m.position) +
-             values[kSine] * std::sin(m.position);
+    m.weight = values[kCosine] * std::cos(m.position) + values[kSine] * std::sin(m.position);
+    m.load = m.chain + values[kInertia] * m.acceleration + m.weight;
     m.load_slope = values[kSine] * std::cos(m.position) - values[kCosine] * std::sin(m.position);
+  }
+}
+
+/// What the equation says of each moment, with all that the healthy machine shows.
+void set_torques(const HealthyModel& model, SampledMotion& motion) {
+  if (motion.sampling.channel == ChangeChannel::deflection) return;
+  std::vector<OfMoment> all = lasting(motion.sampling);
+  for (OfMoment& f : warming(motion.sampling, model.warm_up)) all.push_back(std::move(f));
+  for (const ChangeEffect& e : model.further)
+    for (const auto& f : e.columns) all.emplace_back([&](const Moment& m) { return f(m, e.shape); });
+  for (Moment& m : motion.moments) {
+    m.torque = m.chain;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      m.torque += model.values[static_cast<Eigen::Index>(i)] * all[i](m);
   }
 }
 
@@ -287,7 +311,10 @@ HealthyModel commission_healthy(const std::vector<record::Record>& records, cons
   model.spread = spread_of(data, fit, settings);
   if (sampling.mesh) model.least_change = settings.least_of_two * rms_about_offset(data, fit);
   model.drift = settings.drift * std::fabs(fit.values[kCoulomb]);
-  for (SampledMotion& motion : data.motions) set_loads(fit.values, motion);
+  for (SampledMotion& motion : data.motions) {
+    set_loads(fit.values, motion);
+    set_torques(model, motion);
+  }
   model.records = std::make_shared<const std::vector<SampledMotion>>(std::move(data.motions));
   for (const SampledMotion& m : *model.records)
     m.known_columns.clear();  // of all effects: few are needed again
@@ -318,6 +345,7 @@ SampledMotion motion_by(const HealthyModel& model, const record::Record& record,
                         const ChangeSettings& settings) {
   SampledMotion motion = sampled_motion(record, model.sampling, settings);
   set_loads(model.values, motion);
+  set_torques(model, motion);
   return motion;
 }
 
@@ -357,20 +385,59 @@ struct Nuisances {
   }
 };
 
+/// Dry friction of the healthy machine over that of fast motion: what it shows beside is a part of it, and
+/// comes and goes with the same temperature and oil.
+OfMoment dry_friction(const HealthyModel& model) {
+  std::vector<std::pair<double, OfMoment>> parts;
+  Eigen::Index i = kWarmCoulomb + 1;
+  for (const ChangeEffect& e : model.further)
+    for (const auto& f : e.columns) {
+      const double share = model.values[i++] / model.values[kCoulomb], shape = e.shape;
+      if (e.rubs() && std::fabs(share) < kMostBeside)
+        parts.emplace_back(share, [f, shape](const Moment& m) { return f(m, shape); });
+    }
+  return [parts](const Moment& m) {
+    double sum = m.direction;
+    for (const auto& [share, f] : parts) sum += share * f(m);
+    return sum;
+  };
+}
+
 /// What wanders, straight between knots: dry and viscous friction; both flanks and the gap between them.
 void add_wander(const HealthyModel& model, double length, const ChangeSettings& settings, Nuisances& out) {
   const bool torque = model.sampling.channel == ChangeChannel::torque;
   const auto share = [&](int k) { return settings.wander * std::fabs(model.values[k]); };
   const double first = torque ? share(kCoulomb) : share(kHalfGap);
   const double second = torque ? share(kViscous) : first;
+  const OfMoment flank = [](const Moment& m) { return m.side(); };
+  const OfMoment rubbing = torque ? dry_friction(model) : flank;
   const int cells = std::max(1, static_cast<int>(std::lround(length / settings.wander_time)));
   for (int k = 0; k <= cells; ++k) {
     const auto hat = [=](const Moment& m) {
       return std::max(0.0, 1 - std::fabs(m.time / length * cells - k));
     };
-    out.add([=](const Moment& m) { return (torque ? m.direction : m.side()) * hat(m); }, first);
+    out.add([=](const Moment& m) { return rubbing(m) * hat(m); }, first);
     out.add([=](const Moment& m) { return (torque ? m.speed : 1) * hat(m); }, second);
   }
+}
+
+/// The equation has dry friction alone warm up, in one time: the rest of it does as well, more or less, and
+/// each day is another.
+void add_warm_rest(const HealthyModel& model, Nuisances& out) {
+  const double warm_up = model.warm_up;
+  const double share = std::fabs(model.values[kWarmCoulomb] / model.values[kCoulomb]);
+  const auto slower = [=](const Moment& m) { return m.time / warm_up * std::exp(-m.time / warm_up); };
+  out.add([=](const Moment& m) { return m.direction * slower(m); },
+          kOtherWarmUp * std::fabs(model.values[kWarmCoulomb]));
+  out.add([=](const Moment& m) { return m.speed * slower(m); },
+          kOtherWarmUp * std::fabs(model.values[kWarmViscous]));
+  Eigen::Index i = kWarmCoulomb + 1;
+  for (const ChangeEffect& e : model.further)
+    for (const auto& f : e.columns) {
+      const double spread = std::min(share, 1.0) * std::fabs(model.values[i++]), shape = e.shape;
+      if (e.rubs())
+        out.add([=](const Moment& m) { return f(m, shape) * std::exp(-m.time / warm_up); }, spread);
+    }
 }
 
 /// At rest the machine cools down, and warms up again after; or the clock was set.
@@ -378,7 +445,8 @@ void add_rest(const HealthyModel& model, const Rest& rest, Nuisances& out) {
   const double warm_up = model.warm_up, end = rest.to;
   const auto cooled = [=](const Moment& m) { return m.time < end ? 0 : std::exp(-(m.time - end) / warm_up); };
   const double share = 1 - std::exp(-(rest.to - rest.from) / warm_up);
-  out.add([=](const Moment& m) { return m.direction * cooled(m); }, share * model.spread[kWarmCoulomb]);
+  const OfMoment rubbing = dry_friction(model);
+  out.add([=](const Moment& m) { return rubbing(m) * cooled(m); }, share * model.spread[kWarmCoulomb]);
   out.add([=](const Moment& m) { return m.speed * cooled(m); }, share * model.spread[kWarmViscous]);
 }
 
@@ -388,6 +456,7 @@ Nuisances nuisances_of(const HealthyModel& model, const SampledMotion& motion,
   const double length = motion.moments.back().time;
   add_wander(model, length, settings, out);
   if (motion.sampling.channel == ChangeChannel::deflection) return out;
+  add_warm_rest(model, out);
   out.add([=](const Moment& m) { return m.direction * (m.time / length - 0.5); }, model.drift);
   if (motion.sampling.chain) out.add([](const Moment& m) { return m.chain; }, settings.chain_share);
   for (const Rest& rest : rests_of(motion, settings)) add_rest(model, rest, out);

@@ -107,10 +107,11 @@ std::vector<char> usable(const SampledMotion& motion, const std::vector<char>& t
   std::vector<char> good(n, 1);
   for (std::size_t k = 0; k < n; ++k) {
     const double speed = std::fabs(motion.moments[k].speed);
-    const bool known = fast == 0 || (speed < fast && std::fabs(motion.moments[k].acceleration) < hard);
+    const double pull = std::fabs(motion.moments[k].acceleration);
+    const bool known = fast == 0 || (speed < fast && pull < hard);
     if (there[k] && speed > slow && known && rests_on_flank(motion, k)) continue;
     // Filters ring for long after a jump of the position, which no motion is.
-    const bool jump = fast > 0 && speed > settings.jump * fast;
+    const bool jump = fast > 0 && (speed > settings.jump * fast || pull > settings.jump * hard);
     const std::size_t reach = jump ? settings.jump_guard * guard : guard;
     const std::size_t last = std::min(n, k + reach + 1);
     for (std::size_t i = k > reach ? k - reach : 0; i < last; ++i) good[i] = 0;
@@ -176,7 +177,9 @@ void add_moments(const EvenSamples& even, const ChangeSettings& settings, Sample
                 0,
                 0,
                 0,
-                even.chain[k]};
+                0,
+                even.chain[k],
+                0};
     if (const auto& mesh = sampling.mesh)
       m.mesh = mesh->inertia * (acceleration[k] - parting[k]) + mesh->viscous * m.speed +
                mesh->coulomb * m.direction + mesh->cosine * std::cos(m.position) +

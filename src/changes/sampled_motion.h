@@ -54,10 +54,12 @@ struct Moment {
   double direction;     // -1..1
   double way;           // rad, since the last reversal
   double load;          // N m, that the healthy machine's load takes
+  double weight;        // N m, the part of that by gravity
   double load_slope;    // N m/rad, of its gravity
   double fluctuation;   // N m s/rad, by which that may fluctuate per speed, faster than the record shows
   double mesh;          // N m, that the teeth bear; 0: one inertia
   double chain;         // N m, that the rest of an arm takes; 0: there is none
+  double torque;        // N m, that the healthy machine takes in all; 0: not known yet
 
   double side() const { return mesh < 0 ? -1 : 1; }  // flank that bears it
 };

@@ -22,7 +22,8 @@ struct ChangeSettings {
   double fast = 1.2;                    // - of the fastest healthy speed: no extrapolation. Choice
   double spike =
       30;  // mean differences from the median of three: no noise. Choice: 11 is the most of a million
-  double jump = 3;              // of the fastest speed that is extrapolated to: no motion. Choice
+  double jump = 1.5;            // of the fastest speed, or hardest acceleration, that is extrapolated to: no
+                                // motion. Choice: a slip of 0.02 rad at 125 Hz is 2
   std::size_t jump_guard = 6;   // guards about it. Theory: filters have rung out to 1e-10 of it
   double gap = 2.5;             // intervals between samples that are none. Choice
   double longest_gap = 600;     // s. Choice: the machine has another temperature then
@@ -63,12 +64,14 @@ struct ChangeSettings {
   double block = 0.2;  // s, resolution of the onset. Choice
   double margin = 8;   // s at either end in which no change begins. Choice
   double least_explained = 0.1;  // - of the squares of the residual after the onset. Choice
-  double learned_from_one = 2;   // of the threshold, of a joint of an arm of which one record is healthy: how
-                                 // far another task is from it is not known. Measured: a UR5 needs 1.6
-  double least_of_two = 0.003;   // - of the rms target of two inertias, that it explains at least: teeth that
-                                 // ring and cross the gap leave as much. Choice
-  double errors_of_side = 4;     // standard errors of the share of friction that loads the teeth. Choice
-  double worst_side = 0.4;       // -, of that share from 0 or 1, with its errors. Choice: 0.5 is neither
+  double least_ramp = 1.5;  // of `drift`, that friction grows by. Simulation: friction that wanders by 2 %
+                            // from minute to minute looks like 1.3
+  double learned_from_one = 2;  // of the threshold, of a joint of an arm of which one record is healthy: how
+                                // far another task is from it is not known. Measured: a UR5 needs 1.6
+  double least_of_two = 0.003;  // - of the rms target of two inertias, that it explains at least: teeth that
+                                // ring and cross the gap leave as much. Choice
+  double errors_of_side = 4;    // standard errors of the share of friction that loads the teeth. Choice
+  double worst_side = 0.4;      // -, of that share from 0 or 1, with its errors. Choice: 0.5 is neither
   double least_further =
       0.05;               // - of the first change's gain. Simulation: what a first one leaves by its shape
   double undone = 0.3;    // - of a change's size, that one which takes it back may leave. Choice

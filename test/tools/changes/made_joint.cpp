@@ -10,7 +10,9 @@ namespace {
 constexpr double kEncoderNoise = 2e-6, kTurn = 0.05;  // rad; N m over which the gap is crossed
 constexpr double kStep = 1e-3;                        // s, of differences
 constexpr double kPayloadArm = 0.5;                   // m, at which a payload hangs
+constexpr double kSlow = 0.08;                        // rad/s, below which friction is more
 constexpr double kPush = 1.5;                         // s
+constexpr double kGain = 0.3;                         // -, by a tenth of which the smallest gain is more
 constexpr double kEarth = 9.81;                       // m/s^2
 
 double sign(double w) {
@@ -85,7 +87,9 @@ Joint::Joint(Random& random, const MadeOptions& made)
       cooling(uniform(random, 60, 150)),
       noise(uniform(random, 0.02, 0.06)),
       options(made),
-      colour_time(uniform(random, 0.05, 0.5)) {
+      colour_time(uniform(random, 0.05, 0.5)),
+      wander_time(uniform(random, 60, 240)),
+      stribeck(random() % 2 ? uniform(random, 0.1, 0.4) : 0) {
   if (!options.two) return;
   inertia *= 3;
   motor_inertia = inertia * uniform(random, 0.1, 0.6);
@@ -108,7 +112,8 @@ record::Record Joint::record(Random& random, double duration, bool cold, bool re
   for (int k = 0; k < int(duration * rate); ++k) {
     const double t = k / rate;
     const double temperature = 1 + (cold ? warm * std::exp(-stamp / cooling) : 0) +
-                               options.wander * std::sin(2 * M_PI * stamp / 600 + task.phase());
+                               options.wander * std::sin(2 * M_PI * stamp / 600 + task.phase()) +
+                               options.wander * std::sin(2 * M_PI * stamp / wander_time + 2 * task.phase());
     const double late = added.of("presliding", t) *
                         (bristles.next(task(t) - task(t - 1 / rate), 1 / added.width) - sign(task(t, 1)));
     const double slip = added.of("encoder_slip", t);
@@ -116,8 +121,8 @@ record::Record Joint::record(Random& random, double duration, bool cold, bool re
     r.time.push_back(stamp);
     r.column(record::Channel::motor_position).push_back(shown + encoder(random));
     r.column(record::Channel::motor_torque)
-        .push_back(torque(task, t, temperature, added) + late + white(random) +
-                   options.coloured * noise * coloured.next(random));
+        .push_back((1 + added.of("motor_torque_gain", t)) * torque(task, t, temperature, added) + late +
+                   white(random) + options.coloured * noise * coloured.next(random));
     if (options.two) r.column(record::Channel::load_position).push_back(task(t) + slip + encoder(random));
     stamp += 1 / rate;
     if (t > next_rest) {  // nothing is published
@@ -146,6 +151,7 @@ double Joint::value(const std::string& effect) const {
   if (effect == "gravity" || effect == "payload") return gravity;
   if (effect == "backlash" || effect == "growing_backlash") return backlash;
   if (effect == "mesh_stiffness") return compliance;
+  if (effect == "motor_torque_gain") return kGain;
   return inertia;
 }
 
@@ -159,9 +165,10 @@ double Joint::load(const Task& task, double t, double temperature, const Added& 
                      (options.two ? 0 : a.growth_of("friction_drift", t)) +
                      a.of("load_dependent_friction", t) * std::fabs(free);
   const double fault = a.of("local_fault", t) * (w > 0 ? a.forward : a.backward) * bump(a, q);
-  return free + temperature * (viscous * w + coulomb * sign(w)) +
+  const double rubs = coulomb * sign(w) * (1 + stribeck * std::exp(-w * w / (kSlow * kSlow)));
+  return free + temperature * (viscous * w + rubs) +
          (a.of("load_viscous", t) + (options.two ? 0 : a.of("motor_viscous", t))) * w + dry * sign(w) +
-         fault + a.of("cogging", t) * std::sin(a.order * q + a.phase) +
+         fault + a.of("asymmetric_coulomb", t) + a.of("cogging", t) * std::sin(a.order * q + a.phase) +
          (t < a.since + kPush ? a.of("push", t) : 0) +
          a.of("stribeck", t) * sign(w) * std::exp(-w * w / 0.1) +
          a.of("swing", t) * sign(w) * std::sin(M_PI * t) + options.wave * noise * sign(w) * std::sin(25 * q) +

@@ -17,7 +17,7 @@ using Random = std::mt19937_64;
 struct MadeOptions {
   double sampling = 50;   // Hz
   bool two = false;       // inertias
-  double wander = 0.02;   // - of friction, up and down in ten minutes
+  double wander = 0.02;   // - of friction, amplitude: up and down in ten minutes, and again in one to four
   double wave = 0;        // of the white noise: friction 25 times per rad that no effect has, when healthy
   bool cyclic = false;    // tasks of one sine, of the record that is judged
   double coloured = 0.5;  // - of the white noise, rms of first order noise beside it
@@ -71,11 +71,13 @@ struct Joint {
   double inertia, viscous, coulomb, gravity, warm, cooling, noise;
   MadeOptions options;
   double colour_time = 0;  // s
+  double wander_time = 0;  // s, of the quicker part
+  double stribeck = 0;     // - of dry friction, that it is more at rest
   double motor_inertia = 0, motor_coulomb = 0, backlash = 0, compliance = 0;
 
   Joint(Random& random, const MadeOptions& made);
 
-  /// `cold`: whether it begins so. Friction wanders up and down in ten minutes.
+  /// `cold`: whether it begins so. Friction wanders.
   record::Record record(Random& random, double duration, bool cold, bool rests,
                         const Added& added = {}) const;
 

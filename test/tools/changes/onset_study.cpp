@@ -46,6 +46,8 @@ const std::vector<Drawn>& one_inertia() {
       {"local_fault", {2, 4, 8}, Drawn::noise, "local_fault", "forward", {}},
       {"encoder_slip", {0.01, 0.02, 0.04}, Drawn::absolute, "encoder_slip", "offset", {}},
       {"friction_drift", {0.2, 0.4, 0.8}, Drawn::healthy, "friction_drift", "change", {}},
+      {"motor_torque_gain", {0.1, 0.2, 0.4}, Drawn::healthy, "motor_torque_gain", "gain", {}},
+      {"asymmetric_coulomb", {1, 2, 4}, Drawn::noise, "asymmetric_coulomb", "torque", {}},
   };
   return all;
 }
@@ -64,6 +66,7 @@ const std::vector<Drawn>& two_inertias() {
       {"local_fault", {2, 4, 8}, Drawn::noise, "local_fault", "forward", {}},
       {"tooth", {1e-5, 3e-5, 1e-4}, Drawn::absolute, "local_fault", "forward", {}},
       {"encoder_slip", {1e-5, 3e-5, 1e-4}, Drawn::absolute, "encoder_slip", "offset", {}},
+      {"motor_torque_gain", {0.1, 0.2, 0.4}, Drawn::healthy, "motor_torque_gain", "gain", {}},
   };
   return all;
 }
