@@ -171,6 +171,7 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
 /// is.
 bool ChangeSearch::is_drift(const FoundChange& f) const {
   const double span = settings_.block * double(f.to - f.from);
+  if (f.score.gain < settings_.over_healthy * scores_.most_growth(f.effect)) return true;
   return std::fabs(f.score.values[0]) * span <
          settings_.least_ramp * std::max(1.0, settings_.wander_time / span) * model_.drift;
 }

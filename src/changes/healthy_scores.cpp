@@ -9,7 +9,12 @@ HealthyScores::HealthyScores(const HealthyModel& model, const ChangeSettings& se
     : records_(model.records),
       left_(model.left),
       variance_(model.noise * model.noise),
-      window_(settings.window) {}
+      window_(settings.window),
+      block_(settings.block),
+      margin_(settings.margin) {
+  for (const SampledMotion& motion : *records_)
+    backgrounds_.push_back(background_of(model, motion, settings));
+}
 
 double HealthyScores::inflation(const ChangeEffect& effect) const {
   double most = 1;
@@ -17,6 +22,18 @@ double HealthyScores::inflation(const ChangeEffect& effect) const {
     const SampledMotion& motion = (*records_)[r];
     most = std::max(most,
                     score_inflation(motion, left_[r], *effect_columns(motion, effect), variance_, window_));
+  }
+  return most;
+}
+
+double HealthyScores::most_growth(const ChangeEffect& effect) const {
+  const auto margin = static_cast<std::size_t>(margin_ / block_);
+  double most = 0;
+  for (std::size_t r = 0; r < records_->size(); ++r) {
+    const SampledMotion& motion = (*records_)[r];
+    const EffectSums sums(motion, *effect_columns(motion, effect), backgrounds_[r], block_, effect.ramp);
+    for (std::size_t k = margin; k + margin < sums.blocks(); ++k)
+      most = std::max(most, sums.score(k, sums.blocks(), backgrounds_[r]).gain);
   }
   return most;
 }

@@ -26,7 +26,13 @@ double sign(double x) {
   return x < 0 ? -1 : 1;
 }
 
-record::Record made(unsigned seed, double duration, Added added) {
+double healthy_torque(const Motion& m) {
+  const double warm = 1 + 0.3 * std::exp(-m.t / 80);
+  return 0.45 * m.a + warm * (1.1 * m.w + 0.75 * sign(m.w)) + 3 * std::sin(m.q);
+}
+
+/// `reach`: of the positions, over 1.7 rad.
+record::Record made(unsigned seed, double duration, Added added, double reach = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, kNoise);
   std::uniform_real_distribution<double> phase(0, 2 * M_PI);
@@ -38,16 +44,13 @@ record::Record made(unsigned seed, double duration, Added added) {
     Motion m{k / kRate, 0, 0, 0};
     for (int i = 0; i < 3; ++i) {
       const double w = 2 * M_PI * f[i];
-      m.q += a[i] * std::sin(w * m.t + p[i]);
-      m.w += a[i] * w * std::cos(w * m.t + p[i]);
-      m.a -= a[i] * w * w * std::sin(w * m.t + p[i]);
+      m.q += reach * a[i] * std::sin(w * m.t + p[i]);
+      m.w += reach * a[i] * w * std::cos(w * m.t + p[i]);
+      m.a -= reach * a[i] * w * w * std::sin(w * m.t + p[i]);
     }
-    const double warm = 1 + 0.3 * std::exp(-m.t / 80);
     r.time.push_back(m.t);
     r.column(record::Channel::motor_position).push_back(m.q);
-    r.column(record::Channel::motor_torque)
-        .push_back(0.45 * m.a + warm * (1.1 * m.w + 0.75 * sign(m.w)) + 3 * std::sin(m.q) + added(m) +
-                   noise(random));
+    r.column(record::Channel::motor_torque).push_back(healthy_torque(m) + added(m) + noise(random));
   }
   return r;
 }
@@ -130,6 +133,8 @@ const Case kCases[] = {
        return m.t < kOnset ? 0 : 0.06 * std::fabs(0.45 * m.a + 3 * std::sin(m.q)) * sign(m.w);
      },
      "coefficient", 0.06},
+    {"motor_torque_gain",  // all that is recorded is 6 % more
+     [](const Motion& m) { return m.t < kOnset ? 0 : 0.06 * healthy_torque(m); }, "gain", 0.06},
 };
 INSTANTIATE_TEST_SUITE_P(Effects, ChangesOf, testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.effect; });
@@ -145,6 +150,50 @@ TEST(Changes, APayloadIsGravityWithInertia) {
   EXPECT_NEAR(c.size[0].measured.value, 1.6, 3 * c.size[0].measured.standard_error);
   EXPECT_EQ(c.size[2].name, "inertia");
   EXPECT_NEAR(c.size[2].measured.value, 0.08, 3 * c.size[2].measured.standard_error);
+}
+
+// Within 0.6 rad of where the load pulls most its gravity is nearly a constant, and that explains 99 % of
+// what gravity does. What it leaves stands out of the noise all the same.
+TEST(Changes, AGravityThatIsNearlyAConstantIsNoOffset) {
+  const Changes found = changes_of(made(
+      30, 200, [](const Motion& m) { return m.t < kOnset ? 0 : 0.6 * std::cos(m.q); }, 0.35));
+  ASSERT_EQ(found.changes.size(), 1u);
+  EXPECT_EQ(found.changes.front().effect, "gravity");
+}
+
+// Up and down by 3 % of dry friction in two minutes, as oil and temperature have it.
+TEST(Changes, FrictionThatWandersHasNone) {
+  for (unsigned seed = 70; seed < 74; ++seed)
+    EXPECT_TRUE(changes_of(made(seed, 240,
+                                [](const Motion& m) {
+                                  return 0.03 * 0.75 * sign(m.w) * std::sin(2 * M_PI * m.t / 120 + 1);
+                                }))
+                    .changes.empty())
+        << seed;
+}
+
+// Of a machine with more friction at rest, which falls as it warms up, too: begun cold, and begun warm.
+TEST(Changes, AWarmUpOfAllFrictionIsNone) {
+  const auto stribeck = [](const Motion& m) {
+    return (1 + 0.3 * std::exp(-m.t / 80)) * 0.25 * sign(m.w) * std::exp(-m.w * m.w / (0.1 * 0.1));
+  };
+  for (const double from : {0, 100})
+    EXPECT_TRUE(detect_changes(one_inertia(), {made(1, 240, stribeck), made(2, 240, stribeck)},
+                               made(80, 240 + from, stribeck).slice(from, 240 + from))
+                    .changes.empty())
+        << from;
+}
+
+// Friction that grows moving forward only is two effects at once, of which the larger is told. That it shows
+// late, with the next move forward, is in its interval.
+TEST(Changes, TheOnsetOfFrictionOfOneDirectionHolds) {
+  for (unsigned seed = 90; seed < 96; ++seed) {
+    const Changes found =
+        changes_of(made(seed, 200, [](const Motion& m) { return m.t < kOnset || m.w < 0 ? 0 : 0.25; }));
+    ASSERT_FALSE(found.changes.empty()) << seed;
+    EXPECT_LE(found.changes.front().since_from, kOnset) << seed;
+    EXPECT_GE(found.changes.front().since_to, kOnset) << seed;
+  }
 }
 
 TEST(Changes, ThatEndAreToldWithTheirEnd) {

@@ -111,9 +111,10 @@ record::Record Joint::record(Random& random, double duration, bool cold, bool re
   double stamp = 0, next_rest = rests ? uniform(random, 200, 600) : 1e300;
   for (int k = 0; k < int(duration * rate); ++k) {
     const double t = k / rate;
-    const double temperature = 1 + (cold ? warm * std::exp(-stamp / cooling) : 0) +
-                               options.wander * std::sin(2 * M_PI * stamp / 600 + task.phase()) +
-                               options.wander * std::sin(2 * M_PI * stamp / wander_time + 2 * task.phase());
+    const double temperature =
+        1 + (cold ? warm * std::exp(-stamp / cooling) : 0) +
+        options.wander * std::sin(2 * M_PI * stamp / 600 + task.phase()) +
+        0.5 * options.wander * std::sin(2 * M_PI * stamp / wander_time + 2 * task.phase());
     const double late = added.of("presliding", t) *
                         (bristles.next(task(t) - task(t - 1 / rate), 1 / added.width) - sign(task(t, 1)));
     const double slip = added.of("encoder_slip", t);

@@ -15,11 +15,12 @@ namespace backlash::change_study {
 using Random = std::mt19937_64;
 
 struct MadeOptions {
-  double sampling = 50;   // Hz
-  bool two = false;       // inertias
-  double wander = 0.02;   // - of friction, amplitude: up and down in ten minutes, and again in one to four
-  double wave = 0;        // of the white noise: friction 25 times per rad that no effect has, when healthy
-  bool cyclic = false;    // tasks of one sine, of the record that is judged
+  double sampling = 50;  // Hz
+  bool two = false;      // inertias
+  double wander =
+      0.02;             // - of friction, amplitude: up and down in ten minutes, and half of it in one to four
+  double wave = 0;      // of the white noise: friction 25 times per rad that no effect has, when healthy
+  bool cyclic = false;  // tasks of one sine, of the record that is judged
   double coloured = 0.5;  // - of the white noise, rms of first order noise beside it
 };
 
