@@ -56,7 +56,7 @@ run_tests rostests_alone 1 "${alone[@]}"
 
 echo "Checking style, documentation, installation and faults"
 check catkin_lint catkin_lint --strict "${REPO}"
-for part in licence format tidy headers rooms pages; do
+for part in licence format tidy headers rooms lanes pages; do
   check "${part}" bash "${REPO}/scripts/check_style.sh" "${part}"
 done
 check api_doc bash "${REPO}/scripts/api_doc.sh" "${WS}/doc"

@@ -22,13 +22,10 @@ _CONNECT, _WORKERS = 10, 60  # s: until a scheduler answers, until it has a work
 
 def _distributed():
     try:
-        import cloudpickle
         import dask
         import distributed
     except ImportError as error:
         raise internal("%s (Debian: python3-distributed)" % error) from None
-    # Sent by value: workers elsewhere need none of these files.
-    cloudpickle.register_pickle_by_value(task)
     dask.config.set({
         "distributed.scheduler.allowed-failures": 3,      # workers that a record may take with it
         "distributed.scheduler.worker-saturation": "inf",  # the client bounds what is on its way
@@ -39,6 +36,14 @@ def _distributed():
         "distributed.admin.system-monitor.interval": "5s",
     })
     return distributed
+
+
+def _by_value(function):
+    """A copy that is no longer that of its module, so that pickle, which Dask tries first, refuses it and cloudpickle
+    sends it whole: workers elsewhere, and since Dask 2024 schedulers, need none of these files."""
+    import cloudpickle
+    cloudpickle.register_pickle_by_value(task)
+    return cloudpickle.loads(cloudpickle.dumps(function))
 
 
 class Stopped(FleetError):
@@ -52,6 +57,7 @@ class Engine:
     def __init__(self, address, cores=None):
         self._address, self._cores = address, cores
         self._distributed = _distributed()
+        self._run_all = _by_value(task.run_all)
         self._cluster = self._client = None
         self._futures = {}
         self._size = 1  # records of a group
@@ -147,7 +153,7 @@ class Engine:
         if not groups:
             return
         keys = ["%s-%s" % ("alone" if group[0].get("alone") else "records", group[0]["key"]) for group in groups]
-        futures = self._client.map(task.run_all, groups, key=keys, pure=False, retries=0)
+        futures = self._client.map(self._run_all, groups, key=keys, pure=False, retries=0)
         for key, group, future in zip(keys, groups, futures):
             flying[key] = group
             self._futures[key] = future

@@ -11,6 +11,8 @@
 
 namespace backlash::diagnosis {
 
+/// On the stack only: memory for a std::vector of them is aligned to alignof(), which g++ caps at 16 bytes
+/// without AVX, and functions compiled for AVX2 take them to lie at multiples of 32 or 64.
 using WaveformLanes = double __attribute__((vector_size(8 * kWaveformSets)));
 
 /// a^n for a >= 0, 1 <= n <= 2, to 1e-13 of the value; what is below 1e-150 counts as 0.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <utility>
 #if defined(__SSE2__)
 #include <emmintrin.h>
@@ -179,13 +180,13 @@ State start(const Train<Output, Law>& train, const WaveformWindow& window, const
   return s;
 }
 
-void put(const Lanes& from, std::array<double, kWaveformSets>& to) {
-  for (int i = 0; i < kWaveformSets; ++i) to[static_cast<std::size_t>(i)] = from[i];
+WAVEFORM_INLINE void put(const Lanes& from, std::array<double, kWaveformSets>& to) {
+  std::memcpy(to.data(), &from, sizeof from);
 }
 
 /// Torque `lag` ago, by the cubic through values and rates at either end of a step of the integration
 /// (Hermite). Between samples it would miss some per cent of the ring.
-double lagged(const std::vector<Lanes>& torque, const std::vector<Lanes>& rate, int step, int set, double lag,
+double lagged(const WaveformRows& torque, const WaveformRows& rate, int step, std::size_t set, double lag,
               double interval) {
   const double x = step - lag / interval;
   const int last = static_cast<int>(torque.size()) - 2;
@@ -233,7 +234,7 @@ WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& 
   const Drive drive(window, grid, v[kSwitchDelay]);
   const Lanes zero = v[kPositionZero] + v[kStartZero];
   const auto count = static_cast<std::size_t>(samples);
-  static thread_local std::vector<Lanes> torque, rate;
+  static thread_local WaveformRows torque, rate;
   const auto steps = static_cast<std::size_t>(grid.steps), all = (count - 1) * steps + 1;
   torque.resize(all), rate.resize(all);
   motion.torque.resize(count), motion.position.resize(count);
@@ -243,8 +244,8 @@ WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& 
   for (std::size_t k = 0; k < count; ++k) {
     put(s.qm + zero, motion.position[k]);
     for (std::size_t j = 0; j < steps; ++j) {
-      torque[k * steps + j] = v[kSensorGain] * shown + v[kSensorBias];
-      rate[k * steps + j] = v[kSensorGain] * shown_rate;
+      put(v[kSensorGain] * shown + v[kSensorBias], torque[k * steps + j]);
+      put(v[kSensorGain] * shown_rate, rate[k * steps + j]);
       if (k + 1 == count) break;
       train.step(drive.at(k, static_cast<int>(j)) + v[kDriveOffset], h, s);
       shown += follow * (train.ki * (s.qm - s.qp) + damper * (s.wm - s.wp) - shown);
@@ -253,8 +254,7 @@ WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& 
   }
   for (std::size_t k = 0; k < count; ++k)
     for (std::size_t i = 0; i < kWaveformSets; ++i)
-      motion.torque[k][i] =
-          lagged(torque, rate, static_cast<int>(k * steps), static_cast<int>(i), sets[kSensorLag][i], h);
+      motion.torque[k][i] = lagged(torque, rate, static_cast<int>(k * steps), i, sets[kSensorLag][i], h);
 }
 
 template <WaveformOutput Output>

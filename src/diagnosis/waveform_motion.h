@@ -88,8 +88,9 @@ struct WaveformGrid {
 };
 
 /// One column per set; all have `samples` rows.
+using WaveformRows = std::vector<std::array<double, kWaveformSets>>;
 struct WaveformMotion {
-  std::vector<std::array<double, kWaveformSets>> torque, position;
+  WaveformRows torque, position;
 };
 
 /// `motion` keeps its memory from call to call.

@@ -12,6 +12,8 @@
 namespace backlash::simulation {
 
 constexpr int kLanes = 4;
+/// On the stack, or in a struct that says alignas(sizeof(Lanes)): memory for other things is aligned to
+/// alignof(), which g++ caps at 16 bytes without AVX, and functions compiled for AVX2 count on 32.
 using Lanes = double __attribute__((vector_size(8 * kLanes)));
 
 #define BACKLASH_LANES inline __attribute__((always_inline))
