@@ -10,6 +10,11 @@
 #include "onset_threshold.h"
 
 namespace backlash::changes {
+namespace {
+
+constexpr double kNone = 1e-9;  // of a spread
+
+}  // namespace
 
 ChangeSearch::ChangeSearch(const HealthyModel& model, const SampledMotion& motion,
                            std::vector<ChangeEffect> candidates, const HealthyScores& scores,
@@ -167,6 +172,16 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
   return without - b.columns * (b.inverse * (b.columns.transpose() * without / b.variance));
 }
 
+/// Whether friction that wanders has a part in it: then most of it is gone where friction may not.
+bool ChangeSearch::needs_wander(const FoundChange& f, const Background& b) const {
+  Background steady = b;
+  steady.spread.segment(first_.wander, first_.wanders).setConstant(kNone);
+  steady.solve();
+  const Eigen::VectorXd& x = f.score.values;
+  const EffectSums::Score s = sums_of(f, steady).score(f.from, f.to, steady);
+  return s.values.size() != x.size() || s.values.dot(x) < settings_.least_steadily * x.squaredNorm();
+}
+
 /// Growth of friction as a healthy machine may have it; what is quicker than its wander looks larger than it
 /// is.
 bool ChangeSearch::is_drift(const FoundChange& f) const {
@@ -180,7 +195,8 @@ bool ChangeSearch::believed(const FoundChange& f, const Background& b) const {
   double rows = 0;
   const double squares = f.effect.at_place() ? left_at(f, b.left(), rows) : left_after(b, f.from, f.to, rows);
   const double explained = f.score.gain * b.variance;
-  if (f.effect.ramp && motion_.sampling.channel == ChangeChannel::torque && is_drift(f)) return false;
+  const bool torque = motion_.sampling.channel == ChangeChannel::torque;
+  if (torque && ((f.effect.ramp && is_drift(f)) || needs_wander(f, b))) return false;
   if (explained < settings_.least_explained * squares) return false;
   if (explained < rows * model_.least_change * model_.least_change) return false;
   // More noise than in the healthy records counts against it.

@@ -378,6 +378,7 @@ std::vector<Rest> rests_of(const SampledMotion& motion, const ChangeSettings& se
 struct Nuisances {
   std::vector<OfMoment> columns;
   std::vector<double> spread;
+  Eigen::Index wanders = 0;  // how many of the columns, the first ones, are of what wanders
 
   void add(OfMoment column, double of_values) {
     columns.push_back(std::move(column));
@@ -454,10 +455,12 @@ Nuisances nuisances_of(const HealthyModel& model, const SampledMotion& motion,
                        const ChangeSettings& settings) {
   Nuisances out;
   const double length = motion.moments.back().time;
+  const bool torque = motion.sampling.channel == ChangeChannel::torque;
   add_wander(model, length, settings, out);
-  if (motion.sampling.channel == ChangeChannel::deflection) return out;
+  if (torque) out.add([=](const Moment& m) { return m.direction * (m.time / length - 0.5); }, model.drift);
+  out.wanders = static_cast<Eigen::Index>(out.columns.size());
+  if (!torque) return out;
   add_warm_rest(model, out);
-  out.add([=](const Moment& m) { return m.direction * (m.time / length - 0.5); }, model.drift);
   if (motion.sampling.chain) out.add([](const Moment& m) { return m.chain; }, settings.chain_share);
   for (const Rest& rest : rests_of(motion, settings)) add_rest(model, rest, out);
   return out;
@@ -472,6 +475,8 @@ Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, con
   out.residual = motion.target - known * model.values;
   const Nuisances more = nuisances_of(model, motion, settings);
   out.nuisances = beside(known, columns(motion, more.columns));
+  out.wander = known.cols();
+  out.wanders = more.wanders;
   const auto count = static_cast<Eigen::Index>(more.spread.size());
   out.spread.resize(model.spread.size() + count);
   out.spread << model.spread, Eigen::Map<const Eigen::VectorXd>(more.spread.data(), count);

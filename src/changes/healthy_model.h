@@ -51,7 +51,8 @@ Eigen::VectorXd expected_squares(const HealthyModel& model, const SampledMotion&
 struct Whitened {
   Eigen::VectorXd residual;  // N m or rad
   Eigen::MatrixXd nuisances;
-  Eigen::VectorXd spread;  // standard deviation of each
+  Eigen::VectorXd spread;                // standard deviation of each
+  Eigen::Index wander = 0, wanders = 0;  // the first of the columns of what wanders, and how many
 };
 Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings);
 
