@@ -172,14 +172,18 @@ Eigen::VectorXd ChangeSearch::left_with(const FoundChange& f, const Background& 
   return without - b.columns * (b.inverse * (b.columns.transpose() * without / b.variance));
 }
 
-/// Whether friction that wanders has a part in it: then most of it is gone where friction may not.
-bool ChangeSearch::needs_wander(const FoundChange& f, const Background& b) const {
+/// Its values where friction may not wander beside it; none where the record cannot tell so.
+Eigen::VectorXd ChangeSearch::values_without_wander(const FoundChange& f, const Background& b) const {
   Background steady = b;
   steady.spread.segment(first_.wander, first_.wanders).setConstant(kNone);
   steady.solve();
-  const Eigen::VectorXd& x = f.score.values;
-  const EffectSums::Score s = sums_of(f, steady).score(f.from, f.to, steady);
-  return s.values.size() != x.size() || s.values.dot(x) < settings_.least_steadily * x.squaredNorm();
+  return sums_of(f, steady).score(f.from, f.to, steady).values;
+}
+
+/// Whether friction that wanders has a part in it: then most of it is gone where friction may not.
+bool ChangeSearch::needs_wander(const FoundChange& f, const Background& b) const {
+  const Eigen::VectorXd &x = f.score.values, without = values_without_wander(f, b);
+  return without.size() != x.size() || without.dot(x) < settings_.least_steadily * x.squaredNorm();
 }
 
 /// Growth of friction as a healthy machine may have it; what is quicker than its wander looks larger than it
@@ -445,6 +449,9 @@ Change ChangeSearch::told(const FoundChange& f, const std::vector<FoundChange>& 
   change.error_after = std::sqrt(after);
   Eigen::VectorXd values = f.score.values;
   Eigen::MatrixXd covariance = f.score.covariance * f.inflation * std::max(1.0, after / b.variance);
+  // How friction wanders is not known either.
+  if (const Eigen::VectorXd without = values_without_wander(f, b); without.size() == values.size())
+    covariance.diagonal() += (without - values).cwiseAbs2();
   const Eigen::Index wave = std::min<Eigen::Index>(values.size(), 2);
   covariance.diagonal().head(wave).array() += std::pow(settings_.model_error * values.head(wave).norm(), 2);
   for (Eigen::Index i = wave; i < values.size(); ++i)

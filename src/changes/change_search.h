@@ -61,6 +61,7 @@ class ChangeSearch {
   bool leaves_more(const FoundChange& f, const FoundChange& most, const Background& b) const;
   FoundChange scanned(const ChangeEffect& e, const Background& b, std::size_t step) const;
   Eigen::VectorXd left_with(const FoundChange& f, const Background& b) const;
+  Eigen::VectorXd values_without_wander(const FoundChange& f, const Background& b) const;
   bool needs_wander(const FoundChange& f, const Background& b) const;
   bool is_drift(const FoundChange& f) const;
   bool believed(const FoundChange& f, const Background& b) const;
