@@ -10,31 +10,21 @@
 #include "backlash_diagnosis/arm/dynamics.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/record/resampling.h"
-#include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "flank_stays.h"
+#include "play_fit.h"
 
 namespace backlash::geared_arm {
 namespace {
 
 using record::Channel;
 
-constexpr double kHertz = 2.0 / 3;    // theory: deflection over torque of a Hertzian contact
-constexpr double kSameColumn = 1e-9;  // of its size: a column that is constant tells nothing
-
 /// What the fit of one joint looks at: one row per low-passed sample.
-struct Rows {
-  std::vector<double> torque, twist, position, speed;
+struct Rows : FlankRows {
   std::vector<double> sign, lacking;  // S; of the motor's torque, beyond chain and rotor [N m]
   double noise = 0;                   // of lacking: sum of variances [N^2 m^2]
   std::vector<bool> first;            // of a stretch
   std::size_t size() const { return torque.size(); }
-};
-
-struct Fit {
-  double play = 0, error = 0, slope = 0, residual = 0;
-  double compliance = 0;  // rad/(N m), at the mean load
-  double degrees = 0;     // of freedom: stays less what is fitted
 };
 
 /// The record with the link's own angle as position: the chain moves with it, not with the motor.
@@ -97,51 +87,6 @@ double disagreement(const Rows& rows) {
   return load > 0 ? std::sqrt(std::fmax(0, left.squaredNorm() - rows.noise) / load) : 0;
 }
 
-Eigen::MatrixXd columns_of(const Rows& rows, const std::vector<int>& sides,
-                           const std::vector<std::size_t>& used, double power) {
-  Eigen::MatrixXd x(Eigen::Index(used.size()), 5);
-  for (Eigen::Index r = 0; r < x.rows(); ++r) {
-    const std::size_t k = used[std::size_t(r)];
-    x.row(r) << sides[k] / 2.0, std::copysign(std::pow(std::fabs(rows.torque[k]), power), rows.torque[k]), 1,
-        rows.position[k], rows.speed[k];
-  }
-  for (Eigen::Index c = 3; c < 5; ++c) {  // less correlated so
-    x.col(c).array() -= x.col(c).mean();
-    if (x.col(c).norm() < kSameColumn * std::sqrt(double(x.rows()))) x.col(c).setZero();
-  }
-  return x;
-}
-
-Fit fit(const Rows& rows, const std::vector<int>& sides, const std::vector<std::size_t>& stay, double power) {
-  std::vector<std::size_t> used;
-  for (std::size_t k = 0; k < sides.size(); ++k)
-    if (sides[k] != 0) used.push_back(k);
-  const Eigen::MatrixXd x = columns_of(rows, sides, used, power);
-  Eigen::VectorXd y(x.rows());
-  for (Eigen::Index r = 0; r < y.size(); ++r) y[r] = rows.twist[used[std::size_t(r)]];
-  const Eigen::VectorXd scale = x.colwise().norm().cwiseMax(1e-300).transpose();
-  const Eigen::MatrixXd scaled = x * scale.cwiseInverse().asDiagonal();
-  const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(scaled);
-  const Eigen::VectorXd b = solver.solve(y), residual = y - scaled * b;
-  const Eigen::MatrixXd inverse = solver.pseudoInverse();
-  const std::size_t stays = *std::max_element(stay.begin(), stay.end()) + 1;
-  std::vector<double> influence(stays, 0.0);  // of each stay's residuals on the play
-  for (Eigen::Index r = 0; r < y.size(); ++r)
-    influence[stay[used[std::size_t(r)]]] += inverse(0, r) * residual[r];
-  double variance = 0;
-  for (const double each : influence) variance += each * each;
-  Fit f;
-  f.degrees = std::fmax(1, double(stays) - double(solver.rank()));
-  f.play = b[0] / scale[0];
-  f.error = std::sqrt(variance * double(stays) / f.degrees) / scale[0];
-  f.slope = b[1] / scale[1];
-  double load = 0;
-  for (const std::size_t k : used) load += std::fabs(rows.torque[k]) / double(used.size());
-  f.compliance = f.slope * power * std::pow(load, power - 1);
-  f.residual = std::sqrt(residual.squaredNorm() / double(y.size()));
-  return f;
-}
-
 /// Where gravity would press the other flank by twice the least load: the nearest to where the joint was.
 std::optional<double> showing_pose(const arm::Chain& chain, const arm::Joints& mean, std::size_t joint,
                                    int wanted, double least) {
@@ -172,37 +117,36 @@ std::string one_flank_message(const JointPlay& play, bool any, double least) {
                      : "; faster motion or a pose in which gravity loads the joint would do");
 }
 
-void judge(JointPlay& play, const Rows& rows, const std::vector<int>& sides,
-           const std::vector<std::size_t>& stay, double friction, const PlaySettings& settings) {
-  const Fit spring = fit(rows, sides, stay, 1), hertz = fit(rows, sides, stay, kHertz);
-  const bool bends = hertz.residual < spring.residual;
-  const Fit &best = bends ? hertz : spring, &other = bends ? spring : hertz;
-  const bool told_apart = other.residual > settings.same_fit * best.residual;
+void judge(JointPlay& play, const Rows& rows, double friction, const PlaySettings& settings) {
+  const FlankPlayFit fit = fit_flank_play(rows);
   diagnosis::Estimate& e = play.estimate;
-  e.components = diagnosis::PlayComponents{best.play, best.compliance, kNaN, kNaN};
+  e.components = diagnosis::PlayComponents{fit.play, fit.compliance, kNaN, kNaN};
   // What friction behind the gap does to the deflection is in the interval, and no teeth that float.
-  if (best.residual > settings.worst_residual * std::fabs(best.play) && best.play > 3 * best.error &&
-      best.residual > friction * std::fabs(best.compliance)) {
+  if (fit.residual > settings.worst_residual * std::fabs(fit.play) && fit.play > 3 * fit.error &&
+      fit.residual > friction * std::fabs(fit.compliance)) {
     e.status = diagnosis::Status::ambiguous;
     e.message = fmt::format(
-        "cannot tell: the teeth do not rest on their flanks, {:.2g} rad are left of the fit", best.residual);
+        "cannot tell: the teeth do not rest on their flanks, {:.2g} rad are left of the fit", fit.residual);
     return;
   }
-  const double t = signal::student_t_quantile(0.975, best.degrees);
-  const double half = std::hypot(std::hypot(t * best.error, settings.bend * best.play),
-                                 2 * friction * std::fabs(best.compliance));
-  const double apart = told_apart ? 0 : other.play - best.play;
-  e.angle_lower = std::fmax(0, best.play + std::fmin(0, apart) - half);
-  e.angle_upper = std::fmax(0, best.play + std::fmax(0, apart) + half);
+  const double rest = std::hypot(settings.bend * fit.play, 2 * friction * fit.softest);
+  e.angle_lower = std::fmax(0, fit.play - std::hypot(fit.play - fit.lower, rest));
+  e.angle_upper = std::fmax(0, fit.play + std::hypot(fit.upper - fit.play, rest));
   e.from_record = true;
-  if (e.angle_lower > 0) {
-    e.status = diagnosis::Status::ok;
-    e.backlash_angle = best.play;
-    e.message = fmt::format("{} and {} stays on the two flanks by the chain's load; deflection of a {}",
-                            play.stays[1], play.stays[0], bends ? "Hertzian contact" : "spring");
-  } else {
+  if (!(e.angle_lower > 0)) {
     e.status = diagnosis::Status::below_range;
     e.message = fmt::format("no play that is larger than its interval: at most {:.3g} rad", e.angle_upper);
+  } else if (e.angle_upper - e.angle_lower > 2 * settings.vague * fit.play) {
+    e.status = diagnosis::Status::ambiguous;
+    e.message = fmt::format(
+        "cannot tell closer than {:.3g} to {:.3g} rad: the record does not tell play and the deflection of "
+        "the teeth apart",
+        e.angle_lower, e.angle_upper);
+  } else {
+    e.status = diagnosis::Status::ok;
+    e.backlash_angle = fit.play;
+    e.message = fmt::format("{} and {} stays on the two flanks by the chain's load; deflection of {}",
+                            play.stays[1], play.stays[0], fit.law);
   }
 }
 
@@ -238,8 +182,9 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
     const double most = std::fmax(std::fabs(*least), std::fabs(*largest));
     const double certain = certain_load(loads[j], most, settings);
     const double friction = std::fmax(loads[j].link_coulomb, settings.least_friction * most);
-    const std::vector<int> sides = sides_of(rows.torque, rows.first, certain, guard_rows(settings));
-    const std::vector<std::size_t> stay = stays_of(sides, play.stays);
+    rows.side = sides_of(rows.torque, rows.first, certain, guard_rows(settings));
+    rows.stay = stays_of(rows.side, play.stays);
+    rows.per_cycle = kRowsPerCycle;
     if (!two_encoders) {
       play.estimate.message = "needs load_position";
     } else if (play.stays[0] == 0 || play.stays[1] == 0) {
@@ -259,7 +204,7 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
           "what the arm carries, or fit links and drives (identify)",
           100 * play.disagreement);
     } else {
-      judge(play, rows, sides, stay, friction, settings);
+      judge(play, rows, friction, settings);
     }
     plays.push_back(std::move(play));
   }

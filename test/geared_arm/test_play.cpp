@@ -2,6 +2,7 @@
 // Plays of simulated arms, whose truth is known: right or "cannot tell", never the wrong joint.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <iostream>
 
 #include "backlash_diagnosis/base/random.h"
@@ -99,9 +100,12 @@ TEST(ArmPlay, DrawnArmsAreRightOrUnknown) {
       for (double& position : joint.excitation.moves.positions)
         position = (j == 0 ? centre : 0) + random.uniform(-1.2, 1.2);
       joint.gear->backlash = truth[j] = plays[int(random.uniform(0, 4))];
-      if (random.uniform(0, 1) < 0.4)
+      if (random.uniform(0, 1) < 0.6) {  // powers between a spring and Hertz; rad at 5 or 2 N m
+        const double exponent = random.uniform(1.05, 1.5), yields = random.uniform(5e-4, 2e-3);
+        const double stiffness = (j == 0 ? 5 : 2) / std::pow(yields, exponent);
         joint.gear->contact = model::make_contact_law(
-            "hunt_crossley", {{"stiffness", j == 0 ? 3e5 : 1e5}, {"exponent", 1.5}, {"alpha", 0.5}});
+            "hunt_crossley", {{"stiffness", stiffness}, {"exponent", exponent}, {"alpha", 0.5}});
+      }
     }
     for (GearedJoint& joint : declared.joints) joint.link_coulomb = 0;
     const std::vector<JointPlay> found = diagnosed(machine, declared);

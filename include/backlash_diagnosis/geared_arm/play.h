@@ -5,17 +5,19 @@
 //   T = tau(q, v, a) + friction behind the gap,   phi = q_M - q = f + side b / 2 + g e(T) + s q + d v
 //
 // tau: the chain's torque at the joint (arm/dynamics.h), side: the sign of T where it is large for certain
-// and stays so. f: offset of the encoders, s: their scale, d: their skew in time. e(T) is that of a spring or
-// Hertz's power 2/3, whichever fits; where the record does not tell, the interval holds both. The
-// motor's torque only tells whether the declared chain is the one that moved: beyond any friction of the
-// motor it must agree with T.
+// and stays so. f: offset of the encoders, s: their scale, d: their skew in time. Under small loads, where
+// the side is not certain, e(T) is a law's: of a spring, of teeth that yield as a power of the load (Hertz
+// 2/3), of springs that harden. All that the record does not rule out are in the interval. The motor's torque
+// only tells whether the declared chain is the one that moved: beyond any friction of the motor it must agree
+// with T.
 //
 // Interval, 95 %, root of the sum of squares of
-// - scatter: Student t times the standard error, each stay on a flank counted as one (sandwich estimator over
-//   stays, see diagnosis/flank_fit.h),
+// - scatter and laws of the deflection: Student t times the standard error, each stay on a flank counted as
+//   one (sandwich estimator over stays, see diagnosis/flank_fit.h), by every law,
 // - the friction behind the gap, as uncertain as it is large, over the stiffness, on both flanks; where the
 //   file says less, 1 % of the largest load,
-// - 2 % of the play, as position_difference where the deflection bends otherwise than either.
+// - 2 % of the play, as position_difference where the deflection bends otherwise than any of them.
+// Half of it beyond 15 % of the play: "cannot tell closer than".
 #pragma once
 
 #include <optional>
@@ -40,8 +42,8 @@ struct PlaySettings {
   double settle = 1.5;  // cycles of torque_cutoff that a low-pass smears a change of flank over; choice
   std::size_t least_stays = 3;  // on each flank, for a standard error that means something; choice
   double disagreement = 0.1;    // beyond it the chain is not the one that moved; choice, see doc/arm.md
-  double same_fit = 1.1;        // ratio of residuals below which two deflections are not told apart; choice
   double bend = 0.02;           // of the play, see above
+  double vague = 0.15;  // half width of the interval, of the play, beyond which nothing is told; choice
   double worst_residual = 0.2;  // of the play: beyond it the teeth do not rest on their flanks; choice
 };
 
