@@ -19,6 +19,7 @@ constexpr double kForgotten =
     0.05;  // choice: correlation from which on the memory of a residual counts as over
 constexpr double kLongestMemory = 3;  // s; choice
 constexpr double kSettled = 1e-3;     // standard errors; choice
+constexpr double kLag = 0.1;          // of Coulomb friction, bristles and Stribeck; choice, see doc/arm.md
 
 using Mask = Eigen::Matrix<char, Eigen::Dynamic, Eigen::Dynamic>;
 
@@ -68,7 +69,9 @@ class Fit {
                 Eigen::Index to, Normal& to_block) const;
   std::vector<char> free_unknowns(bool first) const;
   void apply(const Eigen::VectorXd& step);
-  Eigen::MatrixXd covariance(const std::vector<Normal>& blocks) const;
+  Eigen::MatrixXd lags(const std::vector<std::vector<Linearised>>& all) const;
+  Eigen::MatrixXd covariance(const std::vector<Normal>& blocks,
+                             const std::vector<std::vector<Linearised>>& all) const;
   ArmFit result(const Eigen::MatrixXd& covariance, const std::vector<std::vector<Linearised>>& all) const;
   void set_drives(ArmFit& fit, const Eigen::MatrixXd& covariance) const;
   void set_payload(ArmFit& fit, const Eigen::MatrixXd& covariance) const;
@@ -218,11 +221,36 @@ ArmFit Fit::run(const Progress& progress) {
     if (i > 3 && step.dot(sum.h * step) < kSettled) break;
   }
   set_weights(all);
-  return result(covariance(blocks(all)), all);
+  return result(covariance(blocks(all), all), all);
 }
 
-/// Blocks left out, one step of Newton each, and what the declared values leave open.
-Eigen::MatrixXd Fit::covariance(const std::vector<Normal>& blocks) const {
+/// What friction that lags behind its model's would change: of each joint in the marked motions a torque that
+/// follows the acceleration, kLag of its Coulomb friction (rms). Columns: joints.
+Eigen::MatrixXd Fit::lags(const std::vector<std::vector<Linearised>>& all) const {
+  Eigen::MatrixXd g = Eigen::MatrixXd::Zero(layout_.size(), layout_.joints);
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    const auto c = Eigen::Index(j);
+    if (!moves_[j]) continue;
+    Normal sum{Eigen::MatrixXd::Zero(layout_.size(), layout_.size()), Eigen::VectorXd::Zero(layout_.size())};
+    double squares = 0, count = 0;
+    for (std::size_t m = 0; m < all.size(); ++m) {
+      if (!motions_[m].marked) continue;
+      const ArmMotion& motion = *motions_[m].motion;
+      add_rows(all[m][j], motion, j, 0, Eigen::Index(motion.rows.size()), sum);
+      squares += motion.drive[j].col(int(DriveTerm::rotor_inertia)).squaredNorm();
+      count += double(motion.rows.size());
+    }
+    if (!(squares > 0)) continue;
+    const double inertia =
+        kLag * state_.drives(c, Eigen::Index(DriveTerm::coulomb)) / std::sqrt(squares / count);
+    g.col(c) = inertia * sum.h.col(layout_.drive(c) + Eigen::Index(DriveTerm::rotor_inertia));
+  }
+  return g;
+}
+
+/// Blocks left out, one step of Newton each, what the declared values leave open, and friction that lags.
+Eigen::MatrixXd Fit::covariance(const std::vector<Normal>& blocks,
+                                const std::vector<std::vector<Linearised>>& all) const {
   const std::vector<char> free = free_unknowns(false);
   std::vector<Eigen::Index> places;
   for (std::size_t i = 0; i < free.size(); ++i)
@@ -256,7 +284,14 @@ Eigen::MatrixXd Fit::covariance(const std::vector<Normal>& blocks) const {
   const Eigen::MatrixXd centred = changes.colwise() - changes.rowwise().mean();
   const Eigen::MatrixXd open =
       solve(sum, Eigen::MatrixXd(signal::product(prior, solve(sum, Eigen::MatrixXd::Identity(n, n)))));
-  const Eigen::MatrixXd both = (count - 1) / count * signal::product(centred, centred.transpose()) + open;
+  Eigen::MatrixXd both = (count - 1) / count * signal::product(centred, centred.transpose()) + open;
+  if (freedom_.payload) {
+    const Eigen::MatrixXd g = lags(all);
+    Eigen::MatrixXd free_g(n, g.cols());
+    for (Eigen::Index i = 0; i < n; ++i) free_g.row(i) = g.row(places[std::size_t(i)]);
+    const Eigen::MatrixXd changed = solve(sum, free_g);
+    both += signal::product(changed, changed.transpose());
+  }
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(layout_.size(), layout_.size());
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index k = 0; k < n; ++k) out(places[std::size_t(i)], places[std::size_t(k)]) = both(i, k);

@@ -72,27 +72,26 @@ std::vector<Linearised> FitModel::linearised(const State& state, const FittedMot
   const auto n = Eigen::Index(m.time.size()), count = m.q.cols();
   const bool tilts = freedom_.tilt && motion.marked;
   Eigen::MatrixXd load(n, count);
-  std::vector<Eigen::MatrixXd> tilt(tilts ? 2 : 0, Eigen::MatrixXd(n, count));
-  const Eigen::Matrix<double, 3, 2> turns =
-      (Eigen::Matrix<double, 3, 2>() << Eigen::Vector3d::UnitX().cross(loaded.gravity),
-       Eigen::Vector3d::UnitY().cross(loaded.gravity))
+  std::vector<Eigen::MatrixXd> tilt(tilts ? 3 : 0, Eigen::MatrixXd(n, count));
+  const Eigen::Matrix3d turns =
+      (Eigen::Matrix3d() << Eigen::Vector3d::UnitX().cross(loaded.gravity),
+       Eigen::Vector3d::UnitY().cross(loaded.gravity), loaded.gravity - rig_.chain.gravity)
           .finished();
   for (Eigen::Index k = 0; k < n; ++k) {
     load.row(k) = inverse_dynamics(loaded, m.q.row(k), m.v.row(k), m.a.row(k)).transpose();
     if (!tilts) continue;
     const Eigen::MatrixXd by_tilt = gravity_regressor(loaded, m.q.row(k)) * turns;
-    for (int i = 0; i < 2; ++i) tilt[std::size_t(i)].row(k) = by_tilt.col(i).transpose();
+    for (int i = 0; i < 3; ++i) tilt[std::size_t(i)].row(k) = by_tilt.col(i).transpose();
   }
   std::vector<Linearised> all;
   const double cutoff = rig_.identification.torque_cutoff;
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     const auto c = Eigen::Index(j);
-    Eigen::MatrixXd by_tilt(Eigen::Index(m.rows.size()), tilts ? 2 : 0);
+    Eigen::MatrixXd by_tilt(Eigen::Index(m.rows.size()), Eigen::Index(tilt.size()));
     for (std::size_t i = 0; i < tilt.size(); ++i)
       by_tilt.col(Eigen::Index(i)) = at_rows(tilt[i].col(c), m, cutoff);
     all.push_back(joint(state, motion, j,
                         at_rows(m.sign.col(c).cwiseProduct(load.col(c).cwiseAbs()), m, cutoff), by_tilt));
-    if (!tilts) continue;
   }
   return all;
 }
@@ -102,11 +101,13 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
   const ArmMotion& m = *motion.motion;
   const auto c = Eigen::Index(j);
   const Layout at{Eigen::Index(rig_.joints.size())};
-  const bool carries = freedom_.payload && motion.marked, rubs = freedom_.friction && motion.marked;
+  const bool carries = freedom_.payload && motion.marked, rubs = freedom_.friction && motion.marked,
+             tilts = tilt.cols() > 0;
   const double factor = std::exp(-state.drives(c, kDriveTerms)) / rig_.joints[j].constant;
   Linearised out;
   const Eigen::Index links = 10 * at.joints, rows = Eigen::Index(m.rows.size());
-  out.sensitivity.resize(rows, links + kDriveUnknowns + (carries ? 10 : 0) + tilt.cols() + (rubs ? 2 : 0));
+  out.sensitivity.resize(rows,
+                         links + kDriveUnknowns + (carries ? 10 : 0) + (tilts ? 2 : 0) + (rubs ? 2 : 0));
   for (Eigen::Index i = 0; i < links; ++i) out.unknowns.push_back(i);
   out.sensitivity.leftCols(links) = factor * m.chain[j];
   Eigen::MatrixXd drive = m.drive[j];
@@ -122,8 +123,7 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
   if (rubs) out.predicted.array() += state.shift[c];
   for (Eigen::Index i = 0; i < at.joints; ++i)
     out.predicted += m.chain[j].middleCols(10 * i, 10) * chain.links[std::size_t(i)];
-  if (tilt.cols() > 0)
-    out.predicted += tilt * state.tilt;  // for small angles; the chain's columns know no tilt
+  if (tilts) out.predicted += tilt.col(2);  // the chain's columns know no tilt
   out.predicted *= factor;
   const auto [measured, rate] = later(m, j, state.drives(c, kDriveUnknowns - 1));
   out.measured = measured;
@@ -138,7 +138,7 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
     for (Eigen::Index i = 0; i < 10; ++i) out.unknowns.push_back(at.payload() + i);
     next += 10;
   }
-  for (Eigen::Index i = 0; i < tilt.cols(); ++i, ++next) {
+  for (Eigen::Index i = 0; tilts && i < 2; ++i, ++next) {
     out.sensitivity.col(next) = factor * tilt.col(i);
     out.unknowns.push_back(at.tilt() + i);
   }

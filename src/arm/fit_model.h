@@ -53,6 +53,7 @@ class FitModel {
   Chain chain(const State& state, bool marked) const;
 
  private:
+  /// `tilt`: of the tilt's sensitivity, and what the tilt of the state adds to the torque; empty without.
   Linearised joint(const State& state, const FittedMotion& motion, std::size_t j, const Eigen::VectorXd& load,
                    const Eigen::MatrixXd& tilt) const;
   const ArmRig& rig_;

@@ -15,6 +15,7 @@ constexpr int kMostSteps = 60;        // of Newton; choice
 constexpr int kMostHalvings = 40;     // choice: 2^-40 of a step is none
 constexpr double kSettled = 1e-8;     // of the decrease that a step promises; choice
 constexpr double kDelayError = 0.03;  // s, of a delay that nobody declares: some samples; choice
+constexpr double kTilt = 0.3;         // rad, how far a base may be off that is called level; choice
 constexpr double kBall = 0.2;         // theory: Sigma = 0.2 m r^2 of a ball
 
 std::array<Eigen::Matrix4d, 10> pseudo_basis() {
@@ -46,6 +47,8 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
     for (std::size_t i = 0; i < rig.chain.size(); ++i)
       bodies_.push_back({layout_.link(Eigen::Index(i)), inverse(pseudo_inertia(rig.chain.links[i]))});
   if (payload_) bodies_.push_back({layout_.payload(), Eigen::Matrix4d::Identity()});
+  for (Eigen::Index i = 0; freedom.tilt && i < 2; ++i)
+    normal_.push_back({layout_.tilt() + i, 0, 1 / (kTilt * kTilt)});
   for (std::size_t j = 0; j < rig.joints.size(); ++j) {
     const auto c = Eigen::Index(j);
     if (!moves[j]) continue;
@@ -81,6 +84,7 @@ Eigen::VectorXd Priors::vector_of(const State& state) const {
   for (Eigen::Index i = 0; i < layout_.joints; ++i)
     x.segment<10>(layout_.link(i)) = state.links[std::size_t(i)];
   x.segment<10>(layout_.payload()) = state.payload;
+  x.segment<2>(layout_.tilt()) = state.tilt;
   x.segment(layout_.friction(0), layout_.joints) = state.friction;
   x.segment(layout_.shift(0), layout_.joints) = state.shift;
   for (Eigen::Index j = 0; j < layout_.joints; ++j)

@@ -17,9 +17,10 @@
 namespace backlash::arm {
 namespace {
 
-constexpr double kRowsPerCycle = 5;  // choice: of torque_cutoff; two would do for a perfect low-pass
-constexpr double kEdge = 1;          // cycles of torque_cutoff that a low-pass needs to settle; choice
-constexpr int kNoiseOrder = 3;       // of the differences that tell white noise; choice
+constexpr double kRowsPerCycle = 5;         // choice: of torque_cutoff; two would do for a perfect low-pass
+constexpr double kEdge = 1;                 // cycles of torque_cutoff that a low-pass needs to settle; choice
+constexpr int kNoiseOrder = 3;              // of the differences that tell white noise; choice
+constexpr double kLargestDeflection = 0.1;  // rad, of a gear between its encoders; choice
 /// Theory: of white noise at sampling interval T, low_pass(f) leaves the variance share 2 T f times the
 /// integral of 1 / (1 + x^8)^2 from 0 to infinity.
 constexpr double kNoiseBandwidth = 0.898;
@@ -32,23 +33,59 @@ Eigen::VectorXd to_eigen(const std::vector<double>& v) {
   return Eigen::Map<const Eigen::VectorXd>(v.data(), Eigen::Index(v.size()));
 }
 
-void set_kinematics(ArmMotion& m, const std::vector<record::Record>& joints, const ArmRig& rig) {
+struct Kinematics {
+  std::vector<double> q, v, a;
+};
+
+Kinematics smooth_kinematics(const record::Record& r, record::Channel position, record::Channel velocity,
+                             double interval, double cutoff) {
+  Kinematics k;
+  k.q = signal::low_pass(r.column(position), interval, cutoff);
+  const std::vector<double>& speed = r.column(velocity);
+  k.v = speed.empty() ? signal::derivative(k.q, interval) : signal::low_pass(speed, interval, cutoff);
+  k.a = signal::derivative(k.v, interval);
+  return k;
+}
+
+/// The load's encoder is that of the link: it follows the motor's but for its zero and a deflection.
+bool follows(const record::Record& r) {
+  if (!r.has(record::Channel::load_position)) return false;
+  const std::vector<double>&motor = r.column(record::Channel::motor_position),
+        &load = r.column(record::Channel::load_position);
+  double least = INFINITY, largest = -INFINITY;
+  for (std::size_t k = 0; k < motor.size(); ++k)
+    least = std::fmin(least, load[k] - motor[k]), largest = std::fmax(largest, load[k] - motor[k]);
+  return largest - least < kLargestDeflection;  // false where a sample is missing
+}
+
+/// Links as the load's encoder has them where there is one, else as the motor's. Zero is the load's: what a
+/// gear sags by is no error of it; but the motor's where they are farther apart than any gear sags.
+void set_kinematics(ArmMotion& m, const std::vector<record::Record>& joints, const ArmRig& rig,
+                    std::vector<std::string>& warnings) {
+  using record::Channel;
   const auto n = Eigen::Index(m.time.size()), count = Eigen::Index(joints.size());
-  m.q.resize(n, count), m.v.resize(n, count), m.a.resize(n, count), m.signal.resize(n, count),
-      m.sign.resize(n, count);
+  for (Eigen::MatrixXd* each : {&m.q, &m.v, &m.a, &m.motor_v, &m.motor_a, &m.signal, &m.sign})
+    each->resize(n, count);
   m.noise.resize(count);
+  const double cutoff = rig.identification.kinematics_cutoff;
   for (Eigen::Index j = 0; j < count; ++j) {
     const record::Record& r = joints[std::size_t(j)];
-    const auto smooth = [&](const std::vector<double>& x) {
-      return signal::low_pass(x, m.interval, rig.identification.kinematics_cutoff);
-    };
-    const std::vector<double> q = smooth(r.column(record::Channel::motor_position));
-    const std::vector<double>& speed = r.column(record::Channel::motor_velocity);
-    const std::vector<double> v = speed.empty() ? signal::derivative(q, m.interval) : smooth(speed);
-    m.q.col(j) = to_eigen(q);
-    m.v.col(j) = to_eigen(v);
-    m.a.col(j) = to_eigen(signal::derivative(v, m.interval));
-    m.sign.col(j) = (m.v.col(j) / rig.identification.friction_speed).array().tanh();
+    const Kinematics motor =
+        smooth_kinematics(r, Channel::motor_position, Channel::motor_velocity, m.interval, cutoff);
+    Kinematics link = motor;
+    if (follows(r)) {
+      link = smooth_kinematics(r, Channel::load_position, Channel::load_velocity, m.interval, cutoff);
+      const double offset = to_eigen(motor.q).mean() - to_eigen(link.q).mean();
+      if (std::fabs(offset) > kLargestDeflection)
+        for (double& q : link.q) q += offset;
+    } else if (r.has(Channel::load_position)) {
+      warnings.push_back(
+          fmt::format("{}: load_position of {} does not follow motor_position to {} rad: unused", m.name,
+                      rig.joints[std::size_t(j)].name, kLargestDeflection));
+    }
+    m.q.col(j) = to_eigen(link.q), m.v.col(j) = to_eigen(link.v), m.a.col(j) = to_eigen(link.a);
+    m.motor_v.col(j) = to_eigen(motor.v), m.motor_a.col(j) = to_eigen(motor.a);
+    m.sign.col(j) = (m.motor_v.col(j) / rig.identification.friction_speed).array().tanh();
     const std::vector<double>& s = r.column(rig.channel);
     m.signal.col(j) = to_eigen(signal::low_pass(s, m.interval, rig.identification.torque_cutoff));
     m.noise[j] = signal::noise_from_differences(s, kNoiseOrder) *
@@ -85,9 +122,9 @@ void set_regressors(ArmMotion& m, const ArmRig& rig) {
   for (std::size_t j = 0; j < count; ++j) {
     const auto c = Eigen::Index(j);
     m.chain.push_back(rows_of(all[j], m, rig));
-    const Eigen::ArrayXd v = m.v.col(c);
+    const Eigen::ArrayXd v = m.motor_v.col(c);
     Eigen::MatrixXd drive = Eigen::MatrixXd::Zero(n, kDriveTerms);
-    drive.col(int(DriveTerm::rotor_inertia)) = m.a.col(c);
+    drive.col(int(DriveTerm::rotor_inertia)) = m.motor_a.col(c);
     drive.col(int(DriveTerm::coulomb)) = m.sign.col(c);
     drive.col(int(DriveTerm::viscous)) = v;
     drive.col(int(DriveTerm::quadratic)) = v * v.abs();
@@ -100,7 +137,8 @@ void set_regressors(ArmMotion& m, const ArmRig& rig) {
   }
 }
 
-ArmMotion motion_of(const ArmRecord& record, const ArmRig& rig, double from, double to) {
+ArmMotion motion_of(const ArmRecord& record, const ArmRig& rig, double from, double to,
+                    std::vector<std::string>& warnings) {
   ArmMotion m;
   m.name = record.name;
   std::vector<record::Record> joints;
@@ -111,7 +149,7 @@ ArmMotion motion_of(const ArmRecord& record, const ArmRig& rig, double from, dou
   if (2 * rig.identification.kinematics_cutoff * m.interval >= 1)
     throw BadData(record.name, fmt::format("sampled at {:.4g} Hz: too slow for kinematics_cutoff = {} Hz",
                                            1 / m.interval, rig.identification.kinematics_cutoff));
-  set_kinematics(m, joints, rig);
+  set_kinematics(m, joints, rig, warnings);
   set_rows(m, rig);
   return m;
 }
@@ -158,7 +196,7 @@ std::vector<ArmMotion> kinematics_of(const ArmRecord& record, const ArmRig& rig,
     if (k < time.size() && time[k] - time[k - 1] <= most) continue;
     const double to = k < time.size() ? time[k] : time.back() + most + 1;
     if (time[k - 1] - time[begin] >= kShortestStretch)
-      all.push_back(motion_of(record, rig, time[begin], to));
+      all.push_back(motion_of(record, rig, time[begin], to, warnings));
     else if (k - begin > 1)
       warnings.push_back(fmt::format("{}: {:.3g} s from t = {:.4g} s are too short for a fit and left out",
                                      record.name, time[k - 1] - time[begin], time[begin]));

@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "fit_model.h"
 
@@ -62,6 +63,18 @@ struct Candidate {
   std::string reason;  // why not; empty: believed
 };
 
+/// Of unknowns that stand together in a covariance, in the direction in which they are told best.
+double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance,
+                                 Eigen::Index place) {
+  const Eigen::Index n = values.size();
+  const Eigen::VectorXd scale = covariance.diagonal().segment(place, n).cwiseSqrt().cwiseMax(1e-300);
+  Eigen::MatrixXd c = scale.cwiseInverse().asDiagonal() * covariance.block(place, place, n, n) *
+                      scale.cwiseInverse().asDiagonal();
+  c.diagonal().array() += 1e-9;  // unknowns that follow from each other
+  const Eigen::VectorXd v = values.cwiseQuotient(scale);
+  return std::sqrt((v.transpose() * signal::solve_symmetric(c, v))(0, 0));
+}
+
 class Tracer {
  public:
   Tracer(const ArmRig& rig, const ArmTraceSettings& settings, const Progress& progress)
@@ -87,7 +100,9 @@ class Tracer {
   void bootstrap(Candidate& c, const Squares& squares) const;
   std::string refusal(const Candidate& c) const;
   ArmStep step_of(const Candidate& c) const;
+  const Candidate* rival_of(const std::vector<Candidate>& all, std::size_t chosen) const;
   std::size_t best_of(const std::vector<Candidate>& all) const;
+  void tell_rival(ArmStep& step, const Candidate& rival);
   void tell_friction(const Candidate& c, const Motions& judged);
   void finish(const Motions& judged, const Candidate& taken, bool named);
   void set_augmented(const Candidate& taken);
@@ -198,14 +213,22 @@ std::string Tracer::refusal(const Candidate& c) const {
         100 * c.gain, rig_.joints[c.joint].name, 100 * settings_.least_gain);
   if (!(c.lower > 0) || !(c.all_lower > 0))
     return "the part that was not fitted does not confirm it in all blocks of time";
-  if (c.freedom.payload && !(std::fabs(c.fit.mass.value) > settings_.sure * c.fit.mass.standard_error))
-    return fmt::format("its mass is not told apart from none: {:.2g} +- {:.1g} kg", c.fit.mass.value,
-                       c.fit.mass.standard_error);
+  const Layout layout{Eigen::Index(rig_.joints.size())};
+  if (c.freedom.payload) {  // of mass and moments together: an arm may tell the moments only
+    const double errors =
+        standard_errors_from_none(c.fit.payload.head<4>(), c.fit.covariance, layout.payload());
+    if (!(errors > settings_.sure))
+      return fmt::format(
+          "its mass and moments are {:.1f} standard errors from none: mass {:.2g} +- {:.1g} kg", errors,
+          c.fit.mass.value, c.fit.mass.standard_error);
+  }
   if (c.freedom.tilt) {
-    const double tilt = std::hypot(c.fit.tilt[0].value, c.fit.tilt[1].value),
-                 error = std::hypot(c.fit.tilt[0].standard_error, c.fit.tilt[1].standard_error);
-    if (tilt < settings_.least_tilt || tilt < settings_.sure * error)
-      return fmt::format("the tilt is {:.2g} +- {:.1g} rad, no more than a level base has", tilt, error);
+    // A planar arm tells the tilt about one axis only.
+    const Eigen::Vector2d tilt(c.fit.tilt[0].value, c.fit.tilt[1].value);
+    const double errors = standard_errors_from_none(tilt, c.fit.covariance, layout.tilt());
+    if (tilt.norm() < settings_.least_tilt || !(errors > settings_.sure))
+      return fmt::format("the tilt is {:.2g} rad, {:.1f} standard errors: no more than a level base has",
+                         tilt.norm(), errors);
   }
   return "";
 }
@@ -247,6 +270,20 @@ ArmStep Tracer::step_of(const Candidate& c) const {
   return step;
 }
 
+/// What is taken away on one side does nearly what a body on the other side does: values hold both.
+void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
+  const ArmStep other = step_of(rival);
+  for (std::size_t i = 0; i < step.parameters.size(); ++i) {
+    signal::Measured& m = step.parameters[i].measured;
+    m.standard_error = std::hypot(m.standard_error, other.parameters[i].measured.value - m.value);
+  }
+  step.equivalent_to.push_back("payload (taken away)");
+  trace_.notes.push_back(fmt::format(
+      "a body that is gone does nearly as well as one that has come: {:.3g} kg; motion with faster turns, or "
+      "other poses, would tell them apart",
+      rival.fit.mass.value));
+}
+
 /// Where friction is not that of the training: a step where it is more than a robot's warming up, else a
 /// note.
 void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
@@ -276,6 +313,15 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
   }
 }
 
+/// A body at the last link that has come, or is gone, and does as well as the other of the two.
+const Candidate* Tracer::rival_of(const std::vector<Candidate>& all, std::size_t chosen) const {
+  if (chosen > 1) return nullptr;
+  const Candidate& other = all[1 - chosen];
+  const bool alike =
+      other.reason.empty() && std::fabs(all[chosen].all - other.all) < -std::log(1 - settings_.same_link);
+  return alike ? &other : nullptr;
+}
+
 /// The best of the candidates that are believed; none: the end of the list.
 std::size_t Tracer::best_of(const std::vector<Candidate>& all) const {
   std::size_t best = all.size(), last = all.size();
@@ -284,9 +330,10 @@ std::size_t Tracer::best_of(const std::vector<Candidate>& all) const {
     if (best == all.size() || all[i].all > all[best].all) best = i;
     if (i < 2 && (last == all.size() || all[i].all > all[last].all)) last = i;
   }
-  const bool alike = best < all.size() && last < all.size() && all[best].freedom.payload &&
-                     all[best].all - all[last].all < -std::log(1 - settings_.same_link);
-  return alike ? last : best;
+  const bool same = best < all.size() && last < all.size() && all[best].freedom.payload &&
+                    all[best].all - all[last].all < -std::log(1 - settings_.same_link);
+  const std::size_t chosen = same ? last : best;
+  return chosen < 2 && rival_of(all, chosen) ? 0 : chosen;
 }
 
 /// True where something was found.
@@ -310,7 +357,10 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   trace_.notes.clear();
   const std::size_t best = best_of(all);
   const Candidate& taken = best < all.size() ? all[best] : without;
-  if (best < all.size()) trace_.steps.push_back(step_of(taken));
+  if (best < all.size()) {
+    trace_.steps.push_back(step_of(taken));
+    if (const Candidate* rival = rival_of(all, best)) tell_rival(trace_.steps.back(), *rival);
+  }
   tell_friction(taken, judged);
   for (std::size_t i = 0; best < all.size() && i < all.size(); ++i)
     if (i != best && all[i].reason.empty() && taken.freedom.payload && all[i].freedom.payload &&
@@ -352,7 +402,11 @@ void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   }
   if (named) set_augmented(taken);
   set_series(judged, freedom, named ? fit : base_, named);
-  ArmFit known = fit;  // of a fitted rig: what it says of itself, and what the effect is not known to
+  // What was left of the training records, and what the effect is not known to. What a half of the test
+  // record leaves may be what is missing.
+  ArmFit known = fit;
+  for (std::size_t j = 0; !rig_.fitted && j < rig_.joints.size(); ++j)
+    known.deviation[j] = std::fmin(fit.deviation[j], base_.deviation[j]);
   if (rig_.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
   std::vector<double> foretold = foretold_errors(known, freedom, as_fitted(judged, true), least);
   for (std::size_t j = 0; rig_.fitted && j < rig_.joints.size(); ++j) {

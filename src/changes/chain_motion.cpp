@@ -102,7 +102,7 @@ void add_joints(const arm::ArmRig& rig, const arm::Chain& chain,
         r.column(record::Channel::load_position).push_back(loads[j](m.time[k]));
       r.column(record::Channel::output_torque).push_back(torque[c]);
       r.column(record::Channel::motor_torque)
-          .push_back(own_torque(rig.joints[j], signals[j](m.time[k] + rig.joints[j].delay), m.v(row, c),
+          .push_back(own_torque(rig.joints[j], signals[j](m.time[k] + rig.joints[j].delay), m.motor_v(row, c),
                                 m.sign(row, c), torque[c]));
     }
   }

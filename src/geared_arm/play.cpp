@@ -27,17 +27,6 @@ struct Rows : FlankRows {
   std::size_t size() const { return torque.size(); }
 };
 
-/// The record with the link's own angle as position: the chain moves with it, not with the motor.
-arm::ArmRecord by_links(const arm::ArmRecord& record) {
-  arm::ArmRecord out = record;
-  for (record::Record& joint : out.joints) {
-    if (!joint.has(Channel::load_position)) continue;
-    joint.column(Channel::motor_position) = joint.column(Channel::load_position);
-    joint.column(Channel::motor_velocity) = joint.column(Channel::load_velocity);
-  }
-  return out;
-}
-
 /// phi of a stretch, low-passed as the torque is.
 std::vector<double> twist_of(const record::Record& joint, const arm::ArmMotion& motion, double cutoff) {
   const record::Record even =
@@ -155,7 +144,7 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
 std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointLoad>& loads,
                                 const arm::ArmRecord& record, std::vector<std::string>& warnings,
                                 const PlaySettings& settings) {
-  const std::vector<arm::ArmMotion> motions = arm::motions_of(by_links(record), rig, warnings);
+  const std::vector<arm::ArmMotion> motions = arm::motions_of(record, rig, warnings);
   const arm::Chain chain = arm::loaded_chain(rig);
   Eigen::VectorXd links(10 * Eigen::Index(chain.size()));
   for (std::size_t i = 0; i < chain.size(); ++i) links.segment<10>(10 * Eigen::Index(i)) = chain.links[i];

@@ -18,7 +18,8 @@ struct ArmRecord {
 };
 
 /// The joints of the rig out of a record. Throws BadData where one of them, or a channel of it, is missing:
-/// position and the rig's channel are needed; the speed is taken from the position where it is absent.
+/// motor_position and the rig's channel are needed; speeds are taken from positions where they are absent.
+/// With load_position the links move as that says, which an elastic gear does not do with its motor.
 ArmRecord arm_record(const std::vector<record::JointRecord>& joints, const ArmRig& rig,
                      const std::string& name);
 
@@ -26,9 +27,10 @@ ArmRecord arm_record(const std::vector<record::JointRecord>& joints, const ArmRi
 /// "all" has every sample. Columns of matrices are joints unless said otherwise.
 struct ArmMotion {
   std::string name;
-  double interval = 0;                 // s, between samples
-  std::vector<double> time;            // s, of all samples
-  Eigen::MatrixXd q, v, a;             // all, low-passed at kinematics_cutoff: rad, rad/s, rad/s^2
+  double interval = 0;       // s, between samples
+  std::vector<double> time;  // s, of all samples
+  Eigen::MatrixXd q, v, a;   // all, of the links, low-passed at kinematics_cutoff: rad, rad/s, rad/s^2
+  Eigen::MatrixXd motor_v, motor_a;    // all, the same of the motors
   Eigen::MatrixXd signal;              // all, low-passed at torque_cutoff: unit of the channel
   std::vector<std::size_t> rows;       // places among all
   std::vector<Eigen::MatrixXd> chain;  // per joint: rows x 10 per link, the regressor, low-passed

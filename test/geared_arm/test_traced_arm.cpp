@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What an arm behind elastic gears lacks, traced: the records are simulated, their truth is known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "backlash_diagnosis/arm/dynamics.h"
+#include "backlash_diagnosis/arm/trace.h"
+#include "backlash_diagnosis/geared_arm/simulation.h"
+#include "support/data.h"
+
+namespace backlash::geared_arm {
+namespace {
+
+using record::Channel;
+
+GearedArm planar_arm() {
+  return load_geared_arm(test::package_file("config/two_link_arm/two_link_arm.yaml"));
+}
+
+/// `shift`: of what the motors do, so that no record is another one's motion.
+arm::ArmRecord recorded(GearedArm machine, double shift) {
+  for (GearedJoint& joint : machine.joints) {
+    joint.excitation.moves.positions.front() += shift;
+    joint.excitation.moves.positions.back() -= shift;
+  }
+  machine.sensors.seed += std::uint64_t(1000 * std::fabs(shift));
+  return arm::arm_record(simulate_arm(machine, 30), machine.rig, "simulated");
+}
+
+/// The chain of a planar arm knows nothing of a tilt about the axis that its links never leave.
+TEST(TracedArm, APlanarArmTellsTheTiltThatItFeels) {
+  const GearedArm declared = planar_arm();
+  GearedArm tilted = declared;
+  constexpr double kTilt = 0.12;  // rad: beyond small angles
+  tilted.rig.chain.gravity = {9.80665 * std::sin(kTilt), 0, -9.80665 * std::cos(kTilt)};
+  const arm::ArmTrace trace = arm::trace_arm(declared.rig, {recorded(declared, 0), recorded(declared, 0.2)},
+                                             recorded(tilted, -0.2), false);
+  ASSERT_EQ(trace.steps.size(), 1u);
+  EXPECT_EQ(trace.steps[0].effect, "gravity_direction");
+  const signal::Measured about_x = trace.steps[0].parameters[0].measured,
+                         about_y = trace.steps[0].parameters[1].measured;
+  EXPECT_NEAR(about_y.value, -kTilt, 3 * about_y.standard_error);
+  EXPECT_LT(about_y.standard_error, 0.1 * kTilt);
+  EXPECT_GT(about_x.standard_error, 0.2);  // as much as is known of any base
+  for (const double after : trace.after) EXPECT_LT(after, 0.05);
+}
+
+/// Of a body at the end of a planar arm gravity tells moments; its mass follows from inertia alone. The right
+/// values lie within three standard errors, and a body that is gone is not told.
+TEST(TracedArm, ABodyWhoseMassIsHardlyToldIsToldAsThat) {
+  const GearedArm declared = planar_arm();
+  GearedArm loaded = declared;
+  arm::Body body;
+  body.mass = 0.4;
+  body.centre = {0.2, 0, 0.05};
+  body.inertia = 1e-4 * Eigen::Matrix3d::Identity();
+  loaded.rig.chain.links[1] += arm::parameters_of(body);
+  const arm::ArmTrace trace = arm::trace_arm(declared.rig, {recorded(declared, 0), recorded(declared, 0.2)},
+                                             recorded(loaded, -0.2), false);
+  ASSERT_EQ(trace.steps.size(), 1u);
+  EXPECT_EQ(trace.steps[0].effect, "payload");
+  EXPECT_EQ(trace.steps[0].link, "forearm");
+  const double truth[] = {0.4, 0.2, 0, 0.05};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const arm::ArmParameter& p = trace.steps[0].parameters[i];
+    EXPECT_NEAR(p.measured.value, truth[i], 3 * p.measured.standard_error) << p.name;
+  }
+  EXPECT_GT(trace.steps[0].parameters[2].measured.standard_error, 0.02);  // y: the axis of both joints
+}
+
+/// Gears that sag by 20 mrad under the links: with an encoder behind them the links are where that says.
+TEST(TracedArm, LinksMoveAsTheirOwnEncodersSay) {
+  GearedArm soft = planar_arm();
+  for (GearedJoint& joint : soft.joints)
+    joint.gear->contact = model::make_contact_law("linear", {{"stiffness", 500.0}, {"damping", 3.0}});
+  const arm::ArmRecord record = recorded(soft, 0);
+  std::vector<std::string> warnings;
+  const auto by_links = arm::motions_of(record, soft.rig, warnings);
+  EXPECT_TRUE(warnings.empty());
+  arm::ArmRecord turned = record, other = record;
+  for (double& q : turned.joints[0].column(Channel::load_position)) q += 0.7;  // another zero
+  for (double& q : other.joints[0].column(Channel::load_position)) q *= 2;     // not this link's
+  const auto same = arm::motions_of(turned, soft.rig, warnings);
+  EXPECT_TRUE(warnings.empty());
+  const auto by_motor = arm::motions_of(other, soft.rig, warnings);
+  EXPECT_FALSE(warnings.empty());
+  double sag = 0, zero = 0;
+  for (Eigen::Index k = 0; k < by_links[0].q.rows(); ++k) {
+    sag = std::fmax(sag, std::fabs(by_links[0].q(k, 0) - by_motor[0].q(k, 0)));
+    zero = std::fmax(zero, std::fabs(same[0].q(k, 0) - by_motor[0].q(k, 0)));
+  }
+  EXPECT_GT(sag, 0.01);  // 9 N m of gravity over 500 N m/rad: 18 mrad
+  EXPECT_LT(sag, 0.06);  // and what the motion adds
+  EXPECT_LT(zero, 0.06);
+  EXPECT_EQ(by_links[0].motor_v, by_motor[0].motor_v);
+}
+
+}  // namespace
+}  // namespace backlash::geared_arm
