@@ -19,7 +19,7 @@ constexpr double kForgotten =
     0.05;  // choice: correlation from which on the memory of a residual counts as over
 constexpr double kLongestMemory = 3;  // s; choice
 constexpr double kSettled = 1e-3;     // standard errors; choice
-constexpr double kLag = 0.1;          // of Coulomb friction, bristles and Stribeck; choice, see doc/arm.md
+constexpr double kLag = 0.1;  // of Coulomb friction, bristles and Stribeck; choice, tried on drawn arms
 
 using Mask = Eigen::Matrix<char, Eigen::Dynamic, Eigen::Dynamic>;
 

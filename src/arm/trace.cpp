@@ -8,15 +8,11 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
-#include "backlash_diagnosis/base/random.h"
-#include "backlash_diagnosis/signal/linear_algebra.h"
-#include "backlash_diagnosis/signal/order_statistics.h"
 #include "fit_model.h"
+#include "trace_evidence.h"
 
 namespace backlash::arm {
 namespace {
-
-using Motions = std::vector<ArmMotion>;
 
 const char* const kHalves =
     "The test record is of a machine that has changed: effects are fitted to its first half and judged on "
@@ -46,35 +42,6 @@ double middle(const Motions& motions) {
   return 0;
 }
 
-/// Squared residuals of each joint in blocks of time, of two models.
-struct Squares {
-  std::vector<std::vector<double>> before, after;  // block, joint
-};
-
-struct Candidate {
-  std::string effect;
-  FitFreedom freedom;
-  ArmFit fit;
-  std::vector<double> gains, lowers, uppers;  // per joint, and of the mean logarithm of all
-  double gain = 0, lower = 0, upper = 0;      // of the joint that it helps most
-  std::size_t joint = 0;
-  double all_lower = 0;  // of the mean of all joints' logarithms, lower end
-  double all = 0;
-  std::string reason;  // why not; empty: believed
-};
-
-/// Of unknowns that stand together in a covariance, in the direction in which they are told best.
-double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance,
-                                 Eigen::Index place) {
-  const Eigen::Index n = values.size();
-  const Eigen::VectorXd scale = covariance.diagonal().segment(place, n).cwiseSqrt().cwiseMax(1e-300);
-  Eigen::MatrixXd c = scale.cwiseInverse().asDiagonal() * covariance.block(place, place, n, n) *
-                      scale.cwiseInverse().asDiagonal();
-  c.diagonal().array() += 1e-9;  // unknowns that follow from each other
-  const Eigen::VectorXd v = values.cwiseQuotient(scale);
-  return std::sqrt((v.transpose() * signal::solve_symmetric(c, v))(0, 0));
-}
-
 class Tracer {
  public:
   Tracer(const ArmRig& rig, const ArmTraceSettings& settings, const Progress& progress)
@@ -96,9 +63,6 @@ class Tracer {
   std::vector<Candidate> candidates() const;
   void fit_candidate(Candidate& c, const Motions& fitted) const;
   void try_out(Candidate& c, const Candidate& without, const Motions& fitted, const Motions& judged) const;
-  Squares squares(const Candidate& without, const Candidate& c, const Motions& judged) const;
-  void bootstrap(Candidate& c, const Squares& squares) const;
-  std::string refusal(const Candidate& c) const;
   ArmStep step_of(const Candidate& c) const;
   const Candidate* rival_of(const std::vector<Candidate>& all, std::size_t chosen) const;
   std::size_t best_of(const std::vector<Candidate>& all) const;
@@ -128,65 +92,6 @@ void Tracer::set_base() {
   for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
 }
 
-Squares Tracer::squares(const Candidate& without, const Candidate& c, const Motions& judged) const {
-  Squares all;
-  for (const ArmMotion& m : judged) {
-    const Prediction before = predict(without.fit, without.freedom, {&m, true}),
-                     after = predict(c.fit, c.freedom, {&m, true});
-    double begin = -1e300;
-    for (std::size_t k = 0; k < m.rows.size(); ++k) {
-      if (m.time[m.rows[k]] >= begin + settings_.block) {
-        begin = m.time[m.rows[k]];
-        all.before.emplace_back(rig_.joints.size(), 0.0);
-        all.after.emplace_back(rig_.joints.size(), 0.0);
-      }
-      for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-        const auto r = Eigen::Index(k), col = Eigen::Index(j);
-        if (!m.counts(r, col)) continue;
-        all.before.back()[j] += std::pow(before.measured(r, col) - before.predicted(r, col), 2);
-        all.after.back()[j] += std::pow(after.measured(r, col) - after.predicted(r, col), 2);
-      }
-    }
-  }
-  return all;
-}
-
-void Tracer::bootstrap(Candidate& c, const Squares& s) const {
-  const std::size_t joints = rig_.joints.size(), blocks = s.before.size();
-  std::vector<std::size_t> places(blocks);
-  const auto gains = [&](const std::vector<std::size_t>& chosen) {
-    std::vector<double> out(joints + 1, 0);
-    double count = 0;
-    for (std::size_t j = 0; j < joints; ++j) {
-      double before = 0, after = 0;
-      for (const std::size_t b : chosen) before += s.before[b][j], after += s.after[b][j];
-      if (!(before > 0)) continue;
-      out[j] = 1 - after / before;
-      out[joints] -= std::log(after / before);
-      count += 1;
-    }
-    if (count > 0) out[joints] /= count;
-    return out;
-  };
-  for (std::size_t b = 0; b < blocks; ++b) places[b] = b;
-  c.gains = gains(places);
-  c.joint = std::size_t(std::max_element(c.gains.begin(), c.gains.end() - 1) - c.gains.begin());
-  Random random(settings_.seed);
-  std::vector<std::vector<double>> drawn(joints + 1);
-  for (int d = 0; d < settings_.draws; ++d) {
-    for (std::size_t& place : places) place = random.below(blocks);
-    const std::vector<double> one = gains(places);
-    for (std::size_t j = 0; j <= joints; ++j) drawn[j].push_back(one[j]);
-  }
-  c.lowers.clear(), c.uppers.clear();
-  for (const std::vector<double>& of_joint : drawn) {
-    c.lowers.push_back(signal::quantile(of_joint, 0.025));
-    c.uppers.push_back(signal::quantile(of_joint, 0.975));
-  }
-  c.gain = c.gains[c.joint], c.lower = c.lowers[c.joint], c.upper = c.uppers[c.joint];
-  c.all = c.gains[joints], c.all_lower = c.lowers[joints];
-}
-
 /// The model with what may differ from day to day, and with the effect.
 void Tracer::fit_candidate(Candidate& c, const Motions& fitted) const {
   std::vector<FittedMotion> motions = as_fitted(fitted, true);
@@ -202,35 +107,8 @@ void Tracer::fit_candidate(Candidate& c, const Motions& fitted) const {
 void Tracer::try_out(Candidate& c, const Candidate& without, const Motions& fitted,
                      const Motions& judged) const {
   fit_candidate(c, fitted);
-  bootstrap(c, squares(without, c, judged));
-  c.reason = refusal(c);
-}
-
-std::string Tracer::refusal(const Candidate& c) const {
-  if (c.gain < settings_.least_gain)
-    return fmt::format(
-        "takes {:.0f} % of the squared error of {} away in the part that was not fitted, {:.0f} % are needed",
-        100 * c.gain, rig_.joints[c.joint].name, 100 * settings_.least_gain);
-  if (!(c.lower > 0) || !(c.all_lower > 0))
-    return "the part that was not fitted does not confirm it in all blocks of time";
-  const Layout layout{Eigen::Index(rig_.joints.size())};
-  if (c.freedom.payload) {  // of mass and moments together: an arm may tell the moments only
-    const double errors =
-        standard_errors_from_none(c.fit.payload.head<4>(), c.fit.covariance, layout.payload());
-    if (!(errors > settings_.sure))
-      return fmt::format(
-          "its mass and moments are {:.1f} standard errors from none: mass {:.2g} +- {:.1g} kg", errors,
-          c.fit.mass.value, c.fit.mass.standard_error);
-  }
-  if (c.freedom.tilt) {
-    // A planar arm tells the tilt about one axis only.
-    const Eigen::Vector2d tilt(c.fit.tilt[0].value, c.fit.tilt[1].value);
-    const double errors = standard_errors_from_none(tilt, c.fit.covariance, layout.tilt());
-    if (tilt.norm() < settings_.least_tilt || !(errors > settings_.sure))
-      return fmt::format("the tilt is {:.2g} rad, {:.1f} standard errors: no more than a level base has",
-                         tilt.norm(), errors);
-  }
-  return "";
+  judge(c, without, judged, rig_, settings_);
+  c.reason = refusal(c, rig_, settings_);
 }
 
 /// In their order: a payload at the last link, come or gone, first.
@@ -290,7 +168,7 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
   Candidate base;
   base.fit = base_;
   Candidate against = c;
-  bootstrap(against, squares(base, c, judged));
+  judge(against, base, judged, rig_, settings_);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     const signal::Measured& f = c.fit.friction_factors[j];
     if (!(std::fabs(f.value - 1) > settings_.sure * f.standard_error)) continue;
@@ -494,7 +372,7 @@ bool Tracer::changed_since(const Motions& first, const Motions& second) {
   trace_.steps.clear(), trace_.floor.clear(), trace_.series = {}, trace_.unexplained.reset();
   if (search(first, second, kHalves)) {
     Candidate halves = taken_;
-    bootstrap(halves, squares(old, halves, second));
+    judge(halves, old, second, rig_, settings_);
     if (halves.all > -std::log(1 - settings_.same_link) && halves.all_lower > 0) {
       for (const ArmStep& step : in_training.steps)
         trace_.notes.push_back(fmt::format("the training records show another one: {} {}{}, {} = {:.3g} {}",

@@ -10,7 +10,8 @@
 // which matters only where the records say nothing (Lee, Wensing and Park 2020, IEEE T-RO 36:168). What must
 // be positive in a drive has the same divergence in one dimension. All masses together are only as well known
 // as the declared constants. Standard errors are those of blocks left out, plus what the declared values
-// leave open.
+// leave open; of a payload also what friction that lags behind its model, by a tenth of Coulomb's (rms),
+// could pass for: it follows the acceleration as inertia does, and no block of time knows better.
 #pragma once
 
 #include <optional>

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "trace_evidence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/base/random.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "fit_model.h"
+
+namespace backlash::arm {
+namespace {
+
+/// Squared residuals of each joint in blocks of time, of two models.
+struct Squares {
+  std::vector<std::vector<double>> before, after;  // block, joint
+};
+
+Squares squares_of(const Candidate& without, const Candidate& c, const Motions& judged, const ArmRig& rig,
+                   double block) {
+  Squares all;
+  for (const ArmMotion& m : judged) {
+    const Prediction before = predict(without.fit, without.freedom, {&m, true}),
+                     after = predict(c.fit, c.freedom, {&m, true});
+    double begin = -1e300;
+    for (std::size_t k = 0; k < m.rows.size(); ++k) {
+      if (m.time[m.rows[k]] >= begin + block) {
+        begin = m.time[m.rows[k]];
+        all.before.emplace_back(rig.joints.size(), 0.0);
+        all.after.emplace_back(rig.joints.size(), 0.0);
+      }
+      for (std::size_t j = 0; j < rig.joints.size(); ++j) {
+        const auto r = Eigen::Index(k), col = Eigen::Index(j);
+        if (!m.counts(r, col)) continue;
+        all.before.back()[j] += std::pow(before.measured(r, col) - before.predicted(r, col), 2);
+        all.after.back()[j] += std::pow(after.measured(r, col) - after.predicted(r, col), 2);
+      }
+    }
+  }
+  return all;
+}
+
+void bootstrap(Candidate& c, const Squares& s, const ArmTraceSettings& settings) {
+  const std::size_t joints = c.fit.rig.joints.size(), blocks = s.before.size();
+  std::vector<std::size_t> places(blocks);
+  const auto gains = [&](const std::vector<std::size_t>& chosen) {
+    std::vector<double> out(joints + 1, 0);
+    double count = 0;
+    for (std::size_t j = 0; j < joints; ++j) {
+      double before = 0, after = 0;
+      for (const std::size_t b : chosen) before += s.before[b][j], after += s.after[b][j];
+      if (!(before > 0)) continue;
+      out[j] = 1 - after / before;
+      out[joints] -= std::log(after / before);
+      count += 1;
+    }
+    if (count > 0) out[joints] /= count;
+    return out;
+  };
+  for (std::size_t b = 0; b < blocks; ++b) places[b] = b;
+  c.gains = gains(places);
+  c.joint = std::size_t(std::max_element(c.gains.begin(), c.gains.end() - 1) - c.gains.begin());
+  Random random(settings.seed);
+  std::vector<std::vector<double>> drawn(joints + 1);
+  for (int d = 0; d < settings.draws; ++d) {
+    for (std::size_t& place : places) place = random.below(blocks);
+    const std::vector<double> one = gains(places);
+    for (std::size_t j = 0; j <= joints; ++j) drawn[j].push_back(one[j]);
+  }
+  c.lowers.clear(), c.uppers.clear();
+  for (const std::vector<double>& of_joint : drawn) {
+    c.lowers.push_back(signal::quantile(of_joint, 0.025));
+    c.uppers.push_back(signal::quantile(of_joint, 0.975));
+  }
+  c.gain = c.gains[c.joint], c.lower = c.lowers[c.joint], c.upper = c.uppers[c.joint];
+  c.all = c.gains[joints], c.all_lower = c.lowers[joints];
+}
+
+/// Of unknowns that stand together in a covariance, in the direction in which they are told best.
+double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance,
+                                 Eigen::Index place) {
+  const Eigen::Index n = values.size();
+  const Eigen::VectorXd scale = covariance.diagonal().segment(place, n).cwiseSqrt().cwiseMax(1e-300);
+  Eigen::MatrixXd c = scale.cwiseInverse().asDiagonal() * covariance.block(place, place, n, n) *
+                      scale.cwiseInverse().asDiagonal();
+  c.diagonal().array() += 1e-9;  // unknowns that follow from each other
+  const Eigen::VectorXd v = values.cwiseQuotient(scale);
+  return std::sqrt((v.transpose() * signal::solve_symmetric(c, v))(0, 0));
+}
+
+}  // namespace
+
+void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
+           const ArmTraceSettings& settings) {
+  bootstrap(c, squares_of(without, c, judged, rig, settings.block), settings);
+}
+
+std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
+  if (c.gain < settings.least_gain)
+    return fmt::format(
+        "takes {:.0f} % of the squared error of {} away in the part that was not fitted, {:.0f} % are needed",
+        100 * c.gain, rig.joints[c.joint].name, 100 * settings.least_gain);
+  if (!(c.lower > 0) || !(c.all_lower > 0))
+    return "the part that was not fitted does not confirm it in all blocks of time";
+  const Layout layout{Eigen::Index(rig.joints.size())};
+  if (c.freedom.payload) {  // of mass and moments together: an arm may tell the moments only
+    const double errors =
+        standard_errors_from_none(c.fit.payload.head<4>(), c.fit.covariance, layout.payload());
+    if (!(errors > settings.sure))
+      return fmt::format(
+          "its mass and moments are {:.1f} standard errors from none: mass {:.2g} +- {:.1g} kg", errors,
+          c.fit.mass.value, c.fit.mass.standard_error);
+  }
+  if (c.freedom.tilt) {
+    // A planar arm tells the tilt about one axis only.
+    const Eigen::Vector2d tilt(c.fit.tilt[0].value, c.fit.tilt[1].value);
+    const double errors = standard_errors_from_none(tilt, c.fit.covariance, layout.tilt());
+    if (tilt.norm() < settings.least_tilt || !(errors > settings.sure))
+      return fmt::format("the tilt is {:.2g} rad, {:.1f} standard errors: no more than a level base has",
+                         tilt.norm(), errors);
+  }
+  return "";
+}
+
+}  // namespace backlash::arm

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// An effect that is tried on an arm, and whether the part of the records that was not fitted confirms it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/arm/trace.h"
+
+namespace backlash::arm {
+
+using Motions = std::vector<ArmMotion>;
+
+struct Candidate {
+  std::string effect;
+  FitFreedom freedom;
+  ArmFit fit;
+  std::vector<double> gains, lowers, uppers;  // per joint, and of the mean logarithm of all
+  double gain = 0, lower = 0, upper = 0;      // of the joint that it helps most
+  std::size_t joint = 0;
+  double all_lower = 0;  // of the mean of all joints' logarithms, lower end
+  double all = 0;
+  std::string reason;  // why not; empty: believed
+};
+
+/// Gains of `c` over `without` on `judged`, with blocks of time drawn at random.
+void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
+           const ArmTraceSettings& settings);
+
+/// Why a candidate that was judged is not believed; empty: it is.
+std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings);
+
+}  // namespace backlash::arm
