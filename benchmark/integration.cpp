@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Cost of simulating a rig at a measured error: SUNDIALS through Plant, the ensemble, and Boost.odeint as
-// their peer. Every run is the same work: sensor torque at 1 kHz of config/sarkar_1997.yaml, half gap 50 um,
-// 0.5 s; for the ensemble 32 half gaps from 0 to 100 um, 0.1 s (some gaps are chaotic, longer runs would
-// compare luck). The error is that of the torque, rms over rms, against Verner's pair at 1e-13; of 32 rigs
-// the median.
+// Cost of simulating a rig at a measured error: SUNDIALS through Plant, the ensemble (also of one rig alone),
+// and Boost.odeint as their peer. Every run is the same work: sensor torque at 1 kHz of
+// config/sarkar_1997.yaml, half gap 50 um, 0.5 s; for the ensemble 32 half gaps from 0 to 100 um, 0.1 s (some
+// gaps are chaotic, longer runs would compare luck). The error is that of the torque, rms over rms, against
+// Verner's pair at 1e-13; of 32 rigs the median.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -103,6 +103,21 @@ void one_plant(benchmark::State& state, const std::string& method, double tolera
   state.counters["error"] = error(found, right_torque());
 }
 
+void one_lane(benchmark::State& state, double tolerance) {
+  const RigFile file = file_with(kHalfGap);
+  Signal found;
+  for (auto _ : state) {
+    found.clear();
+    Ensemble alone({file.rig}, file.simulation.excitation, solver("", tolerance));
+    for (long k = 0; k < std::lround(kDuration * kRate); ++k) {
+      alone.advance_to(double(k) / kRate);
+      const auto now = alone.state(0);
+      found.push_back(file.rig.input_coupling.stiffness * (now[0] - now[1]));
+    }
+  }
+  state.counters["error"] = error(found, right_torque());
+}
+
 void one_boost(benchmark::State& state, double tolerance) {
   const RigFile file = file_with(kHalfGap);
   Signal found;
@@ -157,6 +172,7 @@ int main(int argc, char** argv) {
     add("one_rig/boost_dopri5", tolerance, one_boost);
     for (const char* method : {"dormand_prince", "cash_karp", "tsitouras"})
       add(std::string("one_rig/") + method, tolerance, one_plant, method);
+    add("one_rig/ensemble", tolerance, one_lane);
     add("32_rigs/boost_dopri5", tolerance, many_boost);
     add("32_rigs/ensemble", tolerance, ensemble);
   }

@@ -85,8 +85,8 @@ rooms() {
 # Where containers and new put lanes they may end a program on another system and not on this one, see
 # src/simulation/lanes.h; no compiler warns of it.
 lanes() {
-  local holders='(vector|deque|list|unique_ptr|shared_ptr|make_unique|make_shared)<(const )?[A-Za-z_:]*Lanes>'
-  ! grep -rnE "${holders}|new [A-Za-z_:]*Lanes\b" include src test benchmark >&2
+  local holders='(vector|deque|list|unique_ptr|shared_ptr|make_unique|make_shared)<(const )?[A-Za-z_:]*Lanes[0-9]*>'
+  ! grep -rnE "${holders}|new [A-Za-z_:]*Lanes[0-9]*\b" include src test benchmark >&2
 }
 
 pages() {

@@ -14,8 +14,7 @@ constexpr int kMostSteps = 60;        // theory: 2^-60 where friction grows by h
 constexpr double kSettled = 1e-12;    // theory: relative, above roundings
 constexpr double kWithinReach = 0.1;  // share of the half gap; a flank that moves by less cannot touch
 
-/// A load with rigid couplings behind a mesh that gives way: node 0 is the motor, node 1 the load.
-constexpr TrainLayout kFollowingLoad(false, true, false, true);
+constexpr TrainLayout kFollowingLoad = TrainLayout::following_load();
 
 TrainLayout layout_of(const Rig& rig) {
   return {!rig.input_coupling.rigid, !rig.mesh.rigid, !rig.output_coupling.rigid, !rig.link_locked};

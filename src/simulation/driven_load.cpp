@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/stick_slip.h"
+#include "power_teeth.h"
 
 namespace backlash::simulation {
 namespace {
@@ -75,6 +76,15 @@ struct Halves {
   }
 };
 
+constexpr model::TrainLayout kFollowing = model::TrainLayout::following_load();
+constexpr int kParts = model::TrainParts::kPartCount;
+using PartMotion = model::EquationsOfMotion<double>::PartMotion;
+
+PartMotion ends(const model::Motion& m) {
+  return {{m.motor_position, m.motor_position, m.load_position, m.load_position},
+          {m.motor_velocity, m.motor_velocity, m.load_velocity, m.load_velocity}};
+}
+
 class Load {
  public:
   Load(const model::Rig& rig, double feedback)
@@ -82,7 +92,13 @@ class Load {
         inertia_(train_.load_inertia()),
         feedback_(feedback),
         rubs_(train_.friction_event_count() > 0),
-        shaped_(train_.flanks_shift_with_position()) {}
+        shaped_(train_.flanks_shift_with_position()),
+        plain_(train_.plain_load()) {
+    if (!plain_) return;
+    const model::PowerContact law = *train_.power_contact();
+    teeth_ = {law.exponent, law.stiffness, law.loss, law.damping, 0.5 * train_.backlash()};
+    friction_ = train_.load_forces({}).friction;
+  }
 
   double q = 0, w = 0;
 
@@ -129,9 +145,24 @@ class Load {
   /// `flanks`: where they are at nearly this position, if known.
   Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
     const model::Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0};
-    Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position, rate};
+    Forces f{plain_   ? plain_forces(motion)
+             : flanks ? train_.load_forces(motion, *flanks)
+                      : train_.load_forces(motion),
+             position, rate};
     f.net += inertia_ * feedback_ * (m.load_rate - rate);
     return f;
+  }
+
+  /// GearTrain::load_forces() of a plain load, without a call: a sample takes four of them.
+  model::GearTrain::LoadForces plain_forces(const model::Motion& m) const {
+    const model::EquationsOfMotion<double>& train = train_.equations();
+    const PartMotion s = ends(m);
+    const double mesh_torque =
+        train.lever * teeth_.force(train.gap_position(s, teeth_.half_gap), train.gap_rate(s));
+    double net[kParts];
+    train.net_torques(
+        kFollowing, s, 0, 0, [&](double* torque) { train.add_mesh(mesh_torque, torque); }, net);
+    return {net[kFollowing.node[model::TrainParts::kLink]], mesh_torque, -mesh_torque, friction_};
   }
 
   double acceleration(const Forces& f) const {
@@ -232,7 +263,9 @@ class Load {
 
   model::GearTrain train_;
   double inertia_, feedback_;
-  bool rubs_, shaped_;
+  bool rubs_, shaped_, plain_;
+  PowerTeeth<double> teeth_{};      // of a plain load
+  model::FrictionLimits friction_;  // of a plain load
   model::StickSlip mode_;
   Forces last_{};  // at the end of the sample before
   Flanks flanks_;  // there, if known
@@ -350,6 +383,14 @@ DrivenLoad simulate_driven_load(const model::Rig& rig, const RecordedMotion& mot
 MotorTorques motor_torques(const model::Rig& rig, const RecordedMotion& motion, const DrivenLoad& load) {
   const model::GearTrain train(rig);
   const std::size_t n = motion.motor->size();
+  const bool plain = rig.terms.empty() && !rig.mesh.rigid;  // dampers and friction that does not change
+  const model::FrictionLimits friction = train.motor_forces({}).friction;
+  const auto of_dampers = [&](const model::Motion& m) {
+    double net[kParts];
+    train.equations().net_torques(
+        kFollowing, ends(m), 0, 0, [](double*) {}, net);
+    return net[kFollowing.node[model::TrainParts::kMotor]];
+  };
   MotorTorques out{load.mesh_on_motor, std::vector<model::FrictionLimits>(n), load.mesh_torque};
   for (std::size_t k = 0; k < n; ++k) {
     model::Motion m{double(k) * motion.interval, (*motion.motor)[k], (*motion.motor_rate)[k], load.load[k],
@@ -357,7 +398,8 @@ MotorTorques motor_torques(const model::Rig& rig, const RecordedMotion& motion, 
     if (rig.mesh.rigid)
       out.mesh_torque[k] = m.mesh_torque =
           train.torque_of_load(m, motion.acceleration ? (*motion.acceleration)[k] : 0);
-    const model::GearTrain::MotorForces forces = train.motor_forces(m);
+    const model::GearTrain::MotorForces forces =
+        plain ? model::GearTrain::MotorForces{of_dampers(m), friction} : train.motor_forces(m);
     // The triangular weights of two intervals, by Simpson's rule for what is smooth.
     out.mean[k] += 10.0 / 12 * forces.net;
     out.mean[k == 0 ? 0 : k - 1] += forces.net / 12;

@@ -1,46 +1,69 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Numbers of several rigs side by side, worked on at once by the vector units. With AVX2 four at a time,
-// without it two and two; either way the same operations in the same order, so that results do not depend on
-// the processor: no fused multiply-add, which rounds once where others round twice.
+// Numbers of several rigs side by side, worked on at once by the vector units: eight with AVX-512, four with
+// AVX2, else two. Whatever the number, the same operations in the same order, so that results do not depend
+// on the processor: no fused multiply-add, which rounds once where others round twice. One rig is worked on
+// by the same code with a double in their place (one_lane.h).
 #pragma once
 
-#include <cmath>
+#include <type_traits>
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #endif
 
+#include "one_lane.h"
+
 namespace backlash::simulation {
 
-constexpr int kLanes = 4;
-/// On the stack, or in a struct that says alignas(sizeof(Lanes)): memory for other things is aligned to
-/// alignof(), which g++ caps at 16 bytes without AVX, and functions compiled for AVX2 count on 32.
-using Lanes = double __attribute__((vector_size(8 * kLanes)));
+/// On the stack, or in a struct that says alignas(sizeof(Lanes8)): memory for other things is aligned to
+/// alignof(), which g++ caps at 16 bytes without AVX, and functions compiled for AVX2 count on 32 and more.
+/// No more of them than the processor works on at once: g++ makes single numbers of the comparisons of
+/// others.
+using Lanes2 = double __attribute__((vector_size(16)));
+using Lanes4 = double __attribute__((vector_size(32)));
+using Lanes8 = double __attribute__((vector_size(64)));
 
-#define BACKLASH_LANES inline __attribute__((always_inline))
-
-BACKLASH_LANES Lanes larger(const Lanes& a, const Lanes& b) {
-  return a > b ? a : b;
-}
-
-BACKLASH_LANES Lanes smaller(const Lanes& a, const Lanes& b) {
-  return a < b ? a : b;
-}
-
-BACKLASH_LANES Lanes magnitude(const Lanes& a) {
-  return a < 0 ? -a : a;
-}
-
-/// Of numbers >= 0.
-BACKLASH_LANES Lanes root(const Lanes& a) {
-#if defined(__SSE2__)  // in a loop compilers make a call of sqrt()
-  const __m128d low = _mm_sqrt_pd(__builtin_shufflevector(a, a, 0, 1));
-  const __m128d high = _mm_sqrt_pd(__builtin_shufflevector(a, a, 2, 3));
-  return __builtin_shufflevector(low, high, 0, 1, 2, 3);
+/// Of numbers >= 0. In a loop over the lanes compilers make a call of sqrt().
+BACKLASH_LANES Lanes2 root(const Lanes2& a) {
+#if defined(__SSE2__)
+  return _mm_sqrt_pd(a);
 #else
-  Lanes r = a;
-  for (int i = 0; i < kLanes; ++i) r[i] = std::sqrt(r[i]);
-  return r;
+  return Lanes2{root(a[0]), root(a[1])};
 #endif
+}
+
+BACKLASH_LANES Lanes4 root(const Lanes4& a) {
+  const Lanes2 low = root(Lanes2(__builtin_shufflevector(a, a, 0, 1))),
+               high = root(Lanes2(__builtin_shufflevector(a, a, 2, 3)));
+  return __builtin_shufflevector(low, high, 0, 1, 2, 3);
+}
+
+BACKLASH_LANES Lanes8 root(const Lanes8& a) {
+  const Lanes4 low = root(Lanes4(__builtin_shufflevector(a, a, 0, 1, 2, 3))),
+               high = root(Lanes4(__builtin_shufflevector(a, a, 4, 5, 6, 7)));
+  return __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+template <typename Lanes, std::enable_if_t<(kLanesOf<Lanes> > 1), int> = 0>
+BACKLASH_LANES double lane(const Lanes& a, int i) {
+  return a[i];
+}
+
+template <typename Lanes, std::enable_if_t<(kLanesOf<Lanes> > 1), int> = 0>
+BACKLASH_LANES void set_lane(Lanes& a, int i, double value) {
+  a[i] = value;
+}
+
+/// Of numbers >= 0. By reference, as how a vector is returned depends on the processor.
+template <typename Lanes>
+__attribute__((noinline)) void to_power(Lanes& a, double exponent) {
+  for (int i = 0; i < kLanesOf<Lanes>; ++i) a[i] = any_power(a[i], exponent);
+}
+
+template <typename Lanes, std::enable_if_t<(kLanesOf<Lanes> > 1), int> = 0>
+BACKLASH_LANES Lanes any_power(const Lanes& a, double exponent) {
+  Lanes r = a;
+  to_power(r, exponent);
+  return r;
 }
 
 }  // namespace backlash::simulation

@@ -28,8 +28,9 @@ constexpr double kError[kStages] = {-0.00178001105222577714, -0.0008164344596567
                                     0.015151515151515152};
 
 /// Weights of the solution at a share u of the step, 0 <= u <= 1, order 4.
-inline void interpolant(double u, double* weights) {
-  const double uu = u * u;
+template <typename Real>
+__attribute__((always_inline)) inline void interpolant(const Real& u, Real* weights) {
+  const Real uu = u * u;
   weights[0] =
       -1.0530884977290216 * u * (u - 1.3299890189751412) * (uu - 1.4364028541716351 * u + 0.7139816917074209);
   weights[1] = 0.1017 * uu * (uu - 2.1966568338249754 * u + 1.2949852507374631);

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <set>
 #include <string>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "support/rig_changes.h"
@@ -189,9 +191,31 @@ TEST(DrivenLoad, WhatMovesNoLoadNeedsNoSimulation) {
   EXPECT_NEAR(torques.mean[k], followed.mesh_on_motor[k] - viscous - cogging, 0.02);
 }
 
+/// Acts on the load by nothing.
+struct Nothing : model::Term {};
+
 bool same_motion(const DrivenLoad& a, const DrivenLoad& b) {
   return a.load == b.load && a.load_rate == b.load_rate && a.mesh_torque == b.mesh_torque &&
          a.mesh_on_motor == b.mesh_on_motor;
+}
+
+// A load of numbers alone is followed by other code than one with terms, which does the same.
+TEST(DrivenLoad, APlainLoadMovesAsTheTrainDoes) {
+  for (const char* law : {"linear", "hunt_crossley"}) {
+    model::Rig rig = other_servo();
+    rig.link.viscous_asymmetry = 0.5;
+    if (law == std::string("hunt_crossley"))
+      rig.mesh.contact =
+          model::make_contact_law(law, {{"stiffness", 4e6}, {"exponent", 1.5}, {"alpha", 0.4}});
+    const record::Record record = simulate_record(rig, test::servo_run(3, false), 2);
+    model::Rig with_term = rig;
+    with_term.terms.push_back(std::make_shared<Nothing>());
+    EXPECT_TRUE(model::GearTrain(rig).plain_load());
+    EXPECT_FALSE(model::GearTrain(with_term).plain_load());
+    EXPECT_TRUE(same_motion(simulate_driven_load(rig, motion_of(record)),
+                            simulate_driven_load(with_term, motion_of(record))))
+        << law;
+  }
 }
 
 // Whoever keeps a simulated load must not take it for that of another machine.

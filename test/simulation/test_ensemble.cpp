@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/simulation/ensemble.h"
@@ -133,14 +134,36 @@ TEST(Ensemble, ObservesWhatAPlantObserves) {
   }
 }
 
-// What one rig does may depend on those beside it through the common step only, by its local errors.
-TEST(Ensemble, IsTheSameEveryTime) {
-  const auto rigs = different(rig_of(true, true, true), 6);
-  Ensemble one(rigs, test::square(0.05, 50), test::solver(1e-6)),
-      two(rigs, test::square(0.05, 50), test::solver(1e-6));
-  one.advance_to(0.05);
-  two.advance_to(0.05);
-  for (std::size_t i = 0; i < rigs.size(); ++i) EXPECT_EQ(one.state(i), two.state(i));
+// To the last bit: in lanes beside others, in a group that is not full and alone by the same operations. The
+// samples are closer together than the steps, so that some rigs are ahead of what is asked for.
+TEST(Ensemble, WhatARigDoesDoesNotDependOnTheOthers) {
+  for (const char* type : {"square", "sine"}) {
+    ExcitationSettings excitation = test::square(0.05, 50);
+    excitation.type = type;
+    const auto rigs = different(rig_of(true, true, true), 13);
+    Ensemble all(rigs, excitation, test::solver(1e-6));
+    std::vector<std::unique_ptr<Ensemble>> alone;
+    for (const model::Rig& rig : rigs)
+      alone.push_back(std::make_unique<Ensemble>(std::vector{rig}, excitation, test::solver(1e-6)));
+    for (int k = 1; k <= 3000; ++k) {
+      const double t = k * 1e-5;
+      all.advance_to(t);
+      for (std::size_t i = 0; i < rigs.size(); ++i) {
+        alone[i]->advance_to(t);
+        ASSERT_EQ(all.state(i), alone[i]->state(0)) << type << ", rig " << i << " at " << t;
+      }
+    }
+  }
+}
+
+// As often as it is looked at.
+TEST(Ensemble, LooksInBetweenChangeNothing) {
+  const auto rigs = different(rig_of(true, true, true), 9);
+  Ensemble often(rigs, test::square(0.05, 50), test::solver(1e-6)),
+      once(rigs, test::square(0.05, 50), test::solver(1e-6));
+  for (int k = 1; k <= 50; ++k) often.advance_to(k * 1e-3);
+  once.advance_to(0.05);
+  for (std::size_t i = 0; i < rigs.size(); ++i) EXPECT_EQ(often.state(i), once.state(i));
 }
 
 TEST(Ensemble, LeavesToPlantsWhatIsNotSmooth) {

@@ -32,6 +32,8 @@ struct TrainLayout : TrainParts {
   static constexpr int kLayouts = 8;
   constexpr int number() const { return input_gives + 2 * output_gives + 4 * link_free; }
   static constexpr TrainLayout numbered(int n) { return {(n & 1) != 0, true, (n & 2) != 0, (n & 4) != 0}; }
+  /// A load with rigid couplings behind a mesh that gives way: node 0 is the motor, node 1 the load.
+  static constexpr TrainLayout following_load() { return {false, true, false, true}; }
 
   bool input_gives, output_gives, link_free;
   int dof = 1;                                         // degrees of freedom, 1 to 4

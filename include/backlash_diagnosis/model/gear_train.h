@@ -84,6 +84,12 @@ class GearTrain : private TrainParts {
     FrictionLimits friction;
   };
   LoadForces load_forces(const Motion& motion) const;
+  /// Whether that is dampers, teeth without memory or shape, and friction that does not change: then
+  /// equations() with power_contact() and the limits at any moment are all of it.
+  bool plain_load() const {
+    return power_contact() && !contact_->needs_impact_speed() && !variation_ && !pairs_ && !shaped_ &&
+           load_terms_.empty();
+  }
 
   /// The shift of either flank at these positions, forward flank first; infinite for a flank that is far
   /// away. Saves time where forces are computed several times at nearly the same position. Only if terms act

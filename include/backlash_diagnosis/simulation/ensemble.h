@@ -12,10 +12,12 @@
 
 namespace backlash::simulation {
 
+class RigGroup;
+
 /// By the explicit pair of Tsitouras (2011), which stands beside SUNDIALS here because a step of a few rigs
 /// in vector registers is shorter than the library's own work for one. The tolerances are those of `solver`,
-/// the method is not; each rig keeps to them, the strictest sets the step. What is returned is the same on
-/// every processor.
+/// the method is not. Each rig has steps of its own: what it does depends neither on those beside it nor on
+/// the processor, and one alone is moved by the same code.
 class Ensemble {
  public:
   /// Whether these can be moved at once: smooth trains (GearTrain::smooth()) of one layout with contact laws
@@ -38,15 +40,19 @@ class Ensemble {
   model::Observation observe(std::size_t rig) const;
   /// 2 dof numbers of one rig, as Plant::state().
   std::vector<double> state(std::size_t rig) const;
-  long steps() const;  // of all groups of rigs that share their steps
+  long steps() const;  // attempts at one, counted once for rigs that are moved together
 
  private:
-  struct Group;
+  struct Place {
+    RigGroup* group;
+    int lane;
+  };
 
   std::vector<model::GearTrain> trains_;
   bool at_load_;
   std::unique_ptr<Excitation> excitation_;
-  std::vector<Group> groups_;
+  std::vector<std::unique_ptr<RigGroup>> groups_;
+  std::vector<Place> places_;  // of each rig
   double time_ = 0;
   long segment_ = 0;
 };
