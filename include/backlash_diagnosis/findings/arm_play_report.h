@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/diagnosis/verdict.h"
 #include "backlash_diagnosis/geared_arm/geared_arm.h"
 #include "backlash_diagnosis/geared_arm/play.h"
+#include "backlash_diagnosis/geared_arm/traverse.h"
 
 namespace backlash::findings {
 
@@ -17,6 +18,7 @@ struct ArmPlayReport {
   std::vector<std::string> warnings;
   const arm::ArmRecord* joints = nullptr;
   std::vector<geared_arm::JointPlay> plays;
+  std::vector<geared_arm::JointTraverse> traverses;  // empty where every joint has two encoders
   std::vector<diagnosis::Verdict> verdicts;  // one per joint
 };
 
