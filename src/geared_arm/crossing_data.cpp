@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "crossing_data.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/arm/dynamics.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
-#include "diagnosis/refusal.h"
 
 namespace backlash::geared_arm {
 namespace {
@@ -20,7 +17,6 @@ using record::Channel;
 constexpr double kCertain = 0.5;      // cycles of torque_cutoff for which the load must be certain
 constexpr double kSmoothed = 0.125;   // of a cycle of the teeth, to each side
 constexpr double kBlock = 0.25;       // of a cycle of the teeth
-constexpr double kCycleSamples = 8;   // in a cycle of the teeth, at least
 constexpr double kStep = 0.5;         // rad of a cycle of the teeth per step
 constexpr double kLead = 3;           // cycles of the teeth that count before the load becomes uncertain
 constexpr double kSettling = 2;       // cycles of the teeth after the begin that do not count
@@ -188,12 +184,11 @@ void add_windows(CrossingData& data, const arm::ArmRig& rig, const arm::Chain& c
   }
 }
 
-/// Of the teeth against what they move [s].
-double cycle_of(const TraverseJoint& joint) {
+}  // namespace
+
+double teeth_cycle(const TraverseJoint& joint) {
   return 2 * M_PI / std::sqrt(joint.stiffness * (1 / joint.rotor + 1 / joint.least_inertia));
 }
-
-}  // namespace
 
 CrossingData crossing_data(const GearedArm& arm, const arm::ArmRig& fitted, const arm::ArmRecord& record,
                            const std::vector<arm::ArmMotion>& motions,
@@ -204,14 +199,9 @@ CrossingData crossing_data(const GearedArm& arm, const arm::ArmRig& fitted, cons
   data.friction_speed = arm.rig.identification.friction_speed;
   double fastest = INFINITY, slowest = 0;
   for (const TraverseJoint& joint : joints) {
-    const double cycle = cycle_of(joint);
+    const double cycle = teeth_cycle(joint);
     fastest = std::fmin(fastest, cycle), slowest = std::fmax(slowest, cycle);
   }
-  if (!(data.interval * kCycleSamples < fastest))
-    throw diagnosis::Refusal{
-        diagnosis::Status::out_of_domain,
-        fmt::format("cannot tell: a sample each {:.3g} s does not resolve the cycle of {:.3g} s of a motor against its link",
-                    data.interval, fastest)};
   data.steps = int(std::ceil(2 * M_PI * data.interval / (fastest * kStep)));
   data.reach = std::max<Eigen::Index>(2, std::lround(kSmoothed * fastest / data.interval));
   data.block = std::max<Eigen::Index>(2 * data.reach + 1, std::lround(kBlock * fastest / data.interval));

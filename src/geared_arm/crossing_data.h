@@ -56,7 +56,10 @@ struct CrossingData {
   std::size_t turns = 0;  // of the load of any joint, of which windows are a part
 };
 
-/// Throws diagnosis::Refusal where the record is too coarse in time.
+/// Of the teeth between what they move [s]: the motor's rotor and the link.
+double teeth_cycle(const TraverseJoint& joint);
+
+/// All joints of the rig that are not among `joints` turn with their motors.
 CrossingData crossing_data(const GearedArm& arm, const arm::ArmRig& fitted, const arm::ArmRecord& record,
                            const std::vector<arm::ArmMotion>& motions,
                            const std::vector<TraverseJoint>& joints, const TraverseSettings& settings);

@@ -27,6 +27,7 @@ constexpr int kTried = 14;                           // of them, evenly in the l
 constexpr int kSteps = 30;                           // of a fit
 constexpr double kRivalApart = 1.25;                 // ratio of gaps that are different answers; choice
 constexpr double kLeastSlow = 0.005;                 // of the largest load; choice
+constexpr double kCycleSamples = 8;                  // in a cycle of the teeth, at least; choice
 constexpr double kTypical = 0.5;                     // of the largest load: where teeth are known; choice
 
 std::vector<double> grid() {
@@ -125,6 +126,15 @@ std::string obstacle(const GearedArm& arm, const arm::ArmFit& fit, std::size_t j
     return "needs load_position, or rotor_inertia of the joint in the rig file";
   if (!std::isfinite(fit.deviation[j])) return "cannot tell: the joint hardly moves";
   return {};
+}
+
+/// Why samples are too far apart for a joint; empty: they are not. Such a link is light: the other joints
+/// hardly feel whether it turns with its motor or a tooth beside it.
+std::string too_fast(const TraverseJoint& joint, double interval) {
+  if (interval * kCycleSamples < teeth_cycle(joint)) return {};
+  return fmt::format("cannot tell: a sample each {:.3g} s does not resolve the cycle of {:.3g} s of a motor "
+                     "against its link",
+                     interval, teeth_cycle(joint));
 }
 
 /// Flights that the fitted machine makes.
@@ -288,7 +298,10 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
     for (std::size_t j = 0; j < out.size(); ++j) {
       out[j].estimate.message = obstacle(arm, fit, j);
       if (!out[j].estimate.message.empty()) continue;
-      joints.push_back(joint_of(arm, fit, record, loads[j], least_inertia(chain, motions, j), j, settings));
+      const TraverseJoint joint =
+          joint_of(arm, fit, record, loads[j], least_inertia(chain, motions, j), j, settings);
+      out[j].estimate.message = too_fast(joint, motions.front().interval);
+      if (out[j].estimate.message.empty()) joints.push_back(joint);
     }
     if (joints.empty()) return out;
     const CrossingData data = crossing_data(arm, fit.rig, record, motions, joints, settings);

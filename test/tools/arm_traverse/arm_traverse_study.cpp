@@ -1,171 +1,159 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How often the play of an arm's joints, told by one encoder per joint, is right, unknown, or wrong: draws
-// arms with play in none, one or both joints, simulates a record of each, takes the links' encoders away,
-// diagnoses with a rig file that is off, and counts. Deterministic for its arguments.
+// arms with play in none, some or all joints, simulates a record of each, takes the links' encoders away,
+// diagnoses with a rig file that does not know what undeclared.h did to the machine, and counts.
+// Deterministic for its arguments.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/program_options.hpp>
 #include <cmath>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "backlash_diagnosis/base/random.h"
 #include "backlash_diagnosis/geared_arm/simulation.h"
 #include "backlash_diagnosis/geared_arm/traverse.h"
 #include "support/data.h"
+#include "undeclared.h"
 
 namespace backlash::geared_arm {
 namespace {
 
 using diagnosis::Status;
+using record::Channel;
 using Json = nlohmann::ordered_json;
 
 struct Options {
   std::uint64_t seed = 1;
-  int arms = 60;
+  int arms = 10;
   double duration = 30;  // s
-  std::string out;
+  std::string rig = "config/two_link_arm/two_link_arm.yaml", kind = "all", out;
 };
 
-struct Drawn {
-  GearedArm machine;
-  std::string wrong;  // what the rig file does not know
-};
+constexpr double kPlay = 0.5;      // probability of it in a joint
+constexpr double kReach = 1.2;     // rad, to each side of where the rig file moves
+constexpr double kSmallest = 3e-4, kLargest = 6e-3;  // rad
 
-double log_uniform(Random& random, double from, double to) {
-  return from * std::pow(to / from, random.uniform());
+/// Motion and play; what the file knows otherwise.
+void draw(GearedArm& machine, Random& random) {
+  for (GearedJoint& joint : machine.joints) {
+    simulation::MoveSettings& moves = joint.excitation.moves;
+    double mean = 0;
+    for (const double position : moves.positions) mean += position / double(moves.positions.size());
+    for (double& position : moves.positions) position = mean + random.uniform(-kReach, kReach);
+    moves.speed *= random.uniform(0.6, 1.5);
+    moves.acceleration *= random.uniform(0.6, 1.5);
+    const double play = log_uniform(random, kSmallest, kLargest);
+    joint.gear->backlash = random.uniform() < kPlay ? play : 0;
+  }
 }
 
-/// What the rig file gets wrong: one thing, several, or nothing.
-std::string disturb(GearedArm& machine, Random& random) {
-  const double off = random.uniform(0.1, 0.2) * (random.uniform() < 0.5 ? -1 : 1);
-  const int kind = int(random.uniform(0, 6));
-  std::string what = "nothing";
-  auto& joints = machine.rig.joints;
-  if (kind == 1 || kind == 5) {
-    what = "friction";
-    for (std::size_t j = 0; j < joints.size(); ++j) {
-      joints[j].terms[std::size_t(arm::DriveTerm::coulomb)] *= 1 + off;
-      joints[j].terms[std::size_t(arm::DriveTerm::viscous)] *= 1 - off;
-      machine.joints[j].link_coulomb *= 1 + 2 * off;
+/// As sensors show it; the links' encoders are taken away.
+void measure(std::vector<record::JointRecord>& joints, const simulation::SensorsSettings& sensors,
+             const std::string& kind, Random& random) {
+  const double more = kind == "noise" ? random.uniform(3, 10) : log_uniform(random, 0.5, 2);
+  for (record::JointRecord& joint : joints) {
+    for (const Channel channel : {Channel::motor_torque, Channel::motor_position}) {
+      simulation::SensorSettings settings = sensors.of(channel);
+      if (kind == "coarse") settings.resolution = channel == Channel::motor_position ? 5e-5 : settings.noise;
+      for (double& value : joint.record.column(channel)) {
+        value += more * settings.noise * random.normal();
+        if (settings.resolution > 0) value = std::round(value / settings.resolution) * settings.resolution;
+      }
     }
-  }
-  if (kind == 2 || kind == 5) {
-    what = kind == 5 ? "friction, payload" : "payload";
-    arm::Body payload;  // up to a fifth of the forearm's mass, between its middle and its end
-    payload.mass = std::fabs(off);
-    payload.centre = {random.uniform(0.15, 0.3), 0, 0};
-    machine.rig.chain.links.back() += arm::parameters_of(payload);
-  }
-  if (kind == 3) {
-    what = "torque constant";
-    joints[std::size_t(random.uniform(0, 2))].constant *= 1 + off;
-  }
-  if (kind == 4) {
-    what = "rotor inertia";
-    joints[std::size_t(random.uniform(0, 2))].terms[std::size_t(arm::DriveTerm::rotor_inertia)] *= 1 + off;
-  }
-  return what;
-}
-
-Drawn draw(const GearedArm& declared, Random& random) {
-  Drawn drawn{declared, {}};
-  GearedArm& machine = drawn.machine;
-  const double centre = random.uniform() < 0.75 ? -M_PI / 2 : 0;  // a quarter is held out level
-  const int where = int(random.uniform(0, 4));                    // none, shoulder, elbow, both
-  const double noise = log_uniform(random, 0.3, 3);
-  machine.sensors.seed = std::uint64_t(random.uniform(1, 1e9));
-  machine.sensors.of(record::Channel::motor_torque).noise *= noise;
-  machine.sensors.of(record::Channel::motor_position).noise *= noise;
-  for (std::size_t j = 0; j < 2; ++j) {
-    GearedJoint& joint = machine.joints[j];
-    for (double& position : joint.excitation.moves.positions)
-      position = (j == 0 ? centre : 0) + random.uniform(-1.2, 1.2);
-    joint.excitation.moves.speed *= random.uniform(0.6, 1.5);
-    joint.excitation.moves.acceleration *= random.uniform(0.6, 1.5);
-    const bool play = where == 3 || where == int(j) + 1;
-    joint.gear->backlash = play ? log_uniform(random, 5e-4, 6e-3) : 0;
-    const double stiff = log_uniform(random, 0.6, 1.7);
-    if (random.uniform() < 0.3)
-      joint.gear->contact = model::make_contact_law(
-          "hunt_crossley", {{"stiffness", stiff * (j == 0 ? 3e5 : 1e5)}, {"exponent", 1.5}, {"alpha", 0.5}});
-    else
-      joint.gear->contact =
-          model::make_contact_law("linear", {{"stiffness", stiff * (j == 0 ? 8000 : 3000)},
-                                             {"damping", log_uniform(random, 0.5, 2) * (j == 0 ? 12 : 4)}});
-  }
-  drawn.wrong = disturb(machine, random);
-  return drawn;
-}
-
-struct Count {
-  int asked = 0, told = 0, within = 0, holds = 0, none = 0, none_holds = 0, wrong_joint = 0, wrong_sure = 0;
-};
-
-/// Of a joint with play `truth`.
-void count(Count& c, const diagnosis::Estimate& e, double truth) {
-  ++c.asked;
-  const bool holds = e.angle_lower <= truth && e.angle_upper >= truth;
-  if (e.status == Status::ok || e.status == Status::below_range) {
-    const double width = e.angle_upper - e.angle_lower;
-    c.wrong_sure += truth < e.angle_lower - 2 * width || truth > e.angle_upper + 2 * width;
-  }
-  if (e.status == Status::ok) {
-    ++c.told;
-    c.holds += holds;
-    c.within += std::fabs(e.backlash_angle - truth) <= 0.1 * truth;
-    c.wrong_joint += truth == 0;
-  } else if (e.status == Status::below_range) {
-    ++c.none;
-    c.none_holds += holds;
+    for (const Channel channel : {Channel::motor_velocity, Channel::load_position, Channel::load_velocity,
+                                  Channel::output_torque})
+      joint.record.column(channel).clear();
   }
 }
 
-void print(const char* name, const Count& c) {
-  fmt::print("{:<12} {:>5} {:>6} {:>10} {:>10} {:>8} {:>10} {:>12} {:>10}\n", name, c.asked, c.told, c.within,
-             c.holds, c.none, c.none_holds, c.wrong_joint, c.wrong_sure);
-}
-
-std::vector<JointTraverse> diagnosed(const GearedArm& machine, const GearedArm& declared, double duration) {
-  std::vector<record::JointRecord> joints = simulate_arm(machine, duration);
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    joints[j].record.column(record::Channel::load_position).clear();
-    joints[j].record.column(record::Channel::load_velocity).clear();
-    // The simulated drive's torque as a drive tells it whose constant is not what the file says.
-    for (double& torque : joints[j].record.column(record::Channel::motor_torque))
-      torque *= machine.rig.joints[j].constant;
-  }
+std::vector<JointTraverse> diagnosed(GearedArm machine, const GearedArm& declared, const Options& o,
+                                     const std::string& kind, Random& random) {
+  const simulation::SensorsSettings sensors = machine.sensors;
+  machine.sensors.channels = {};
+  machine.sensors.of(Channel::motor_velocity).declared = true;
+  machine.sensors.of(Channel::output_torque).declared = true;
+  std::vector<record::JointRecord> joints = simulate_arm(machine, o.duration);
+  change_record(joints, machine, kind, random);
+  measure(joints, sensors, kind, random);
   std::vector<std::string> warnings;
   return traverses_of(declared, arm::arm_record(joints, declared.rig, "simulated"), warnings);
 }
 
-int run(const Options& o) {
-  const GearedArm declared =
-      load_geared_arm(test::package_file("config/two_link_arm/two_link_arm.yaml"));
-  Random random(o.seed);
-  Count sound, play;
-  Json all = Json::array();
-  for (int i = 0; i < o.arms; ++i) {
-    const Drawn drawn = draw(declared, random);
-    const std::vector<JointTraverse> found = diagnosed(drawn.machine, declared, o.duration);
-    for (std::size_t j = 0; j < found.size(); ++j) {
-      const diagnosis::Estimate& e = found[j].estimate;
-      const double truth = drawn.machine.joints[j].gear->backlash;
-      count(truth > 0 ? play : sound, e, truth);
-      all.push_back({{"arm", i}, {"joint", declared.rig.joints[j].name}, {"truth", truth},
-                     {"wrong", drawn.wrong}, {"status", diagnosis::to_string(e.status)},
-                     {"value", e.backlash_angle}, {"lower", e.angle_lower}, {"upper", e.angle_upper},
-                     {"misfit", found[j].misfit}, {"message", e.message}});
-      std::cerr << all.back().dump() << std::endl;
-    }
+struct Count {
+  int asked = 0, told = 0, within = 0, holds = 0, most = 0, most_holds = 0, wrong_sure = 0;
+  double worst = 0;  // error over the interval's half width
+
+  void add(const diagnosis::Estimate& e, double truth) {
+    ++asked;
+    if (e.status != Status::ok && e.status != Status::below_range) return;
+    const bool in = e.angle_lower <= truth && e.angle_upper >= truth;
+    const double width = e.angle_upper - e.angle_lower;
+    wrong_sure += truth < e.angle_lower - 2 * width || truth > e.angle_upper + 2 * width;
+    worst = std::fmax(worst, std::fabs(truth - (e.angle_lower + e.angle_upper) / 2) / (width / 2));
+    (e.status == Status::ok ? told : most) += 1;
+    (e.status == Status::ok ? holds : most_holds) += in;
+    within += e.status == Status::ok && std::fabs(e.backlash_angle - truth) <= 0.1 * truth;
   }
-  fmt::print("{:<12} {:>5} {:>6} {:>10} {:>10} {:>8} {:>10} {:>12} {:>10}\n", "joints", "asked", "told",
-             "within 10%", "holds it", "no play", "holds it", "wrong joint", "wrong+sure");
-  print("with play", play);
-  print("without", sound);
-  if (!o.out.empty()) std::ofstream(o.out) << all.dump(1) << '\n';
-  return play.wrong_sure + sound.wrong_sure + sound.wrong_joint > 0 ? 2 : 0;
+};
+
+constexpr const char* kRow = "{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6.1f} {:>6}\n";
+
+void print(const std::string& name, const Count& play, const Count& sound) {
+  fmt::print(kRow, name, play.asked, play.told, play.within, play.holds, play.most, play.most_holds,
+             play.asked - play.told - play.most, sound.asked, sound.told, sound.most,
+             sound.asked - sound.told - sound.most, std::fmax(play.worst, sound.worst),
+             play.wrong_sure + sound.wrong_sure);
+  std::fflush(stdout);
+}
+
+void add(Count& sum, const Count& c) {
+  sum.asked += c.asked, sum.told += c.told, sum.within += c.within, sum.holds += c.holds;
+  sum.most += c.most, sum.most_holds += c.most_holds, sum.wrong_sure += c.wrong_sure;
+  sum.worst = std::fmax(sum.worst, c.worst);
+}
+
+Json told(const Options& o, const std::string& kind, int arm, const std::string& joint, double truth,
+          const JointTraverse& t) {
+  const diagnosis::Estimate& e = t.estimate;
+  return {{"rig", o.rig},          {"kind", kind},           {"arm", arm},
+          {"joint", joint},        {"truth", truth},         {"status", diagnosis::to_string(e.status)},
+          {"value", e.backlash_angle}, {"lower", e.angle_lower}, {"upper", e.angle_upper},
+          {"misfit", t.misfit},    {"message", e.message}};
+}
+
+int run(const Options& o) {
+  const GearedArm declared = load_geared_arm(test::package_file(o.rig));
+  Count all_play, all_sound;
+  std::ofstream out;
+  if (!o.out.empty()) out.open(o.out, std::ios::app);
+  fmt::print("{:<14} |{:^46} |{:^26} |\n", "", "joints with play", "joints without");
+  fmt::print("{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6} {:>6}\n", "undeclared",
+             "asked", "told", "<10 %", "holds", "most", "holds", "unkn.", "asked", "told", "most", "unkn.",
+             "worst", "w+sure");
+  const std::vector<std::string>& kinds = undeclared_kinds();
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    const std::string& kind = kinds[k];
+    if (o.kind != "all" && o.kind != kind) continue;
+    Random random(o.seed, std::uint32_t(k));
+    Count play, sound;
+    for (int i = 0; i < o.arms; ++i) {
+      GearedArm machine = declared;
+      draw(machine, random);
+      change_machine(machine, kind, random);
+      const std::vector<JointTraverse> found = diagnosed(machine, declared, o, kind, random);
+      for (std::size_t j = 0; j < found.size(); ++j) {
+        const double truth = machine.joints[j].gear->backlash;
+        (truth > 0 ? play : sound).add(found[j].estimate, truth);
+        if (out) out << told(o, kind, i, declared.rig.joints[j].name, truth, found[j]).dump() << std::endl;
+      }
+    }
+    print(kind, play, sound);
+    add(all_play, play), add(all_sound, sound);
+  }
+  print("all", all_play, all_sound);
+  return all_play.wrong_sure + all_sound.wrong_sure + all_sound.told > 0 ? 2 : 0;
 }
 
 }  // namespace
@@ -176,8 +164,9 @@ int main(int argc, char** argv) {
   backlash::geared_arm::Options o;
   po::options_description options("arm_traverse_study: plays of drawn arms by one encoder per joint");
   options.add_options()("help", "this text")("seed", po::value(&o.seed), "of all that is drawn")(
-      "arms", po::value(&o.arms), "how many")("duration", po::value(&o.duration), "of each record [s]")(
-      "json", po::value(&o.out), "file of all answers");
+      "arms", po::value(&o.arms), "how many of each kind")("duration", po::value(&o.duration), "of each record [s]")(
+      "rig", po::value(&o.rig), "within the package")("kind", po::value(&o.kind), "what is undeclared, or all")(
+      "json", po::value(&o.out), "file that each answer is appended to, a line each");
   po::variables_map given;
   po::store(po::parse_command_line(argc, argv, options), given);
   po::notify(given);
