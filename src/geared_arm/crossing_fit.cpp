@@ -17,14 +17,18 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // What is known of the values, standard deviations: choices.
-constexpr double kKnownStiffness = 0.5, kKnownDamping = 0.8, kKnownPower = 0.15, kKnownRotor = 0.15;
+constexpr double kKnownStiffness = 0.5, kKnownDamping = 0.8, kKnownPower = 0.15, kKnownRotor = 0.1;
 constexpr double kKnownCoulomb = 0.5;       // of the declared friction behind the gap, and
 constexpr double kUndeclaredCoulomb = 0.005;  // of the largest load
 constexpr double kHeldTorque = 0.25, kKnownHeld = 0.3;  // samples: held or averaged; theory, choice
 constexpr double kUntold = 0.01;   // of the largest load: torque on a link that nothing tells; choice
+constexpr double kVaries = 0.1;       // of the gap, and
+constexpr double kTeethVary = 0.03;   // of the deflection: what a turn says of the gap otherwise; choices
 constexpr double kSlow = 0.3;      // s, memory of a torque that nothing tells; choice
 constexpr double kRough = 0.03;    // s, the same of friction about a standstill; choice
-constexpr double kBounds[kCrossingValues][2] = {{0, 0.1},  {-3, 3},     {-4, 4}, {1, 1.6},
+constexpr double kDifference = 0.1;          // of a standard deviation, for derivatives; choice
+constexpr double kMostWindows = 0.7;  // that must be explained; choice
+constexpr double kBounds[kCrossingValues][2] = {{0, 0.1},  {-3, 3},     {-4, 4}, {0.8, 1.6},
                                                 {-0.6, 0.6}, {0, 1e300}, {-0.5, 1}};
 
 int place(std::size_t joint, int value) {
@@ -35,9 +39,6 @@ int place(std::size_t joint, int value) {
 
 CrossingFit::CrossingFit(const CrossingData& data)
     : data_(data), machine_(data.joints.size()), held_(data.joints.size(), 0) {
-  beta_spread_.resize(Index(data.joints.size()));
-  for (std::size_t j = 0; j < data.joints.size(); ++j)
-    beta_spread_[Index(j)] = std::hypot(kUntold * data.joints[j].most, data.joints[j].slow_torque);
   whiten();
   begin(std::vector<double>(data.joints.size(), 0.0));
 }
@@ -47,13 +48,27 @@ void CrossingFit::begin(const std::vector<double>& gaps) {
     for (int v = 0; v < kCrossingValues; ++v) machine_[j][std::size_t(v)] = centre(j, v);
     machine_[j][kCrossingGap] = gaps[j];
   }
-  beta_.assign(data_.windows.size(), VectorXd::Zero(Index(machine_.size())));
-  cost_ = cost_of(machine_, beta_);
+  own_.assign(data_.windows.size(), VectorXd::Zero(2 * Index(machine_.size())));
+  cost_ = cost_of(machine_, own_);
+}
+
+/// Standard deviations of what is a window's own. What the equations do not hold makes each turn say another
+/// gap: without that, the one turn with the hardest touch would tell it alone.
+VectorXd CrossingFit::own_spread(const CrossingMachine& machine) const {
+  const Index n = Index(machine.size());
+  VectorXd spread(2 * n);
+  for (Index j = 0; j < n; ++j) {
+    const TraverseJoint& joint = data_.joints[std::size_t(j)];
+    spread[j] = std::hypot(kUntold * joint.most, joint.slow_torque);
+    spread[n + j] = std::hypot(kVaries * machine[std::size_t(j)][kCrossingGap],
+                               kTeethVary * joint.level / joint.stiffness);
+  }
+  return spread;
 }
 
 void CrossingFit::set_gap(std::size_t joint, double gap) {
   machine_[joint][kCrossingGap] = gap;
-  cost_ = cost_of(machine_, beta_);
+  cost_ = cost_of(machine_, own_);
 }
 
 double CrossingFit::centre(std::size_t joint, int value) const {
@@ -76,18 +91,12 @@ double CrossingFit::spread(std::size_t joint, int value) const {
   }
 }
 
-/// A step for a derivative.
-double CrossingFit::small(std::size_t joint, int value) const {
-  if (value == kCrossingGap)
-    return 0.01 * std::fmax(gap(joint), 0.1 * data_.joints[joint].level / data_.joints[joint].stiffness);
-  return 0.05 * spread(joint, value);
-}
-
 /// Covariances of the averaged torques of each window.
 void CrossingFit::whiten() {
   const double block = double(data_.block) * data_.interval, m = double(data_.reach);
   for (const CrossingWindow& w : data_.windows) {
     factors_.emplace_back();
+    shaken_.emplace_back();
     const Index n = (w.samples() - 1 - data_.skipped) / data_.block;
     for (std::size_t j = 0; j < data_.joints.size(); ++j) {
       const TraverseJoint& joint = data_.joints[j];
@@ -106,15 +115,18 @@ void CrossingFit::whiten() {
           if (a == b) c(a, b) += white + 2 * edge;
           if (std::abs(a - b) == 1) c(a, b) -= edge;
         }
-      factors_.back().push_back(Eigen::LLT<MatrixXd>(c).matrixL());
+      const Eigen::LLT<MatrixXd> factor(c);
+      const MatrixXd inverse = factor.solve(MatrixXd::Identity(n, n));
+      factors_.back().push_back(factor.matrixL());
+      shaken_.back().push_back(edge * (2 * inverse.trace() - 2 * inverse.diagonal(1).sum()));
     }
   }
 }
 
 VectorXd CrossingFit::residual(std::size_t window, const CrossingMachine& machine,
-                               const VectorXd& beta) const {
+                               const VectorXd& own) const {
   const CrossingWindow& w = data_.windows[window];
-  const MatrixXd mesh = mesh_torques(data_, w, machine, beta);
+  const MatrixXd mesh = mesh_torques(data_, w, machine, own);
   const Index m = data_.block, n = (w.samples() - 1 - data_.skipped) / m;
   VectorXd all(n * Index(machine.size()));
   for (std::size_t j = 0; j < machine.size(); ++j) {
@@ -139,23 +151,64 @@ VectorXd CrossingFit::residual(std::size_t window, const CrossingMachine& machin
 
 CrossingFit::Part CrossingFit::part(std::size_t window) const {
   Part p;
-  p.residual = residual(window, machine_, beta_[window]);
+  const VectorXd spread = own_spread(machine_);
+  p.residual = residual(window, machine_, own_[window]);
   p.global = MatrixXd::Zero(p.residual.size(), Index(machine_.size()) * kCrossingValues);
-  p.own.resize(p.residual.size(), Index(machine_.size()));
-  for (std::size_t j = 0; j < machine_.size(); ++j) {
-    for (int v = 0; v < kCrossingValues; ++v) {
-      if (v == kCrossingGap && held_[j]) continue;
+  p.own.resize(p.residual.size(), spread.size());
+  for (std::size_t j = 0; j < machine_.size(); ++j)
+    for (int v = kCrossingStiffness; v < kCrossingValues; ++v) {
       CrossingMachine other = machine_;
-      const double step = small(j, v);
+      const double step = kDifference * spread(j, v);
       other[j][std::size_t(v)] += step;
-      p.global.col(place(j, v)) = (residual(window, other, beta_[window]) - p.residual) / step;
+      p.global.col(place(j, v)) = (residual(window, other, own_[window]) - p.residual) / step;
     }
-    VectorXd beta = beta_[window];
-    const double step = 0.1 * beta_spread_[Index(j)];
-    beta[Index(j)] += step;
-    p.own.col(Index(j)) = (residual(window, machine_, beta) - p.residual) / step;
+  for (Index i = 0; i < spread.size(); ++i) {
+    VectorXd own = own_[window];
+    const double step = kDifference * spread[i];
+    own[i] += step;
+    p.own.col(i) = (residual(window, machine_, own) - p.residual) / step;
   }
+  for (std::size_t j = 0; j < machine_.size(); ++j)
+    if (!held_[j]) p.global.col(place(j, kCrossingGap)) = p.own.col(Index(machine_.size() + j));
+  weigh(window, p);
   return p;
+}
+
+/// By how much noise of the position makes the squares of the weighted residuals larger than with the
+/// declared rotor, whose inertia multiplies it: without this a lighter rotor would seem the better one.
+double CrossingFit::shaken(std::size_t window, std::size_t joint, const CrossingMachine& machine) const {
+  return shaken_[window][joint] * (std::exp(2 * machine[joint][kCrossingRotor]) - 1);
+}
+
+/// Minus twice the logarithm of the likelihood of a joint's residuals in a window, whose noise is at least as
+/// large as known: a window that the equations do not explain, such as a long one with many touches, says
+/// little, and does not draw all others with it.
+double CrossingFit::cost_of(std::size_t window, const VectorXd& residual,
+                            const CrossingMachine& machine) const {
+  const Index n = residual.size() / Index(machine_.size());
+  double sum = 0;
+  for (Index j = 0; j < Index(machine_.size()); ++j) {
+    const double left = residual.segment(n * j, n).squaredNorm() - shaken(window, std::size_t(j), machine);
+    sum += left < double(n) ? left : double(n) * (1 + std::log(left / double(n)));
+  }
+  return sum;
+}
+
+/// The rows of each joint by what is left of them.
+void CrossingFit::weigh(std::size_t window, Part& p) const {
+  const Index n = p.residual.size() / Index(machine_.size());
+  p.offset = VectorXd::Zero(p.global.cols());
+  for (Index j = 0; j < Index(machine_.size()); ++j) {
+    const auto joint = std::size_t(j);
+    const double left =
+        (p.residual.segment(n * j, n).squaredNorm() - shaken(window, joint, machine_)) / double(n);
+    const double weight = 1 / std::sqrt(std::fmax(1, left));
+    p.residual.segment(n * j, n) *= weight;
+    p.global.middleRows(n * j, n) *= weight;
+    p.own.middleRows(n * j, n) *= weight;
+    p.offset[place(joint, kCrossingRotor)] = -weight * weight * shaken_[window][joint] *
+                                             std::exp(2 * machine_[joint][kCrossingRotor]);
+  }
 }
 
 std::vector<CrossingFit::Part> CrossingFit::parts() const {
@@ -164,21 +217,23 @@ std::vector<CrossingFit::Part> CrossingFit::parts() const {
   return all;
 }
 
-double CrossingFit::prior_cost(const CrossingMachine& machine, const std::vector<VectorXd>& beta) const {
+double CrossingFit::prior_cost(const CrossingMachine& machine, const std::vector<VectorXd>& own) const {
   double sum = 0;
   for (std::size_t j = 0; j < machine.size(); ++j)
     for (int v = kCrossingStiffness; v < kCrossingValues; ++v)
       sum += std::pow((machine[j][std::size_t(v)] - centre(j, v)) / spread(j, v), 2);
-  for (const VectorXd& each : beta) sum += each.cwiseQuotient(beta_spread_).squaredNorm();
+  const VectorXd spread = own_spread(machine);
+  for (const VectorXd& each : own) sum += each.cwiseQuotient(spread).squaredNorm();
   return sum;
 }
 
-double CrossingFit::cost_of(const CrossingMachine& machine, const std::vector<VectorXd>& beta) const {
+double CrossingFit::cost_of(const CrossingMachine& machine, const std::vector<VectorXd>& own) const {
   std::vector<double> costs(data_.windows.size(), 0.0);
   for_each_in_parallel(int(costs.size()), [&](int w) {
-    costs[std::size_t(w)] = residual(std::size_t(w), machine, beta[std::size_t(w)]).squaredNorm();
+    costs[std::size_t(w)] =
+        cost_of(std::size_t(w), residual(std::size_t(w), machine, own[std::size_t(w)]), machine);
   });
-  double sum = prior_cost(machine, beta);
+  double sum = prior_cost(machine, own);
   for (const double cost : costs) sum += cost;
   return sum;
 }
@@ -186,7 +241,7 @@ double CrossingFit::cost_of(const CrossingMachine& machine, const std::vector<Ve
 double CrossingFit::cost_with(std::size_t joint, double gap) const {
   CrossingMachine other = machine_;
   other[joint][kCrossingGap] = gap;
-  return cost_of(other, beta_);
+  return cost_of(other, own_);
 }
 
 void CrossingFit::add_priors(MatrixXd& h, VectorXd& g) const {
@@ -226,16 +281,16 @@ void CrossingFit::run(int steps) {
     MatrixXd h = MatrixXd::Zero(n, n);
     VectorXd g = VectorXd::Zero(n);
     add_priors(h, g);
-    const MatrixXd known = beta_spread_.array().pow(-2).matrix().asDiagonal();
+    const MatrixXd known = own_spread(machine_).array().pow(-2).matrix().asDiagonal();
     std::vector<MatrixXd> inverse;
     for (std::size_t w = 0; w < all.size(); ++w) {
       const Part& p = all[w];
       inverse.push_back(signal::symmetric_inverse(signal::gram(p.own) + known));
-      const VectorXd own = p.own.transpose() * p.residual + known * beta_[w];
+      const VectorXd own = p.own.transpose() * p.residual + known * own_[w];
       const MatrixXd cross = signal::transposed_product(p.global, p.own);
       const MatrixXd reduced = signal::product(cross, inverse.back());
       h += signal::gram(p.global) - signal::product(reduced, cross.transpose());
-      g += p.global.transpose() * p.residual - reduced * own;
+      g += p.global.transpose() * p.residual + p.offset - reduced * own;
     }
     const double before = cost_;
     bool better = false;
@@ -247,14 +302,14 @@ void CrossingFit::run(int steps) {
       for (std::size_t j = 0; j < machine.size(); ++j)
         for (int v = 0; v < kCrossingValues; ++v)
           taken[place(j, v)] = machine[j][std::size_t(v)] - machine_[j][std::size_t(v)];
-      std::vector<VectorXd> beta = beta_;
+      std::vector<VectorXd> owns = own_;
       for (std::size_t w = 0; w < all.size(); ++w)
-        beta[w] -= inverse[w] * (all[w].own.transpose() * (all[w].residual + all[w].global * taken) +
-                                 known * beta_[w]);
-      const double cost = cost_of(machine, beta);
+        owns[w] -= inverse[w] * (all[w].own.transpose() * (all[w].residual + all[w].global * taken) +
+                                 known * own_[w]);
+      const double cost = cost_of(machine, owns);
       better = cost < cost_;
       damping_ = std::clamp(better ? damping_ / 5 : damping_ * 5, 1e-6, 1e6);
-      if (better) machine_ = machine, beta_ = beta, cost_ = cost;
+      if (better) machine_ = machine, own_ = owns, cost_ = cost;
     }
     if (!better || before - cost_ < 1e-3) return;  // a thirtieth of a standard error
   }
@@ -270,24 +325,14 @@ void CrossingFit::scan(const std::vector<double>& grid) {
   }
 }
 
-double CrossingFit::misfit() const {
+double CrossingFit::misfit(std::size_t joint) const {
   std::vector<double> all;
   for (std::size_t w = 0; w < data_.windows.size(); ++w) {
-    const VectorXd r = residual(w, machine_, beta_[w]);
-    all.push_back(std::sqrt(r.squaredNorm() / double(r.size())));
-  }
-  return signal::median(all);
-}
-
-double CrossingFit::misfit(std::size_t joint) const {
-  double sum = 0, count = 0;
-  for (std::size_t w = 0; w < data_.windows.size(); ++w) {
-    const VectorXd r = residual(w, machine_, beta_[w]);
+    const VectorXd r = residual(w, machine_, own_[w]);
     const Index n = r.size() / Index(machine_.size());
-    sum += r.segment(n * Index(joint), n).squaredNorm();
-    count += double(n);
+    all.push_back(std::sqrt(r.segment(n * Index(joint), n).squaredNorm() / double(n)));
   }
-  return std::sqrt(sum / count);
+  return signal::quantile(std::move(all), kMostWindows);
 }
 
 std::vector<CrossingFit::Errors> CrossingFit::errors() const {
@@ -296,7 +341,7 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
   MatrixXd h = MatrixXd::Zero(n, n);
   VectorXd unused = VectorXd::Zero(n);
   add_priors(h, unused);
-  const MatrixXd known = beta_spread_.array().pow(-2).matrix().asDiagonal();
+  const MatrixXd known = own_spread(machine_).array().pow(-2).matrix().asDiagonal();
   std::vector<VectorXd> scores;
   std::vector<MatrixXd> informations;
   for (std::size_t w = 0; w < all.size(); ++w) {
@@ -305,8 +350,8 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
     const MatrixXd reduced =
         signal::product(cross, signal::symmetric_inverse(signal::gram(p.own) + known));
     informations.push_back(signal::gram(p.global) - signal::product(reduced, cross.transpose()));
-    scores.push_back(p.global.transpose() * p.residual -
-                     reduced * (p.own.transpose() * p.residual + known * beta_[w]));
+    scores.push_back(p.global.transpose() * p.residual + p.offset -
+                     reduced * (p.own.transpose() * p.residual + known * own_[w]));
     h += informations.back();
   }
   for (Index i = 0; i < n; ++i) h(i, i) = h(i, i) * (1 + 1e-9) + 1e-300;

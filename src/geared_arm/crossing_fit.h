@@ -25,15 +25,15 @@ class CrossingFit {
 
   double gap(std::size_t joint) const { return machine_[joint][kCrossingGap]; }
   const CrossingMachine& machine() const { return machine_; }
-  const Eigen::VectorXd& beta(std::size_t window) const { return beta_[window]; }
-  /// Sum of squares of the weighted residuals and of the deviations from what is known.
+  const Eigen::VectorXd& own(std::size_t window) const { return own_[window]; }
+  /// Minus twice the logarithm of the likelihood of the residuals and of the deviations from what is known.
   double cost() const { return cost_; }
-  /// The same with another gap, all else as it is.
+  /// The same with another gap, all else but what is each window's own as it is.
   double cost_with(std::size_t joint, double gap) const;
-  /// Root of the mean square of the weighted residuals: the median of the turns.
-  double misfit() const;
-  /// Of one joint's torques, over all turns.
+  /// Root of the mean square of a joint's weighted residuals that most windows do not exceed: about 1 where
+  /// the equations hold.
   double misfit(std::size_t joint) const;
+  double window_misfit(std::size_t w) const { const auto r = residual(w, machine_, own_[w]); return std::sqrt(r.squaredNorm() / double(r.size())); }  // XXX
 
   struct Errors {
     double own = 0, clustered = 0;  // rad, standard errors of the gap
@@ -43,28 +43,31 @@ class CrossingFit {
 
  private:
   struct Part {  // of one window
-    Eigen::VectorXd residual;
-    Eigen::MatrixXd global, own;  // derivatives
+    Eigen::VectorXd residual, offset;  // offset: of half the gradient by the machine, see shaken()
+    Eigen::MatrixXd global, own;  // derivatives by the machine, by what is of this window alone
   };
   Eigen::VectorXd residual(std::size_t window, const CrossingMachine& machine,
-                           const Eigen::VectorXd& beta) const;
+                           const Eigen::VectorXd& own) const;
   Part part(std::size_t window) const;
   std::vector<Part> parts() const;
-  double cost_of(const CrossingMachine& machine, const std::vector<Eigen::VectorXd>& beta) const;
-  double prior_cost(const CrossingMachine& machine, const std::vector<Eigen::VectorXd>& beta) const;
+  void weigh(std::size_t window, Part& part) const;
+  double shaken(std::size_t window, std::size_t joint, const CrossingMachine& machine) const;
+  double cost_of(std::size_t window, const Eigen::VectorXd& residual, const CrossingMachine& machine) const;
+  double cost_of(const CrossingMachine& machine, const std::vector<Eigen::VectorXd>& own) const;
+  double prior_cost(const CrossingMachine& machine, const std::vector<Eigen::VectorXd>& own) const;
   void add_priors(Eigen::MatrixXd& h, Eigen::VectorXd& g) const;
   double centre(std::size_t joint, int value) const;
   double spread(std::size_t joint, int value) const;
-  double small(std::size_t joint, int value) const;
+  Eigen::VectorXd own_spread(const CrossingMachine& machine) const;
   CrossingMachine moved(const Eigen::VectorXd& step) const;
   void whiten();
 
   const CrossingData& data_;
   CrossingMachine machine_;
   std::vector<char> held_;
-  std::vector<Eigen::VectorXd> beta_;
-  Eigen::VectorXd beta_spread_;
+  std::vector<Eigen::VectorXd> own_;  // per window: as mesh_torques() has it
   std::vector<std::vector<Eigen::MatrixXd>> factors_;  // of covariances, lower: per window, per joint
+  std::vector<std::vector<double>> shaken_;            // the same: squares that noise of the position leaves
   double cost_ = 0, damping_ = 1e-3;
 };
 

@@ -12,8 +12,8 @@ namespace {
 /// for a spring and as the torque after Hertz, as in diagnosis/traverse_motion.cpp.
 class Teeth {
  public:
-  Teeth(const TraverseJoint& joint, const std::array<double, kCrossingValues>& values)
-      : half_gap_(values[kCrossingGap] / 2),
+  Teeth(const TraverseJoint& joint, const std::array<double, kCrossingValues>& values, double wider)
+      : half_gap_(std::fmax(0, values[kCrossingGap] + wider) / 2),
         stiffness_(joint.stiffness * std::exp(values[kCrossingStiffness])),
         damping_(joint.damping * std::exp(values[kCrossingDamping])),
         power_(values[kCrossingPower]),
@@ -24,7 +24,7 @@ class Teeth {
     if (depth <= 0) return 0;
     const double side = twist > 0 ? 1 : -1;
     double force = stiffness_ * depth, damping = damping_;
-    if (power_ > 1) {
+    if (power_ != 1) {
       const double harder = std::exp((power_ - 1) * std::log(force / level_));
       force *= harder, damping *= harder * harder * harder;
     }
@@ -75,9 +75,10 @@ class Interval {
 
 class Links {
  public:
-  Links(const CrossingData& data, const CrossingMachine& machine, const Eigen::VectorXd& beta)
-      : data_(data), machine_(machine), beta_(beta), n_(Eigen::Index(machine.size())) {
-    for (std::size_t j = 0; j < machine.size(); ++j) teeth_.emplace_back(data.joints[j], machine[j]);
+  Links(const CrossingData& data, const CrossingMachine& machine, const Eigen::VectorXd& own)
+      : data_(data), machine_(machine), beta_(own), n_(Eigen::Index(machine.size())) {
+    for (std::size_t j = 0; j < machine.size(); ++j)
+      teeth_.emplace_back(data.joints[j], machine[j], own[n_ + Eigen::Index(j)]);
   }
 
   void begin(const CrossingWindow& window) {
@@ -135,7 +136,7 @@ class Links {
 
   const CrossingData& data_;
   const CrossingMachine& machine_;
-  const Eigen::VectorXd& beta_;
+  const Eigen::VectorXd& beta_;  // its first entries
   Eigen::Index n_;
   std::vector<Teeth> teeth_;
   Small q_, v_;
@@ -170,11 +171,11 @@ class Flights {
 }  // namespace
 
 Eigen::MatrixXd mesh_torques(const CrossingData& data, const CrossingWindow& window,
-                             const CrossingMachine& machine, const Eigen::VectorXd& beta,
+                             const CrossingMachine& machine, const Eigen::VectorXd& own,
                              std::vector<Flight>* flights) {
   const auto n = Eigen::Index(machine.size());
   Eigen::MatrixXd mean(window.samples() - 1, n);
-  Links links(data, machine, beta);
+  Links links(data, machine, own);
   links.begin(window);
   Flights seen(machine.size());
   Eigen::MatrixXd before = mobility(data, window.inertia.front(), machine);

@@ -30,10 +30,11 @@ struct Flight {
   int flank;                   // touched at its end
 };
 
-/// Torque through the teeth, mean between a sample and the next: samples - 1 rows [N m]. `beta` [N m] per
-/// joint. `flights`, where asked for, takes those that end on the other flank.
+/// Torque through the teeth, mean between a sample and the next: samples - 1 rows [N m]. `own`: of this
+/// window, beta [N m] per joint, then per joint how much wider than the machine's its gap is [rad].
+/// `flights`, where asked for, takes those that end on the other flank.
 Eigen::MatrixXd mesh_torques(const CrossingData& data, const CrossingWindow& window,
-                             const CrossingMachine& machine, const Eigen::VectorXd& beta,
+                             const CrossingMachine& machine, const Eigen::VectorXd& own,
                              std::vector<Flight>* flights = nullptr);
 
 }  // namespace backlash::geared_arm

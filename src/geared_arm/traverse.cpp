@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <cstdio>
 
 #include "backlash_diagnosis/arm/dynamics.h"
 #include "backlash_diagnosis/arm/fit.h"
@@ -22,9 +24,12 @@ using diagnosis::Refusal;
 using diagnosis::Status;
 using record::Channel;
 
-constexpr double kSmallest = 5e-5, kLargest = 0.05;  // rad, of the gaps that are tried first; choice
-constexpr int kTried = 14;                           // of them, evenly in the logarithm
+constexpr double kSmallest = 3e-5, kLargest = 0.03;  // rad, of the gaps that are tried first; choice
+constexpr int kTried = 40;                           // of them, evenly in the logarithm
 constexpr int kSteps = 30;                           // of a fit
+constexpr double kProfile = 1.3;                     // ratio of gaps that a profile looks at; choice
+constexpr int kProfileSteps = 6;                     // of its fits; choice
+constexpr double kFarRival = 0.5;                    // of the cost: worse at first is no rival; choice (time)
 constexpr double kRivalApart = 1.25;                 // ratio of gaps that are different answers; choice
 constexpr double kLeastSlow = 0.005;                 // of the largest load; choice
 constexpr double kCycleSamples = 8;                  // in a cycle of the teeth, at least; choice
@@ -142,7 +147,7 @@ void tell_crossings(const CrossingData& data, const CrossingFit& fit, std::vecto
   for (std::size_t w = 0; w < data.windows.size(); ++w) {
     std::vector<Flight> flights;
     const CrossingWindow& window = data.windows[w];
-    mesh_torques(data, window, fit.machine(), fit.beta(w), &flights);
+    mesh_torques(data, window, fit.machine(), fit.own(w), &flights);
     for (const Flight& flight : flights) {
       Crossing c;
       c.time = window.begin + double(flight.from) * data.interval;
@@ -160,33 +165,55 @@ struct Judged {
   const CrossingData& data;
   const TraverseSettings& settings;
   double misfit;
-  std::size_t crossings;
+  std::size_t crossings, turns;
 };
 
+/// Windows in which the load of a joint turns.
+std::size_t turns_of(const CrossingData& data, std::size_t k) {
+  std::size_t turns = 0;
+  for (const CrossingWindow& w : data.windows) {
+    const auto load = w.chain.col(Eigen::Index(k));
+    turns += load.minCoeff() < 0 && load.maxCoeff() > 0;
+  }
+  return turns;
+}
+
 /// How much worse the record is explained without the gap, over the misfit.
-double evidence_of(const CrossingFit& best, std::size_t k, double misfit) {
+double evidence_of(const CrossingFit& best, std::size_t k) {
   CrossingFit sound = best;
   sound.set_gap(k, 0);
   sound.hold_gap(k, true);
   sound.run(kSteps);
-  return (sound.cost() - best.cost()) / std::fmax(1, misfit * misfit);
+  return sound.cost() - best.cost();
 }
 
 /// Another gap that explains the record about as well; NaN: none.
-double rival_of(const CrossingFit& best, std::size_t k, const Judged& judged) {
+double rival_of(const CrossingFit& best, std::size_t k, const TraverseSettings& settings) {
   for (const double gap : grid()) {
     const double ratio = gap / best.gap(k);
     if (gap == 0 || (ratio < kRivalApart && ratio > 1 / kRivalApart)) continue;
-    if (best.cost_with(k, gap) - best.cost() > 0.5 * best.cost()) continue;  // far from any
+    if (best.cost_with(k, gap) - best.cost() > kFarRival * best.cost()) continue;
     CrossingFit other = best;
     other.set_gap(k, gap);
     other.run(kSteps);
     const double found = other.gap(k) / best.gap(k);
-    const double worse = (other.cost() - best.cost()) / std::fmax(1, judged.misfit * judged.misfit);
-    if ((found > kRivalApart || found < 1 / kRivalApart) && worse < judged.settings.rival)
+    if ((found > kRivalApart || found < 1 / kRivalApart) && other.cost() - best.cost() < settings.rival)
       return other.gap(k);
   }
   return std::nan("");
+}
+
+/// The largest gap that explains the record about as well as the best, `from` or more.
+double largest_of(const CrossingFit& best, std::size_t k, double from, const TraverseSettings& settings) {
+  double gap = from;
+  for (; gap < kLargest; gap *= kProfile) {
+    CrossingFit other = best;
+    other.set_gap(k, gap);
+    other.hold_gap(k, true);
+    other.run(kProfileSteps);
+    if (other.cost() - best.cost() > settings.rival) break;
+  }
+  return gap;
 }
 
 double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
@@ -199,39 +226,42 @@ double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Erro
                     judged.settings.law * joint.level / stiffness);
 }
 
-void require_explained(const CrossingFit& fit, std::size_t k, const Judged& judged) {
-  const double misfit = std::fmax(judged.misfit, fit.misfit(k));
-  if (misfit > judged.settings.misfit)
+void require_explained(const Judged& judged) {
+  if (judged.misfit > judged.settings.misfit)
     throw Refusal{Status::out_of_domain,
                   fmt::format("cannot tell: no play, whatever the teeth, explains the torque of the motor "
                               "where the load turns: {:.2g} times the noise are left",
-                              misfit)};
+                              judged.misfit)};
 }
 
 void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
            const Judged& judged) {
   const TraverseSettings& s = judged.settings;
-  require_explained(fit, k, judged);
+  require_explained(judged);
   const double gap = fit.gap(k), half = half_width(fit, k, errors, judged);
-  if (errors.turns < double(s.least_turns))
+  if (judged.turns < s.least_turns)
     throw Refusal{Status::insufficient_data,
-                  fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
-                              "record",
-                              errors.turns, s.least_turns)};
+                  fmt::format("cannot tell: the load turned {} times, {} are needed: a longer record",
+                              judged.turns, s.least_turns)};
   e.from_record = true;
-  const double evidence = gap > 0 ? evidence_of(fit, k, judged.misfit) : 0;
+  const double evidence = gap > 0 ? evidence_of(fit, k) : 0;
   if (evidence < s.evidence || !(gap > half)) {
-    e.angle_lower = 0, e.angle_upper = gap + half;
+    e.angle_lower = 0, e.angle_upper = largest_of(fit, k, gap + half, s);
     e.status = Status::below_range;
     e.message = fmt::format("motor's side alone: no play that is larger than its interval: at most {:.3g} rad",
                             e.angle_upper);
     return;
   }
+  if (errors.turns < double(s.least_turns))
+    throw Refusal{Status::insufficient_data,
+                  fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
+                              "record",
+                              errors.turns, s.least_turns)};
   if (!(half < s.vague * gap))
     throw Refusal{Status::insufficient_data,
                   fmt::format("cannot tell: the turns of the load tell the play only from {:.2g} to {:.2g} rad",
                               gap - half, gap + half)};
-  if (const double rival = rival_of(fit, k, judged); std::isfinite(rival))
+  if (const double rival = rival_of(fit, k, s); std::isfinite(rival))
     throw Refusal{Status::ambiguous,
                   fmt::format("cannot tell: {:.3g} and {:.3g} rad explain the record alike", gap, rival)};
   e.status = Status::ok;
@@ -244,6 +274,16 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
 
 CrossingFit solved(const CrossingData& data) {
   CrossingFit fit(data);
+  if (const char* t = std::getenv("TRAV_START")) {  // XXX
+    std::vector<double> g(data.joints.size());
+    std::sscanf(t, "%lf,%lf", &g[0], &g[1]);
+    fit.begin(g);
+    fmt::print(stderr, "start cost {:.1f} misfit {:.2f}\n", fit.cost(), fit.misfit(0));
+    fit.run(kSteps);
+    fmt::print(stderr, "end cost {:.1f} misfit {:.2f}\n", fit.cost(), fit.misfit(0));
+    for (std::size_t w = 0; w < data.windows.size(); ++w) fmt::print(stderr, "w {} begin {:.2f} samples {} own {} {} {} {}: {:.2f}\n", w, data.windows[w].begin, data.windows[w].samples(), fit.own(w)[0], fit.own(w)[1],fit.own(w)[2],fit.own(w)[3], fit.window_misfit(w));
+    return fit;
+  }
   fit.scan(grid());
   fit.scan(grid());
   fit.run(kSteps);
@@ -257,6 +297,16 @@ void tell(const CrossingData& data, const arm::ArmFit& chain, std::vector<JointT
   const CrossingFit fit = solved(data);
   const std::vector<CrossingFit::Errors> errors = fit.errors();
   tell_crossings(data, fit, out);
+  if (std::getenv("TRAV_DEBUG"))  // XXX
+    for (std::size_t k = 0; k < data.joints.size(); ++k) {
+      const auto& m = fit.machine()[k];
+      fmt::print(stderr,
+                 "DBG {} gap {:.3e} k {:.2f} c {:.2f} p {:.3f} rotor {:.3f} coul {:.3f}/{:.3f} earlier {:.2f} | own {:.2e} "
+                 "clust {:.2e} turns {:.1f} misfit {:.2f} windows {} rotor {:.3f} leastI {:.3f} slow {:.3f} most {:.2f} tn {:.3g} pn {:.3g}\n",
+                 k, m[0], m[1], m[2], m[3], m[4], m[5], data.joints[k].link_coulomb, m[6], errors[k].own, errors[k].clustered,
+                 errors[k].turns, fit.misfit(k), data.windows.size(), data.joints[k].rotor, data.joints[k].least_inertia,
+                 data.joints[k].slow_torque, data.joints[k].most, data.joints[k].torque_noise, data.joints[k].position_noise);
+    }
   for (std::size_t k = 0; k < data.joints.size(); ++k) {
     const TraverseJoint& joint = data.joints[k];
     JointTraverse& one = out[joint.joint];
@@ -271,7 +321,7 @@ void tell(const CrossingData& data, const arm::ArmFit& chain, std::vector<JointT
                       fmt::format("cannot tell: links and drives, fitted to the record, leave {:.2g} N m of "
                                   "the torque of the motor",
                                   joint.slow_torque)};
-      judge(e, fit, k, errors[k], {data, settings, fit.misfit(), one.crossings.size()});
+      judge(e, fit, k, errors[k], {data, settings, one.misfit, one.crossings.size(), turns_of(data, k)});
     });
   }
 }

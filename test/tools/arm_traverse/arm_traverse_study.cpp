@@ -26,14 +26,14 @@ using Json = nlohmann::ordered_json;
 
 struct Options {
   std::uint64_t seed = 1;
-  int arms = 10;
+  int arms = 10, only = -1;
   double duration = 30;  // s
   std::string rig = "config/two_link_arm/two_link_arm.yaml", kind = "all", out;
 };
 
 constexpr double kPlay = 0.5;      // probability of it in a joint
 constexpr double kReach = 1.2;     // rad, to each side of where the rig file moves
-constexpr double kSmallest = 3e-4, kLargest = 6e-3;  // rad
+constexpr double kSmallest = 1e-4, kLargest = 6e-3;  // rad
 
 /// Motion and play; what the file knows otherwise.
 void draw(GearedArm& machine, Random& random) {
@@ -136,9 +136,10 @@ int run(const Options& o) {
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     const std::string& kind = kinds[k];
     if (o.kind != "all" && o.kind != kind) continue;
-    Random random(o.seed, std::uint32_t(k));
     Count play, sound;
     for (int i = 0; i < o.arms; ++i) {
+      if (o.only >= 0 && i != o.only) continue;
+      Random random(o.seed, std::uint32_t(100000 * k + std::size_t(i)));
       GearedArm machine = declared;
       draw(machine, random);
       change_machine(machine, kind, random);
@@ -164,7 +165,7 @@ int main(int argc, char** argv) {
   backlash::geared_arm::Options o;
   po::options_description options("arm_traverse_study: plays of drawn arms by one encoder per joint");
   options.add_options()("help", "this text")("seed", po::value(&o.seed), "of all that is drawn")(
-      "arms", po::value(&o.arms), "how many of each kind")("duration", po::value(&o.duration), "of each record [s]")(
+      "arms", po::value(&o.arms), "how many of each kind")("only", po::value(&o.only), "this one of them")("duration", po::value(&o.duration), "of each record [s]")(
       "rig", po::value(&o.rig), "within the package")("kind", po::value(&o.kind), "what is undeclared, or all")(
       "json", po::value(&o.out), "file that each answer is appended to, a line each");
   po::variables_map given;
