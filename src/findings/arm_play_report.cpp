@@ -70,19 +70,15 @@ report::Json crossings_json(const ArmPlayReport& report, std::size_t joint) {
   return all;
 }
 
-/// Where and how the teeth changed flank, for people.
-std::string crossings_text(const ArmPlayReport& report, std::size_t joint) {
-  const std::vector<geared_arm::Crossing>& all = report.traverses[joint].crossings;
+/// Where and how fast the teeth changed flank, for people.
+std::string crossings_text(const std::vector<geared_arm::Crossing>& all, std::size_t joint) {
   if (all.empty()) return {};
-  std::string text = fmt::format("  {} crossings of the gap:", all.size());
-  for (std::size_t j = 0; j < report.plays.size(); ++j) {
-    const auto [low, high] = std::minmax_element(
-        all.begin(), all.end(), [&](const auto& a, const auto& b) { return a.pose[j] < b.pose[j]; });
-    text += fmt::format(" {} at {:.2f} to {:.2f} rad,", report.plays[j].joint, low->pose[j], high->pose[j]);
-  }
+  const auto [low, high] = std::minmax_element(
+      all.begin(), all.end(), [&](const auto& a, const auto& b) { return a.pose[joint] < b.pose[joint]; });
   const auto [slow, fast] = std::minmax_element(
       all.begin(), all.end(), [](const auto& a, const auto& b) { return a.speed < b.speed; });
-  return text + fmt::format(" motor at {:.2f} to {:.2f} rad/s\n", slow->speed, fast->speed);
+  return fmt::format("  crossings at {:.2f} to {:.2f} rad, {:.2f} to {:.2f} rad/s\n", low->pose[joint],
+                     high->pose[joint], slow->speed, fast->speed);
 }
 
 }  // namespace
@@ -125,7 +121,7 @@ void print_arm_plays(const ArmPlayReport& report, std::ostream& out) {
         "\n  {}\n  pose {:.2f} to {:.2f} rad, up to {:.2f} rad/s, mesh torque {:.3g} to {:.3g} N m\n",
         e.message, play.lower_position, play.upper_position, play.fastest, play.least_torque,
         play.largest_torque);
-    if (!report.traverses.empty()) out << crossings_text(report, j);
+    if (!report.traverses.empty()) out << crossings_text(report.traverses[j].crossings, j);
   }
   for (const std::string& warning : report.warnings) out << "warning: " << warning << '\n';
 }

@@ -27,9 +27,8 @@ using record::Channel;
 constexpr double kSmallest = 3e-5, kLargest = 0.03;  // rad, of the gaps that are tried first; choice
 constexpr int kTried = 40;                           // of them, evenly in the logarithm
 constexpr int kSteps = 30;                           // of a fit
-constexpr double kProfile = 1.3;                     // ratio of gaps that a profile looks at; choice
+constexpr double kProfile = 1.5;                     // ratio of gaps that a profile looks at; choice
 constexpr int kProfileSteps = 6;                     // of its fits; choice
-constexpr double kFarRival = 0.5;                    // of the cost: worse at first is no rival; choice (time)
 constexpr double kRivalApart = 1.25;                 // ratio of gaps that are different answers; choice
 constexpr double kLeastSlow = 0.005;                 // of the largest load; choice
 constexpr double kCycleSamples = 8;                  // in a cycle of the teeth, at least; choice
@@ -143,7 +142,8 @@ std::string too_fast(const TraverseJoint& joint, double interval) {
 }
 
 /// Flights that the fitted machine makes.
-void tell_crossings(const CrossingData& data, const CrossingFit& fit, std::vector<JointTraverse>& out) {
+std::vector<std::vector<Crossing>> crossings_of(const CrossingData& data, const CrossingFit& fit) {
+  std::vector<std::vector<Crossing>> all(data.joints.size());
   for (std::size_t w = 0; w < data.windows.size(); ++w) {
     std::vector<Flight> flights;
     const CrossingWindow& window = data.windows[w];
@@ -156,9 +156,10 @@ void tell_crossings(const CrossingData& data, const CrossingFit& fit, std::vecto
       c.speed = window.rate(flight.from, Eigen::Index(flight.joint));
       const Eigen::VectorXd pose = window.pose.row(flight.from);
       c.pose.assign(pose.data(), pose.data() + pose.size());
-      out[data.joints[flight.joint].joint].crossings.push_back(std::move(c));
+      all[flight.joint].push_back(std::move(c));
     }
   }
+  return all;
 }
 
 struct Judged {
@@ -187,18 +188,21 @@ double evidence_of(const CrossingFit& best, std::size_t k) {
   return sound.cost() - best.cost();
 }
 
-/// Another gap that explains the record about as well; NaN: none.
+/// Another gap that explains the record about as well; NaN: none. Looked for from each gap that is better than
+/// its neighbours.
 double rival_of(const CrossingFit& best, std::size_t k, const TraverseSettings& settings) {
-  for (const double gap : grid()) {
-    const double ratio = gap / best.gap(k);
-    if (gap == 0 || (ratio < kRivalApart && ratio > 1 / kRivalApart)) continue;
-    if (best.cost_with(k, gap) - best.cost() > kFarRival * best.cost()) continue;
+  const auto apart = [&](double gap) {
+    return gap > kRivalApart * best.gap(k) || gap < best.gap(k) / kRivalApart;
+  };
+  const std::vector<double> gaps = grid();
+  std::vector<double> costs;
+  for (const double gap : gaps) costs.push_back(best.cost_with(k, gap));
+  for (std::size_t i = 1; i + 1 < gaps.size(); ++i) {
+    if (costs[i] > costs[i - 1] || costs[i] > costs[i + 1] || !apart(gaps[i])) continue;
     CrossingFit other = best;
-    other.set_gap(k, gap);
+    other.set_gap(k, gaps[i]);
     other.run(kSteps);
-    const double found = other.gap(k) / best.gap(k);
-    if ((found > kRivalApart || found < 1 / kRivalApart) && other.cost() - best.cost() < settings.rival)
-      return other.gap(k);
+    if (apart(other.gap(k)) && other.cost() - best.cost() < settings.rival) return other.gap(k);
   }
   return std::nan("");
 }
@@ -206,10 +210,10 @@ double rival_of(const CrossingFit& best, std::size_t k, const TraverseSettings& 
 /// The largest gap that explains the record about as well as the best, `from` or more.
 double largest_of(const CrossingFit& best, std::size_t k, double from, const TraverseSettings& settings) {
   double gap = from;
+  CrossingFit other = best;
+  other.hold_gap(k, true);
   for (; gap < kLargest; gap *= kProfile) {
-    CrossingFit other = best;
     other.set_gap(k, gap);
-    other.hold_gap(k, true);
     other.run(kProfileSteps);
     if (other.cost() - best.cost() > settings.rival) break;
   }
@@ -296,7 +300,7 @@ void tell(const CrossingData& data, const arm::ArmFit& chain, std::vector<JointT
           const TraverseSettings& settings) {
   const CrossingFit fit = solved(data);
   const std::vector<CrossingFit::Errors> errors = fit.errors();
-  tell_crossings(data, fit, out);
+  std::vector<std::vector<Crossing>> crossings = crossings_of(data, fit);
   if (std::getenv("TRAV_DEBUG"))  // XXX
     for (std::size_t k = 0; k < data.joints.size(); ++k) {
       const auto& m = fit.machine()[k];
@@ -321,8 +325,9 @@ void tell(const CrossingData& data, const arm::ArmFit& chain, std::vector<JointT
                       fmt::format("cannot tell: links and drives, fitted to the record, leave {:.2g} N m of "
                                   "the torque of the motor",
                                   joint.slow_torque)};
-      judge(e, fit, k, errors[k], {data, settings, one.misfit, one.crossings.size(), turns_of(data, k)});
+      judge(e, fit, k, errors[k], {data, settings, one.misfit, crossings[k].size(), turns_of(data, k)});
     });
+    if (one.estimate.status == Status::ok) one.crossings = std::move(crossings[k]);
   }
 }
 

@@ -43,7 +43,7 @@ struct TraverseSettings {
   double evidence = 30;  // by how much less a sound joint explains the record (minus twice the logarithm of
                          // the likelihood, over the misfit); choice: five standard errors and a half
   double rival = 9;      // theory: three standard errors
-  double vague = 0.5;    // half width of the interval, of the play, beyond which nothing is told; choice
+  double vague = 0.25;   // half width of the interval, of the play, beyond which nothing is told; choice
   std::size_t least_turns = 4;  // that tell the play; choice, for a standard error that means something
 };
 
