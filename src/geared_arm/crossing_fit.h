@@ -33,7 +33,6 @@ class CrossingFit {
   /// Root of the mean square of a joint's weighted residuals that most windows do not exceed: about 1 where
   /// the equations hold.
   double misfit(std::size_t joint) const;
-  double window_misfit(std::size_t w) const { const auto r = residual(w, machine_, own_[w]); return std::sqrt(r.squaredNorm() / double(r.size())); }  // XXX
 
   struct Errors {
     double own = 0, clustered = 0;  // rad, standard errors of the gap

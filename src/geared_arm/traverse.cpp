@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <cstdio>
 
 #include "backlash_diagnosis/arm/dynamics.h"
 #include "backlash_diagnosis/arm/fit.h"
@@ -179,7 +177,7 @@ std::size_t turns_of(const CrossingData& data, std::size_t k) {
   return turns;
 }
 
-/// How much worse the record is explained without the gap, over the misfit.
+/// How much worse the record is explained without the gap.
 double evidence_of(const CrossingFit& best, std::size_t k) {
   CrossingFit sound = best;
   sound.set_gap(k, 0);
@@ -209,15 +207,15 @@ double rival_of(const CrossingFit& best, std::size_t k, const TraverseSettings& 
 
 /// The largest gap that explains the record about as well as the best, `from` or more.
 double largest_of(const CrossingFit& best, std::size_t k, double from, const TraverseSettings& settings) {
-  double gap = from;
   CrossingFit other = best;
   other.hold_gap(k, true);
-  for (; gap < kLargest; gap *= kProfile) {
+  for (double gap = from; gap < kLargest; gap *= kProfile) {
     other.set_gap(k, gap);
     other.run(kProfileSteps);
-    if (other.cost() - best.cost() > settings.rival) break;
+    if (other.cost() - best.cost() > settings.rival) return gap;
   }
-  return gap;
+  throw Refusal{Status::insufficient_data,
+                fmt::format("cannot tell: the turns of the load exclude no play up to {:.2g} rad", kLargest)};
 }
 
 double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
@@ -231,43 +229,57 @@ double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Erro
 }
 
 void require_explained(const Judged& judged) {
-  if (judged.misfit > judged.settings.misfit)
+  const TraverseSettings& s = judged.settings;
+  if (judged.misfit > s.misfit)
     throw Refusal{Status::out_of_domain,
                   fmt::format("cannot tell: no play, whatever the teeth, explains the torque of the motor "
                               "where the load turns: {:.2g} times the noise are left",
                               judged.misfit)};
+  if (judged.turns < s.least_turns)
+    throw Refusal{Status::insufficient_data,
+                  fmt::format("cannot tell: the load turned {} times, {} are needed: a longer record",
+                              judged.turns, s.least_turns)};
+}
+
+/// That a play, which there is, is known well enough.
+void require_known(const CrossingFit& fit, std::size_t k, double half, double turns, const Judged& judged) {
+  const TraverseSettings& s = judged.settings;
+  const double gap = fit.gap(k), stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
+  if (std::fmax(stiffer, 1 / stiffer) > s.far)
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("cannot tell: the record fits only teeth of {:.2g} N m/rad at {:.2g} N m, {:.2g} "
+                              "times the declared stiffness: is gear.contact that of this joint?",
+                              stiffer * judged.data.joints[k].stiffness, judged.data.joints[k].level, stiffer)};
+  if (turns < double(s.least_turns))
+    throw Refusal{Status::insufficient_data,
+                  fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
+                              "record",
+                              turns, s.least_turns)};
+  if (!(half < s.vague * gap))
+    throw Refusal{Status::insufficient_data,
+                  fmt::format("cannot tell: the turns of the load tell the play only from {:.2g} to {:.2g} "
+                              "rad; a soft start of the teeth would look alike",
+                              std::fmax(0, gap - half), gap + half)};
+  if (const double rival = rival_of(fit, k, s); std::isfinite(rival))
+    throw Refusal{Status::ambiguous,
+                  fmt::format("cannot tell: {:.3g} and {:.3g} rad explain the record alike", gap, rival)};
 }
 
 void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const CrossingFit::Errors& errors,
            const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   require_explained(judged);
-  const double gap = fit.gap(k), half = half_width(fit, k, errors, judged);
-  if (judged.turns < s.least_turns)
-    throw Refusal{Status::insufficient_data,
-                  fmt::format("cannot tell: the load turned {} times, {} are needed: a longer record",
-                              judged.turns, s.least_turns)};
   e.from_record = true;
-  const double evidence = gap > 0 ? evidence_of(fit, k) : 0;
-  if (evidence < s.evidence || !(gap > half)) {
-    e.angle_lower = 0, e.angle_upper = largest_of(fit, k, gap + half, s);
+  const double gap = fit.gap(k), half = half_width(fit, k, errors, judged);
+  if (!(gap > half) || evidence_of(fit, k) < s.evidence) {
+    const double most = largest_of(fit, k, gap + half, s);
     e.status = Status::below_range;
+    e.angle_lower = 0, e.angle_upper = most;
     e.message = fmt::format("motor's side alone: no play that is larger than its interval: at most {:.3g} rad",
-                            e.angle_upper);
+                            most);
     return;
   }
-  if (errors.turns < double(s.least_turns))
-    throw Refusal{Status::insufficient_data,
-                  fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
-                              "record",
-                              errors.turns, s.least_turns)};
-  if (!(half < s.vague * gap))
-    throw Refusal{Status::insufficient_data,
-                  fmt::format("cannot tell: the turns of the load tell the play only from {:.2g} to {:.2g} rad",
-                              gap - half, gap + half)};
-  if (const double rival = rival_of(fit, k, s); std::isfinite(rival))
-    throw Refusal{Status::ambiguous,
-                  fmt::format("cannot tell: {:.3g} and {:.3g} rad explain the record alike", gap, rival)};
+  require_known(fit, k, half, errors.turns, judged);
   e.status = Status::ok;
   e.backlash_angle = gap, e.angle_lower = gap - half, e.angle_upper = gap + half;
   e.message = fmt::format(
@@ -278,16 +290,6 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
 
 CrossingFit solved(const CrossingData& data) {
   CrossingFit fit(data);
-  if (const char* t = std::getenv("TRAV_START")) {  // XXX
-    std::vector<double> g(data.joints.size());
-    std::sscanf(t, "%lf,%lf", &g[0], &g[1]);
-    fit.begin(g);
-    fmt::print(stderr, "start cost {:.1f} misfit {:.2f}\n", fit.cost(), fit.misfit(0));
-    fit.run(kSteps);
-    fmt::print(stderr, "end cost {:.1f} misfit {:.2f}\n", fit.cost(), fit.misfit(0));
-    for (std::size_t w = 0; w < data.windows.size(); ++w) fmt::print(stderr, "w {} begin {:.2f} samples {} own {} {} {} {}: {:.2f}\n", w, data.windows[w].begin, data.windows[w].samples(), fit.own(w)[0], fit.own(w)[1],fit.own(w)[2],fit.own(w)[3], fit.window_misfit(w));
-    return fit;
-  }
   fit.scan(grid());
   fit.scan(grid());
   fit.run(kSteps);
@@ -296,21 +298,10 @@ CrossingFit solved(const CrossingData& data) {
   return fit;
 }
 
-void tell(const CrossingData& data, const arm::ArmFit& chain, std::vector<JointTraverse>& out,
-          const TraverseSettings& settings) {
+void tell(const CrossingData& data, std::vector<JointTraverse>& out, const TraverseSettings& settings) {
   const CrossingFit fit = solved(data);
   const std::vector<CrossingFit::Errors> errors = fit.errors();
   std::vector<std::vector<Crossing>> crossings = crossings_of(data, fit);
-  if (std::getenv("TRAV_DEBUG"))  // XXX
-    for (std::size_t k = 0; k < data.joints.size(); ++k) {
-      const auto& m = fit.machine()[k];
-      fmt::print(stderr,
-                 "DBG {} gap {:.3e} k {:.2f} c {:.2f} p {:.3f} rotor {:.3f} coul {:.3f}/{:.3f} earlier {:.2f} | own {:.2e} "
-                 "clust {:.2e} turns {:.1f} misfit {:.2f} windows {} rotor {:.3f} leastI {:.3f} slow {:.3f} most {:.2f} tn {:.3g} pn {:.3g}\n",
-                 k, m[0], m[1], m[2], m[3], m[4], m[5], data.joints[k].link_coulomb, m[6], errors[k].own, errors[k].clustered,
-                 errors[k].turns, fit.misfit(k), data.windows.size(), data.joints[k].rotor, data.joints[k].least_inertia,
-                 data.joints[k].slow_torque, data.joints[k].most, data.joints[k].torque_noise, data.joints[k].position_noise);
-    }
   for (std::size_t k = 0; k < data.joints.size(); ++k) {
     const TraverseJoint& joint = data.joints[k];
     JointTraverse& one = out[joint.joint];
@@ -319,8 +310,7 @@ void tell(const CrossingData& data, const arm::ArmFit& chain, std::vector<JointT
     one.estimate = diagnosis::estimate_or_refusal("gap_traverse", [&](diagnosis::Estimate& e) {
       if (!joint.crosses)
         throw Refusal{Status::out_of_domain, "cannot tell: the load never turns for certain"};
-      if (chain.train[joint.joint] > 1 ||
-          joint.slow_torque > settings.disagreement * joint.most)
+      if (joint.slow_torque > settings.disagreement * joint.most)
         throw Refusal{Status::out_of_domain,
                       fmt::format("cannot tell: links and drives, fitted to the record, leave {:.2g} N m of "
                                   "the torque of the motor",
@@ -339,6 +329,7 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
   std::vector<JointTraverse> out(arm.joints.size());
   const auto refuse_all = [&](const Refusal& refusal) {
     for (JointTraverse& each : out) {
+      if (!each.estimate.message.empty()) continue;  // a reason of its own
       each.estimate.status = refusal.status;
       each.estimate.message = refusal.reason;
     }
@@ -363,7 +354,7 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
     if (data.windows.empty())
       throw Refusal{Status::out_of_domain,
                     "cannot tell: at no time that begins with all teeth on a flank for certain does a load turn"};
-    tell(data, fit, out, settings);
+    tell(data, out, settings);
   } catch (const Refusal& refusal) {
     refuse_all(refusal);
   }

@@ -14,7 +14,7 @@ namespace {
 using diagnosis::Status;
 using record::Channel;
 
-constexpr double kDuration = 15;  // s
+constexpr double kDuration = 20;  // s
 
 GearedArm arm_of(const std::string& name) {
   return load_geared_arm(test::package_file("config/two_link_arm/" + name + ".yaml"));

@@ -11,17 +11,25 @@
 //   F = T_u (k d / T_u)^p + c d' > 0
 //
 // q_M: of the record. Links, drives and friction are those of the rig file after a fit to the whole record
-// (arm/fit.h), so that friction, payload and torque constant may be wrong in the file. Free within what is
-// known: b, k, c, p, the rotor's share of what the motor moves, friction behind the gap, the time at which a
-// torque was recorded; and beta, a torque on each link that nothing tells, of each turn. All joints and all
-// turns are fitted together: what the play of one joint throws on the teeth of another is in M.
+// (arm/fit.h), so that friction and payload may be wrong in the file. Free within what is known: b, k, c, p,
+// the rotor's share of what the motor moves, friction behind the gap, the time at which a torque was
+// recorded; and of each turn alone beta, a torque [N m] on each link that nothing tells, and how much wider the
+// gap seems there (10 % of it and 3 % of the deflection of the teeth): what these equations do not hold makes
+// each turn say another gap, and the one with the hardest touch would tell it alone otherwise. All joints and
+// all turns are fitted together: what the play of one joint throws on the teeth of another is in M.
 //
-// The residual, averaged over some samples, is weighted by its covariance: noise of the torque and of the
+// The residual [N m], averaged over some samples, is weighted by its covariance: noise of the torque and of the
 // position, a slow torque that nothing tells (as large as the fit to the whole record leaves), and friction
-// about a standstill.
+// about a standstill. Where more is left the noise of that turn counts as that large. The rotor's inertia
+// multiplies noise of the position, for which the cost is corrected: else a lighter rotor would seem better.
+//
+// A joint whose link is too light for the sampling interval (fewer than eight samples in a cycle of its teeth)
+// is not looked at and turns with its motor.
 //
 // Interval, 95 %: Student's t with the larger of two standard errors (turns as clusters; the fit's own), and
-// `model` of the play and a share of the deflection of the teeth for what these equations do not hold.
+// `model` of the play and `law` of the deflection of the teeth for teeth that yield by no power: a soft start of
+// the teeth and a small play move the motor alike. Of a joint without a play that is larger than its interval:
+// at most the gap with which the record, all else fitted again, is explained worse by `rival`.
 #pragma once
 
 #include <string>
@@ -39,9 +47,10 @@ struct TraverseSettings {
   double model = 0.05;       // of the play; choice, see the study in doc/arm.md
   double law = 0.1;          // of the deflection under the usual load; choice: teeth by no power
   double disagreement = 0.1;  // of the torque of the joint (rms) that the fitted chain may leave; choice
-  double misfit = 2;          // noises that the turns may leave; choice
+  double misfit = 1.5;   // noises that seven in ten turns may leave; choice
   double evidence = 30;  // by how much less a sound joint explains the record (minus twice the logarithm of
-                         // the likelihood, over the misfit); choice: five standard errors and a half
+                         // the likelihood); choice: five standard errors and a half
+  double far = 3.5;      // times stiffer or softer than declared: other teeth; choice: 2.5 spreads of the fit
   double rival = 9;      // theory: three standard errors
   double vague = 0.25;   // half width of the interval, of the play, beyond which nothing is told; choice
   std::size_t least_turns = 4;  // that tell the play; choice, for a standard error that means something
@@ -59,8 +68,8 @@ struct Crossing {
 struct JointTraverse {
   diagnosis::Estimate estimate;  // gap_traverse
   bool turns = false;            // the load is certain on either flank somewhere
-  double misfit = 0;             // noises that are left, median turn
-  std::vector<Crossing> crossings;
+  double misfit = 0;             // noises that are left in seven of ten turns at most
+  std::vector<Crossing> crossings;  // where the play is told
 };
 
 /// One per joint of the rig. `warnings` as arm::motions_of(). Throws BadData as that.

@@ -71,8 +71,9 @@ void change_teeth(GearedArm& machine, const std::string& kind, Random& random) {
       joint.gear->contact = model::make_contact_law(
           "hunt_crossley", {{"stiffness", k / std::sqrt(depth)}, {"exponent", 1.5}, {"alpha", 0.5}});
     } else {
-      joint.gear->contact = std::make_shared<SoftStart>(k, random.uniform(0.05, 0.3),
-                                                        log_uniform(random, 2e-4, 2e-3), c);
+      joint.gear->contact = std::make_shared<SoftStart>(
+          k, kind == "soft_start" ? random.uniform(0.05, 0.3) : random.uniform(0.3, 0.7),
+          log_uniform(random, 2e-4, 2e-3), c);
     }
   }
 }
@@ -131,7 +132,7 @@ double log_uniform(Random& random, double from, double to) {
 const std::vector<std::string>& undeclared_kinds() {
   static const std::vector<std::string> kinds{
       "nothing",    "friction", "payload",  "heavy_payload", "constant", "rotor",     "stribeck",
-      "bristles",   "delay",    "stiffness", "compliance",   "hertz",    "soft_start", "load_friction",
+      "bristles",   "delay",    "stiffness", "compliance",   "hertz",    "soft_start", "mild_start", "load_friction",
       "cogging",    "eccentric", "coarse",  "noise",         "rough",    "several"};
   return kinds;
 }
@@ -143,7 +144,8 @@ void change_machine(GearedArm& machine, const std::string& kind, Random& random)
   if (kind == "rotor" || kind == "several")
     for (std::size_t j = 0; j < machine.joints.size(); ++j)
       term(machine, j, arm::DriveTerm::rotor_inertia) *= off(random, 0.15);
-  if (kind == "stiffness" || kind == "compliance" || kind == "hertz" || kind == "soft_start")
+  if (kind == "stiffness" || kind == "compliance" || kind == "hertz" || kind == "soft_start" ||
+      kind == "mild_start")
     change_teeth(machine, kind, random);
   if (kind == "several") change_teeth(machine, "stiffness", random);
   if (kind == "rough")
