@@ -14,14 +14,14 @@ namespace {
 using record::Channel;
 
 // All choices, tried on simulated arms.
-constexpr double kCertain = 0.5;      // cycles of torque_cutoff for which the load must be certain
-constexpr double kSmoothed = 0.125;   // of a cycle of the teeth, to each side
-constexpr double kBlock = 0.25;       // of a cycle of the teeth
-constexpr double kStep = 0.5;         // rad of a cycle of the teeth per step
-constexpr double kLead = 3;           // cycles of the teeth that count before the load becomes uncertain
-constexpr double kSettling = 2;       // cycles of the teeth after the begin that do not count
-constexpr double kTail = 0.15;        // s, after the load is certain again
-constexpr double kLongest = 1.5;      // s
+constexpr double kCertain = 0.5;         // cycles of torque_cutoff for which the load must be certain
+constexpr double kSmoothed = 0.125;      // of a cycle of the teeth, to each side
+constexpr double kBlock = 0.25;          // of a cycle of the teeth
+constexpr double kStep = 0.5;            // rad of a cycle of the teeth per step
+constexpr double kLead = 3;              // cycles of the teeth that count before the load becomes uncertain
+constexpr double kSettling = 2;          // cycles of the teeth after the begin that do not count
+constexpr double kTail = 0.15;           // s, after the load is certain again
+constexpr double kLongest = 1.5;         // s
 constexpr double kUnsureFriction = 0.3;  // of the motor's dry friction, about a standstill
 constexpr double kStandstill = 3;        // friction speeds
 
@@ -35,8 +35,8 @@ void smooth(const std::vector<double>& x, Eigen::Index reach, double interval, E
     double sum = 0, rise = 0;
     for (Eigen::Index k = -reach; k <= reach; ++k) {
       const double at = x[std::size_t(middle + k)] - x[std::size_t(middle)];
-      sum += at * (3 * (3 * m * m + 3 * m - 1) - 15 * double(k * k)) /
-             ((2 * m - 1) * (2 * m + 1) * (2 * m + 3));
+      sum +=
+          at * (3 * (3 * m * m + 3 * m - 1) - 15 * double(k * k)) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3));
       rise += at * 3 * double(k) / (m * (m + 1) * (2 * m + 1));
     }
     value(i, j) = i == middle ? x[std::size_t(middle)] + sum : x[std::size_t(i)];
@@ -99,8 +99,7 @@ void set_chain(CrossingWindow& w, const CrossingData& data, const arm::Chain& ch
     for (Eigen::Index c = 0; c < n; ++c) {
       const auto joint = Eigen::Index(data.joints[std::size_t(c)].joint);
       a[joint] = 0;
-      const arm::Joints column =
-          arm::inverse_dynamics(weightless, q, rest, arm::Joints::Unit(joints, joint));
+      const arm::Joints column = arm::inverse_dynamics(weightless, q, rest, arm::Joints::Unit(joints, joint));
       for (Eigen::Index r = 0; r < n; ++r)
         inertia(r, c) = column[Eigen::Index(data.joints[std::size_t(r)].joint)];
     }

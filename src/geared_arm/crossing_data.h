@@ -16,27 +16,27 @@ namespace backlash::geared_arm {
 
 /// What is declared of a joint's teeth and drive, all at the joint.
 struct TraverseJoint {
-  std::size_t joint = 0;                  // of the rig
-  double stiffness = 0, damping = 0;      // N m/rad, N m s/rad, at `level`
-  double level = 0;                       // N m, the usual load of its teeth
-  double most = 0;                        // N m, the largest load
-  double rotor = 0;                       // kg m^2
-  double least_inertia = 0;               // kg m^2, of what the link moves, at the poses of the record
+  std::size_t joint = 0;              // of the rig
+  double stiffness = 0, damping = 0;  // N m/rad, N m s/rad, at `level`
+  double level = 0;                   // N m, the usual load of its teeth
+  double most = 0;                    // N m, the largest load
+  double rotor = 0;                   // kg m^2
+  double least_inertia = 0;           // kg m^2, of what the link moves, at the poses of the record
   double link_coulomb = 0, link_viscous = 0;
-  double coulomb = 0;                     // N m, of the motor
-  double slow_torque = 0;                 // N m, standard deviation of what neither chain nor drive explains
-  double torque_noise = 0;                // N m, white, of a sample
-  double position_noise = 0;              // rad, the same
-  bool crosses = false;                   // the load is certain on both flanks
+  double coulomb = 0;         // N m, of the motor
+  double slow_torque = 0;     // N m, standard deviation of what neither chain nor drive explains
+  double torque_noise = 0;    // N m, white, of a sample
+  double position_noise = 0;  // rad, the same
+  bool crosses = false;       // the load is certain on both flanks
 };
 
 /// Columns are the joints that have a gap to look for, rows are samples.
 struct CrossingWindow {
-  double begin = 0;                  // s
-  Eigen::MatrixXd position, rate;    // of the motors, smoothed over a few samples: rad, rad/s
-  Eigen::MatrixXd torque, friction;  // N m, of the motors
-  Eigen::MatrixXd unsure;            // N m, of the friction: standard deviation about a standstill
-  Eigen::MatrixXd bias;              // N m: the chain's torque but for its own acceleration
+  double begin = 0;                      // s
+  Eigen::MatrixXd position, rate;        // of the motors, smoothed over a few samples: rad, rad/s
+  Eigen::MatrixXd torque, friction;      // N m, of the motors
+  Eigen::MatrixXd unsure;                // N m, of the friction: standard deviation about a standstill
+  Eigen::MatrixXd bias;                  // N m: the chain's torque but for its own acceleration
   std::vector<Eigen::MatrixXd> inertia;  // kg m^2, of these joints
   Eigen::VectorXd load;                  // N m, through the teeth at the first sample
   Eigen::MatrixXd chain;                 // N m, T of the motors' motion, low-passed

@@ -18,17 +18,17 @@ using Eigen::VectorXd;
 
 // What is known of the values, standard deviations: choices.
 constexpr double kKnownStiffness = 0.5, kKnownDamping = 0.8, kKnownPower = 0.15, kKnownRotor = 0.1;
-constexpr double kKnownCoulomb = 0.5;       // of the declared friction behind the gap, and
-constexpr double kUndeclaredCoulomb = 0.005;  // of the largest load
+constexpr double kKnownCoulomb = 0.5;                   // of the declared friction behind the gap, and
+constexpr double kUndeclaredCoulomb = 0.005;            // of the largest load
 constexpr double kHeldTorque = 0.25, kKnownHeld = 0.3;  // samples: held or averaged; theory, choice
-constexpr double kUntold = 0.01;   // of the largest load: torque on a link that nothing tells; choice
+constexpr double kUntold = 0.01;      // of the largest load: torque on a link that nothing tells; choice
 constexpr double kVaries = 0.1;       // of the gap, and
 constexpr double kTeethVary = 0.03;   // of the deflection: what a turn says of the gap otherwise; choices
-constexpr double kSlow = 0.3;      // s, memory of a torque that nothing tells; choice
-constexpr double kRough = 0.03;    // s, the same of friction about a standstill; choice
-constexpr double kDifference = 0.1;          // of a standard deviation, for derivatives; choice
+constexpr double kSlow = 0.3;         // s, memory of a torque that nothing tells; choice
+constexpr double kRough = 0.03;       // s, the same of friction about a standstill; choice
+constexpr double kDifference = 0.1;   // of a standard deviation, for derivatives; choice
 constexpr double kMostWindows = 0.7;  // that must be explained; choice
-constexpr double kBounds[kCrossingValues][2] = {{0, 0.1},  {-3, 3},     {-4, 4}, {0.8, 1.6},
+constexpr double kBounds[kCrossingValues][2] = {{0, 0.1},    {-3, 3},    {-4, 4},  {0.8, 1.6},
                                                 {-0.6, 0.6}, {0, 1e300}, {-0.5, 1}};
 
 int place(std::size_t joint, int value) {
@@ -81,13 +81,20 @@ double CrossingFit::centre(std::size_t joint, int value) const {
 double CrossingFit::spread(std::size_t joint, int value) const {
   const TraverseJoint& known = data_.joints[joint];
   switch (value) {
-    case kCrossingStiffness: return kKnownStiffness;
-    case kCrossingDamping: return kKnownDamping;
-    case kCrossingPower: return kKnownPower;
-    case kCrossingRotor: return kKnownRotor;
-    case kCrossingCoulomb: return std::hypot(kKnownCoulomb * known.link_coulomb, kUndeclaredCoulomb * known.most);
-    case kCrossingEarlier: return kKnownHeld;
-    default: return INFINITY;
+    case kCrossingStiffness:
+      return kKnownStiffness;
+    case kCrossingDamping:
+      return kKnownDamping;
+    case kCrossingPower:
+      return kKnownPower;
+    case kCrossingRotor:
+      return kKnownRotor;
+    case kCrossingCoulomb:
+      return std::hypot(kKnownCoulomb * known.link_coulomb, kUndeclaredCoulomb * known.most);
+    case kCrossingEarlier:
+      return kKnownHeld;
+    default:
+      return INFINITY;
   }
 }
 
@@ -137,10 +144,10 @@ VectorXd CrossingFit::residual(std::size_t window, const CrossingMachine& machin
       const Index from = data_.skipped + k * m, to = from + m;
       const double torque = w.torque.col(c).segment(from, m).mean() +
                             machine[j][kCrossingEarlier] * (w.torque(to, c) - w.torque(from, c)) / double(m);
-      const double inertial =
-          rotor * (w.rate(to, c) - w.rate(from, c)) / (double(m) * data_.interval);
-      const double friction = (w.friction.col(c).segment(from, m).sum() +
-                               w.friction.col(c).segment(from + 1, m).sum()) / (2 * double(m));
+      const double inertial = rotor * (w.rate(to, c) - w.rate(from, c)) / (double(m) * data_.interval);
+      const double friction =
+          (w.friction.col(c).segment(from, m).sum() + w.friction.col(c).segment(from + 1, m).sum()) /
+          (2 * double(m));
       r[k] = torque - inertial - friction - mesh.col(c).segment(from, m).mean();
     }
     factors_[window][j].triangularView<Eigen::Lower>().solveInPlace(r);
@@ -206,8 +213,8 @@ void CrossingFit::weigh(std::size_t window, Part& p) const {
     p.residual.segment(n * j, n) *= weight;
     p.global.middleRows(n * j, n) *= weight;
     p.own.middleRows(n * j, n) *= weight;
-    p.offset[place(joint, kCrossingRotor)] = -weight * weight * shaken_[window][joint] *
-                                             std::exp(2 * machine_[joint][kCrossingRotor]);
+    p.offset[place(joint, kCrossingRotor)] =
+        -weight * weight * shaken_[window][joint] * std::exp(2 * machine_[joint][kCrossingRotor]);
   }
 }
 
@@ -268,8 +275,7 @@ CrossingMachine CrossingFit::moved(const VectorXd& step) const {
         const double most = 0.3 * gap(j) + 0.2 * data_.joints[j].level / data_.joints[j].stiffness;
         by = std::clamp(by, -most, most);
       }
-      other[j][std::size_t(v)] =
-          std::clamp(machine_[j][std::size_t(v)] + by, kBounds[v][0], kBounds[v][1]);
+      other[j][std::size_t(v)] = std::clamp(machine_[j][std::size_t(v)] + by, kBounds[v][0], kBounds[v][1]);
     }
   return other;
 }
@@ -304,8 +310,8 @@ void CrossingFit::run(int steps) {
           taken[place(j, v)] = machine[j][std::size_t(v)] - machine_[j][std::size_t(v)];
       std::vector<VectorXd> owns = own_;
       for (std::size_t w = 0; w < all.size(); ++w)
-        owns[w] -= inverse[w] * (all[w].own.transpose() * (all[w].residual + all[w].global * taken) +
-                                 known * own_[w]);
+        owns[w] -= inverse[w] *
+                   (all[w].own.transpose() * (all[w].residual + all[w].global * taken) + known * own_[w]);
       const double cost = cost_of(machine, owns);
       better = cost < cost_;
       damping_ = std::clamp(better ? damping_ / 5 : damping_ * 5, 1e-6, 1e6);
@@ -347,8 +353,7 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
   for (std::size_t w = 0; w < all.size(); ++w) {
     const Part& p = all[w];
     const MatrixXd cross = signal::transposed_product(p.global, p.own);
-    const MatrixXd reduced =
-        signal::product(cross, signal::symmetric_inverse(signal::gram(p.own) + known));
+    const MatrixXd reduced = signal::product(cross, signal::symmetric_inverse(signal::gram(p.own) + known));
     informations.push_back(signal::gram(p.global) - signal::product(reduced, cross.transpose()));
     scores.push_back(p.global.transpose() * p.residual + p.offset -
                      reduced * (p.own.transpose() * p.residual + known * own_[w]));

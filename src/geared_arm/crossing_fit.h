@@ -41,9 +41,9 @@ class CrossingFit {
   std::vector<Errors> errors() const;  // per joint
 
  private:
-  struct Part {  // of one window
+  struct Part {                        // of one window
     Eigen::VectorXd residual, offset;  // offset: of half the gradient by the machine, see shaken()
-    Eigen::MatrixXd global, own;  // derivatives by the machine, by what is of this window alone
+    Eigen::MatrixXd global, own;       // derivatives by the machine, by what is of this window alone
   };
   Eigen::VectorXd residual(std::size_t window, const CrossingMachine& machine,
                            const Eigen::VectorXd& own) const;
@@ -64,7 +64,7 @@ class CrossingFit {
   const CrossingData& data_;
   CrossingMachine machine_;
   std::vector<char> held_;
-  std::vector<Eigen::VectorXd> own_;  // per window: as mesh_torques() has it
+  std::vector<Eigen::VectorXd> own_;                   // per window: as mesh_torques() has it
   std::vector<std::vector<Eigen::MatrixXd>> factors_;  // of covariances, lower: per window, per joint
   std::vector<std::vector<double>> shaken_;            // the same: squares that noise of the position leaves
   double cost_ = 0, damping_ = 1e-3;

@@ -42,8 +42,7 @@ class Teeth {
   double half_gap_, stiffness_, damping_, power_, level_;
 };
 
-constexpr Eigen::Index kMostJoints = 16;
-using Small = std::array<double, kMostJoints>;
+using Small = std::array<double, kMostGaps>;
 
 /// Links and motors between two samples.
 class Interval {
@@ -183,8 +182,7 @@ Eigen::MatrixXd mesh_torques(const CrossingData& data, const CrossingWindow& win
     const Eigen::MatrixXd after = mobility(data, window.inertia[std::size_t(i + 1)], machine);
     const Interval at(data, window, i, before, after);
     if (flights)
-      for (Eigen::Index j = 0; j < n; ++j)
-        seen.see(std::size_t(j), i, links.flank(window, i, j), *flights);
+      for (Eigen::Index j = 0; j < n; ++j) seen.see(std::size_t(j), i, links.flank(window, i, j), *flights);
     Small sum{};
     for (int s = 0; s < data.steps; ++s)
       links.step(at, double(s) / data.steps, double(s + 1) / data.steps, sum);

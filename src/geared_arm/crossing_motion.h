@@ -25,10 +25,12 @@ using CrossingMachine = std::vector<std::array<double, kCrossingValues>>;  // on
 
 /// How long a joint's teeth touched nothing, between flanks of either sign.
 struct Flight {
-  std::size_t joint;           // of CrossingData
-  Eigen::Index from, to;       // samples
-  int flank;                   // touched at its end
+  std::size_t joint;      // of CrossingData
+  Eigen::Index from, to;  // samples
+  int flank;              // touched at its end
 };
+
+constexpr std::size_t kMostGaps = 16;  // joints that are looked at together; choice (time)
 
 /// Torque through the teeth, mean between a sample and the next: samples - 1 rows [N m]. `own`: of this
 /// window, beta [N m] per joint, then per joint how much wider than the machine's its gap is [rad].

@@ -53,7 +53,8 @@ arm::ArmFit fitted_to(const arm::ArmRig& rig, const std::vector<arm::ArmMotion>&
 }
 
 /// T of each joint by the fitted chain, low-passed, at the rows of all motions.
-std::vector<std::vector<double>> loads_of(const arm::ArmRig& rig, const std::vector<arm::ArmMotion>& motions) {
+std::vector<std::vector<double>> loads_of(const arm::ArmRig& rig,
+                                          const std::vector<arm::ArmMotion>& motions) {
   const arm::Chain chain = arm::loaded_chain(rig);
   Eigen::VectorXd links(10 * Eigen::Index(chain.size()));
   for (std::size_t i = 0; i < chain.size(); ++i) links.segment<10>(10 * Eigen::Index(i)) = chain.links[i];
@@ -114,7 +115,7 @@ TraverseJoint joint_of(const GearedArm& arm, const arm::ArmFit& fit, const arm::
                                signal::smallest_step(r.column(Channel::motor_position)) / std::sqrt(12.0));
   const double certain = t.link_coulomb + settings.least_load * t.most;
   const auto [lowest, highest] = std::minmax_element(load.begin(), load.end());
-  t.crosses = *lowest < -certain && *highest > certain;
+  t.crosses = *lowest<-certain&& * highest> certain;
   return t;
 }
 
@@ -134,9 +135,10 @@ std::string obstacle(const GearedArm& arm, const arm::ArmFit& fit, std::size_t j
 /// hardly feel whether it turns with its motor or a tooth beside it.
 std::string too_fast(const TraverseJoint& joint, double interval) {
   if (interval * kCycleSamples < teeth_cycle(joint)) return {};
-  return fmt::format("cannot tell: a sample each {:.3g} s does not resolve the cycle of {:.3g} s of a motor "
-                     "against its link",
-                     interval, teeth_cycle(joint));
+  return fmt::format(
+      "cannot tell: a sample each {:.3g} s does not resolve the cycle of {:.3g} s of a motor "
+      "against its link",
+      interval, teeth_cycle(joint));
 }
 
 /// Flights that the fitted machine makes.
@@ -186,8 +188,8 @@ double evidence_of(const CrossingFit& best, std::size_t k) {
   return sound.cost() - best.cost();
 }
 
-/// Another gap that explains the record about as well; NaN: none. Looked for from each gap that is better than
-/// its neighbours.
+/// Another gap that explains the record about as well; NaN: none. Looked for from each gap that is better
+/// than its neighbours.
 double rival_of(const CrossingFit& best, std::size_t k, const TraverseSettings& settings) {
   const auto apart = [&](double gap) {
     return gap > kRivalApart * best.gap(k) || gap < best.gap(k) / kRivalApart;
@@ -246,10 +248,11 @@ void require_known(const CrossingFit& fit, std::size_t k, double half, double tu
   const TraverseSettings& s = judged.settings;
   const double gap = fit.gap(k), stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
   if (std::fmax(stiffer, 1 / stiffer) > s.far)
-    throw Refusal{Status::out_of_domain,
-                  fmt::format("cannot tell: the record fits only teeth of {:.2g} N m/rad at {:.2g} N m, {:.2g} "
-                              "times the declared stiffness: is gear.contact that of this joint?",
-                              stiffer * judged.data.joints[k].stiffness, judged.data.joints[k].level, stiffer)};
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("cannot tell: the record fits only teeth of {:.2g} N m/rad at {:.2g} N m, {:.2g} "
+                    "times the declared stiffness: is gear.contact that of this joint?",
+                    stiffer * judged.data.joints[k].stiffness, judged.data.joints[k].level, stiffer)};
   if (turns < double(s.least_turns))
     throw Refusal{Status::insufficient_data,
                   fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
@@ -275,15 +278,16 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
     const double most = largest_of(fit, k, gap + half, s);
     e.status = Status::below_range;
     e.angle_lower = 0, e.angle_upper = most;
-    e.message = fmt::format("motor's side alone: no play that is larger than its interval: at most {:.3g} rad",
-                            most);
+    e.message =
+        fmt::format("motor's side alone: no play that is larger than its interval: at most {:.3g} rad", most);
     return;
   }
   require_known(fit, k, half, errors.turns, judged);
   e.status = Status::ok;
   e.backlash_angle = gap, e.angle_lower = gap - half, e.angle_upper = gap + half;
   e.message = fmt::format(
-      "motor's side alone, against the link that the chain's load moves: the gap was crossed {} times; {:.2g} "
+      "motor's side alone, against the link that the chain's load moves: the gap was crossed {} times; "
+      "{:.2g} "
       "times the noise are left",
       judged.crossings, judged.misfit);
 }
@@ -350,10 +354,14 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
       if (out[j].estimate.message.empty()) joints.push_back(joint);
     }
     if (joints.empty()) return out;
+    if (joints.size() > kMostGaps)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("needs load_position: more than {} joints have a gap", kMostGaps)};
     const CrossingData data = crossing_data(arm, fit.rig, record, motions, joints, settings);
     if (data.windows.empty())
-      throw Refusal{Status::out_of_domain,
-                    "cannot tell: at no time that begins with all teeth on a flank for certain does a load turn"};
+      throw Refusal{
+          Status::out_of_domain,
+          "cannot tell: at no time that begins with all teeth on a flank for certain does a load turn"};
     tell(data, out, settings);
   } catch (const Refusal& refusal) {
     refuse_all(refusal);

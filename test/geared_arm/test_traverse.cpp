@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Plays of simulated arms with the motors' encoders alone, whose truth is known: right or "cannot tell", never
-// the wrong joint. How often is counted by tools/arm_traverse.
-#include "backlash_diagnosis/geared_arm/traverse.h"
-
+// Plays of simulated arms with the motors' encoders alone, whose truth is known: right or "cannot tell",
+// never the wrong joint. How often is counted by tools/arm_traverse.
 #include <gtest/gtest.h>
 
 #include "backlash_diagnosis/geared_arm/simulation.h"
+#include "backlash_diagnosis/geared_arm/traverse.h"
 #include "support/data.h"
 
 namespace backlash::geared_arm {
@@ -47,7 +46,7 @@ TEST(ArmTraverse, TheMotorsAloneTellBothPlaysAndWhereTheyWereCrossed) {
   expect_told(found[0].estimate, 2e-3);
   expect_told(found[1].estimate, 3e-3);
   for (const JointTraverse& joint : found) {
-    EXPECT_LT(joint.misfit, 1.5);            // the simulated machine is the fitted one: noise is left
+    EXPECT_LT(joint.misfit, 1.5);           // the simulated machine is the fitted one: noise is left
     ASSERT_GE(joint.crossings.size(), 4u);  // fewer would not have been told
     for (const Crossing& crossing : joint.crossings) {
       EXPECT_EQ(crossing.pose.size(), 2u);

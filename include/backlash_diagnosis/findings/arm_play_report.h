@@ -19,7 +19,7 @@ struct ArmPlayReport {
   const arm::ArmRecord* joints = nullptr;
   std::vector<geared_arm::JointPlay> plays;
   std::vector<geared_arm::JointTraverse> traverses;  // empty where every joint has two encoders
-  std::vector<diagnosis::Verdict> verdicts;  // one per joint
+  std::vector<diagnosis::Verdict> verdicts;          // one per joint
 };
 
 /// Verdicts by the limits of each joint.

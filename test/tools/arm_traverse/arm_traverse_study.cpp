@@ -31,8 +31,8 @@ struct Options {
   std::string rig = "config/two_link_arm/two_link_arm.yaml", kind = "all", out;
 };
 
-constexpr double kPlay = 0.5;      // probability of it in a joint
-constexpr double kReach = 1.2;     // rad, to each side of where the rig file moves
+constexpr double kPlay = 0.5;                        // probability of it in a joint
+constexpr double kReach = 1.2;                       // rad, to each side of where the rig file moves
 constexpr double kSmallest = 1e-4, kLargest = 6e-3;  // rad
 
 /// Motion and play; what the file knows otherwise.
@@ -62,8 +62,8 @@ void measure(std::vector<record::JointRecord>& joints, const simulation::Sensors
         if (settings.resolution > 0) value = std::round(value / settings.resolution) * settings.resolution;
       }
     }
-    for (const Channel channel : {Channel::motor_velocity, Channel::load_position, Channel::load_velocity,
-                                  Channel::output_torque})
+    for (const Channel channel :
+         {Channel::motor_velocity, Channel::load_position, Channel::load_velocity, Channel::output_torque})
       joint.record.column(channel).clear();
   }
 }
@@ -98,7 +98,8 @@ struct Count {
   }
 };
 
-constexpr const char* kRow = "{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6.1f} {:>6}\n";
+constexpr const char* kRow =
+    "{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6.1f} {:>6}\n";
 
 void print(const std::string& name, const Count& play, const Count& sound) {
   fmt::print(kRow, name, play.asked, play.told, play.within, play.holds, play.most, play.most_holds,
@@ -117,10 +118,17 @@ void add(Count& sum, const Count& c) {
 Json told(const Options& o, const std::string& kind, int arm, const std::string& joint, double truth,
           const JointTraverse& t) {
   const diagnosis::Estimate& e = t.estimate;
-  return {{"rig", o.rig},          {"kind", kind},           {"arm", arm},
-          {"joint", joint},        {"truth", truth},         {"status", diagnosis::to_string(e.status)},
-          {"value", e.backlash_angle}, {"lower", e.angle_lower}, {"upper", e.angle_upper},
-          {"misfit", t.misfit},    {"message", e.message}};
+  return {{"rig", o.rig},
+          {"kind", kind},
+          {"arm", arm},
+          {"joint", joint},
+          {"truth", truth},
+          {"status", diagnosis::to_string(e.status)},
+          {"value", e.backlash_angle},
+          {"lower", e.angle_lower},
+          {"upper", e.angle_upper},
+          {"misfit", t.misfit},
+          {"message", e.message}};
 }
 
 int run(const Options& o) {
@@ -129,9 +137,9 @@ int run(const Options& o) {
   std::ofstream out;
   if (!o.out.empty()) out.open(o.out, std::ios::app);
   fmt::print("{:<14} |{:^46} |{:^26} |\n", "", "joints with play", "joints without");
-  fmt::print("{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6} {:>6}\n", "undeclared",
-             "asked", "told", "<10 %", "holds", "most", "holds", "unkn.", "asked", "told", "most", "unkn.",
-             "worst", "w+sure");
+  fmt::print("{:<14} |{:>6} {:>5} {:>6} {:>6} {:>5} {:>6} {:>6} |{:>6} {:>5} {:>6} {:>6} |{:>6} {:>6}\n",
+             "undeclared", "asked", "told", "<10 %", "holds", "most", "holds", "unkn.", "asked", "told",
+             "most", "unkn.", "worst", "w+sure");
   const std::vector<std::string>& kinds = undeclared_kinds();
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     const std::string& kind = kinds[k];
@@ -165,8 +173,10 @@ int main(int argc, char** argv) {
   backlash::geared_arm::Options o;
   po::options_description options("arm_traverse_study: plays of drawn arms by one encoder per joint");
   options.add_options()("help", "this text")("seed", po::value(&o.seed), "of all that is drawn")(
-      "arms", po::value(&o.arms), "how many of each kind")("only", po::value(&o.only), "this one of them")("duration", po::value(&o.duration), "of each record [s]")(
-      "rig", po::value(&o.rig), "within the package")("kind", po::value(&o.kind), "what is undeclared, or all")(
+      "arms", po::value(&o.arms), "how many of each kind")("only", po::value(&o.only), "this one of them")(
+      "duration", po::value(&o.duration), "of each record [s]")(
+      "rig", po::value(&o.rig), "within the package")("kind", po::value(&o.kind),
+                                                      "what is undeclared, or all")(
       "json", po::value(&o.out), "file that each answer is appended to, a line each");
   po::variables_map given;
   po::store(po::parse_command_line(argc, argv, options), given);

@@ -115,7 +115,8 @@ void change_joint(const Columns& c, const GearedArm& machine, std::size_t joint,
   const std::vector<double> exact = c.position;
   for (std::size_t i = 0; i < c.torque.size(); ++i) {
     const double v = c.speed[i], sign = std::tanh(v / v0);
-    if (kind == "stribeck") c.torque[i] += coulomb * (0.3 + 0.5 * size) * std::exp(-std::pow(v / 0.05, 2)) * sign;
+    if (kind == "stribeck")
+      c.torque[i] += coulomb * (0.3 + 0.5 * size) * std::exp(-std::pow(v / 0.05, 2)) * sign;
     if (kind == "load_friction") c.torque[i] += (0.05 + 0.1 * size) * std::fabs(c.mesh[i]) * sign;
     if (kind == "cogging") c.torque[i] += coulomb * (0.05 + 0.2 * size) * std::sin(teeth * exact[i] + where);
     if (kind == "eccentric") c.position[i] += 2e-4 * size * std::sin(50 * exact[i] + where);
@@ -131,9 +132,9 @@ double log_uniform(Random& random, double from, double to) {
 
 const std::vector<std::string>& undeclared_kinds() {
   static const std::vector<std::string> kinds{
-      "nothing",    "friction", "payload",  "heavy_payload", "constant", "rotor",     "stribeck",
-      "bristles",   "delay",    "stiffness", "compliance",   "hertz",    "soft_start", "mild_start", "load_friction",
-      "cogging",    "eccentric", "coarse",  "noise",         "rough",    "several"};
+      "nothing",       "friction", "payload",   "heavy_payload", "constant", "rotor",      "stribeck",
+      "bristles",      "delay",    "stiffness", "compliance",    "hertz",    "soft_start", "mild_start",
+      "load_friction", "cogging",  "eccentric", "coarse",        "noise",    "rough",      "several"};
   return kinds;
 }
 
