@@ -20,8 +20,8 @@ void add_traverses(ArmPlayReport& report, const geared_arm::GearedArm& arm, cons
   std::vector<std::string> said;  // by plays_of() already
   report.traverses = geared_arm::traverses_of(arm, record, said);
   for (std::size_t j = 0; j < report.plays.size(); ++j) {
+    if (!alone(record.joints[j])) report.traverses[j] = {};  // two encoders say it better
     diagnosis::Estimate& e = report.traverses[j].estimate;
-    if (!alone(record.joints[j])) e.method.clear();
     if (e.status == diagnosis::Status::out_of_domain && !report.traverses[j].turns &&
         !report.plays[j].one_flank.empty())
       e.message = report.plays[j].one_flank;

@@ -18,7 +18,7 @@ struct ArmPlayReport {
   std::vector<std::string> warnings;
   const arm::ArmRecord* joints = nullptr;
   std::vector<geared_arm::JointPlay> plays;
-  std::vector<geared_arm::JointTraverse> traverses;  // empty where every joint has two encoders
+  std::vector<geared_arm::JointTraverse> traverses;  // of joints with one encoder; empty where none has
   std::vector<diagnosis::Verdict> verdicts;          // one per joint
 };
 

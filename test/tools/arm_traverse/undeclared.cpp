@@ -94,6 +94,13 @@ void add_bristles(const Columns& c, double coulomb, double friction_speed, doubl
   }
 }
 
+/// A drive that shows its torque through a low-pass of first order of `cutoff` [Hz].
+void low_pass(std::vector<double>& x, double cutoff, double interval) {
+  const double share = 1 - std::exp(-2 * M_PI * cutoff * interval);
+  double y = x.front();
+  for (double& each : x) each = y += share * (each - y);
+}
+
 std::vector<double> later(const std::vector<double>& x, double samples) {
   std::vector<double> y = x;
   for (std::size_t i = 0; i < x.size(); ++i) {
@@ -110,6 +117,7 @@ void change_joint(const Columns& c, const GearedArm& machine, std::size_t joint,
   const double v0 = machine.rig.identification.friction_speed;
   const double size = random.uniform(), where = random.uniform(0, 2 * M_PI);
   if (kind == "bristles") add_bristles(c, coulomb, v0, interval, 1e-4 * std::pow(30, size));
+  if (kind == "filtered") low_pass(c.torque, 50 * std::pow(6, size), interval);
   if (kind == "delay") c.position = later(c.position, 0.5 + 2.5 * size);
   const double constant = kind == "constant" ? off(random, 0.05) : 1, teeth = std::round(50 + 150 * size);
   const std::vector<double> exact = c.position;
@@ -132,9 +140,10 @@ double log_uniform(Random& random, double from, double to) {
 
 const std::vector<std::string>& undeclared_kinds() {
   static const std::vector<std::string> kinds{
-      "nothing",       "friction", "payload",   "heavy_payload", "constant", "rotor",      "stribeck",
-      "bristles",      "delay",    "stiffness", "compliance",    "hertz",    "soft_start", "mild_start",
-      "load_friction", "cogging",  "eccentric", "coarse",        "noise",    "rough",      "several"};
+      "nothing",    "friction",   "payload",       "heavy_payload", "constant",   "rotor",
+      "stribeck",   "bristles",   "delay",         "stiffness",     "compliance", "hertz",
+      "soft_start", "mild_start", "load_friction", "cogging",       "eccentric",  "coarse",
+      "noise",      "rough",      "several",       "filtered"};
   return kinds;
 }
 
