@@ -103,7 +103,7 @@ void set_chain(CrossingWindow& w, const CrossingData& data, const arm::Chain& ch
       for (Eigen::Index r = 0; r < n; ++r)
         inertia(r, c) = column[Eigen::Index(data.joints[std::size_t(r)].joint)];
     }
-    w.inertia.push_back((inertia + inertia.transpose()) / 2);
+    w.inertia.emplace_back((inertia + inertia.transpose()) / 2);
     const arm::Joints bias = arm::inverse_dynamics(chain, q, v, a);
     for (Eigen::Index c = 0; c < n; ++c) w.bias(i, c) = bias[Eigen::Index(data.joints[std::size_t(c)].joint)];
   }

@@ -354,9 +354,9 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
     const Part& p = all[w];
     const MatrixXd cross = signal::transposed_product(p.global, p.own);
     const MatrixXd reduced = signal::product(cross, signal::symmetric_inverse(signal::gram(p.own) + known));
-    informations.push_back(signal::gram(p.global) - signal::product(reduced, cross.transpose()));
-    scores.push_back(p.global.transpose() * p.residual + p.offset -
-                     reduced * (p.own.transpose() * p.residual + known * own_[w]));
+    informations.emplace_back(signal::gram(p.global) - signal::product(reduced, cross.transpose()));
+    scores.emplace_back(p.global.transpose() * p.residual + p.offset -
+                        reduced * (p.own.transpose() * p.residual + known * own_[w]));
     h += informations.back();
   }
   for (Index i = 0; i < n; ++i) h(i, i) = h(i, i) * (1 + 1e-9) + 1e-300;
