@@ -174,13 +174,16 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
     rows.side = sides_of(rows.torque, rows.first, certain, guard_rows(settings));
     rows.stay = stays_of(rows.side, play.stays);
     rows.per_cycle = kRowsPerCycle;
-    if (!two_encoders) {
-      play.estimate.message = "needs load_position";
-    } else if (play.stays[0] == 0 || play.stays[1] == 0) {
+    if (play.stays[0] == 0 || play.stays[1] == 0) {
       const int present = play.stays[0] > 0 ? -1 : play.stays[1] > 0 ? 1 : 0;
       if (present != 0) play.pose = showing_pose(chain, mean, j, -present, certain);
+      play.one_flank = one_flank_message(play, present != 0, certain);
+    }
+    if (!two_encoders) {
+      play.estimate.message = "needs load_position";
+    } else if (!play.one_flank.empty()) {
       play.estimate.status = diagnosis::Status::out_of_domain;
-      play.estimate.message = one_flank_message(play, present != 0, certain);
+      play.estimate.message = play.one_flank;
     } else if (std::min(play.stays[0], play.stays[1]) < settings.least_stays) {
       play.estimate.message = fmt::format(
           "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: a longer record",

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // simulate and diagnose_record of an arm with gears as their users run them.
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "support/data.h"
 #include "tools/command_runner.h"
@@ -48,6 +50,50 @@ TEST_F(ArmPlay, FromUrdfToADiagnosisOfEachJoint) {
   EXPECT_EQ(hidden.code, 3);
   expect_contains(hidden.out, "the load holds the teeth on one flank throughout (mesh torque between");
   expect_contains(hidden.out, "motion that passes a pose with shoulder at");
+}
+
+/// The same CSV without one of its columns.
+std::string without(const std::string& csv, const std::string& column) {
+  std::istringstream in(csv);
+  std::string out, line;
+  std::size_t left_out = std::string::npos;
+  while (std::getline(in, line)) {
+    std::istringstream cells(line);
+    std::string cell;
+    std::size_t i = 0;
+    for (; std::getline(cells, cell, ','); ++i) {
+      if (left_out == std::string::npos && cell == column) left_out = i;
+      if (i != left_out) out += (i == 0 ? "" : ",") + cell;
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+TEST_F(ArmPlay, AJointWithTheMotorsEncoderAloneIsToldBesideOneWithTwo) {
+  done("simulate rig/two_link_arm.yaml --duration 20 --out both.csv");
+  write("one.csv", without(read("both.csv"), "elbow/load_position"));
+  const Outcome outcome = run("diagnose_record one.csv --rig rig/two_link_arm.yaml --json out.json");
+  EXPECT_EQ(outcome.code, 0);
+  expect_contains(outcome.out, "elbow: ungraded, play ");
+  const std::size_t where = outcome.out.find("  crossings at ");  // of the elbow alone
+  EXPECT_GT(where, outcome.out.find("elbow: "));
+  expect_contains(outcome.out, "motor's side alone");
+  expect_contains(outcome.out, "  crossings at ");
+  const auto joints = nlohmann::ordered_json::parse(read("out.json")).at("joints");
+  const auto &shoulder = joints.at("shoulder"), &elbow = joints.at("elbow");
+  EXPECT_EQ(shoulder.at("estimates").size(), 1u);
+  EXPECT_EQ(shoulder.at("estimates").at(0).at("method"), "position_difference");
+  EXPECT_FALSE(shoulder.contains("crossings"));
+  const double truth = 3e-3;  // the rig file's
+  EXPECT_EQ(elbow.at("estimates").at(0).at("message"), "needs load_position");
+  EXPECT_EQ(elbow.at("estimates").at(1).at("method"), "gap_traverse");
+  EXPECT_NEAR(elbow.at("verdict").at("backlash_angle").get<double>(), truth, 0.1 * truth);
+  EXPECT_LE(elbow.at("verdict").at("angle_interval").at(0).get<double>(), truth);
+  EXPECT_GE(elbow.at("verdict").at("angle_interval").at(1).get<double>(), truth);
+  const auto& crossing = elbow.at("crossings").at(0);
+  EXPECT_TRUE(crossing.at("pose").contains("shoulder"));
+  EXPECT_EQ(std::abs(crossing.at("flank").get<int>()), 1);
 }
 
 TEST_F(ArmPlay, ABagSaysTheSameAsTheCsv) {

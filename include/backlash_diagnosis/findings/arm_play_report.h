@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/diagnosis/verdict.h"
 #include "backlash_diagnosis/geared_arm/geared_arm.h"
 #include "backlash_diagnosis/geared_arm/play.h"
+#include "backlash_diagnosis/geared_arm/traverse.h"
 
 namespace backlash::findings {
 
@@ -17,7 +18,8 @@ struct ArmPlayReport {
   std::vector<std::string> warnings;
   const arm::ArmRecord* joints = nullptr;
   std::vector<geared_arm::JointPlay> plays;
-  std::vector<diagnosis::Verdict> verdicts;  // one per joint
+  std::vector<geared_arm::JointTraverse> traverses;  // of joints with one encoder; empty where none has
+  std::vector<diagnosis::Verdict> verdicts;          // one per joint
 };
 
 /// Verdicts by the limits of each joint.

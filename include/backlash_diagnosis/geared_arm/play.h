@@ -55,6 +55,7 @@ struct JointPlay {
   double fastest = 0;                             // rad/s
   double disagreement = 0;        // of the motor's torque and the chain's, relative, rms, friction aside
   std::size_t stays[2] = {0, 0};  // on the negative and the positive flank
+  std::string one_flank;          // why the load tells nothing, for people; empty: it presses both flanks
   std::optional<double> pose;  // rad, of this joint, the others as they were on average: where gravity would
                                // turn the load that never turned
 };

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "crossing_motion.h"
+
+#include <cmath>
+
+#include "backlash_diagnosis/signal/linear_algebra.h"
+
+namespace backlash::geared_arm {
+namespace {
+
+/// Teeth that are a spring at the usual torque `level` and yield by a power elsewhere; damping is constant
+/// for a spring and as the torque after Hertz, as in diagnosis/traverse_motion.cpp.
+class Teeth {
+ public:
+  Teeth(const TraverseJoint& joint, const std::array<double, kCrossingValues>& values, double wider)
+      : half_gap_(std::fmax(0, values[kCrossingGap] + wider) / 2),
+        stiffness_(joint.stiffness * std::exp(values[kCrossingStiffness])),
+        damping_(joint.damping * std::exp(values[kCrossingDamping])),
+        power_(values[kCrossingPower]),
+        level_(joint.level) {}
+
+  double torque(double twist, double rate) const {
+    const double depth = std::fabs(twist) - half_gap_;
+    if (depth <= 0) return 0;
+    const double side = twist > 0 ? 1 : -1;
+    double force = stiffness_ * depth, damping = damping_;
+    if (power_ != 1) {
+      const double harder = std::exp((power_ - 1) * std::log(force / level_));
+      force *= harder, damping *= harder * harder * harder;
+    }
+    force += damping * side * rate;
+    return force > 0 ? side * force : 0;
+  }
+  double twist_under(double torque) const {
+    const double depth = level_ / stiffness_ * std::pow(std::fabs(torque) / level_, 1 / power_);
+    return std::copysign(half_gap_ + depth, torque);
+  }
+  /// 1, -1: the flank that is touched; 0: none.
+  int flank(double twist) const { return std::fabs(twist) <= half_gap_ ? 0 : twist > 0 ? 1 : -1; }
+
+ private:
+  double half_gap_, stiffness_, damping_, power_, level_;
+};
+
+using Small = std::array<double, kMostGaps>;
+
+/// Links and motors between two samples.
+class Interval {
+ public:
+  Interval(const CrossingData& data, const CrossingWindow& window, Eigen::Index i,
+           const Eigen::MatrixXd& mobility0, const Eigen::MatrixXd& mobility1)
+      : window_(window), i_(i), interval_(data.interval), m0_(mobility0), m1_(mobility1) {}
+
+  void motor(double u, Eigen::Index j, double& q, double& v) const {
+    const double q0 = window_.position(i_, j), q1 = window_.position(i_ + 1, j);
+    const double v0 = window_.rate(i_, j) * interval_, v1 = window_.rate(i_ + 1, j) * interval_;
+    const double u2 = u * u, u3 = u2 * u;
+    q = (2 * u3 - 3 * u2 + 1) * q0 + (u3 - 2 * u2 + u) * v0 + (3 * u2 - 2 * u3) * q1 + (u3 - u2) * v1;
+    v = ((6 * u2 - 6 * u) * (q0 - q1) + (3 * u2 - 4 * u + 1) * v0 + (3 * u2 - 2 * u) * v1) / interval_;
+  }
+  double bias(double u, Eigen::Index j) const {
+    return (1 - u) * window_.bias(i_, j) + u * window_.bias(i_ + 1, j);
+  }
+  double mobility(double u, Eigen::Index r, Eigen::Index c) const {
+    return (1 - u) * m0_(r, c) + u * m1_(r, c);
+  }
+
+ private:
+  const CrossingWindow& window_;
+  Eigen::Index i_;
+  double interval_;
+  const Eigen::MatrixXd &m0_, &m1_;
+};
+
+class Links {
+ public:
+  Links(const CrossingData& data, const CrossingMachine& machine, const Eigen::VectorXd& own)
+      : data_(data), machine_(machine), beta_(own), n_(Eigen::Index(machine.size())) {
+    for (std::size_t j = 0; j < machine.size(); ++j)
+      teeth_.emplace_back(data.joints[j], machine[j], own[n_ + Eigen::Index(j)]);
+  }
+
+  void begin(const CrossingWindow& window) {
+    for (Eigen::Index j = 0; j < n_; ++j) {
+      q_[std::size_t(j)] = window.position(0, j) - teeth_[std::size_t(j)].twist_under(window.load[j]);
+      v_[std::size_t(j)] = window.rate(0, j);
+    }
+  }
+
+  /// Runge and Kutta's step from u0 to u1 [samples]; adds the mean torque times the step to `sum`.
+  void step(const Interval& at, double u0, double u1, Small& sum) {
+    const double dt = (u1 - u0) * data_.interval, half = (u0 + u1) / 2;
+    Small a1, a2, a3, a4, t1, t2, t3, t4;
+    rates(at, u0, q_, v_, a1, t1);
+    Small q2 = moved(q_, v_, dt / 2), v2 = moved(v_, a1, dt / 2);
+    rates(at, half, q2, v2, a2, t2);
+    Small q3 = moved(q_, v2, dt / 2), v3 = moved(v_, a2, dt / 2);
+    rates(at, half, q3, v3, a3, t3);
+    Small q4 = moved(q_, v3, dt), v4 = moved(v_, a3, dt);
+    rates(at, u1, q4, v4, a4, t4);
+    for (std::size_t j = 0; j < std::size_t(n_); ++j) {
+      q_[j] += dt * (v_[j] + 2 * v2[j] + 2 * v3[j] + v4[j]) / 6;
+      v_[j] += dt * (a1[j] + 2 * a2[j] + 2 * a3[j] + a4[j]) / 6;
+      sum[j] += (u1 - u0) * (t1[j] + 2 * t2[j] + 2 * t3[j] + t4[j]) / 6;
+    }
+  }
+
+  int flank(const CrossingWindow& window, Eigen::Index sample, Eigen::Index j) const {
+    return teeth_[std::size_t(j)].flank(window.position(sample, j) - q_[std::size_t(j)]);
+  }
+
+ private:
+  Small moved(const Small& from, const Small& rate, double dt) const {
+    Small to;
+    for (std::size_t j = 0; j < std::size_t(n_); ++j) to[j] = from[j] + dt * rate[j];
+    return to;
+  }
+
+  void rates(const Interval& at, double u, const Small& q, const Small& v, Small& a, Small& torque) const {
+    Small net;
+    for (Eigen::Index j = 0; j < n_; ++j) {
+      const auto k = std::size_t(j);
+      double motor, rate;
+      at.motor(u, j, motor, rate);
+      torque[k] = teeth_[k].torque(motor - q[k], rate - v[k]);
+      net[k] = torque[k] - at.bias(u, j) - beta_[j] - data_.joints[k].link_viscous * v[k] -
+               machine_[k][kCrossingCoulomb] * std::tanh(v[k] / data_.friction_speed);
+    }
+    for (Eigen::Index j = 0; j < n_; ++j) {
+      double sum = 0;
+      for (Eigen::Index c = 0; c < n_; ++c) sum += at.mobility(u, j, c) * net[std::size_t(c)];
+      a[std::size_t(j)] = sum;
+    }
+  }
+
+  const CrossingData& data_;
+  const CrossingMachine& machine_;
+  const Eigen::VectorXd& beta_;  // its first entries
+  Eigen::Index n_;
+  std::vector<Teeth> teeth_;
+  Small q_, v_;
+};
+
+/// Of the links alone: what the fit moves to the rotor is taken from them.
+Eigen::MatrixXd mobility(const CrossingData& data, const Eigen::MatrixXd& inertia,
+                         const CrossingMachine& machine) {
+  Eigen::MatrixXd links = inertia;
+  for (std::size_t j = 0; j < machine.size(); ++j)
+    links(Eigen::Index(j), Eigen::Index(j)) -=
+        data.joints[j].rotor * (std::exp(machine[j][kCrossingRotor]) - 1);
+  return signal::symmetric_inverse(links);
+}
+
+/// Adds the flights that have ended at a sample.
+class Flights {
+ public:
+  explicit Flights(std::size_t joints) : last_(joints, 0), left_(joints, 0) {}
+  void see(std::size_t joint, Eigen::Index sample, int flank, std::vector<Flight>& found) {
+    if (flank == 0) return;
+    if (last_[joint] == -flank) found.push_back({joint, left_[joint], sample, flank});
+    last_[joint] = flank;
+    left_[joint] = sample;
+  }
+
+ private:
+  std::vector<int> last_;
+  std::vector<Eigen::Index> left_;
+};
+
+}  // namespace
+
+Eigen::MatrixXd mesh_torques(const CrossingData& data, const CrossingWindow& window,
+                             const CrossingMachine& machine, const Eigen::VectorXd& own,
+                             std::vector<Flight>* flights) {
+  const auto n = Eigen::Index(machine.size());
+  Eigen::MatrixXd mean(window.samples() - 1, n);
+  Links links(data, machine, own);
+  links.begin(window);
+  Flights seen(machine.size());
+  Eigen::MatrixXd before = mobility(data, window.inertia.front(), machine);
+  for (Eigen::Index i = 0; i + 1 < window.samples(); ++i) {
+    const Eigen::MatrixXd after = mobility(data, window.inertia[std::size_t(i + 1)], machine);
+    const Interval at(data, window, i, before, after);
+    if (flights)
+      for (Eigen::Index j = 0; j < n; ++j) seen.see(std::size_t(j), i, links.flank(window, i, j), *flights);
+    Small sum{};
+    for (int s = 0; s < data.steps; ++s)
+      links.step(at, double(s) / data.steps, double(s + 1) / data.steps, sum);
+    for (Eigen::Index j = 0; j < n; ++j) mean(i, j) = sum[std::size_t(j)];
+    before = after;
+  }
+  return mean;
+}
+
+}  // namespace backlash::geared_arm
