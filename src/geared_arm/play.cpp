@@ -110,6 +110,10 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
   const FlankPlayFit fit = fit_flank_play(rows);
   diagnosis::Estimate& e = play.estimate;
   e.components = diagnosis::PlayComponents{fit.play, fit.compliance, kNaN, kNaN};
+  if (!std::isfinite(fit.lower) || !std::isfinite(fit.upper)) {
+    e.message = "cannot tell: the deflection has no finite fit";
+    return;
+  }
   // What friction behind the gap does to the deflection is in the interval, and no teeth that float.
   if (fit.residual > settings.worst_residual * std::fabs(fit.play) && fit.play > 3 * fit.error &&
       fit.residual > friction * std::fabs(fit.compliance)) {

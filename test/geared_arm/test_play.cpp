@@ -137,6 +137,21 @@ TEST(ArmPlay, APayloadThatTheFileDoesNotKnowMakesNoAnswer) {
   }
 }
 
+/// The error of an eccentric encoder follows the angle as gravity's change of flank does.
+TEST(ArmPlay, AnEncoderOutOfCentreMakesNoWrongAnswer) {
+  const GearedArm arm = arm_of("two_link_arm");
+  std::vector<record::JointRecord> joints = simulate_arm(arm, 30);
+  for (double& q : joints[0].record.column(record::Channel::load_position)) q += 1e-3 * std::cos(q);
+  std::vector<std::string> warnings;
+  const auto plays = plays_of(arm.rig, {{0.05, 0.02}, {0.02, 0.01}},
+                              arm::arm_record(joints, arm.rig, "simulated"), warnings);
+  const diagnosis::Estimate& e = plays[0].estimate;
+  ASSERT_EQ(e.status, Status::ok) << e.message;
+  EXPECT_NEAR(e.backlash_angle, 2e-3, 0.1 * 2e-3);  // the promise of the page
+  EXPECT_LE(e.angle_lower, 2e-3);
+  EXPECT_GE(e.angle_upper, 2e-3);
+}
+
 TEST(ArmPlay, OneEncoderIsNotEnough) {
   const GearedArm arm = arm_of("two_link_arm");
   std::vector<record::JointRecord> joints = simulate_arm(arm, 10);

@@ -94,6 +94,16 @@ TEST(ArmTraverse, ALoadThatNeverTurnsTellsNothing) {
   }
 }
 
+/// The shoulder's load reaches 6.7 N m on the flank that is loaded less: 5 N m of friction hide a gap.
+TEST(ArmTraverse, ALoadThatTheMotorsFrictionHidesTellsNothing) {
+  GearedArm rough = arm_of("two_link_arm");
+  rough.rig.joints[0].terms[std::size_t(arm::DriveTerm::coulomb)] = 5;
+  const std::vector<JointTraverse> found = diagnosed(rough, rough);
+  EXPECT_EQ(found[0].estimate.status, Status::out_of_domain);
+  EXPECT_NE(found[0].estimate.message.find("dry friction"), std::string::npos) << found[0].estimate.message;
+  EXPECT_TRUE(found[0].crossings.empty());
+}
+
 TEST(ArmTraverse, WhatIsMissingIsSaid) {
   GearedArm arm = arm_of("two_link_arm");
   std::vector<record::JointRecord> joints = simulate_arm(arm, 10);

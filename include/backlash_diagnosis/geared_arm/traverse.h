@@ -6,9 +6,9 @@
 // each such turn the links are moved by the recorded motors, and the torque that this needs is fitted to the
 // recorded one (of one joint with a free load: diagnosis/gap_traverse.h):
 //
-//   J_j a_M = tau_j - friction_j(v_M) - T_j,   T_j = s F(|phi| - b_j / 2, s phi'),  phi = q_M - q_j,  s =
-//   sign(phi) M(q_M) a + c(q_M, v_M) + g(q_M) = T - friction of the links - beta F = T_u (k d / T_u)^p + c d'
-//   > 0
+//   J_j a_M = tau_j - friction_j(v_M) - T_j,   T_j = s F(|phi| - b_j / 2, s phi')
+//   phi = q_M - q_j,   s = sign(phi),   F = T_u (k d / T_u)^p + c d' > 0
+//   M(q_M) a + c(q_M, v_M) + g(q_M) = T - friction of the links - beta
 //
 // q_M: of the record. Links, drives and friction are those of the rig file after a fit to the whole record
 // (arm/fit.h), so that friction and payload may be wrong in the file. Free within what is known: b, k, c, p,
