@@ -119,9 +119,9 @@ void read_payload(const YamlReader& yaml, ArmRig& rig) {
   rig.payloads.push_back(payload);
 }
 
-std::string path_beside(const std::string& path, const std::string& source) {
+std::string path_in(const std::string& folder, const std::string& path) {
   const std::filesystem::path p(path);
-  return p.is_absolute() ? path : (std::filesystem::path(source).parent_path() / p).string();
+  return p.is_absolute() ? path : (std::filesystem::path(folder) / p).string();
 }
 
 void read_drives(const YamlReader& yaml, ArmRig& rig) {
@@ -154,19 +154,54 @@ std::vector<std::string> ArmRig::joint_names() const {
   return names;
 }
 
+bool is_urdf(const std::string& path) {
+  const std::string start = read_start(path, 4096);
+  const std::size_t first = start.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+  return first != std::string::npos && start[first] == '<';
+}
+
+ArmRig arm_rig_of_urdf(const std::string& path) {
+  ArmRig rig;
+  rig.source = rig.urdf = path;
+  rig.name = std::filesystem::path(path).stem().string();
+  rig.channel = record::Channel::motor_torque;
+  rig.terms = {DriveTerm::rotor_inertia, DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::offset};
+  for (const std::string& name : moving_joints(path)) {
+    rig.joints.emplace_back();
+    rig.joints.back().name = name;
+  }
+  rig.chain = read_chain(path, rig.joint_names());
+  rig.text = arm_rig_text(
+      rig,
+      {"All joints of " + std::filesystem::path(path).filename().string() +
+           " that move. Nothing is known of their drives, all 0: identify finds the values.",
+       "For plan_motion a joint may have motion_limits: {lower, upper, speed, acceleration, start} [rad, s].",
+       "identification: cutoffs that records of many arms bear [choice]; look at yours."});
+  return rig;
+}
+
 bool is_arm_rig(const std::string& path) {
+  if (is_urdf(path))
+    throw BadData(path,
+                  "is a URDF: what is needed is a rig file, which names it and tells the drives; "
+                  "plan_motion writes one (--write-rig) to begin with");
   return YamlReader::from_file(path).has("urdf");
 }
 
 ArmRig load_arm_rig(const std::string& path) {
-  const YamlReader yaml = YamlReader::from_file(path);
-  ArmRig rig;
-  rig.source = path;
   std::ifstream in = open_input(path);
-  rig.text.assign(std::istreambuf_iterator<char>(in), {});
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  return arm_rig_from_text(text, path, std::filesystem::path(path).parent_path().string());
+}
+
+ArmRig arm_rig_from_text(const std::string& text, const std::string& source, const std::string& folder) {
+  const YamlReader yaml = YamlReader::from_text(text, source);
+  ArmRig rig;
+  rig.source = source;
+  rig.text = text;
   yaml.integer("schema_version", kSchema, kSchema);
   rig.name = yaml.text("name");
-  rig.urdf = path_beside(yaml.text("urdf"), path);
+  rig.urdf = path_in(folder, yaml.text("urdf"));
   read_drives(yaml, rig);
   rig.identification = read_identification(yaml.map("identification"));
   rig.chain = read_chain(rig.urdf, rig.joint_names());

@@ -136,6 +136,17 @@ urdf::ModelInterfaceSharedPtr model_of(const std::string& text, const std::strin
   return model;
 }
 
+/// Joints that are not fixed and begin at the link or at what is fixed to it.
+void add_moving(const urdf::ModelInterface& model, const urdf::Link& link,
+                std::vector<urdf::JointConstSharedPtr>& to) {
+  for (const auto& joint : link.child_joints) {
+    if (joint->type == urdf::Joint::FIXED)
+      add_moving(model, *model.getLink(joint->child_link_name), to);
+    else
+      to.push_back(joint);
+  }
+}
+
 }  // namespace
 
 Chain chain_of_urdf(const std::string& text, const std::string& name,
@@ -149,6 +160,24 @@ std::string read_urdf(const std::string& path) {
 
 Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints) {
   return chain_of_urdf(read_urdf(urdf_path), urdf_path, joints);
+}
+
+std::vector<std::string> moving_joints(const std::string& urdf_path) {
+  const urdf::ModelInterfaceSharedPtr model = model_of(read_urdf(urdf_path), urdf_path);
+  std::vector<std::string> names;
+  std::vector<urdf::JointConstSharedPtr> next;
+  add_moving(*model, *model->getRoot(), next);
+  while (!next.empty()) {
+    if (next.size() > 1)
+      throw BadData(urdf_path, "joints '" + next[0]->name + "' and '" + next[1]->name +
+                                   "' begin at the same body: only a serial chain is known");
+    names.push_back(next.front()->name);
+    const urdf::LinkConstSharedPtr link = model->getLink(next.front()->child_link_name);
+    next.clear();
+    add_moving(*model, *link, next);
+  }
+  if (names.empty()) throw BadData(urdf_path, "has no joint that moves");
+  return names;
 }
 
 std::vector<JointLimits> read_limits(const std::string& urdf_path, const std::vector<std::string>& joints) {

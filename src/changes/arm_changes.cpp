@@ -9,6 +9,7 @@
 
 #include "backlash_diagnosis/arm/push.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/base/text.h"
 #include "commissioned_arm.h"
 
@@ -45,6 +46,7 @@ class ArmChanges {
            const HealthyModel& model);
   void add_constant_error(const ArmJoint& joint, Change& change) const;
   bool is_left_by_chain(const ArmJoint& joint, std::size_t place, const Change& change) const;
+  double left(const FoundChainChange& f) const;
   Change told(const FoundChainChange& f) const;
 
   std::deque<ArmJoint>& joints() { return arm_->joints(); }
@@ -77,6 +79,7 @@ ChainDifference ArmChanges::difference_of(const FoundChainChange& found, bool fr
 /// A change of the chain stands beside those of each joint from then on.
 void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& record) {
   const bool from_beginning = found.low <= 0;
+  const double before = left(found);
   arm_->differ(difference_of(found, from_beginning, record.joints.front().time.back()), record);
   std::size_t j = 0;
   for (ArmJoint& joint : joints()) {
@@ -90,6 +93,7 @@ void ArmChanges::take(const FoundChainChange& found, const arm::ArmRecord& recor
   earlier_.push_back(found);
   if (!from_beginning) {
     chain_.push_back(found);
+    chain_.back().error_before = before;
     return;
   }
   const std::string name = described(found.effect, rig_.chain);
@@ -169,6 +173,7 @@ void ArmChanges::tell_pushes(const arm::ArmRecord& record) {
     change.since_to = e.begin + settings_.onset_least;
     if (e.released) change.until = e.end;
     change.gain = e.clear * e.clear;
+    change.error_before = change.error_after = kNaN;  // no torque is predicted while the arm rests
     change.size.push_back({"torque", "N m", {-e.torque, e.torque_error}});
     out_.changes.push_back(change);
   }
@@ -243,8 +248,21 @@ void ArmChanges::tell_joint(const ArmJoint& joint, std::size_t place) {
   out_.noise = std::max(out_.noise, joint.model.noise);
 }
 
+/// N m, rms of what all joints leave while it lasts, beside all that is known by now.
+double ArmChanges::left(const FoundChainChange& f) const {
+  double squares = 0, rows = 0;
+  for (const ArmJoint& joint : arm_->joints()) {
+    double of_joint = 0;
+    squares += joint.search->left_after(joint.search->background(joint.found), f.from, f.to, of_joint);
+    rows += of_joint;
+  }
+  return std::sqrt(squares / std::max(rows, 1.0));
+}
+
 Change ArmChanges::told(const FoundChainChange& f) const {
   Change change;
+  change.error_before = f.error_before;
+  change.error_after = left(f);
   change.effect = f.effect.id;
   const arm::Joint& joint = rig_.chain.joints[f.effect.joint];
   change.joint = joint.name;

@@ -33,6 +33,7 @@ struct FoundChainChange {
   std::vector<double> shares;  // of the gain, by joint
   double inflation = 1;
   double low = 0, high = 0;        // s, of the onset
+  double error_before = 0;         // N m, rms of all joints without it, while it lasts
   std::vector<std::string> alike;  // others that explain it as well, in words
 
   /// The size has this error, noise that follows the effect included.

@@ -37,6 +37,8 @@ class ChangeSearch {
   std::optional<FoundChange> next(const std::vector<FoundChange>& found);
   void add(FoundChange next, std::vector<FoundChange>& found) const;
   Background background(const std::vector<FoundChange>& others) const;
+  /// Squares [(N m)^2] that it leaves of these blocks, and of how many rows.
+  double left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const;
   std::size_t blocks() const { return blocks_; }
   double threshold(Eigen::Index values) const;
   std::size_t windows() const;
@@ -90,7 +92,6 @@ class ChangeSearch {
   void onset_interval(const FoundChange& f, const EffectSums& sums, const Background& b,
                       Change& change) const;
   void onset_with_left(const FoundChange& f, const Background& b, Change& change) const;
-  double left_after(const Background& b, std::size_t from, std::size_t to, double& rows) const;
 
   const HealthyModel& model_;
   const SampledMotion& motion_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/geared_arm/geared_arm.h"
 
+#include <utility>
+
 #include "backlash_diagnosis/base/error.h"
 
 namespace backlash::geared_arm {
@@ -47,12 +49,10 @@ GearedJoint read_joint(const YamlReader& yaml, const arm::JointDrive& drive, boo
   return joint;
 }
 
-}  // namespace
-
-GearedArm load_geared_arm(const std::string& path) {
+GearedArm geared_arm_of(arm::ArmRig rig) {
   GearedArm arm;
-  arm.rig = arm::load_arm_rig(path);
-  const YamlReader yaml = YamlReader::from_file(path);
+  arm.rig = std::move(rig);
+  const YamlReader yaml = YamlReader::from_text(arm.rig.text, arm.rig.source);
   const auto simulated = yaml.optional_map("simulation");
   arm.simulated = simulated.has_value();
   if (simulated) {
@@ -65,6 +65,17 @@ GearedArm load_geared_arm(const std::string& path) {
   for (std::size_t j = 0; j < joints.size(); ++j)
     arm.joints.push_back(read_joint(joints[j], arm.rig.joints[j], arm.simulated));
   return arm;
+}
+
+}  // namespace
+
+GearedArm load_geared_arm(const std::string& path) {
+  return geared_arm_of(arm::load_arm_rig(path));
+}
+
+GearedArm geared_arm_from_text(const std::string& text, const std::string& source,
+                               const std::string& folder) {
+  return geared_arm_of(arm::arm_rig_from_text(text, source, folder));
 }
 
 }  // namespace backlash::geared_arm

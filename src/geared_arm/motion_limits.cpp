@@ -62,7 +62,7 @@ MotionLimits read_joint(const YamlReader& joint, const arm::JointLimits& urdf, s
 }  // namespace
 
 std::vector<MotionLimits> load_motion_limits(const GearedArm& arm, std::optional<double> acceleration) {
-  const std::vector<YamlReader> joints = YamlReader::from_file(arm.rig.source).maps("joints");
+  const std::vector<YamlReader> joints = YamlReader::from_text(arm.rig.text, arm.rig.source).maps("joints");
   const std::vector<arm::JointLimits> urdf = arm::read_limits(arm.rig.urdf, arm.rig.joint_names());
   std::vector<MotionLimits> all;
   for (std::size_t j = 0; j < joints.size(); ++j)

@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
+#include "backlash_diagnosis/base/text.h"
 
 namespace backlash::geared_arm {
 namespace {
@@ -31,7 +32,11 @@ arm::Joints part(const double* values, Eigen::Index count) {
 }  // namespace
 
 ArmPlant::ArmPlant(const GearedArm& arm)
-    : arm_(arm), chain_(arm::loaded_chain(arm.rig)), links_(Eigen::Index(chain_.size())), angles_(links_) {
+    : arm_(arm),
+      chain_(arm::loaded_chain(arm.rig)),
+      believed_(chain_),
+      links_(Eigen::Index(chain_.size())),
+      angles_(links_) {
   rotors_ = arm::Joints::Zero(links_);
   given_ = arm::Joints::Constant(links_, kNaN);
   for (std::size_t j = 0; j < arm_.joints.size(); ++j) {
@@ -147,7 +152,7 @@ void ArmPlant::begin_segments() {
 void ArmPlant::compensate_gravity() {
   if (!arm_.gravity_compensation) return;
   const arm::Joints rest = arm::Joints::Zero(links_);
-  const arm::Joints gravity = arm::inverse_dynamics(chain_, motor_positions(), rest, rest);
+  const arm::Joints gravity = arm::inverse_dynamics(believed_, motor_positions(), rest, rest);
   for (std::size_t j = 0; j < drives_.size(); ++j) drives_[j].compensation = gravity[Eigen::Index(j)];
 }
 
@@ -197,6 +202,29 @@ void ArmPlant::set_backlash(std::size_t joint, double backlash) {
         "backlash", backlash,
         "joint '" + arm_.rig.joints[joint].name + "' has no gap: it has no gear or is held");
   arm_.joints[joint].gear->backlash = backlash;
+}
+
+void ArmPlant::set_machine(const GearedArm& arm) {
+  const auto require = [](bool same, const std::string& what) {
+    if (!same) throw InvalidParameter("rig", what, "must be as in the arm that is simulated");
+  };
+  require(arm.rig.joint_names() == arm_.rig.joint_names(), joined(arm.rig.joint_names()));
+  require(arm.rig.channel == arm_.rig.channel, record::channel_name(arm.rig.channel));
+  for (std::size_t j = 0; j < arm.joints.size(); ++j) {
+    const GearedJoint &now = arm_.joints[j], &then = arm.joints[j];
+    require(now.gear.has_value() == then.gear.has_value(), "gear of joint '" + arm.rig.joints[j].name + "'");
+    require(now.held == then.held, "held of joint '" + arm.rig.joints[j].name + "'");
+  }
+  arm_.rig = arm.rig;
+  chain_ = arm::loaded_chain(arm.rig);
+  for (std::size_t j = 0; j < arm.joints.size(); ++j) {
+    GearedJoint& joint = arm_.joints[j];
+    joint.gear = arm.joints[j].gear;
+    joint.link_coulomb = arm.joints[j].link_coulomb;
+    joint.link_viscous = arm.joints[j].link_viscous;
+    if (drives_[j].motor < 0)
+      rotors_[Eigen::Index(j)] = arm.rig.joints[j].terms[std::size_t(arm::DriveTerm::rotor_inertia)];
+  }
 }
 
 bool ArmPlant::set_torque(std::size_t joint, double torque) {

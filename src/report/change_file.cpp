@@ -67,8 +67,11 @@ std::string change_text(const diagnosis::FoundChange& change) {
                      utc_time(change.since) + " (" + time_of_day(change.since_from) + " to " +
                      time_of_day(change.since_to) + ")";
   if (change.until) text += ", until " + utc_time(*change.until);
-  for (const diagnosis::FoundSize& s : change.size)
-    text += fmt::format(": {} {:.4g} +- {:.2g} {}", s.name, s.value, s.standard_error, s.unit);
+  const char* before = ": ";
+  for (const diagnosis::FoundSize& s : change.size) {
+    text += fmt::format("{}{} {:.4g} +- {:.2g} {}", before, s.name, s.value, s.standard_error, s.unit);
+    before = ", ";
+  }
   if (change.effect == "unknown")
     text += "; no effect explains it";
   else if (!change.equivalent_to.empty())

@@ -3,6 +3,10 @@
 
 #include <ros/console.h>
 
+#include <filesystem>
+
+#include "backlash_diagnosis/base/error.h"
+
 namespace backlash::ros_bridge {
 namespace {
 
@@ -21,6 +25,7 @@ void set_robot_description(const ros::NodeHandle& handle, const std::string& urd
 SimulatedArm::SimulatedArm(const ArmSettings& settings, const ros::NodeHandle& handle,
                            const ros::NodeHandle& private_handle)
     : title_("simulating " + settings.arm.rig.name + " (" + settings.arm.rig.source + ")"),
+      folder_(std::filesystem::path(settings.arm.rig.source).parent_path().string()),
       simulation_(settings.arm),
       rig_description_(publish_rig_description(handle, settings.description)) {
   for (std::size_t j = 0; j < settings.arm.joints.size(); ++j) {
@@ -33,6 +38,7 @@ SimulatedArm::SimulatedArm(const ArmSettings& settings, const ros::NodeHandle& h
         access(j), ros::NodeHandle(handle, joint), ros::NodeHandle(private_handle, joint));
   }
   if (settings.set_robot_description) set_robot_description(handle, settings.urdf);
+  set_rig_ = ros::NodeHandle(private_handle).advertiseService("set_rig", &SimulatedArm::set_rig, this);
 }
 
 JointAccess SimulatedArm::access(std::size_t joint) {
@@ -53,6 +59,24 @@ void SimulatedArm::step(std::map<std::string, sensor_msgs::JointState>& messages
 void SimulatedArm::reset() {
   simulation_.reset();
   for (JointControls& joint : controls_) joint.tell();
+}
+
+bool SimulatedArm::set_rig(backlash_diagnosis::SetRig::Request& request,
+                           backlash_diagnosis::SetRig::Response& response) {
+  try {
+    const geared_arm::GearedArm arm = geared_arm::geared_arm_from_text(request.rig, "set_rig", folder_);
+    simulation_.plant().set_machine(arm);
+    for (JointControls& joint : controls_) joint.tell();
+    response.success = true;
+    response.message = "the arm is " + arm.rig.name + ", " + std::to_string(arm.rig.payloads.size()) +
+                       " payloads; backlash is " + true_backlash();
+    ROS_INFO_STREAM(response.message);
+  } catch (const Error& error) {
+    response.success = false;
+    response.message = error.what();
+    ROS_WARN_STREAM("set_rig refused: " << response.message);
+  }
+  return true;
 }
 
 std::string SimulatedArm::true_backlash() const {

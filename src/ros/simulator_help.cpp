@@ -53,8 +53,8 @@ Services
 
 An arm: all joints in each message of joint_states, as JOINT, the name in the URDF (position and velocity of the
 link, torque of the motor, for robot_state_publisher), JOINT_motor and JOINT_load. Other topics are below JOINT/,
-services and live parameters below ~JOINT/; backlash is in rad, set_rig is not there. Parameters that are for one
-joint (run, joint, joints, rig_folder, backlash, half_gap, excitation_...) are refused; noise has the seed plus the
+services and live parameters below ~JOINT/; backlash is in rad. ~set_rig goes on with links, payloads, drives and
+gears of another file of the same joints; gravity compensation believes what it did. Parameters that are for one joint (run, joint, joints, rig_folder, backlash, half_gap, excitation_...) are refused; noise has the seed plus the
 joint's place.
 
 Stamps start at the present ROS time. With use_sim_time, real_time_factor 1 and a /clock from elsewhere the

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Plans a motion of an arm that shows the play of each joint and the parameters.
+#include <algorithm>
 #include <iostream>
 #include <limits>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/motion_plan_report.h"
@@ -23,10 +26,11 @@ Command command() {
       "Plans a motion of all joints of an arm within their limits: each gap is crossed under known load, and "
       "links "
       "and drives are seen as well as they can be.";
-  c.positional = {"RIG.yaml"};
+  c.positional = {"RIG.yaml|ROBOT.urdf"};
   c.options = {
       {"out", "MOTION.yaml", "the motion: a Fourier series per joint, for simulate --motion", true},
       {"json", "OUT.json", "the same with all figures"},
+      {"write-rig", "RIG.yaml", "of a URDF: the rig file that it is taken for, to complete and for identify"},
       {"csv", "TRAJECTORY.csv", "approach and one period as samples, for any controller; needs --rate"},
       {"rate", "HZ", "of --csv"},
       {"acceleration", "RAD/S^2", "limit of the joints whose motion_limits in the rig file have none"},
@@ -38,8 +42,10 @@ Command command() {
       "Limits are the URDF's <limit>, tighter where motion_limits of a joint in the rig file says so. They "
       "are all "
       "that is known of the place: no walls, no collisions of the arm with itself. Watch the motion in a "
-      "simulation of the cell, or slowly, before it is run.";
-  c.examples = {"plan_motion config/two_link_arm/two_link_arm.yaml --out motion.yaml"};
+      "simulation of the cell, or slowly, before it is run. Of a URDF all joints that move are planned, from "
+      "0 rad; of its drives nothing is known, so that how much load their friction hides is not told.";
+  c.examples = {"plan_motion config/two_link_arm/two_link_arm.yaml --out motion.yaml",
+                "plan_motion robot.urdf --acceleration 5 --out motion.yaml --write-rig robot.yaml"};
   c.exit_codes =
       "  0   done\n  3   the gap of a joint cannot be shown within the limits; the motion for all others is "
       "written\n";
@@ -57,14 +63,36 @@ geared_arm::PlanSettings settings_of(const Arguments& arguments) {
 void check_outputs(const Arguments& arguments, const std::vector<std::string>& inputs) {
   const std::string out = arguments.text("out");
   check_output(out, inputs);
-  for (const char* option : {"json", "csv"}) {
+  std::vector<std::string> others = {out};
+  for (const char* option : {"json", "csv", "write-rig"}) {
     if (!arguments.has(option)) continue;
     const std::string path = arguments.text(option);
     check_output(path, inputs);
-    if (path == out || (std::string(option) == "csv" && path == arguments.text("json")))
+    if (std::find(others.begin(), others.end(), path) != others.end())
       throw UsageError(std::string("--") + option + " names the same file as another output");
+    others.push_back(path);
   }
   if (arguments.has("csv") != arguments.has("rate")) throw UsageError("--csv and --rate go together");
+}
+
+geared_arm::GearedArm arm_of(const Arguments& arguments) {
+  const std::string& path = arguments.positional(0);
+  if (arm::is_urdf(path)) {
+    const arm::ArmRig rig = arm::arm_rig_of_urdf(path);
+    check_outputs(arguments, {path});
+    if (arguments.has("write-rig")) write_text(arguments.text("write-rig"), rig.text);
+    return geared_arm::geared_arm_from_text(rig.text, "the rig of " + path, "");
+  }
+  if (arguments.has("write-rig")) throw UsageError("--write-rig is for a URDF; " + path + " is a rig file");
+  if (!arm::is_arm_rig(path))
+    throw BadData(
+        path,
+        "is the rig of one joint; a motion is planned for an arm (a rig file with urdf). A joint alone "
+        "needs no plan: it is told by the excitation of its rig file, see the test runs of identify and "
+        "doc/howto/excite_a_joint.md");
+  geared_arm::GearedArm arm = geared_arm::load_geared_arm(path);
+  check_outputs(arguments, {path, arm.rig.urdf});
+  return arm;
 }
 
 int plan(const Arguments& arguments) {
@@ -73,14 +101,7 @@ int plan(const Arguments& arguments) {
   const double rate = arguments.number("rate", 0, Range::between(1, 1e5));
   std::optional<double> acceleration;
   if (arguments.has("acceleration")) acceleration = arguments.number("acceleration", 0, Range::positive());
-  if (!arm::is_arm_rig(path))
-    throw BadData(
-        path,
-        "is the rig of one joint; a motion is planned for an arm (a rig file with urdf). A joint alone "
-        "needs no plan: it is told by the excitation of its rig file, see the test runs of identify and "
-        "doc/howto/excite_a_joint.md");
-  const geared_arm::GearedArm arm = geared_arm::load_geared_arm(path);
-  check_outputs(arguments, {path, arm.rig.urdf});
+  const geared_arm::GearedArm arm = arm_of(arguments);
   const std::vector<geared_arm::MotionLimits> limits = geared_arm::load_motion_limits(arm, acceleration);
   geared_arm::MotionPlan plan;
   {

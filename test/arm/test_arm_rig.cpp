@@ -117,6 +117,31 @@ TEST_F(ArmRigFile, WrongRobotsAreRefused) {
       std::string::npos);
 }
 
+TEST_F(ArmRigFile, AUrdfByItselfIsAllItsJointsThatMove) {
+  const std::string urdf = path("ur5_arm.urdf");
+  const ArmRig declared = load_arm_rig(path("ur5_arm.yaml"));
+  EXPECT_TRUE(is_urdf(urdf));
+  EXPECT_FALSE(is_urdf(path("ur5_arm.yaml")));
+  EXPECT_THROW(is_arm_rig(urdf), BadData);
+  const ArmRig rig = arm_rig_of_urdf(urdf);
+  EXPECT_EQ(rig.joint_names(), declared.joint_names());  // tool0_joint is fixed
+  write_file(path("of_urdf.yaml"), rig.text);
+  const ArmRig back = load_arm_rig(path("of_urdf.yaml"));
+  EXPECT_EQ(back.chain.links[2], declared.chain.links[2]);
+  EXPECT_EQ(back.chain.gravity, declared.chain.gravity);
+  EXPECT_EQ(back.joints[0].terms, JointDrive().terms);
+
+  write_file(path("two.urdf"), R"(<robot name="two"><link name="a"/><link name="b"/><link name="c"/>
+    <joint name="left" type="continuous"><parent link="a"/><child link="b"/></joint>
+    <joint name="right" type="continuous"><parent link="a"/><child link="c"/></joint></robot>)");
+  try {
+    arm_rig_of_urdf(path("two.urdf"));
+    ADD_FAILURE() << "accepted";
+  } catch (const BadData& error) {
+    EXPECT_NE(std::string(error.what()).find("'left' and 'right' begin at the same body"), std::string::npos);
+  }
+}
+
 // Theory: a cloud of masses has a positive definite pseudo inertia, a body whose inertia breaks the triangle
 // rule has not.
 TEST(Body, PseudoInertiaTellsWhatIsPhysical) {

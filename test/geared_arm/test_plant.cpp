@@ -55,6 +55,44 @@ TEST(GearedArm, UndampedArmKeepsItsEnergy) {
   EXPECT_NEAR(largest, 0, 2e-5);
 }
 
+/// A body that is put on while the arm falls: its energy is that of a point (by hand, two links of 0.3 m in a
+/// plane), and from then on that of all together stays.
+TEST(GearedArm, GoesOnWithAnotherMachineFromWhereItIs) {
+  const GearedArm first = free_arm();
+  GearedArm loaded = first;
+  const double mass = 0.8, from_elbow = 0.25;
+  arm::Body body;
+  body.mass = mass;
+  body.centre = {from_elbow, 0, 0};
+  body.inertia = 1e-12 * Eigen::Matrix3d::Identity();
+  loaded.rig.payloads.push_back({"forearm", 1, arm::parameters_of(body)});
+  ArmPlant plant(first);
+  plant.advance_to(0.4);
+  const double before = plant.energy();
+  plant.set_machine(loaded);
+  const double a = plant.observe(0).load_position, b = a + plant.observe(1).load_position;
+  const double da = plant.observe(0).load_velocity, db = da + plant.observe(1).load_velocity;
+  const double vx = -0.3 * std::sin(a) * da - from_elbow * std::sin(b) * db;
+  const double vz = 0.3 * std::cos(a) * da + from_elbow * std::cos(b) * db;
+  const double height = 0.3 * std::sin(a) + from_elbow * std::sin(b);
+  const double added = mass * (0.5 * (vx * vx + vz * vz) + 9.80665 * height);
+  EXPECT_GT(std::fabs(added), 0.1);
+  EXPECT_NEAR(plant.energy() - before, added, 1e-9 * std::fabs(added));  // rounding
+  const double then = plant.energy();
+  plant.advance_to(1.4);
+  EXPECT_NEAR(plant.energy(), then, 2e-5);  // as where nothing changes
+
+  GearedArm other = first;
+  other.joints[1].gear.reset();
+  EXPECT_THROW(plant.set_machine(other), InvalidParameter);
+  other = first;
+  other.joints[0].held = 0.0;
+  EXPECT_THROW(plant.set_machine(other), InvalidParameter);
+  other = first;
+  other.rig.joints[1].name = "wrist";
+  EXPECT_THROW(plant.set_machine(other), InvalidParameter);
+}
+
 /// Today's rig with the same numbers as the shoulder, with the elbow held and no gravity.
 TEST(GearedArm, OneGearWithTheRestHeldIsTheRigOfOneJoint) {
   GearedArm arm = two_links();

@@ -84,6 +84,22 @@ TEST_F(PlanMotion, TheSeedDecides) {
   EXPECT_NE(read("a.yaml"), read("c.yaml"));
 }
 
+TEST_F(PlanMotion, AUrdfIsPlannedAndGivesARigFile) {
+  const std::string line = "plan_motion link.urdf --acceleration 5 ";
+  const Outcome outcome = done(line + "--out of_urdf.yaml --write-rig rig.yaml");
+  expect_contains(outcome.out, "the rig file states neither its rotor nor its friction");
+  done("plan_motion rig.yaml --acceleration 5 --out of_rig.yaml");
+  const auto motion = [this](const std::string& name) {
+    const std::string text = read(name);
+    return text.substr(text.find("joints:"));
+  };
+  EXPECT_EQ(motion("of_urdf.yaml"), motion("of_rig.yaml"));
+  write("r.csv", "time,hinge/motor_torque,hinge/motor_position\n0,0,0\n");
+  refused("plan_motion link.urdf --out m.yaml", 65, "no limit of the acceleration");
+  refused("plan_motion hinge.yaml --out m.yaml --write-rig r.yaml", 64, "--write-rig");
+  refused("identify r.csv --rig link.urdf --out f.yaml --json f.json", 65, "is a URDF");
+}
+
 TEST_F(PlanMotion, WhatDoesNotServeIsRefused) {
   const std::string joint = package_file("config/two_inertia_servo.yaml");
   refused("plan_motion hinge.yaml", 64, "--out");

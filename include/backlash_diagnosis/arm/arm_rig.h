@@ -73,11 +73,20 @@ struct ArmRig {
   std::vector<std::string> joint_names() const;
 };
 
-/// Whether a rig file is that of an arm: it has `urdf`. Throws MissingInput, BadData.
+/// Whether a file is a URDF, as it begins like XML. Throws MissingInput.
+bool is_urdf(const std::string& path);
+
+/// What a URDF by itself says as a rig: all its joints that move, with drives whose values nobody knows (all
+/// 0) and torques at the joint as channel, the base level. Throws MissingInput, BadData.
+ArmRig arm_rig_of_urdf(const std::string& path);
+
+/// Whether a rig file is that of an arm: it has `urdf`. Throws MissingInput, BadData; for a URDF, too.
 bool is_arm_rig(const std::string& path);
 
 /// Throws MissingInput, BadData (file, line, key, value, limit).
 ArmRig load_arm_rig(const std::string& path);
+/// The same of a text. `source` names it in errors; a URDF without absolute path is looked for in `folder`.
+ArmRig arm_rig_from_text(const std::string& text, const std::string& source, const std::string& folder);
 
 /// The rig as a file that load_arm_rig() reads, with all its values; `comments` stand at the top, one per
 /// line.

@@ -63,6 +63,10 @@ std::string read_urdf(const std::string& path);
 Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints);
 Chain chain_of_urdf(const std::string& text, const std::string& name, const std::vector<std::string>& joints);
 
+/// All joints that are not fixed, from the root to the tip. Throws MissingInput; BadData where the file is no
+/// URDF, has no such joint, or where two of them begin at one link: that is no chain.
+std::vector<std::string> moving_joints(const std::string& urdf_path);
+
 /// What the limit element of a joint says; NaN where it does not: a revolute joint without lower < upper, a
 /// continuous one (which has no such limits), velocity or effort that are not > 0.
 struct JointLimits {

@@ -25,15 +25,16 @@ struct ChangeSize {
 };
 
 struct Change {
-  std::string effect;                        // id of an effect, name of a declared value, or "unknown"
-  std::string joint, link;                   // of an arm
-  double since = 0;                          // s, in the record's time
-  double since_from = 0, since_to = 0;       // s
-  std::optional<double> until;               // s; absent: to the end of the record
-  std::vector<ChangeSize> size;              // empty where unknown
-  std::vector<std::string> alike;            // other effects that explain the record as well
-  double gain = 0;                           // twice the log likelihood ratio
-  double error_before = 0, error_after = 0;  // N m, rms of the residual after the onset
+  std::string effect;                   // id of an effect, name of a declared value, or "unknown"
+  std::string joint, link;              // of an arm
+  double since = 0;                     // s, in the record's time
+  double since_from = 0, since_to = 0;  // s
+  std::optional<double> until;          // s; absent: to the end of the record
+  std::vector<ChangeSize> size;         // empty where unknown
+  std::vector<std::string> alike;       // other effects that explain the record as well
+  double gain = 0;                      // twice the log likelihood ratio
+  double error_before = 0,
+         error_after = 0;  // N m, rms of the residual after the onset; of the chain: all joints
 };
 
 /// A joint of an arm of which this record tells nothing.

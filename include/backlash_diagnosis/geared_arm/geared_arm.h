@@ -49,5 +49,7 @@ struct GearedArm {
 
 /// Throws MissingInput, BadData (file, line, key, value, limit), InvalidParameter.
 GearedArm load_geared_arm(const std::string& path);
+/// As arm::arm_rig_from_text().
+GearedArm geared_arm_from_text(const std::string& text, const std::string& source, const std::string& folder);
 
 }  // namespace backlash::geared_arm

@@ -28,6 +28,10 @@ class ArmPlant {
   double backlash(std::size_t joint) const;
   /// From now on. Throws InvalidParameter unless >= 0 and finite, and for a joint that has no gap.
   void set_backlash(std::size_t joint, double backlash);
+  /// Links, payloads, drives, gears and gravity of another file from now on, in the same motion: excitations,
+  /// sensors and what gravity compensation believes stay. Throws InvalidParameter where a joint has another
+  /// name, or a gear, a rotor or a hold that it did not have.
+  void set_machine(const GearedArm& arm);
   /// Motor torque [N m] from now on of a joint with `topic` excitation, false of all others. Gravity
   /// compensation, which is added, is renewed. Throws InvalidParameter unless finite.
   bool set_torque(std::size_t joint, double torque);
@@ -57,7 +61,7 @@ class ArmPlant {
   arm::Joints motor_positions() const;
 
   GearedArm arm_;
-  arm::Chain chain_;
+  arm::Chain chain_, believed_;  // believed_: by gravity compensation
   std::vector<Drive> drives_;
   Eigen::Index links_, angles_;
   arm::Joints rotors_, given_;  // of joints without gear; 0 where held, NaN elsewhere

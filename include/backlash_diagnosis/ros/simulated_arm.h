@@ -8,12 +8,14 @@
 
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
+#include <ros/service_server.h>
 
 #include <deque>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/SetRig.h"
 #include "backlash_diagnosis/geared_arm/simulation.h"
 #include "backlash_diagnosis/ros/joint_controls.h"
 #include "backlash_diagnosis/ros/joint_state.h"
@@ -24,8 +26,9 @@ namespace backlash::ros_bridge {
 
 class SimulatedArm : public SimulatedMachine {
  public:
-  /// Topic rig_description is relative to `handle`, what JointControls has below the name of each joint. Sets
-  /// the parameter robot_description where it is wanted and there is none yet.
+  /// Topic rig_description is relative to `handle`, what JointControls has below the name of each joint,
+  /// service set_rig to `private_handle`. Sets the parameter robot_description where it is wanted and there
+  /// is none yet.
   SimulatedArm(const ArmSettings& settings, const ros::NodeHandle& handle,
                const ros::NodeHandle& private_handle);
   SimulatedArm(const SimulatedArm&) = delete;  // callbacks refer to this object
@@ -40,12 +43,14 @@ class SimulatedArm : public SimulatedMachine {
 
  private:
   JointAccess access(std::size_t joint);
+  bool set_rig(backlash_diagnosis::SetRig::Request& request, backlash_diagnosis::SetRig::Response& response);
 
-  std::string title_;
+  std::string title_, folder_;  // folder_: of the rig file, where the URDF of another is looked for
   std::vector<JointNames> names_;
   geared_arm::ArmSimulation simulation_;
   std::deque<JointControls> controls_;  // cannot be moved
   ros::Publisher rig_description_;
+  ros::ServiceServer set_rig_;
 };
 
 }  // namespace backlash::ros_bridge
