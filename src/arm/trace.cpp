@@ -241,7 +241,8 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   }
   tell_friction(taken, judged);
   for (std::size_t i = 0; best < all.size() && i < all.size(); ++i)
-    if (i != best && all[i].reason.empty() && taken.freedom.payload && all[i].freedom.payload &&
+    if (all[i].reason.empty() && taken.freedom.payload && all[i].freedom.payload &&
+        *all[i].freedom.payload != *taken.freedom.payload &&
         taken.all - all[i].all < -std::log(1 - settings_.same_link))
       trace_.notes.push_back("a payload at " + rig_.chain.joints[*all[i].freedom.payload].link +
                              " does nearly as well");

@@ -69,6 +69,34 @@ TEST(TracedArm, ABodyWhoseMassIsHardlyToldIsToldAsThat) {
   EXPECT_GT(trace.steps[0].parameters[2].measured.standard_error, 0.02);  // y: the axis of both joints
 }
 
+/// Of one link that turns slowly gravity tells a moment: a body that is gone on the other side does what one
+/// on this side does. Both are said, and the values hold the truth of either.
+TEST(TracedArm, WhatHasComeOrIsGoneIsSaidWhereBothExplainIt) {
+  GearedArm declared = planar_arm();
+  declared.joints.resize(1);
+  declared.rig.joints.resize(1);
+  declared.rig.chain.joints.resize(1);
+  declared.rig.chain.links.resize(1);
+  declared.joints[0].excitation.moves.speed = 0.4;
+  declared.joints[0].excitation.moves.acceleration = 0.5;
+  for (const int sign : {1, -1}) {
+    arm::Body body;
+    body.mass = 2;
+    body.centre = {0.03, 0, 0};
+    body.inertia = 1e-4 * Eigen::Matrix3d::Identity();
+    GearedArm other = declared;
+    other.rig.chain.links[0] += sign * arm::parameters_of(body);
+    const arm::ArmTrace trace = arm::trace_arm(declared.rig, {recorded(declared, 0), recorded(declared, 0.2)},
+                                               recorded(other, -0.2), false);
+    ASSERT_EQ(trace.steps.size(), 1u) << sign;
+    const arm::ArmStep& step = trace.steps[0];
+    EXPECT_EQ(step.effect, "payload");
+    EXPECT_EQ(step.equivalent_to, std::vector<std::string>{"payload (taken away)"}) << sign;
+    const signal::Measured mass = step.parameters[0].measured;
+    EXPECT_NEAR(mass.value, sign * 2, 3 * mass.standard_error) << sign;
+  }
+}
+
 /// Gears that sag by 20 mrad under the links: with an encoder behind them the links are where that says.
 TEST(TracedArm, LinksMoveAsTheirOwnEncodersSay) {
   GearedArm soft = planar_arm();
