@@ -15,6 +15,7 @@ PAIRS = [  # figure, peer, which result, larger is better
     ("curve/build_curve", "curve/boost_dopri5", "real_time", False),
     ("bags/read", "bags/bare_view", "messages_per_s", True),
     ("bags/read_and_diagnose", "bags/bare_view", "messages_per_s", True),
+    ("bags/read_and_diagnose_waveform", "bags/bare_view", "messages_per_s", True),
     ("nodes/diagnoser/flood", "nodes/bare/flood", "messages_per_s", True),
     ("nodes/diagnoser/1000_Hz", "nodes/bare/1000_Hz", "us_per_message", False),
     ("nodes/diagnoser/20000_Hz", "nodes/bare/20000_Hz", "us_per_message", False),

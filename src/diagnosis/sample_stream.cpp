@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 
@@ -223,13 +224,26 @@ std::vector<PeriodResult> SampleStream::results(const Windows& cut) const {
   return chosen;
 }
 
-PeriodWindow SampleStream::latest(long count) const {
-  if (!settings_.apd && (count == 0 || !grid_)) return {record_, period_, periods(), {}};
-  if (!grid_) return searched_now(count);
+SampleStream::Windows SampleStream::latest_windows(long count) const {
   Windows cut = windows();
   if (count > 0) cut.begin = std::max(cut.begin, cut.end - count);
+  return cut;
+}
+
+PeriodWindow SampleStream::latest(long count) const& {
+  if (!settings_.apd && (count == 0 || !grid_)) return {record_, period_, periods(), {}};
+  if (!grid_) return searched_now(count);
+  const Windows cut = latest_windows(count);
   return {record_.slice(grid_->start(cut.begin), grid_->start(cut.end)), period_, cut.end - cut.begin,
           results(cut)};
+}
+
+PeriodWindow SampleStream::latest(long count) && {
+  if (!settings_.apd || !grid_) return latest(count);
+  const Windows cut = latest_windows(count);
+  std::vector<PeriodResult> whole = results(cut);
+  return {std::move(record_).slice(grid_->start(cut.begin), grid_->start(cut.end)), period_,
+          cut.end - cut.begin, std::move(whole)};
 }
 
 /// A period may show before the next search is due.
@@ -241,14 +255,24 @@ PeriodWindow SampleStream::searched_now(long count) const {
   if (!(settings.apd->period > 0)) return {record_, 0, 0, {}};
   SampleStream again(settings);
   again.add(record_);
-  return again.grid_ ? again.latest(count) : PeriodWindow{record::Record(), settings.apd->period, 0, {}};
+  return again.grid_ ? std::move(again).latest(count)
+                     : PeriodWindow{record::Record(), settings.apd->period, 0, {}};
 }
 
 void SampleStream::add(const record::Record& record) {
   record::ChannelValues values;
+  values.fill(kNaN);
+  std::vector<record::Channel> there;
+  const bool all_stay = settings_.keep == kForever;
+  if (all_stay) record_.time.reserve(record.size());
+  for (const record::Channel channel : record::kChannels) {
+    if (!record.has(channel)) continue;
+    there.push_back(channel);
+    if (all_stay) record_.column(channel).reserve(record.size());
+  }
   for (std::size_t i = 0; i < record.size(); ++i) {
-    for (const record::Channel channel : record::kChannels)
-      values[static_cast<std::size_t>(channel)] = record.has(channel) ? record.column(channel)[i] : kNaN;
+    for (const record::Channel channel : there)
+      values[static_cast<std::size_t>(channel)] = record.column(channel)[i];
     add(record.time[i], values);
   }
 }
@@ -260,7 +284,7 @@ PeriodWindow cut_periods(const record::Record& record, const std::optional<ApdSe
   settings.of_record = true;
   SampleStream stream(settings);
   stream.add(record);
-  PeriodWindow window = stream.latest(last);
+  PeriodWindow window = std::move(stream).latest(last);
   window.record.name = record.name;
   window.record.warnings = record.warnings;
   return window;

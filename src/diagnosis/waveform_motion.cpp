@@ -5,9 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <utility>
-#if defined(__SSE2__)
-#include <emmintrin.h>
-#endif
 
 #include "waveform_lanes.h"
 
@@ -23,15 +20,11 @@ WAVEFORM_INLINE Lanes magnitude(const Lanes& a) {
   return a < 0 ? -a : a;
 }
 WAVEFORM_INLINE Lanes root(const Lanes& a) {
-  Lanes r = a;
-#if defined(__SSE2__)  // in a loop compilers make a call of sqrt()
-  for (int i = 0; i < kWaveformSets; i += 2) {
-    const __m128d pair = _mm_sqrt_pd(__m128d{a[i], a[i + 1]});
-    r[i] = pair[0], r[i + 1] = pair[1];
-  }
-#else
-  for (int i = 0; i < kWaveformSets; ++i) r[i] = std::sqrt(r[i]);
-#endif
+  double each[kWaveformSets];  // a loop over these becomes one instruction for all of them
+  std::memcpy(each, &a, sizeof each);
+  for (double& value : each) value = std::sqrt(value);
+  Lanes r;
+  std::memcpy(&r, each, sizeof r);
   return r;
 }
 
@@ -279,6 +272,14 @@ WAVEFORM_INLINE void move_any(const WaveformWindow& window, const WaveformGrid& 
 }
 
 #if defined(__x86_64__)
+__attribute__((target("avx512f,prefer-vector-width=512"))) void move_avx512(const WaveformWindow& window,
+                                                                            const WaveformGrid& grid,
+                                                                            int samples,
+                                                                            const WaveformSets& sets,
+                                                                            WaveformMotion& motion) {
+  move_any(window, grid, samples, sets, motion);
+}
+
 __attribute__((target("avx2"))) void move_avx2(const WaveformWindow& window, const WaveformGrid& grid,
                                                int samples, const WaveformSets& sets,
                                                WaveformMotion& motion) {
@@ -291,7 +292,9 @@ __attribute__((target("avx2"))) void move_avx2(const WaveformWindow& window, con
 void move_waveform(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                    const WaveformSets& sets, WaveformMotion& motion) {
 #if defined(__x86_64__)
+  static const bool has_avx512 = __builtin_cpu_supports("avx512f");
   static const bool has_avx2 = __builtin_cpu_supports("avx2");
+  if (has_avx512) return move_avx512(window, grid, samples, sets, motion);
   if (has_avx2) return move_avx2(window, grid, samples, sets, motion);
 #endif
   move_any(window, grid, samples, sets, motion);

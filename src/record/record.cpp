@@ -79,9 +79,18 @@ void Record::forget(std::size_t count) {
   for (std::vector<double>& values : columns_) drop(values);
 }
 
-Record Record::slice(double from, double to) const {
+std::pair<std::ptrdiff_t, std::ptrdiff_t> Record::places(double from, double to) const {
   const auto first = std::lower_bound(time.begin(), time.end(), from) - time.begin();
   const auto last = std::max(first, std::lower_bound(time.begin(), time.end(), to) - time.begin());
+  for (const Channel channel : kChannels)
+    if (has(channel) && column(channel).size() != time.size())
+      throw BadData(name, channel_name(channel) + " has " + std::to_string(column(channel).size()) +
+                              " values, time has " + std::to_string(time.size()));
+  return {first, last};
+}
+
+Record Record::slice(double from, double to) const& {
+  const auto [first, last] = places(from, to);
   Record part;
   part.name = name;
   part.warnings = warnings;
@@ -89,14 +98,18 @@ Record Record::slice(double from, double to) const {
   part.time.assign(time.begin() + first, time.begin() + last);
   for (const Channel channel : kChannels) {
     const std::vector<double>& all = column(channel);
-    if (all.empty()) continue;
-    if (all.size() != time.size()) {
-      throw BadData(name, channel_name(channel) + " has " + std::to_string(all.size()) +
-                              " values, time has " + std::to_string(time.size()));
-    }
-    part.column(channel).assign(all.begin() + first, all.begin() + last);
+    if (!all.empty()) part.column(channel).assign(all.begin() + first, all.begin() + last);
   }
   return part;
+}
+
+Record Record::slice(double from, double to) && {
+  const auto [first, last] = places(from, to);
+  for (const Channel channel : kChannels)
+    if (has(channel)) column(channel).resize(static_cast<std::size_t>(last));
+  time.resize(static_cast<std::size_t>(last));
+  forget(static_cast<std::size_t>(first));
+  return std::move(*this);
 }
 
 Record samples_at(const Record& record, const std::vector<double>& times) {

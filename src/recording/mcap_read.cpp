@@ -215,8 +215,9 @@ class Pass {
     const std::uint8_t* data = fields.bytes(packed);
     if (size > kMostBytes)
       fields.fail(fmt::format("a chunk of {} bytes; at most {} can be read", size, kMostBytes));
-    const Bytes records = unpacked(compression, data, static_cast<std::size_t>(packed),
-                                   static_cast<std::size_t>(size), fields.where());
+    Bytes records;
+    unpack(compression, data, static_cast<std::size_t>(packed), static_cast<std::size_t>(size),
+           fields.where(), records);
     if (crc != 0 && crc != crc_of(records.data(), records.size()))
       fields.fail("the chunk does not have its check sum");
     Fields inside(records.data(), records.size(), fields.where() + " (chunk)");

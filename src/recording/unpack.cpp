@@ -17,8 +17,9 @@ namespace {
   throw BadData(where, "damaged: the chunk does not unpack (" + how + ") to the size that it states");
 }
 
-Bytes of_lz4(const std::uint8_t* data, std::size_t bytes, std::size_t size, const std::string& where) {
-  Bytes out(size + 1);  // one more than wanted, to see a frame that holds too much
+void unpack_lz4(const std::uint8_t* data, std::size_t bytes, std::size_t size, const std::string& where,
+                Bytes& out) {
+  out.resize(size + 1);  // one more than wanted, to see a frame that holds too much
   LZ4F_dctx* raw = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION))) throw std::bad_alloc();
   const std::unique_ptr<LZ4F_dctx, LZ4F_errorCode_t (*)(LZ4F_dctx*)> context(raw,
@@ -34,31 +35,30 @@ Bytes of_lz4(const std::uint8_t* data, std::size_t bytes, std::size_t size, cons
   }
   if (expected != 0 || read != bytes || written != size) damaged(where, "lz4");
   out.resize(size);
-  return out;
 }
 
-Bytes of_zstd(const std::uint8_t* data, std::size_t bytes, std::size_t size, const std::string& where) {
+void unpack_zstd(const std::uint8_t* data, std::size_t bytes, std::size_t size, const std::string& where,
+                 Bytes& out) {
   const auto stated = ZSTD_getFrameContentSize(data, bytes);
   if (stated == ZSTD_CONTENTSIZE_ERROR) damaged(where, "zstd");
   if (stated != ZSTD_CONTENTSIZE_UNKNOWN && stated > size) damaged(where, "zstd");
-  Bytes out(size);
+  out.resize(size);
   const std::size_t written = ZSTD_decompress(out.data(), size, data, bytes);
   if (ZSTD_isError(written)) damaged(where, ZSTD_getErrorName(written));
   if (written != size) damaged(where, "zstd");
-  return out;
 }
 
 }  // namespace
 
-Bytes unpacked(const std::string& compression, const std::uint8_t* data, std::size_t bytes, std::size_t size,
-               const std::string& where) {
-  if (compression == "lz4") return of_lz4(data, bytes, size, where);
-  if (compression == "zstd") return of_zstd(data, bytes, size, where);
+void unpack(const std::string& compression, const std::uint8_t* data, std::size_t bytes, std::size_t size,
+            const std::string& where, Bytes& to) {
+  if (compression == "lz4") return unpack_lz4(data, bytes, size, where, to);
+  if (compression == "zstd") return unpack_zstd(data, bytes, size, where, to);
   if (!compression.empty())
     throw BadData(where,
                   "compression '" + printable(compression) + "' cannot be read; lz4, zstd or none can");
   if (bytes != size) damaged(where, "none");
-  return Bytes(data, data + bytes);
+  to.assign(data, data + bytes);
 }
 
 }  // namespace backlash::recording

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The compressions of MCAP chunks.
+// The compressions of the chunks of recordings.
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@
 
 namespace backlash::recording {
 
-/// `compression`: "", "lz4" (frames) or "zstd". Throws BadData with `where` for any other, and where the
-/// result is not of `size` bytes.
-Bytes unpacked(const std::string& compression, const std::uint8_t* data, std::size_t bytes, std::size_t size,
-               const std::string& where);
+/// Unpacks into `to`, whose room is used again, what is `size` bytes then. `compression`: "", "lz4" (frames)
+/// or "zstd". Throws BadData with `where` for any other, and where the result is not of that size.
+void unpack(const std::string& compression, const std::uint8_t* data, std::size_t bytes, std::size_t size,
+            const std::string& where, Bytes& to);
 
 }  // namespace backlash::recording

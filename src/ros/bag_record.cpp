@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -50,8 +51,14 @@ std::optional<std::string> joint_of(const std::string& name) {
 /// A joint of a topic, message by message.
 class JointRun {
  public:
-  JointRun(std::string path, std::string topic, std::string joint, std::optional<ros::Time> origin)
-      : path_(std::move(path)), topic_(std::move(topic)), joint_(std::move(joint)), origin_(origin) {
+  /// `expected`: messages, about.
+  JointRun(std::string path, std::string topic, std::string joint, std::optional<ros::Time> origin,
+           std::size_t expected)
+      : path_(std::move(path)),
+        topic_(std::move(topic)),
+        joint_(std::move(joint)),
+        origin_(origin),
+        expected_(expected) {
     record_.name = path_;
   }
 
@@ -61,14 +68,18 @@ class JointRun {
   void take(const JointStateReader& reader, std::size_t place, const ros::Time& stamp, std::size_t index) {
     if (!reader.problem(place).empty()) fail_at(index, reader.problem(place));
     if (!accept_stamp(stamp, index)) return;
-    for (const record::Channel channel : record::kChannels)
-      add(channel, reader.values(place)[static_cast<std::size_t>(channel)], stamp, index);
+    if (record_.time.size() == 1) start(reader.values(place));
+    for (std::size_t i = 0; i < record::kChannelCount; ++i) {
+      const double value = reader.values(place)[i];
+      if (std::isnan(value) == present_[i]) fail_as_unlike_before(record::kChannels[i], value, stamp, index);
+      if (present_[i]) record_.column(record::kChannels[i]).push_back(value);
+    }
   }
 
   record::Record finished() {
     if (record_.time.empty())
       throw BadData(path_, "no message of joint '" + printable(joint_) + "' on " + printable(topic_));
-    drop_absent_channels();
+    require_a_channel();
     return with_warnings();
   }
 
@@ -76,14 +87,11 @@ class JointRun {
   record::Record finished(const record::ChannelMap& sources) {
     for (const record::ChannelSource& source : sources.sources) {
       std::vector<double>& column = record_.column(source.channel);
-      if (column.empty() || std::isnan(column.front()))
+      if (column.empty())
         throw BadData(path_, fmt::format("channels.{}: no message on {} has the {} of '{}'",
                                          record::channel_name(source.channel), printable(topic_),
                                          record::field_name(source.field), printable(source.name)));
     }
-    for (const record::Channel channel : record::kChannels)
-      if (!record_.column(channel).empty() && std::isnan(record_.column(channel).front()))
-        record_.column(channel).clear();
     return with_warnings();
   }
 
@@ -124,22 +132,25 @@ class JointRun {
   }
 
   /// A channel is there in all messages or in none.
-  void add(record::Channel channel, double value, const ros::Time& stamp, std::size_t index) {
-    std::vector<double>& column = record_.column(channel);
-    if (!column.empty() && std::isnan(column.front()) != std::isnan(value))
-      fail_at(index, record::channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
-                         stamp_text(stamp) + " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
-                         ", unlike in the messages before");
-    column.push_back(value);
+  void start(const record::ChannelValues& first) {
+    record_.time.reserve(expected_);
+    for (std::size_t i = 0; i < record::kChannelCount; ++i) {
+      present_[i] = !std::isnan(first[i]);
+      if (present_[i]) record_.column(record::kChannels[i]).reserve(expected_);
+    }
   }
 
-  void drop_absent_channels() {
+  [[noreturn]] void fail_as_unlike_before(record::Channel channel, double value, const ros::Time& stamp,
+                                          std::size_t index) const {
+    fail_at(index, record::channel_name(channel) + " of joint '" + printable(joint_) + "' at stamp " +
+                       stamp_text(stamp) + " s is " + (std::isnan(value) ? "missing or NaN" : "there") +
+                       ", unlike in the messages before");
+  }
+
+  void require_a_channel() const {
     std::vector<std::string> present;
-    for (const record::Channel channel : record::kChannels) {
-      std::vector<double>& column = record_.column(channel);
-      if (!column.empty() && std::isnan(column.front())) column.clear();
-      if (!column.empty()) present.push_back(record::channel_name(channel));
-    }
+    for (const record::Channel channel : record::kChannels)
+      if (record_.has(channel)) present.push_back(record::channel_name(channel));
     if (!record_.can_show_backlash())
       throw BadData(path_,
                     "joint '" + printable(joint_) + "' on " + printable(topic_) +
@@ -149,15 +160,18 @@ class JointRun {
 
   std::string path_, topic_, joint_;
   std::optional<ros::Time> origin_;
+  std::size_t expected_;
   ros::Time last_stamp_;
   StampClock clock_, since_first_;
   record::StampChecker stamps_;
+  std::array<bool, record::kChannelCount> present_{};
   record::Record record_;
 };
 
 /// All joints of a topic, as their names turn up.
 struct TopicRuns {
   std::set<std::string> names;
+  std::vector<std::string> last_names;  // of the message before
   std::vector<std::string> joints;
   std::vector<JointRun> runs;
   JointStateReader reader{std::vector<record::ChannelMap>()};
@@ -174,26 +188,37 @@ class Reader {
         source_(recording::is_recording(path) ? open_ros2_recording(path) : open_bag(path)) {}
 
   record::Record read() {
-    read_origin();
-    return with_own_names(joint_);
+    return of_sound_file([this] { return with_own_names(joint_); });
   }
 
   record::Record read(const record::ChannelMap& map) {
-    read_origin();
-    return origin_ ? with_own_names(map.joint) : with_map(map);
+    return of_sound_file([&] { return origin_ ? with_own_names(map.joint) : with_map(map); });
   }
 
   record::Record read_of_robot(const record::ChannelMap& stock) {
-    read_origin();
-    joint_ = stock.joint;
-    const std::vector<std::string> topics = candidate_topics(wanted_topic_);
-    read_messages(topics);
-    if (origin_ || any_has(JointNames(joint_).motor)) return finished(topics);
-    topics_.clear();
-    return with_map(stock);
+    return of_sound_file([&] {
+      joint_ = stock.joint;
+      const std::vector<std::string> topics = candidate_topics(wanted_topic_);
+      read_messages(topics);
+      if (origin_ || any_has(JointNames(joint_).motor)) return finished(topics);
+      topics_.clear();
+      return with_map(stock);
+    });
   }
 
  private:
+  /// What is damaged is told before what is missing, which may be missing for that.
+  template <typename Read>
+  record::Record of_sound_file(const Read& read) {
+    try {
+      read_origin();
+      return read();
+    } catch (const Error&) {
+      source_->check();
+      throw;
+    }
+  }
+
   [[noreturn]] void fail(const std::string& reason) const { throw BadData(path_, reason); }
 
   record::Record with_map(const record::ChannelMap& map) {
@@ -270,8 +295,11 @@ class Reader {
 
   void take(const sensor_msgs::JointState& message, const std::string& topic) {
     TopicRuns& on = topics_[topic];
-    for (const std::string& name : message.name)
-      if (on.names.insert(name).second && !mapped_) meet(name, topic, on);
+    if (message.name != on.last_names) {
+      on.last_names = message.name;
+      for (const std::string& name : message.name)
+        if (on.names.insert(name).second && !mapped_) meet(name, topic, on);
+    }
     const std::size_t index = on.messages++;
     for (const std::size_t place : on.reader.read(message)) {
       JointRun& run = on.runs[place];
@@ -291,7 +319,7 @@ class Reader {
     if (!joint || std::find(on.joints.begin(), on.joints.end(), *joint) != on.joints.end()) return;
     joints_.insert(*joint);
     on.joints.push_back(*joint);
-    on.runs.emplace_back(path_, topic, *joint, origin_);
+    on.runs.emplace_back(path_, topic, *joint, origin_, source_->expected(topic));
     std::vector<record::ChannelMap> maps;
     for (const std::string& each : on.joints) maps.push_back(record::usual_channels(each));
     on.reader = JointStateReader(maps);
@@ -300,7 +328,7 @@ class Reader {
   void meet(const record::ChannelMap& sources, const std::string& topic) {
     TopicRuns& on = topics_[topic];
     on.joints = {sources.joint};
-    on.runs.emplace_back(path_, topic, sources.joint, origin_);
+    on.runs.emplace_back(path_, topic, sources.joint, origin_, source_->expected(topic));
     on.reader = JointStateReader({sources});
   }
 

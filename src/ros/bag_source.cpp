@@ -1,127 +1,114 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// Bags are read once, chunk by chunk, each checked before its messages are taken: the bag library would check
+// nothing, and its views make an object for every message.
 #include <fmt/format.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <std_msgs/String.h>
 
-#include <cstring>
-#include <exception>
+#include <algorithm>
+#include <map>
+#include <set>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
+#include "bag_delivery.h"
+#include "bag_format.h"
+#include "bag_index.h"
 #include "bag_structure.h"
 #include "message_source.h"
+#include "serialised_joint_state.h"
 
 namespace backlash::ros_bridge {
 namespace {
 
 template <typename Message>
-bool is_type(const rosbag::ConnectionInfo& c) {
-  return c.datatype == ros::message_traits::DataType<Message>::value() &&
+bool is_type(const BagIndex::Connection& c) {
+  return c.type == ros::message_traits::DataType<Message>::value() &&
          c.md5sum == ros::message_traits::MD5Sum<Message>::value();
 }
 
-/// Lengths of a serialised JointState: a damaged one would make the deserialiser reserve what it asks for.
-bool lengths_fit(const std::vector<std::uint8_t>& bytes) {
-  std::size_t place = 12;  // sequence number, stamp
-  const auto array = [&](std::size_t item, std::uint32_t& count) {
-    if (place + 4 > bytes.size()) return false;
-    std::memcpy(&count, bytes.data() + place, 4);
-    place += 4;
-    if (std::uint64_t{count} * item > bytes.size() - place) return false;
-    place += count * item;
-    return true;
-  };
-  std::uint32_t count = 0, names = 0, ignored = 0;
-  if (!array(1, count)) return false;  // frame_id
-  if (place + 4 > bytes.size()) return false;
-  std::memcpy(&names, bytes.data() + place, 4);
-  place += 4;
-  if (names > (bytes.size() - place) / 4) return false;
-  for (std::uint32_t i = 0; i < names; ++i)
-    if (!array(1, ignored)) return false;
-  for (int i = 0; i < 3; ++i)
-    if (!array(sizeof(double), ignored)) return false;
-  return place == bytes.size();
-}
-
-/// Takes a message's bytes as they lie in the bag. MessageInstance::write asks a stream for no more than
-/// this; to ask the instance for its size before would read its header twice.
-struct RawMessage {
-  std::vector<std::uint8_t> bytes;
-  std::uint8_t* advance(std::uint32_t size) {
-    bytes.resize(size);
-    return bytes.data();
+/// What is wrong with the file as a whole is told before what is wrong with its index.
+BagIndex index_of(const std::string& path) {
+  try {
+    return read_bag_index(path);
+  } catch (const BadData&) {
+    check_bag_structure(path);
+    throw;
   }
-};
+}
 
 class BagSource : public MessageSource {
  public:
-  explicit BagSource(const std::string& path) : path_(path) {
-    check_bag_structure(path_);
-    guarded([this] { bag_.open(path_, rosbag::bagmode::Read); });
-  }
+  explicit BagSource(const std::string& path) : path_(path), index_(index_of(path)) {}
+
+  void check() override { check_bag_structure(path_); }
 
   std::vector<Topic> topics() override {
     std::vector<Topic> all;
-    guarded([&] {
-      rosbag::View view(bag_);
-      for (const rosbag::ConnectionInfo* c : view.getConnections())
-        all.push_back({c->topic, printable(c->datatype), is_type<sensor_msgs::JointState>(*c)});
-    });
+    for (const BagIndex::Connection& c : index_.connections)
+      all.push_back({c.topic, printable(c.type), is_type<sensor_msgs::JointState>(c)});
     return all;
   }
 
   std::string expected_type() const override { return "sensor_msgs/JointState"; }
 
+  std::size_t expected(const std::string& topic) const override {
+    std::set<std::uint32_t> ids;
+    for (const BagIndex::Connection& c : index_.connections)
+      if (c.topic == topic) ids.insert(c.id);
+    std::size_t count = 0;
+    for (const BagIndex::Chunk& chunk : index_.chunks)
+      for (const BagIndex::Entry& entry : chunk.entries) count += ids.count(entry.connection);
+    return count;
+  }
+
   std::optional<std::string> info() override {
-    std::optional<std::string> text;
-    guarded([&] {
-      rosbag::View all(bag_);
-      for (const rosbag::ConnectionInfo* c : all.getConnections())
-        if (c->topic == kInfoTopic && !is_type<std_msgs::String>(*c)) return;  // somebody else's topic
-      rosbag::View view(bag_, rosbag::TopicQuery(kInfoTopic));
-      if (view.begin() == view.end()) return;
-      if (const auto message = view.begin()->instantiate<std_msgs::String>()) text = message->data;
-    });
-    return text;
+    std::set<std::uint32_t> ids;
+    for (const BagIndex::Connection& c : index_.connections) {
+      if (c.topic != kInfoTopic) continue;
+      if (!is_type<std_msgs::String>(c)) return std::nullopt;  // somebody else's topic
+      ids.insert(c.id);
+    }
+    const BagIndex::Chunk* chunk = nullptr;
+    const BagIndex::Entry* first = nullptr;
+    for (const BagIndex::Chunk& each : index_.chunks)
+      for (const BagIndex::Entry& entry : each.entries)
+        if (ids.count(entry.connection) > 0 && (first == nullptr || entry.received < first->received))
+          chunk = &each, first = &entry;
+    if (first == nullptr) return std::nullopt;
+    const std::string records = records_of_bag_chunk(path_, chunk->place);
+    std::string_view message, text;
+    if (!find_message(records, first->offset, message) || !bag_format::take_part(message, text))
+      throw BadData(path_, "damaged bag: the message on " + kInfoTopic + " is not where the index says");
+    return std::string(text);
   }
 
   void read(const std::vector<std::string>& topics, const Take& take) override {
-    guarded([&] {
-      rosbag::View view(bag_, rosbag::TopicQuery(topics));
-      std::size_t index = 0;
-      RawMessage raw;
-      sensor_msgs::JointState message;  // one for all: its arrays keep their room
-      for (const rosbag::MessageInstance& instance : view) {
-        raw.bytes.clear();  // an empty message asks for nothing
-        instance.write(raw);
-        if (!lengths_fit(raw.bytes))
-          throw BadData(fmt::format("{}: {} message {}", path_, printable(instance.getTopic()), index),
-                        "damaged: its arrays do not fit into it");
-        ros::serialization::IStream in(raw.bytes.data(), static_cast<std::uint32_t>(raw.bytes.size()));
-        ros::serialization::deserialize(in, message);
-        ++index;
-        take(message, instance.getTopic());
-      }
+    struct Wanted {
+      const std::string* topic;
+      JointStateDecoder decoder;
+    };
+    std::map<std::uint32_t, Wanted> wanted;
+    std::set<std::uint32_t> ids;
+    for (const BagIndex::Connection& c : index_.connections)
+      if (std::find(topics.begin(), topics.end(), c.topic) != topics.end() && ids.insert(c.id).second)
+        wanted[c.id].topic = &c.topic;
+    std::size_t count = 0;
+    BagDelivery delivery(index_, ids, [&](std::uint32_t connection, std::string_view message) {
+      Wanted& from = wanted.at(connection);
+      if (!from.decoder.decode(message))
+        throw BadData(fmt::format("{}: {} message {}", path_, printable(*from.topic), count),
+                      "damaged: its arrays do not fit into it");
+      ++count;
+      take(from.decoder.message(), *from.topic);
+    });
+    check_bag_structure(path_, [&delivery](std::uint64_t place, std::string_view records) {
+      return delivery.add(place, records);
     });
   }
 
  private:
-  template <typename Action>
-  void guarded(const Action& action) {
-    try {
-      action();
-    } catch (const Error&) {
-      throw;
-    } catch (const std::exception& e) {
-      throw BadData(path_,
-                    std::string("damaged bag: ") + e.what() + "; 'rosbag reindex' may save a part of it");
-    }
-  }
-
   const std::string path_;
-  rosbag::Bag bag_;
+  const BagIndex index_;
 };
 
 }  // namespace

@@ -21,9 +21,13 @@ class MessageSource {
   using Take = std::function<void(const sensor_msgs::JointState& message, const std::string& topic)>;
 
   virtual ~MessageSource() = default;
+  /// Throws BadData where the file is damaged, wherever that is; read() finds it as well.
+  virtual void check() {}
   virtual std::vector<Topic> topics() = 0;
   /// "sensor_msgs/JointState", as this kind of file names it.
   virtual std::string expected_type() const = 0;
+  /// How many messages a topic has, where that is known beforehand; else 0.
+  virtual std::size_t expected(const std::string&) const { return 0; }
   /// Text of the first message on /record_info; none where the file has none.
   virtual std::optional<std::string> info() = 0;
   /// Messages on these topics, which all carry joint states, as they were received. Throws BadData.

@@ -48,9 +48,10 @@ class SampleStream {
   long periods() const;
 
   /// The last `count` whole settled periods (0: all that are kept); empty where there are none yet. All
-  /// samples where the excitation has no period, and for count 0 without APD. A copy: its cost grows with
-  /// the samples asked for.
-  PeriodWindow latest(long count) const;
+  /// samples where the excitation has no period, and for count 0 without APD. A copy, whose cost grows with
+  /// the samples asked for, but of a stream that ends with this.
+  PeriodWindow latest(long count) const&;
+  PeriodWindow latest(long count) &&;
 
   double period() const { return period_; }  ///< s; 0 until known
   double jump_limit() const;                 ///< s; infinite for a record
@@ -75,6 +76,7 @@ class SampleStream {
   void trim();
   void forget_results();
   Windows windows() const;
+  Windows latest_windows(long count) const;
   std::vector<PeriodResult> results(const Windows& cut) const;
   PeriodWindow searched_now(long count) const;
 

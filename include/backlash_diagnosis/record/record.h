@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace backlash::record {
@@ -70,9 +71,13 @@ class Record {
   void forget(std::size_t count);
 
   /// Samples with from <= time < to.
-  Record slice(double from, double to) const;
+  Record slice(double from, double to) const&;
+  Record slice(double from, double to) &&;  ///< the same without a copy
 
  private:
+  std::pair<std::ptrdiff_t, std::ptrdiff_t> places(double from,
+                                                   double to) const;  // first, one after the last
+
   std::array<std::vector<double>, kChannelCount> columns_;
 };
 

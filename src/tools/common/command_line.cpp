@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/memory.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
 #include "tools/common/exit_codes.h"
@@ -214,6 +215,7 @@ std::string help_text(const Command& command) {
 }
 
 int run_command(const Command& command, int argc, char** argv, int (*body)(const Arguments&)) {
+  keep_freed_memory();
   const auto fail = [&command](const std::string& message, ExitCode code) {
     std::cerr << command.name << ": " << message << std::endl;
     return static_cast<int>(code);
