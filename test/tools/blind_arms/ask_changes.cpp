@@ -95,7 +95,7 @@ void add(Count& c, const ArmTrace& trace, const std::string& kind, const Arm& ar
 }
 
 ArmTrace traced(const Options& options, const Arm& before, const Arm& after, const std::string& kind) {
-  const std::string trained = files_of(options, before, before, "trained"),
+  const std::string trained = files_of(options, before, before, kind == "bend" ? "bent" : "trained"),
                     folder = files_of(options, after, before, kind);
   const backlash::arm::ArmRig rig = backlash::arm::load_arm_rig(folder + "/rig.yaml");
   std::vector<backlash::arm::ArmRecord> train;
@@ -114,7 +114,8 @@ int ask_changes(const Options& options) {
     for (const Kind& kind : changes()) {
       if (options.kind != "all" && options.kind != kind.name) continue;
       const std::uint64_t seed = options.seed + std::uint64_t(i);
-      const Arm before = drawn_arm(seed, "unchanged"), after = drawn_arm(seed, kind.name);
+      const Arm before = drawn_arm(seed, kind.name == "bend" ? "bend" : "unchanged"),
+                after = drawn_arm(seed, kind.name);
       try {
         add(counts[kind.name], traced(options, before, after, kind.name), kind.name, after, file);
       } catch (const backlash::CannotIdentify& e) {

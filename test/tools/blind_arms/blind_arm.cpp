@@ -101,6 +101,25 @@ void declare(Arm& arm, const std::string& kind, Random& random) {
   }
 }
 
+void make_wavy(Arm& arm, Random& random) {
+  for (Joint& j : arm.joints)
+    for (std::size_t k = 0; k < j.waves.size(); ++k) {
+      j.waves[k] = log_uniform(random, 2e-5, 2e-4);
+      j.wave_phases[k] = random.phase();
+    }
+}
+
+/// Half of the arms hang and swing, so that gravity turns the load; the others go where the first draw says.
+void choose_poses(Arm& arm, Random& random) {
+  if (random.chance(0.5)) return;
+  for (std::size_t i = 0; i < arm.joints.size(); ++i) {
+    Joint& j = arm.joints[i];
+    const double down = i == 0 ? j.axis[1] * Random::kPi / 2 : 0;  // links lie along x at 0
+    const double middle = down + random.uniform(-0.4, 0.4), half = random.uniform(0.7, 1.6);
+    j.lower = middle - half, j.upper = middle + half;
+  }
+}
+
 /// Torsion behind the gear, 15 to 60 Hz of all that the joint carries; what stands before it is a small part
 /// of that, and in the URDF.
 void bend(Arm& arm, Random& random) {
@@ -116,7 +135,7 @@ void bend(Arm& arm, Random& random) {
 void push(Arm& arm, Random& random) {
   double arms_length = arm.joints.back().centre[0];
   for (std::size_t i = 1; i < arm.joints.size(); ++i) arms_length += arm.joints[i].place[0];
-  for (double time = random.uniform(4, 8); time < 36; time += random.uniform(6, 14)) {
+  for (double time = random.uniform(4, 8); time < 300; time += random.uniform(6, 14)) {
     Push p;
     p.begin = time;
     p.end = time + random.uniform(0.5, 2);
@@ -140,6 +159,7 @@ const std::vector<Kind>& kinds() {
       {"bend", "links bend behind the gear, at 15 to 60 Hz"},
       {"pushed", "pushes on the last link while the arm moves"},
       {"backwards", "the links' encoders count the other way"},
+      {"wavy", "the links' encoders are wrong twice and three times per turn as well, by up to 0.2 mrad"},
       {"sound", "no play in any joint"}};
   return all;
 }
@@ -150,7 +170,9 @@ const std::vector<Kind>& changes() {
       {"payload", "a payload of 0.15 to 0.8 times the last link"},
       {"friction", "Coulomb friction of one motor 1.4 to 1.8 times what it was"},
       {"tilt", "the base tilted by 2 to 7 degrees"},
-      {"warm", "friction of all motors up to 25 % less"}};
+      {"warm", "friction of all motors up to 25 % less"},
+      {"pushed", "pushes on the last link while the arm moves"},
+      {"bend", "links bend behind the gear, before as after"}};
   return all;
 }
 
@@ -174,7 +196,7 @@ double carried_weight(const Arm& arm, std::size_t joint) {
 }
 
 Arm drawn_arm(std::uint64_t seed, const std::string& kind) {
-  Random random(seed, "arm"), file(seed, "file"), more(seed, "kind");
+  Random random(seed, "arm"), poses(seed, "poses"), file(seed, "file"), more(seed, "kind");
   Arm arm;
   arm.seed = seed;
   const auto joints = std::size_t(std::array{2, 2, 3, 3, 4, 6}[std::size_t(random.whole(0, 5))]);
@@ -187,6 +209,7 @@ Arm drawn_arm(std::uint64_t seed, const std::string& kind) {
   arm.series = random.chance(0.5);
   arm.reach = random.uniform(0.5, 1);
   arm.haste = log_uniform(random, 0.5, 1.6);
+  choose_poses(arm, poses);
   declare(arm, kind, file);
   const Joint& last = arm.joints.back();
   const double mass = last.mass * log_uniform(more, 0.15, 0.8);
@@ -199,6 +222,7 @@ Arm drawn_arm(std::uint64_t seed, const std::string& kind) {
   if (kind == "friction") arm.joints[arm.changed].coulomb *= arm.more_friction;
   if (kind == "bend") bend(arm, more);
   if (kind == "pushed") push(arm, more);
+  if (kind == "wavy") make_wavy(arm, more);
   arm.backwards = kind == "backwards";
   for (Joint& j : arm.joints) {
     if (kind == "sound") j.play = 0;

@@ -32,6 +32,7 @@ struct Joint {
   double bend_stiffness = 0, bend_damping = 0;   // of a link that bends about the joint's axis; 0: rigid
   double flange = 0;                             // kg m^2, before the bend
   double eccentricity = 0, eccentric_phase = 0;  // rad, of the link's encoder
+  std::array<double, 2> waves = {0, 0}, wave_phases = {0, 0};  // rad, the same twice and three times per turn
   double transmission = 0,
          transmission_phase = 0;  // rad, of the motor's encoder, `transmission_order` per turn
   int transmission_order = 30;
@@ -40,6 +41,9 @@ struct Joint {
   double position_gain = 0, speed_gain = 0, integral_gain = 0;  // 1/s, N m s/rad, 1/s
   double torque_noise = 0, slow_noise = 0;                      // N m, white and coloured
 };
+
+/// Of a flange's inertia, about its other axes: a disc has a half, and is flat.
+constexpr double kDisc = 0.55;
 
 struct Push {
   double begin = 0, end = 0;  // s

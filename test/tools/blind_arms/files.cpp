@@ -16,7 +16,7 @@ std::string urdf(const Arm& arm) {
     const DeclaredJoint& d = arm.declared[i];
     Vector inertia = j.inertia;
     for (std::size_t a = 0; a < 3; ++a)
-      inertia[a] = d.mass * j.inertia[a] + j.flange * (j.axis[a] != 0 ? 1 : 0.5);
+      inertia[a] = d.mass * j.inertia[a] + j.flange * (j.axis[a] != 0 ? 1 : kDisc);
     text += fmt::format(
         "<link name='link{}'><inertial><origin xyz='{:.10g} {:.10g} {:.10g}'/><mass "
         "value='{:.10g}'/><inertia "

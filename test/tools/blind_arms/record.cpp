@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
@@ -137,6 +138,8 @@ class Sensors {
           j.transmission * std::sin(j.transmission_order * motor + j.transmission_phase);
       double link_shown = link + j.zero + j.eccentricity * std::sin(link + j.eccentric_phase) +
                           arm_.link_noise * noise.normal();
+      for (std::size_t k = 0; k < j.waves.size(); ++k)
+        link_shown += j.waves[k] * std::sin(double(k + 2) * link + j.wave_phases[k]);
       link_shown = std::round(link_shown / arm_.link_step) * arm_.link_step;
       line += fmt::format(",{:.9g},{:.10g},{:.10g}", shown, motor_shown,
                           arm_.backwards ? -link_shown : link_shown);
@@ -162,7 +165,7 @@ void make_record(const Arm& arm, double duration, int number, const std::string&
       noise(arm.seed, "noise " + std::to_string(number));
   std::vector<Motion> motions;
   for (const Joint& j : arm.joints) motions.emplace_back(arm, j, duration, drawn);
-  World world(arm, path + ".xml");
+  World world(arm, std::filesystem::path(path).replace_extension(".xml"));
   Controller controller(arm, std::move(motions));
   Sensors sensors(arm);
   std::vector<double> torque(arm.joints.size(), 0);

@@ -31,7 +31,7 @@ std::string joint_xml(const Joint& j, std::size_t i, bool& bends) {
   bends = j.bend_stiffness > 0;
   if (bends) {
     Vector flange;
-    for (std::size_t a = 0; a < 3; ++a) flange[a] = j.flange * (j.axis[a] != 0 ? 1 : 0.5);  // a disc
+    for (std::size_t a = 0; a < 3; ++a) flange[a] = j.flange * (j.axis[a] != 0 ? 1 : kDisc);
     xml += fmt::format(
         "<inertial pos='0 0 0' mass='1e-6' diaginertia='{}'/><body><joint name='bend{}' type='hinge' "
         "axis='{}' "
