@@ -21,6 +21,7 @@ constexpr double kRowsPerCycle = 5;         // choice: of torque_cutoff; two wou
 constexpr double kEdge = 1;                 // cycles of torque_cutoff that a low-pass needs to settle; choice
 constexpr int kNoiseOrder = 3;              // of the differences that tell white noise; choice
 constexpr double kLargestDeflection = 0.1;  // rad, of a gear between its encoders; choice
+constexpr double kBackwards = 2;  // theory: 0 of an encoder that follows, 1 of one of two that rest; choice
 /// Theory: of white noise at sampling interval T, low_pass(f) leaves the variance share 2 T f times the
 /// integral of 1 / (1 + x^8)^2 from 0 to infinity.
 constexpr double kNoiseBandwidth = 0.898;
@@ -47,15 +48,22 @@ Kinematics smooth_kinematics(const record::Record& r, record::Channel position, 
   return k;
 }
 
-/// The load's encoder is that of the link: it follows the motor's but for its zero and a deflection.
+/// The load's encoder is that of the link: it follows the motor's but for its zero and a deflection, and
+/// turns the same way. One that counts the other way moves against the motor by twice of what the joint
+/// moves, and read backwards hardly at all; a link in its gap moves as much against the motor as read
+/// backwards.
 bool follows(const record::Record& r) {
   if (!r.has(record::Channel::load_position)) return false;
   const std::vector<double>&motor = r.column(record::Channel::motor_position),
         &load = r.column(record::Channel::load_position);
-  double least = INFINITY, largest = -INFINITY;
-  for (std::size_t k = 0; k < motor.size(); ++k)
+  double least = INFINITY, largest = -INFINITY, least_sum = INFINITY, largest_sum = -INFINITY;
+  for (std::size_t k = 0; k < motor.size(); ++k) {
     least = std::fmin(least, load[k] - motor[k]), largest = std::fmax(largest, load[k] - motor[k]);
-  return largest - least < kLargestDeflection;  // false where a sample is missing
+    least_sum = std::fmin(least_sum, load[k] + motor[k]),
+    largest_sum = std::fmax(largest_sum, load[k] + motor[k]);
+  }
+  const double apart = largest - least;
+  return apart < kLargestDeflection && apart <= kBackwards * (largest_sum - least_sum);
 }
 
 /// Links as the load's encoder has them where there is one, else as the motor's. Zero is the load's: what a
@@ -73,15 +81,16 @@ void set_kinematics(ArmMotion& m, const std::vector<record::Record>& joints, con
     const Kinematics motor =
         smooth_kinematics(r, Channel::motor_position, Channel::motor_velocity, m.interval, cutoff);
     Kinematics link = motor;
-    if (follows(r)) {
+    m.link_follows.push_back(follows(r));
+    if (m.link_follows.back()) {
       link = smooth_kinematics(r, Channel::load_position, Channel::load_velocity, m.interval, cutoff);
       const double offset = to_eigen(motor.q).mean() - to_eigen(link.q).mean();
       if (std::fabs(offset) > kLargestDeflection)
         for (double& q : link.q) q += offset;
     } else if (r.has(Channel::load_position)) {
-      warnings.push_back(
-          fmt::format("{}: load_position of {} does not follow motor_position to {} rad: unused", m.name,
-                      rig.joints[std::size_t(j)].name, kLargestDeflection));
+      warnings.push_back(fmt::format(
+          "{}: load_position of {} does not follow motor_position to {} rad, or counts the other way: unused",
+          m.name, rig.joints[std::size_t(j)].name, kLargestDeflection));
     }
     m.q.col(j) = to_eigen(link.q), m.v.col(j) = to_eigen(link.v), m.a.col(j) = to_eigen(link.a);
     m.motor_v.col(j) = to_eigen(motor.v), m.motor_a.col(j) = to_eigen(motor.a);

@@ -114,6 +114,15 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
     e.message = "cannot tell: the deflection has no finite fit";
     return;
   }
+  // Teeth and gap give way to the load: whatever the play, the motor is ahead where it pushes the link.
+  if (!(fit.between + fit.between_error > 0)) {
+    e.status = diagnosis::Status::out_of_domain;
+    e.message = fmt::format(
+        "cannot tell: from flank to flank the motor falls behind its link by {:.2g} rad, as no teeth let it: "
+        "are the encoders exchanged, or does the link's count the other way?",
+        -fit.between);
+    return;
+  }
   // What friction behind the gap does to the deflection is in the interval, and no teeth that float.
   if (fit.residual > settings.worst_residual * std::fabs(fit.play) && fit.play > 3 * fit.error &&
       fit.residual > friction * std::fabs(fit.compliance)) {
@@ -124,7 +133,14 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
   }
   const double rest = std::hypot(settings.bend * fit.play, 2 * friction * fit.softest);
   e.angle_lower = std::fmax(0, fit.play - std::hypot(fit.play - fit.lower, rest));
-  e.angle_upper = std::fmax(0, fit.play + std::hypot(fit.upper - fit.play, rest));
+  e.angle_upper = fit.play + std::hypot(fit.upper - fit.play, rest);
+  if (!(e.angle_upper > 0)) {
+    e.status = diagnosis::Status::out_of_domain;
+    e.message =
+        fmt::format("cannot tell: only a play below none, of {:.2g} rad, fits the deflection", fit.play);
+    e.angle_lower = e.angle_upper = kNaN;
+    return;
+  }
   e.from_record = true;
   if (!(e.angle_lower > 0)) {
     e.status = diagnosis::Status::below_range;
@@ -140,6 +156,37 @@ void judge(JointPlay& play, const Rows& rows, double friction, const PlaySetting
     e.backlash_angle = fit.play;
     e.message = fmt::format("{} and {} stays on the two flanks by the chain's load; deflection of {}",
                             play.stays[1], play.stays[0], fit.law);
+  }
+}
+
+/// Reasons not to look at the deflection first.
+void answer(JointPlay& play, const Rows& rows, bool two_encoders, bool follows, double friction,
+            const PlaySettings& settings) {
+  diagnosis::Estimate& e = play.estimate;
+  if (!two_encoders) {
+    e.message = "needs load_position";
+  } else if (!follows) {
+    e.status = diagnosis::Status::out_of_domain;
+    e.message =
+        "cannot tell: load_position does not follow motor_position: does it count the other way, or is it "
+        "of "
+        "another joint?";
+  } else if (!play.one_flank.empty()) {
+    e.status = diagnosis::Status::out_of_domain;
+    e.message = play.one_flank;
+  } else if (std::min(play.stays[0], play.stays[1]) < settings.least_stays) {
+    e.message = fmt::format(
+        "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: a longer record",
+        play.stays[1], play.stays[0], settings.least_stays);
+  } else if (play.disagreement > settings.disagreement) {
+    e.status = diagnosis::Status::out_of_domain;
+    e.message = fmt::format(
+        "cannot tell: the motor's torque differs from that of the declared chain by {:.0f} % of it: "
+        "declare "
+        "what the arm carries, or fit links and drives (identify)",
+        100 * play.disagreement);
+  } else {
+    judge(play, rows, friction, settings);
   }
 }
 
@@ -160,6 +207,8 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
     play.joint = rig.joints[j].name;
     play.estimate.method = "position_difference";
     const bool two_encoders = record.joints[j].has(Channel::load_position);
+    const bool follows = std::all_of(motions.begin(), motions.end(),
+                                     [&](const arm::ArmMotion& m) { return m.link_follows[j]; });
     Rows rows;
     for (const arm::ArmMotion& m : motions)
       append(rows, m, j, links, rig.joints[j], loads[j],
@@ -183,25 +232,7 @@ std::vector<JointPlay> plays_of(const arm::ArmRig& rig, const std::vector<JointL
       if (present != 0) play.pose = showing_pose(chain, mean, j, -present, certain);
       play.one_flank = one_flank_message(play, present != 0, certain);
     }
-    if (!two_encoders) {
-      play.estimate.message = "needs load_position";
-    } else if (!play.one_flank.empty()) {
-      play.estimate.status = diagnosis::Status::out_of_domain;
-      play.estimate.message = play.one_flank;
-    } else if (std::min(play.stays[0], play.stays[1]) < settings.least_stays) {
-      play.estimate.message = fmt::format(
-          "cannot tell: only {} and {} stays on the two flanks, {} on each are needed: a longer record",
-          play.stays[1], play.stays[0], settings.least_stays);
-    } else if (play.disagreement > settings.disagreement) {
-      play.estimate.status = diagnosis::Status::out_of_domain;
-      play.estimate.message = fmt::format(
-          "cannot tell: the motor's torque differs from that of the declared chain by {:.0f} % of it: "
-          "declare "
-          "what the arm carries, or fit links and drives (identify)",
-          100 * play.disagreement);
-    } else {
-      judge(play, rows, friction, settings);
-    }
+    answer(play, rows, two_encoders, follows, friction, settings);
     plays.push_back(std::move(play));
   }
   return plays;

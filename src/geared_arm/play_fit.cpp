@@ -21,7 +21,8 @@ constexpr double kHardening[] = {0.1, 0.2, 0.5, 1, 2, 5, 10};
 // comes of other causes too. Choice, see the drawn arms in doc/arm.md.
 constexpr double kSameLaw = 1.5;
 constexpr double kLawErrors = 3;      // standard errors by which the record tells two laws apart: choice
-constexpr double kOutOfCentre = 0.8;  // of the squares, which an encoder out of centre must leave: choice
+constexpr double kOutOfCentre = 0.8;  // of the squares, which an encoder's errors must leave: choice
+constexpr int kMostWaves = 3;         // per turn, of an encoder: more are a gear's, and average out; choice
 constexpr double kTurned = 0.5;       // rad, of travel, below which it is a straight line: choice
 
 /// Deflection over load, of loads and in deflections of the size of 1.
@@ -56,9 +57,10 @@ std::vector<Law> laws() {
 
 struct Fit {
   double play = 0, error = 0;
-  double compliance = 0, softest = 0;  // rad/(N m), at the mean load and at the least one that counts
-  double squares = 0;                  // of the residuals
-  double degrees = 0;                  // of freedom: stays less what is fitted
+  double compliance = 0, softest = 0;     // rad/(N m), at the mean load and at the least one that counts
+  double between = 0, between_error = 0;  // rad: play and the deflection at the mean load on both flanks
+  double squares = 0;                     // of the residuals
+  double degrees = 0;                     // of freedom: stays less what is fitted
 };
 
 /// What is the same for all laws.
@@ -76,7 +78,7 @@ class Flanks {
     stays_ = *std::max_element(rows.stay.begin(), rows.stay.end()) + 1;
   }
 
-  Fit fit(const Law& law, bool out_of_centre) const;
+  Fit fit(const Law& law, int waves) const;
   Eigen::Index n() const { return Eigen::Index(used_.size()); }
   bool turns() const {
     double least = INFINITY, largest = -INFINITY;
@@ -89,7 +91,7 @@ class Flanks {
 
  private:
   std::size_t at(Eigen::Index row) const { return used_[std::size_t(row)]; }
-  Eigen::MatrixXd columns(const Law& law, bool out_of_centre) const;
+  Eigen::MatrixXd columns(const Law& law, int waves) const;
 
   const FlankRows& rows_;
   std::vector<std::size_t> used_;  // rows on a flank
@@ -98,13 +100,13 @@ class Flanks {
   std::size_t stays_ = 0;
 };
 
-Eigen::MatrixXd Flanks::columns(const Law& law, bool out_of_centre) const {
-  Eigen::MatrixXd x(n(), out_of_centre ? 7 : 5);
+Eigen::MatrixXd Flanks::columns(const Law& law, int waves) const {
+  Eigen::MatrixXd x(n(), 5 + 2 * waves);
   for (Eigen::Index r = 0; r < n(); ++r) {
     const double t = rows_.torque[at(r)] / most_, q = rows_.position[at(r)];
     x.row(r).head<5>() << rows_.side[at(r)] / 2.0, std::copysign(law.deflection(std::fabs(t)), t), 1, q,
         rows_.speed[at(r)];
-    if (out_of_centre) x.row(r).tail<2>() << std::cos(q), std::sin(q);
+    for (int k = 1; k <= waves; ++k) x(r, 3 + 2 * k) = std::cos(k * q), x(r, 4 + 2 * k) = std::sin(k * q);
   }
   for (Eigen::Index c = 3; c < x.cols(); ++c) {  // less correlated so
     x.col(c).array() -= x.col(c).mean();
@@ -113,22 +115,30 @@ Eigen::MatrixXd Flanks::columns(const Law& law, bool out_of_centre) const {
   return x;
 }
 
-Fit Flanks::fit(const Law& law, bool out_of_centre) const {
-  const Eigen::MatrixXd x = columns(law, out_of_centre);
+Fit Flanks::fit(const Law& law, int waves) const {
+  const Eigen::MatrixXd x = columns(law, waves);
   const Eigen::VectorXd scale = x.colwise().norm().cwiseMax(1e-300).transpose();
   const Eigen::MatrixXd scaled = x * scale.cwiseInverse().asDiagonal();
   const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(scaled);
   const Eigen::VectorXd b = solver.solve(y_), residual = y_ - scaled * b;
   const Eigen::MatrixXd inverse = solver.pseudoInverse();
-  std::vector<double> influence(stays_, 0.0);  // of each stay's residuals on the play
-  for (Eigen::Index r = 0; r < n(); ++r) influence[rows_.stay[at(r)]] += inverse(0, r) * residual[r];
-  double variance = 0, load = 0;
-  for (const double each : influence) variance += each * each;
+  double load = 0;
   for (const std::size_t k : used_) load += std::fabs(rows_.torque[k]) / (most_ * double(n()));
   Fit f;
   f.degrees = std::fmax(1, double(stays_) - double(solver.rank()));
+  const auto error_of = [&](double first, double second) {  // of first b[0] + second b[1]
+    std::vector<double> influence(stays_, 0.0);             // of each stay's residuals
+    for (Eigen::Index r = 0; r < n(); ++r)
+      influence[rows_.stay[at(r)]] += (first * inverse(0, r) + second * inverse(1, r)) * residual[r];
+    double variance = 0;
+    for (const double each : influence) variance += each * each;
+    return std::sqrt(variance * double(stays_) / f.degrees);
+  };
   f.play = b[0] / scale[0];
-  f.error = std::sqrt(variance * double(stays_) / f.degrees) / scale[0];
+  f.error = error_of(1 / scale[0], 0);
+  const double yield = 2 * law.deflection(load) / scale[1];
+  f.between = f.play + yield * b[1];
+  f.between_error = error_of(1 / scale[0], yield);
   const auto compliance = [&](double t) {
     return b[1] / scale[1] * (law.deflection(1.01 * t) - law.deflection(0.99 * t)) / (0.02 * t * most_);
   };
@@ -142,9 +152,9 @@ Fit Flanks::fit(const Law& law, bool out_of_centre) const {
 FlankPlayFit fit_flank_play(const FlankRows& rows) {
   const Flanks flanks(rows);
   const std::vector<Law> all = laws();
-  const auto fits_of = [&](bool out_of_centre) {
+  const auto fits_of = [&](int waves) {
     std::vector<Fit> fits;
-    for (const Law& law : all) fits.push_back(flanks.fit(law, out_of_centre));
+    for (const Law& law : all) fits.push_back(flanks.fit(law, waves));
     return fits;
   };
   const auto least_of = [](const std::vector<Fit>& fits) {
@@ -152,10 +162,10 @@ FlankPlayFit fit_flank_play(const FlankRows& rows) {
                                         [](const Fit& a, const Fit& b) { return a.squares < b.squares; }) -
                        fits.begin());
   };
-  std::vector<Fit> fits = fits_of(false);
+  std::vector<Fit> fits = fits_of(0);
   std::size_t best = least_of(fits);
-  if (flanks.turns()) {
-    std::vector<Fit> other = fits_of(true);
+  for (int waves = 1; flanks.turns() && waves <= kMostWaves; ++waves) {
+    std::vector<Fit> other = fits_of(waves);
     const std::size_t least = least_of(other);
     if (other[least].squares * flanks.apart() < kOutOfCentre * fits[best].squares)
       fits = std::move(other), best = least;
@@ -163,6 +173,8 @@ FlankPlayFit fit_flank_play(const FlankRows& rows) {
   FlankPlayFit out;
   out.play = fits[best].play, out.error = fits[best].error;
   out.compliance = fits[best].compliance, out.softest = fits[best].softest;
+  out.between = fits[best].between;
+  out.between_error = signal::student_t_quantile(0.975, fits[best].degrees) * fits[best].between_error;
   out.residual = std::sqrt(fits[best].squares / double(flanks.n()));
   out.law = all[best].name;
   out.lower = INFINITY, out.upper = -INFINITY;

@@ -152,6 +152,56 @@ TEST(ArmPlay, AnEncoderOutOfCentreMakesNoWrongAnswer) {
   EXPECT_GE(e.angle_upper, 2e-3);
 }
 
+/// Errors thrice per turn: the elbow's turns with the load's change of flank as no straight line does.
+TEST(ArmPlay, AnEncoderThatIsWrongThricePerTurnMakesNoWrongAnswer) {
+  GearedArm arm = arm_of("two_link_arm");
+  for (GearedJoint& joint : arm.joints) joint.gear->backlash = 3e-4;
+  const std::vector<record::JointRecord> joints = simulate_arm(arm, 30);
+  for (const double phase : {0.0, M_PI / 2, M_PI, 3 * M_PI / 2}) {
+    std::vector<record::JointRecord> shown = joints;
+    for (record::JointRecord& joint : shown)
+      for (double& q : joint.record.column(record::Channel::load_position))
+        q += 1e-4 * std::sin(3 * q + phase);
+    std::vector<std::string> warnings;
+    const auto plays = plays_of(arm.rig, {{0.05, 0.02}, {0.02, 0.01}},
+                                arm::arm_record(shown, arm.rig, "simulated"), warnings);
+    EXPECT_EQ(plays[1].estimate.status, Status::ok) << phase << plays[1].estimate.message;
+    for (const JointPlay& play : plays) {
+      if (play.estimate.status != Status::ok && play.estimate.status != Status::below_range) continue;
+      EXPECT_LE(play.estimate.angle_lower, 3e-4) << play.joint << phase;
+      EXPECT_GE(play.estimate.angle_upper, 3e-4) << play.joint << phase;
+    }
+  }
+}
+
+/// Teeth give way to the load: encoders that show otherwise are not those of this joint, and no play follows.
+TEST(ArmPlay, EncodersTheWrongWayRoundMakeNoAnswer) {
+  GearedArm arm = arm_of("two_link_arm");
+  for (const double travel : {1.0, 0.03}) {  // about the upright pose, and hardly off it
+    for (GearedJoint& joint : arm.joints)
+      for (double& position : joint.excitation.moves.positions) position *= travel;
+    const std::vector<record::JointRecord> joints = simulate_arm(arm, 30);
+    for (const bool backwards : {true, false}) {
+      std::vector<record::JointRecord> shown = joints;
+      for (record::JointRecord& joint : shown) {
+        std::vector<double>& load = joint.record.column(record::Channel::load_position);
+        if (backwards)
+          for (double& q : load) q = -q;
+        else
+          load.swap(joint.record.column(record::Channel::motor_position));
+      }
+      std::vector<std::string> warnings;
+      for (const JointPlay& play : plays_of(arm.rig, {{0.05, 0.02}, {0.02, 0.01}},
+                                            arm::arm_record(shown, arm.rig, "simulated"), warnings)) {
+        const diagnosis::Estimate& e = play.estimate;
+        EXPECT_NE(e.status, Status::ok) << play.joint << travel << backwards;
+        EXPECT_NE(e.status, Status::below_range) << play.joint << travel << backwards << e.message;
+        if (travel == 1) EXPECT_EQ(e.status, Status::out_of_domain) << e.message;
+      }
+    }
+  }
+}
+
 TEST(ArmPlay, OneEncoderIsNotEnough) {
   const GearedArm arm = arm_of("two_link_arm");
   std::vector<record::JointRecord> joints = simulate_arm(arm, 10);

@@ -31,6 +31,7 @@ struct ArmMotion {
   std::vector<double> time;  // s, of all samples
   Eigen::MatrixXd q, v, a;   // all, of the links, low-passed at kinematics_cutoff: rad, rad/s, rad/s^2
   Eigen::MatrixXd motor_v, motor_a;    // all, the same of the motors
+  std::vector<char> link_follows;      // per joint: it has an encoder of its link, which moves as its motor's
   Eigen::MatrixXd signal;              // all, low-passed at torque_cutoff: unit of the channel
   std::vector<std::size_t> rows;       // places among all
   std::vector<Eigen::MatrixXd> chain;  // per joint: rows x 10 per link, the regressor, low-passed

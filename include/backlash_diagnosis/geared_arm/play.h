@@ -5,11 +5,11 @@
 //   T = tau(q, v, a) + friction behind the gap,   phi = q_M - q = f + side b / 2 + g e(T) + s q + d v
 //
 // tau: the chain's torque at the joint (arm/dynamics.h), side: the sign of T where it is large for certain
-// and stays so. f: offset of the encoders, s: their scale, d: their skew in time. Under small loads, where
-// the side is not certain, e(T) is a law's: of a spring, of teeth that yield as a power of the load (Hertz
-// 2/3), of springs that harden. All that the record does not rule out are in the interval. The motor's torque
-// only tells whether the declared chain is the one that moved: beyond any friction of the motor it must agree
-// with T.
+// and stays so. f: offset of the encoders, s: their scale, d: their skew in time; errors up to three times
+// per turn where the record shows them. Under small loads, where the side is not certain, e(T) is a law's: of
+// a spring, of teeth that yield as a power of the load (Hertz 2/3), of springs that harden. All that the
+// record does not rule out are in the interval. The motor's torque only tells whether the declared chain is
+// the one that moved: beyond any friction of the motor it must agree with T.
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter and laws of the deflection: Student t times the standard error, each stay on a flank counted as
@@ -17,7 +17,8 @@
 // - the friction behind the gap, as uncertain as it is large, over the stiffness, on both flanks; where the
 //   file says less, 1 % of the largest load,
 // - 2 % of the play, as position_difference where the deflection bends otherwise than any of them.
-// Half of it beyond 15 % of the play: "cannot tell closer than".
+// Half of it beyond 15 % of the play: "cannot tell closer than". Teeth give way to the load: an encoder that
+// does not follow its motor, or from flank to flank the other way, tells nothing.
 #pragma once
 
 #include <optional>
