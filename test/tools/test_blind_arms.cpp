@@ -17,14 +17,13 @@ namespace {
 
 #ifdef BACKLASH_DIAGNOSIS_MUJOCO
 
-using blind_arms::Arm;
 using blind_arms::World;
 
 class BlindArms : public CommandTest {};
 
 /// Two links that fall, without friction and damping; play in both joints.
-Arm falling(blind_arms::Teeth teeth, bool bends) {
-  Arm arm = blind_arms::drawn_arm(3, "clean");
+blind_arms::Arm falling(blind_arms::Teeth teeth, bool bends) {
+  blind_arms::Arm arm = blind_arms::drawn_arm(3, "clean");
   arm.joints.resize(2);
   for (blind_arms::Joint& j : arm.joints) {
     j.coulomb = j.viscous = j.link_coulomb = j.link_viscous = j.damping = 0;
@@ -41,7 +40,7 @@ Arm falling(blind_arms::Teeth teeth, bool bends) {
 TEST_F(BlindArms, EnergyIsWhatTheMotorsGive) {
   for (const auto teeth : {blind_arms::Teeth::spring, blind_arms::Teeth::power, blind_arms::Teeth::hardening})
     for (const bool bends : {false, true}) {
-      const Arm arm = falling(teeth, bends);
+      const blind_arms::Arm arm = falling(teeth, bends);
       World world(arm, path("arm.xml"));
       std::vector<double> torque(2, 0);
       double work = 0, least = 0, most = 0, worst = 0, twist = 0;
@@ -63,7 +62,7 @@ TEST_F(BlindArms, EnergyIsWhatTheMotorsGive) {
 }
 
 TEST_F(BlindArms, TeethHoldTheWeightInClosedForm) {
-  Arm arm = falling(blind_arms::Teeth::spring, false);
+  blind_arms::Arm arm = falling(blind_arms::Teeth::spring, false);
   for (blind_arms::Joint& j : arm.joints) j.damping = 0.3 * std::sqrt(j.stiffness * j.rotor);
   arm.joints[1].place[2] = 0;
   for (blind_arms::Joint& j : arm.joints) j.centre[2] = 0;
