@@ -280,6 +280,17 @@ CrossingMachine CrossingFit::moved(const VectorXd& step) const {
   return other;
 }
 
+CrossingFit::Told CrossingFit::told_by(const Part& p, const MatrixXd& known, const VectorXd& own) {
+  Told told;
+  told.inverse = signal::symmetric_inverse(signal::gram(p.own) + known);
+  const MatrixXd cross = signal::transposed_product(p.global, p.own);
+  const MatrixXd reduced = signal::product(cross, told.inverse);
+  told.information = signal::gram(p.global) - signal::product(reduced, cross.transpose());
+  told.score =
+      p.global.transpose() * p.residual + p.offset - reduced * (p.own.transpose() * p.residual + known * own);
+  return told;
+}
+
 void CrossingFit::run(int steps) {
   for (int s = 0; s < steps; ++s) {
     const std::vector<Part> all = parts();
@@ -288,15 +299,11 @@ void CrossingFit::run(int steps) {
     VectorXd g = VectorXd::Zero(n);
     add_priors(h, g);
     const MatrixXd known = own_spread(machine_).array().pow(-2).matrix().asDiagonal();
-    std::vector<MatrixXd> inverse;
+    std::vector<Told> told;
     for (std::size_t w = 0; w < all.size(); ++w) {
-      const Part& p = all[w];
-      inverse.push_back(signal::symmetric_inverse(signal::gram(p.own) + known));
-      const VectorXd own = p.own.transpose() * p.residual + known * own_[w];
-      const MatrixXd cross = signal::transposed_product(p.global, p.own);
-      const MatrixXd reduced = signal::product(cross, inverse.back());
-      h += signal::gram(p.global) - signal::product(reduced, cross.transpose());
-      g += p.global.transpose() * p.residual + p.offset - reduced * own;
+      told.push_back(told_by(all[w], known, own_[w]));
+      h += told.back().information;
+      g += told.back().score;
     }
     const double before = cost_;
     bool better = false;
@@ -310,7 +317,7 @@ void CrossingFit::run(int steps) {
           taken[place(j, v)] = machine[j][std::size_t(v)] - machine_[j][std::size_t(v)];
       std::vector<VectorXd> owns = own_;
       for (std::size_t w = 0; w < all.size(); ++w)
-        owns[w] -= inverse[w] *
+        owns[w] -= told[w].inverse *
                    (all[w].own.transpose() * (all[w].residual + all[w].global * taken) + known * own_[w]);
       const double cost = cost_of(machine, owns);
       better = cost < cost_;
@@ -348,16 +355,10 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
   VectorXd unused = VectorXd::Zero(n);
   add_priors(h, unused);
   const MatrixXd known = own_spread(machine_).array().pow(-2).matrix().asDiagonal();
-  std::vector<VectorXd> scores;
-  std::vector<MatrixXd> informations;
+  std::vector<Told> told;
   for (std::size_t w = 0; w < all.size(); ++w) {
-    const Part& p = all[w];
-    const MatrixXd cross = signal::transposed_product(p.global, p.own);
-    const MatrixXd reduced = signal::product(cross, signal::symmetric_inverse(signal::gram(p.own) + known));
-    informations.emplace_back(signal::gram(p.global) - signal::product(reduced, cross.transpose()));
-    scores.emplace_back(p.global.transpose() * p.residual + p.offset -
-                        reduced * (p.own.transpose() * p.residual + known * own_[w]));
-    h += informations.back();
+    told.push_back(told_by(all[w], known, own_[w]));
+    h += told.back().information;
   }
   for (Index i = 0; i < n; ++i) h(i, i) = h(i, i) * (1 + 1e-9) + 1e-300;
   const MatrixXd inverse = signal::symmetric_inverse(h);
@@ -366,9 +367,9 @@ std::vector<CrossingFit::Errors> CrossingFit::errors() const {
     const int p = place(j, kCrossingGap);
     double sum = 0, squares = 0, clustered = 0;
     for (std::size_t w = 0; w < all.size(); ++w) {
-      const double told = informations[w](p, p);
-      sum += told, squares += told * told;
-      clustered += std::pow(inverse.row(p).dot(scores[w]), 2);
+      const double information = told[w].information(p, p);
+      sum += information, squares += information * information;
+      clustered += std::pow(inverse.row(p).dot(told[w].score), 2);
     }
     Errors& e = errors[j];
     e.turns = squares > 0 ? sum * sum / squares : 0;

@@ -45,6 +45,11 @@ class CrossingFit {
     Eigen::VectorXd residual, offset;  // offset: of half the gradient by the machine, see shaken()
     Eigen::MatrixXd global, own;       // derivatives by the machine, by what is of this window alone
   };
+  struct Told {                            // by one window of the machine, its own values taken out
+    Eigen::MatrixXd inverse, information;  // inverse: of the information on its own values
+    Eigen::VectorXd score;
+  };
+  static Told told_by(const Part& part, const Eigen::MatrixXd& known, const Eigen::VectorXd& own);
   Eigen::VectorXd residual(std::size_t window, const CrossingMachine& machine,
                            const Eigen::VectorXd& own) const;
   Part part(std::size_t window) const;
