@@ -95,10 +95,17 @@ KnownChange* ChangeLedger::match(const FoundChange& found, std::vector<long>& ke
   return best;
 }
 
+/// Whether it ends where the other begins: a look that no longer saw the onset finds the end as a change.
+bool ends_with(const KnownChange& known, const FoundChange& found) {
+  return known.state == ChangeState::ended && known.found.until &&
+         *known.found.until > found.since_from - kSameEvent &&
+         *known.found.until < found.since_to + kSameEvent;
+}
+
 long ChangeLedger::undone_by(const FoundChange& found) const {
   for (auto k = known_.rbegin(); k != known_.rend(); ++k)
-    if (k->id > 0 && k->state == ChangeState::standing && k->found.since_to < found.since_from &&
-        undoes(k->found, found))
+    if (k->id > 0 && (k->state == ChangeState::standing || ends_with(*k, found)) &&
+        k->found.since_to < found.since_from && undoes(k->found, found))
       return k->id;
   return 0;
 }
@@ -112,13 +119,15 @@ bool ChangeLedger::confirm(KnownChange& known) {
     known.id = ++last_id_;
     return true;
   }
+  bool news = false;
   for (KnownChange& k : known_)
-    if (k.id > 0 && k.id == known.ends) {
+    if (k.id > 0 && k.id == known.ends && k.state == ChangeState::standing) {
       k.state = ChangeState::ended;
       k.found.until = known.found.since;
+      news = true;
     }
   known.state = ChangeState::ended;
-  return true;
+  return news;
 }
 
 std::vector<long> ChangeLedger::take(const ChangeLook& look) {

@@ -103,6 +103,23 @@ TEST(ChangeLedger, EndsAChangeThatIsUndone) {
   EXPECT_EQ(ledger.told().size(), 3u);
 }
 
+// One look sees onset and end; later ones, from which the onset has gone, see the end as a change.
+TEST(ChangeLedger, TheEndThatWasToldIsNoFurtherChange) {
+  ChangeLedger ledger;
+  FoundChange ended = coulomb(950, 0.6);
+  ended.until = kStart + 1030;
+  ledger.take(look(1000, {coulomb(950, 0.6)}));
+  ledger.take(look(1020, {coulomb(950, 0.6)}));
+  EXPECT_EQ(ledger.take(look(1100, {ended})), std::vector<long>{1});
+  for (int to = 1260; to < 1330; to += 30)
+    EXPECT_TRUE(ledger.take(look(to, {coulomb(1031, -0.6)}, {"motor_coulomb"})).empty());
+  ASSERT_EQ(ledger.told().size(), 1u);
+  EXPECT_EQ(ledger.told().front().state, ChangeState::ended);
+  // What falls further than to where it was begins another change.
+  ledger.take(look(5000, {coulomb(4950, -0.6)}));
+  EXPECT_EQ(ledger.take(look(5060, {coulomb(4950, -0.6)})), std::vector<long>{2});
+}
+
 TEST(ChangeLedger, EndsASineOfOppositePhase) {
   const auto sine = [](double since, double phase) {
     FoundChange c = coulomb(since, 0.2);
