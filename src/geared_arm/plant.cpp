@@ -208,6 +208,7 @@ void ArmPlant::set_machine(const GearedArm& arm) {
   const auto require = [](bool same, const std::string& what) {
     if (!same) throw InvalidParameter("rig", what, "must be as in the arm that is simulated");
   };
+  require(arm.simulated, "a file without `simulation`");  // whose drives nobody checked for one
   require(arm.rig.joint_names() == arm_.rig.joint_names(), joined(arm.rig.joint_names()));
   require(arm.rig.channel == arm_.rig.channel, record::channel_name(arm.rig.channel));
   for (std::size_t j = 0; j < arm.joints.size(); ++j) {

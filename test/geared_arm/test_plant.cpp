@@ -89,6 +89,9 @@ TEST(GearedArm, GoesOnWithAnotherMachineFromWhereItIs) {
   other.joints[0].held = 0.0;
   EXPECT_THROW(plant.set_machine(other), InvalidParameter);
   other = first;
+  other.simulated = false;  // e.g. no rotor in front of a gear
+  EXPECT_THROW(plant.set_machine(other), InvalidParameter);
+  other = first;
   other.rig.joints[1].name = "wrist";
   EXPECT_THROW(plant.set_machine(other), InvalidParameter);
 }
