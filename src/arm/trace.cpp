@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "fit_model.h"
 #include "trace_evidence.h"
+#include "trace_result.h"
 
 namespace backlash::arm {
 namespace {
@@ -17,12 +18,6 @@ namespace {
 const char* const kHalves =
     "The test record is of a machine that has changed: effects are fitted to its first half and judged on "
     "its second half.";
-
-std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked) {
-  std::vector<FittedMotion> all;
-  for (const ArmMotion& m : motions) all.push_back({&m, marked});
-  return all;
-}
 
 Motions parts(const Motions& motions, double from, double to) {
   Motions out;
@@ -58,7 +53,6 @@ class Tracer {
   void search_all(bool same_record);
   void cannot_judge(const std::string& why);
   void look_for_pushes(const ArmRecord& test);
-  void set_held_series(const ArmRecord& test);
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
   std::vector<Candidate> candidates() const;
   void fit_candidate(Candidate& c, const Motions& fitted) const;
@@ -69,9 +63,9 @@ class Tracer {
   void tell_rival(ArmStep& step, const Candidate& rival);
   void tell_friction(const Candidate& c, const Motions& judged);
   void finish(const Motions& judged, const Candidate& taken, bool named);
-  void set_augmented(const Candidate& taken);
-  void set_unexplained(const std::vector<double>& errors, const std::vector<double>& foretold);
-  void set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit, bool marked);
+  std::vector<double> foretold(const Candidate& taken, const Motions& judged) const;
+  std::optional<ArmTrace::Unexplained> worst_unexplained(const std::vector<double>& errors,
+                                                         const std::vector<double>& expected) const;
 
   const ArmRig& rig_;
   const ArmTraceSettings& settings_;
@@ -261,97 +255,45 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
 /// best, also where nothing of it is named.
 void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   const double least = settings_.fit.least_seconds;
-  const FitFreedom& freedom = taken.freedom;
-  const ArmFit& fit = taken.fit;
-  const std::vector<double> best = relative_errors(fit, freedom, as_fitted(judged, true), least);
+  const std::vector<double> best = relative_errors(taken.fit, taken.freedom, as_fitted(judged, true), least);
   trace_.before = relative_errors(base_, {}, as_fitted(judged, false), least);
   trace_.after = named ? best : trace_.before;
   trace_.train = relative_errors(base_, {}, as_fitted(train_, false), least);
-  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-    double noise = 0, count = 0, sum = 0, squares = 0;
-    for (const ArmMotion& m : judged)
-      for (std::size_t k = 0; k < m.rows.size(); ++k) {
-        if (!m.counts(Eigen::Index(k), Eigen::Index(j))) continue;
-        const double s = m.signal(Eigen::Index(m.rows[k]), Eigen::Index(j));
-        count += 1, sum += s, squares += s * s;
-        noise += m.noise[Eigen::Index(j)] * m.noise[Eigen::Index(j)];
-      }
-    trace_.floor.push_back(std::isnan(trace_.before[j]) ? kNaN
-                                                        : std::sqrt(noise / (squares - sum * sum / count)));
-  }
-  if (named) set_augmented(taken);
-  set_series(judged, freedom, named ? fit : base_, named);
-  // What was left of the training records, and what the effect is not known to. What a half of the test
-  // record leaves may be what is missing.
-  ArmFit known = fit;
+  trace_.floor = noise_floors(judged, trace_.before);
+  if (named) trace_.augmented = augmented_rig(rig_, taken);
+  trace_.series = named ? series_of(judged, base_, taken.freedom, taken.fit, true)
+                        : series_of(judged, base_, {}, base_, false);
+  trace_.unexplained = worst_unexplained(best, foretold(taken, judged));
+}
+
+/// The errors that are expected of it: what was left of the training records, and what the effect is not
+/// known to. What a half of the test record leaves may be what is missing.
+std::vector<double> Tracer::foretold(const Candidate& taken, const Motions& judged) const {
+  ArmFit known = taken.fit;
   for (std::size_t j = 0; !rig_.fitted && j < rig_.joints.size(); ++j)
-    known.deviation[j] = std::fmin(fit.deviation[j], base_.deviation[j]);
+    known.deviation[j] = std::fmin(known.deviation[j], base_.deviation[j]);
   if (rig_.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
-  std::vector<double> foretold = foretold_errors(known, freedom, as_fitted(judged, true), least);
+  std::vector<double> errors =
+      foretold_errors(known, taken.freedom, as_fitted(judged, true), settings_.fit.least_seconds);
   for (std::size_t j = 0; rig_.fitted && j < rig_.joints.size(); ++j) {
     const double said = rig_.joints[j].training_error;
-    foretold[j] = std::hypot(foretold[j], said > 0 ? said : trace_.train[j]);
+    errors[j] = std::hypot(errors[j], said > 0 ? said : trace_.train[j]);
   }
-  set_unexplained(best, foretold);
+  return errors;
 }
 
-void Tracer::set_augmented(const Candidate& taken) {
-  const FitFreedom& freedom = taken.freedom;
-  trace_.augmented = taken.fit.rig;
-  if (freedom.payload)
-    trace_.augmented.payloads.push_back({rig_.chain.joints[*freedom.payload].link, freedom.payload_sign,
-                                         BodyParameters(freedom.payload_sign * taken.fit.payload)});
-  if (freedom.tilt)
-    trace_.augmented.chain.gravity =
-        tilted(taken.fit.rig.chain.gravity, {taken.fit.tilt[0].value, taken.fit.tilt[1].value});
-  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-    trace_.augmented.joints[j].terms[std::size_t(DriveTerm::offset)] += taken.fit.shifts[j];
-    for (const DriveTerm t :
-         {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
-      trace_.augmented.joints[j].terms[std::size_t(t)] *= taken.fit.friction_factors[j].value;
-  }
-}
-
-void Tracer::set_unexplained(const std::vector<double>& errors, const std::vector<double>& foretold) {
+std::optional<ArmTrace::Unexplained> Tracer::worst_unexplained(const std::vector<double>& errors,
+                                                               const std::vector<double>& expected) const {
+  std::optional<ArmTrace::Unexplained> out;
   double worst = settings_.foretold;
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-    const double ratio = errors[j] / foretold[j];
+    const double ratio = errors[j] / expected[j];
     if (!(ratio > worst)) continue;
     worst = ratio;
-    trace_.unexplained = {
-        {rig_.joints[j].name + "/torque",
-         fmt::format("the error is {:.3g} times what the training records let expect", ratio)}};
+    out = {rig_.joints[j].name + "/torque",
+           fmt::format("the error is {:.3g} times what the training records let expect", ratio)};
   }
-}
-
-void Tracer::set_series(const Motions& judged, const FitFreedom& freedom, const ArmFit& fit, bool marked) {
-  const std::size_t joints = rig_.joints.size();
-  trace_.series.measured.resize(joints), trace_.series.before.resize(joints),
-      trace_.series.after.resize(joints);
-  for (const ArmMotion& m : judged) {
-    const Prediction before = predict(base_, {}, {&m, false}),
-                     after = predict(fit, marked ? freedom : FitFreedom(), {&m, marked});
-    for (std::size_t k = 0; k < m.rows.size(); ++k) {
-      trace_.series.time.push_back(m.time[m.rows[k]]);
-      for (std::size_t j = 0; j < joints; ++j) {
-        const auto r = Eigen::Index(k), c = Eigen::Index(j);
-        const bool counts = m.counts(r, c);
-        trace_.series.measured[j].push_back(before.measured(r, c));
-        trace_.series.before[j].push_back(counts ? before.predicted(r, c) : kNaN);
-        trace_.series.after[j].push_back(counts ? after.predicted(r, c) : kNaN);
-      }
-    }
-  }
-}
-
-/// The record as it is: nothing foretells a joint at rest.
-void Tracer::set_held_series(const ArmRecord& test) {
-  trace_.series.time = test.joints.front().time;
-  for (const record::Record& joint : test.joints) {
-    trace_.series.measured.push_back(joint.column(rig_.channel));
-    trace_.series.before.emplace_back(joint.size(), kNaN);
-  }
-  trace_.series.after = trace_.series.before;
+  return out;
 }
 
 void Tracer::look_for_pushes(const ArmRecord& test) {
@@ -430,7 +372,7 @@ ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test,
   trace_.augmented = base_.rig;
   if (holds_pose(test, settings_.push)) {
     look_for_pushes(test);
-    set_held_series(test);
+    trace_.series = held_series(test, rig_.channel);
     cannot_judge(
         "The test record holds its pose: friction at rest hides what the drives carry, so no error is given; "
         "pushes are "

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "trace_result.h"
+
+#include <cmath>
+
+#include "backlash_diagnosis/base/not_a_number.h"
+
+namespace backlash::arm {
+
+std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked) {
+  std::vector<FittedMotion> all;
+  for (const ArmMotion& m : motions) all.push_back({&m, marked});
+  return all;
+}
+
+ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken) {
+  const FitFreedom& freedom = taken.freedom;
+  ArmRig out = taken.fit.rig;
+  if (freedom.payload)
+    out.payloads.push_back({rig.chain.joints[*freedom.payload].link, freedom.payload_sign,
+                            BodyParameters(freedom.payload_sign * taken.fit.payload)});
+  if (freedom.tilt)
+    out.chain.gravity =
+        tilted(taken.fit.rig.chain.gravity, {taken.fit.tilt[0].value, taken.fit.tilt[1].value});
+  for (std::size_t j = 0; j < rig.joints.size(); ++j) {
+    out.joints[j].terms[std::size_t(DriveTerm::offset)] += taken.fit.shifts[j];
+    for (const DriveTerm t :
+         {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
+      out.joints[j].terms[std::size_t(t)] *= taken.fit.friction_factors[j].value;
+  }
+  return out;
+}
+
+ArmTrace::Series series_of(const Motions& judged, const ArmFit& base, const FitFreedom& freedom,
+                           const ArmFit& fit, bool marked) {
+  ArmTrace::Series out;
+  const std::size_t joints = fit.rig.joints.size();
+  out.measured.resize(joints), out.before.resize(joints), out.after.resize(joints);
+  for (const ArmMotion& m : judged) {
+    const Prediction before = predict(base, {}, {&m, false}),
+                     after = predict(fit, marked ? freedom : FitFreedom(), {&m, marked});
+    for (std::size_t k = 0; k < m.rows.size(); ++k) {
+      out.time.push_back(m.time[m.rows[k]]);
+      for (std::size_t j = 0; j < joints; ++j) {
+        const auto r = Eigen::Index(k), c = Eigen::Index(j);
+        const bool counts = m.counts(r, c);
+        out.measured[j].push_back(before.measured(r, c));
+        out.before[j].push_back(counts ? before.predicted(r, c) : kNaN);
+        out.after[j].push_back(counts ? after.predicted(r, c) : kNaN);
+      }
+    }
+  }
+  return out;
+}
+
+ArmTrace::Series held_series(const ArmRecord& record, record::Channel channel) {
+  ArmTrace::Series out;
+  out.time = record.joints.front().time;
+  for (const record::Record& joint : record.joints) {
+    out.measured.push_back(joint.column(channel));
+    out.before.emplace_back(joint.size(), kNaN);
+  }
+  out.after = out.before;
+  return out;
+}
+
+std::vector<double> noise_floors(const Motions& judged, const std::vector<double>& errors) {
+  std::vector<double> out;
+  for (std::size_t j = 0; j < errors.size(); ++j) {
+    double noise = 0, count = 0, sum = 0, squares = 0;
+    for (const ArmMotion& m : judged)
+      for (std::size_t k = 0; k < m.rows.size(); ++k) {
+        if (!m.counts(Eigen::Index(k), Eigen::Index(j))) continue;
+        const double s = m.signal(Eigen::Index(m.rows[k]), Eigen::Index(j));
+        count += 1, sum += s, squares += s * s;
+        noise += m.noise[Eigen::Index(j)] * m.noise[Eigen::Index(j)];
+      }
+    out.push_back(std::isnan(errors[j]) ? kNaN : std::sqrt(noise / (squares - sum * sum / count)));
+  }
+  return out;
+}
+
+}  // namespace backlash::arm
