@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "change_scan.h"
+#include "healthy_columns.h"
 
 namespace backlash::changes {
 namespace {
@@ -15,57 +16,12 @@ constexpr double kFluctuation =
     3.5;  // simulation: times rms torque over rms speed, see load_dependent_friction
 constexpr double kWarmUps[] = {20, 40, 60, 80, 110, 150, 220, 300, 400};  // s, tried. Choice
 
-constexpr double kOtherWarmUp = 0.2;   // - of its time, by which another warm-up differs. Choice
-constexpr double kMostBeside = 3;      // of dry friction, that another part of it may be. Choice: it is none
-constexpr std::size_t kMostRests = 8;  // of a record, the longest. Choice
-constexpr double kLeastSpread = 1e-9;  // so that all can be divided by
-
-// Columns in this order: of the equation of motion; of the deflection, that under the same load.
-enum Base { kInertia, kViscous, kCoulomb, kOffset, kCosine, kSine, kJerk, kCommonColumns };
-enum TorqueBase { kWarmViscous = kCommonColumns, kWarmCoulomb };
-enum DeflectionBase { kHalfGap = kCommonColumns, kScale };
-
-Eigen::MatrixXd beside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  Eigen::MatrixXd out(a.rows(), a.cols() + b.cols());
-  out << a, b;
-  return out;
-}
-
-using OfMoment = std::function<double(const Moment&)>;
-
-std::vector<OfMoment> lasting(const MotionSampling& sampling) {
-  std::vector<OfMoment> all(kCommonColumns);
-  all[kInertia] = [](const Moment& m) { return m.acceleration; };
-  all[kViscous] = [](const Moment& m) { return m.speed; };
-  all[kCoulomb] = [](const Moment& m) { return m.direction; };
-  all[kOffset] = [](const Moment&) { return 1; };
-  all[kCosine] = [](const Moment& m) { return std::cos(m.position); };
-  all[kSine] = [](const Moment& m) { return std::sin(m.position); };
-  all[kJerk] = [](const Moment& m) { return m.jerk; };
-  if (sampling.channel == ChangeChannel::torque) return all;
-  if (sampling.chain) all[kInertia] = [](const Moment& m) { return m.chain; };
-  all.emplace_back([](const Moment& m) { return m.side(); });    // kHalfGap
-  all.emplace_back([](const Moment& m) { return m.position; });  // kScale
-  return all;
-}
-
-/// What warms up: none of the deflection.
-std::vector<OfMoment> warming(const MotionSampling& sampling, double warm_up) {
-  if (sampling.channel == ChangeChannel::deflection) return {};
-  return {[=](const Moment& m) { return m.speed * std::exp(-m.time / warm_up); },
-          [=](const Moment& m) { return m.direction * std::exp(-m.time / warm_up); }};
-}
-
 Eigen::MatrixXd lasting_columns(const SampledMotion& motion) {
   return columns(motion, lasting(motion.sampling));
 }
 
 Eigen::MatrixXd warm_columns(const SampledMotion& motion, double warm_up) {
   return columns(motion, warming(motion.sampling, warm_up));
-}
-
-Eigen::MatrixXd base_columns(const SampledMotion& motion, double warm_up) {
-  return beside(lasting_columns(motion), warm_columns(motion, warm_up));
 }
 
 struct HealthyData {
@@ -353,133 +309,6 @@ Eigen::VectorXd expected_squares(const HealthyModel& model, const SampledMotion&
   Eigen::VectorXd out(motion.size());
   for (Eigen::Index i = 0; i < out.size(); ++i)
     out[i] = model.steady + model.rough * motion.moment(i).roughness;
-  return out;
-}
-
-namespace {
-
-struct Rest {
-  double from, to;  // s, without motion
-};
-
-/// The longest ones.
-std::vector<Rest> rests_of(const SampledMotion& motion, const ChangeSettings& settings) {
-  std::vector<Rest> rests;
-  for (Eigen::Index r = 1; r < motion.size(); ++r)
-    if (motion.time(r) - motion.time(r - 1) > settings.rest)
-      rests.push_back({motion.time(r - 1), motion.time(r)});
-  std::sort(rests.begin(), rests.end(),
-            [](const Rest& a, const Rest& b) { return a.to - a.from > b.to - b.from; });
-  if (rests.size() > kMostRests) rests.resize(kMostRests);
-  return rests;
-}
-
-/// What may be there to some degree, and no change: its column, and its values' standard deviation.
-struct Nuisances {
-  std::vector<OfMoment> columns;
-  std::vector<double> spread;
-  Eigen::Index wanders = 0;  // how many of the columns, the first ones, are of what wanders
-
-  void add(OfMoment column, double of_values) {
-    columns.push_back(std::move(column));
-    spread.push_back(std::max(of_values, kLeastSpread));
-  }
-};
-
-/// Dry friction of the healthy machine over that of fast motion: what it shows beside is a part of it, and
-/// comes and goes with the same temperature and oil.
-OfMoment dry_friction(const HealthyModel& model) {
-  std::vector<std::pair<double, OfMoment>> parts;
-  Eigen::Index i = kWarmCoulomb + 1;
-  for (const ChangeEffect& e : model.further)
-    for (const auto& f : e.columns) {
-      const double share = model.values[i++] / model.values[kCoulomb], shape = e.shape;
-      if (e.rubs() && std::fabs(share) < kMostBeside)
-        parts.emplace_back(share, [f, shape](const Moment& m) { return f(m, shape); });
-    }
-  return [parts](const Moment& m) {
-    double sum = m.direction;
-    for (const auto& [share, f] : parts) sum += share * f(m);
-    return sum;
-  };
-}
-
-/// What wanders, straight between knots: dry and viscous friction; both flanks and the gap between them.
-void add_wander(const HealthyModel& model, double length, const ChangeSettings& settings, Nuisances& out) {
-  const bool torque = model.sampling.channel == ChangeChannel::torque;
-  const auto share = [&](int k) { return settings.wander * std::fabs(model.values[k]); };
-  const double first = torque ? share(kCoulomb) : share(kHalfGap);
-  const double second = torque ? share(kViscous) : first;
-  const OfMoment flank = [](const Moment& m) { return m.side(); };
-  const OfMoment rubbing = torque ? dry_friction(model) : flank;
-  const int cells = std::max(1, static_cast<int>(std::lround(length / settings.wander_time)));
-  for (int k = 0; k <= cells; ++k) {
-    const auto hat = [=](const Moment& m) {
-      return std::max(0.0, 1 - std::fabs(m.time / length * cells - k));
-    };
-    out.add([=](const Moment& m) { return rubbing(m) * hat(m); }, first);
-    out.add([=](const Moment& m) { return (torque ? m.speed : 1) * hat(m); }, second);
-  }
-}
-
-/// The equation has dry friction alone warm up, in one time: the rest of it does as well, more or less, and
-/// each day is another.
-void add_warm_rest(const HealthyModel& model, Nuisances& out) {
-  const double warm_up = model.warm_up;
-  const double share = std::fabs(model.values[kWarmCoulomb] / model.values[kCoulomb]);
-  const auto slower = [=](const Moment& m) { return m.time / warm_up * std::exp(-m.time / warm_up); };
-  out.add([=](const Moment& m) { return m.direction * slower(m); },
-          kOtherWarmUp * std::fabs(model.values[kWarmCoulomb]));
-  out.add([=](const Moment& m) { return m.speed * slower(m); },
-          kOtherWarmUp * std::fabs(model.values[kWarmViscous]));
-  Eigen::Index i = kWarmCoulomb + 1;
-  for (const ChangeEffect& e : model.further)
-    for (const auto& f : e.columns) {
-      const double spread = std::min(share, 1.0) * std::fabs(model.values[i++]), shape = e.shape;
-      if (e.rubs())
-        out.add([=](const Moment& m) { return f(m, shape) * std::exp(-m.time / warm_up); }, spread);
-    }
-}
-
-/// At rest the machine cools down, and warms up again after; or the clock was set.
-void add_rest(const HealthyModel& model, const Rest& rest, Nuisances& out) {
-  const double warm_up = model.warm_up, end = rest.to;
-  const auto cooled = [=](const Moment& m) { return m.time < end ? 0 : std::exp(-(m.time - end) / warm_up); };
-  const double share = 1 - std::exp(-(rest.to - rest.from) / warm_up);
-  const OfMoment rubbing = dry_friction(model);
-  out.add([=](const Moment& m) { return rubbing(m) * cooled(m); }, share * model.spread[kWarmCoulomb]);
-  out.add([=](const Moment& m) { return m.speed * cooled(m); }, share * model.spread[kWarmViscous]);
-}
-
-Nuisances nuisances_of(const HealthyModel& model, const SampledMotion& motion,
-                       const ChangeSettings& settings) {
-  Nuisances out;
-  const double length = motion.moments.back().time;
-  const bool torque = motion.sampling.channel == ChangeChannel::torque;
-  add_wander(model, length, settings, out);
-  if (torque) out.add([=](const Moment& m) { return m.direction * (m.time / length - 0.5); }, model.drift);
-  out.wanders = static_cast<Eigen::Index>(out.columns.size());
-  if (!torque) return out;
-  add_warm_rest(model, out);
-  if (motion.sampling.chain) out.add([](const Moment& m) { return m.chain; }, settings.chain_share);
-  for (const Rest& rest : rests_of(motion, settings)) add_rest(model, rest, out);
-  return out;
-}
-
-}  // namespace
-
-Whitened residual_of(const HealthyModel& model, const SampledMotion& motion, const ChangeSettings& settings) {
-  Eigen::MatrixXd known = base_columns(motion, model.warm_up);
-  for (const ChangeEffect& e : model.further) known = beside(known, *effect_columns(motion, e));
-  Whitened out;
-  out.residual = motion.target - known * model.values;
-  const Nuisances more = nuisances_of(model, motion, settings);
-  out.nuisances = beside(known, columns(motion, more.columns));
-  out.wander = known.cols();
-  out.wanders = more.wanders;
-  const auto count = static_cast<Eigen::Index>(more.spread.size());
-  out.spread.resize(model.spread.size() + count);
-  out.spread << model.spread, Eigen::Map<const Eigen::VectorXd>(more.spread.data(), count);
   return out;
 }
 
