@@ -44,4 +44,5 @@ fuzz csv csv || found=1
 fuzz rig yaml || found=1
 fuzz curve yaml || found=1
 fuzz joint_state names || found=1
+fuzz recording recording || found=1
 exit "${found}"

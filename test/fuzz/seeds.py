@@ -1,10 +1,18 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes what the fuzzers begin with: rig files of the package, a small curve, a baseline, limits, small records."""
+"""Writes what the fuzzers begin with: rig files of the package, a small curve, a baseline, limits, small records and
+recordings."""
 import os
 import random
 import re
+import shutil
+import sqlite3
+import struct
 import sys
+
+import rosbag
+import rospy
+from sensor_msgs.msg import JointState
 
 QUANTILES = 100  # kQuantiles
 
@@ -48,6 +56,60 @@ def write(folder, name, text):
         out.write(text if isinstance(text, bytes) else text.encode())
 
 
+def joint_states():
+    for i in range(30):
+        message = JointState(name=["joint_motor", "joint_load"], position=[0.1 * i, 0.1 * i - 0.01], effort=[0.5, -0.5])
+        message.header.stamp = rospy.Time(1_700_000_000, 1_000_000 * i)
+        yield message
+
+
+def cdr(message):
+    """Little-endian CDR, strings and doubles aligned from behind the four bytes that say so."""
+    body = b""
+
+    def put(form, *values):
+        nonlocal body
+        size = 8 if "d" in form else 4
+        body += b"\0" * (-len(body) % size) + struct.pack("<" + form, *values)
+
+    def text(words):
+        nonlocal body
+        put("I", len(words) + 1)
+        body += words.encode() + b"\0"
+
+    put("iI", message.header.stamp.secs, message.header.stamp.nsecs)
+    text("")
+    put("I", len(message.name))
+    for name in message.name:
+        text(name)
+    for values in (message.position, message.velocity, message.effort):
+        put("I", len(values))
+        if values:
+            put("%dd" % len(values), *values)
+    return b"\0\1\0\0" + body
+
+
+def write_recordings(data, out):
+    os.makedirs(out, exist_ok=True)
+    for compression in (rosbag.Compression.NONE, rosbag.Compression.LZ4, rosbag.Compression.BZ2):
+        with rosbag.Bag(os.path.join(out, compression + ".bag"), "w", compression, 1500) as bag:
+            for message in joint_states():
+                bag.write("/joint_states", message, message.header.stamp)
+    for name in sorted(os.listdir(data)):
+        if name.endswith(".mcap"):
+            shutil.copy(os.path.join(data, name), out)
+    path = os.path.join(out, "run.db3")
+    if os.path.exists(path):
+        os.remove(path)
+    with sqlite3.connect(path) as db:
+        db.execute("PRAGMA page_size=512")
+        db.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)")
+        db.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+        db.execute("INSERT INTO topics VALUES(1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr')")
+        db.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES(1, ?, ?)",
+                       [(m.header.stamp.to_nsec(), cdr(m)) for m in joint_states()])
+
+
 def main(config, out):
     for name in sorted(os.listdir(config)):
         if os.path.isdir(os.path.join(config, name)):
@@ -62,6 +124,7 @@ def main(config, out):
         write(os.path.join(out, "curve"), name, text)
     for number, text in enumerate(RECORDS):
         write(os.path.join(out, "csv"), "record_%d" % number, text)
+    write_recordings(os.path.join(config, "..", "test", "data", "recording"), os.path.join(out, "recording"))
     rng = random.Random(1)
     for number in range(8):
         write(os.path.join(out, "joint_state"), "messages_%d" % number, bytes(rng.randrange(256) for _ in range(2000)))

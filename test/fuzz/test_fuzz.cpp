@@ -19,6 +19,7 @@ extern "C" {
 int fuzz_csv(const std::uint8_t* data, std::size_t size);
 int fuzz_rig(const std::uint8_t* data, std::size_t size);
 int fuzz_curve(const std::uint8_t* data, std::size_t size);
+int fuzz_recording(const std::uint8_t* data, std::size_t size);
 }
 
 namespace backlash {
@@ -104,6 +105,10 @@ TEST_F(Fuzz, Rig) {
 
 TEST_F(Fuzz, Curve) {
   try_all("curve", fuzz_curve);
+}
+
+TEST_F(Fuzz, Recording) {
+  try_all("recording", fuzz_recording);
 }
 
 }  // namespace
