@@ -13,12 +13,13 @@ namespace {
 constexpr double kSameEvent = 5;  // s between onsets of what is one change. As in the search for changes
 constexpr double kEdge = 30;      // s at either end of a stretch in which a look may miss one. Choice: three
                                   // times the margin of the search, and what an onset is uncertain by
-constexpr int kMostMissed = 3;    // looks in a row, then a change is withdrawn. Choice
+constexpr int kMostMissed = 3;    // looks in a row, then a change is withdrawn, or no longer seen. Choice
 constexpr double kSharper = 0.9;  // - of an interval that is worth telling. Choice
 constexpr double kUndone = 3;     // standard errors within which a size is undone. Choice
 
 const std::pair<ChangeState, const char*> kStates[] = {{ChangeState::suspected, "suspected"},
                                                        {ChangeState::standing, "standing"},
+                                                       {ChangeState::unseen, "unseen"},
                                                        {ChangeState::ended, "ended"},
                                                        {ChangeState::withdrawn, "withdrawn"}};
 
@@ -42,6 +43,18 @@ bool says_more(const FoundChange& found, const FoundChange& known) {
   return found.effect != known.effect || found.until.has_value() != known.until.has_value() ||
          found.since_to - found.since_from < kSharper * (known.since_to - known.since_from) ||
          first_error(found) < kSharper * first_error(known);
+}
+
+/// Whether the stretch has this change, or another of its joint, from its beginning.
+bool shows(const ChangeLook& look, const FoundChange& change) {
+  return std::any_of(look.different.begin(), look.different.end(), [&](const std::string& d) {
+    return d.find(change.joint) != std::string::npos || d.find(change.effect) != std::string::npos;
+  });
+}
+
+bool judged(const ChangeLook& look, const std::string& joint) {
+  const auto of = [&](const std::string& u) { return !joint.empty() && u.find(joint) == 0; };
+  return look.windows > 0 && std::none_of(look.unjudged.begin(), look.unjudged.end(), of);
 }
 
 bool near(double a, double b, const FoundSize& x, const FoundSize& y) {
@@ -153,6 +166,7 @@ std::vector<long> ChangeLedger::take(const ChangeLook& look) {
     }
   }
   miss(look, keys_taken, news);
+  lose(look, news);
   note_difference(look);
   return news;
 }
@@ -176,6 +190,31 @@ void ChangeLedger::miss(const ChangeLook& look, const std::vector<long>& keys_ta
   known_.erase(std::remove_if(known_.begin(), known_.end(), forgotten), known_.end());
   if (known_.size() > kMostKnown)
     known_.erase(known_.begin(), known_.end() - static_cast<std::ptrdiff_t>(kMostKnown));
+}
+
+/// Changes before this look's time: while they stand it differs from its beginning. Those that no look ever
+/// saw so are too small for that, and its absence says nothing.
+void ChangeLedger::lose(const ChangeLook& look, std::vector<long>& news) {
+  const auto another = [&](const KnownChange& k) {  // stands, and may be what the look sees
+    return std::any_of(known_.begin(), known_.end(), [&](const KnownChange& o) {
+      return o.key != k.key && o.state == ChangeState::standing && o.found.joint == k.found.joint;
+    });
+  };
+  for (KnownChange& k : known_) {
+    const bool open = k.state == ChangeState::standing || k.state == ChangeState::unseen;
+    if (!open || k.found.since_to > look.from || !judged(look, k.found.joint)) continue;
+    const ChangeState was = k.state;
+    if (k.state == ChangeState::unseen && another(k)) continue;
+    if (shows(look, k.found)) {
+      k.differed = true;
+      k.alike = 0;
+      k.seen = look.to;
+      k.state = ChangeState::standing;
+    } else if (k.differed && look.different.empty() && look.changes.empty() && ++k.alike >= kMostMissed) {
+      k.state = ChangeState::unseen;
+    }
+    if (k.state != was) news.push_back(k.id);
+  }
 }
 
 void ChangeLedger::note_difference(const ChangeLook& look) {

@@ -149,8 +149,10 @@ Json row_of(const JointDay& joint) {
               {"told", told_text(joint, told)},
               {"changes", Json::array()}};
   for (const diagnosis::KnownChange& c : joint.changes)
-    row["changes"].push_back(change_text(c.found) +
-                             (c.state == diagnosis::ChangeState::ended ? ", over" : ""));
+    row["changes"].push_back(change_text(c.found) + (c.state == diagnosis::ChangeState::ended ? ", over"
+                                                     : c.state == diagnosis::ChangeState::unseen
+                                                         ? ", no longer seen"
+                                                         : ""));
   return row;
 }
 

@@ -30,11 +30,11 @@ std::string joint_of(const diagnosis::KnownChange& change, const JointWatch& wat
   return change.found.joint.empty() ? watch.joint() : change.found.joint;
 }
 
-/// The changes that the joint has now, in words; empty: none.
-std::string standing(const WatchState& state) {
+/// The changes in a state, in words; empty: none.
+std::string changes_in(diagnosis::ChangeState wanted, const WatchState& state) {
   std::vector<std::string> texts;
   for (const diagnosis::KnownChange& c : state.changes)
-    if (c.state == diagnosis::ChangeState::standing) texts.push_back(report::change_text(c.found));
+    if (c.state == wanted) texts.push_back(report::change_text(c.found));
   return joined(texts);
 }
 
@@ -150,7 +150,8 @@ void ChangeWatchNode::publish(const std::vector<diagnosis::KnownChange>& news, c
 void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
   const WatchState state = joint.state();
   const double silent = state.any_sample ? (ros::WallTime::now() - state.last_arrival).toSec() : 0;
-  if (const std::string changed = standing(state); !changed.empty())
+  const std::string unseen = changes_in(diagnosis::ChangeState::unseen, state);
+  if (const std::string changed = changes_in(diagnosis::ChangeState::standing, state); !changed.empty())
     status.summary(DiagnosticStatus::WARN, "changed: " + changed);
   else if (!state.any_sample)
     status.summary(DiagnosticStatus::STALE,
@@ -167,7 +168,8 @@ void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
                                                ": since when cannot be told");
   else
     status.summary(DiagnosticStatus::OK, "as commissioned, up to " + utc_time(state.to) +
-                                             (state.unjudged.empty() ? "" : ", but for joints not judged"));
+                                             (state.unjudged.empty() ? "" : ", but for joints not judged") +
+                                             (unseen.empty() ? "" : "; no longer seen: " + unseen));
   const WatchSettings& settings = joint.settings();
   status.add("Healthy machine", state.healthy.empty() ? "being learned" : state.healthy);
   status.addf("False alarms", "%s per hour and look", to_text(settings.rate).c_str());

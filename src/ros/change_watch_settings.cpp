@@ -69,8 +69,8 @@ subscribes
   joint_states   sensor_msgs/JointState: JOINT_motor with position and effort; other topics and names where
                  the rig file's `channels` say so
 publishes
-  changes        backlash_diagnosis/ChangeReport, latched: when a change is new, known better, over or
-                 withdrawn
+  changes        backlash_diagnosis/ChangeReport, latched: when a change is new, known better, over,
+                 withdrawn or no longer seen
   /diagnostics   diagnostic_msgs/DiagnosticArray: "JOINT: model", OK, WARN (changed), STALE (cannot tell)
 )";
 }

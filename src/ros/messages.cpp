@@ -157,6 +157,7 @@ backlash_diagnosis::Change to_message(const diagnosis::KnownChange& change, cons
   m.id = static_cast<std::uint32_t>(change.id);
   m.state = change.state == diagnosis::ChangeState::standing ? Message::STANDING
             : change.state == diagnosis::ChangeState::ended  ? Message::ENDED
+            : change.state == diagnosis::ChangeState::unseen ? Message::UNSEEN
                                                              : Message::WITHDRAWN;
   m.state_name = diagnosis::to_string(change.state);
   m.effect = found.effect;

@@ -31,6 +31,7 @@ ChangeLook look(double to, std::vector<FoundChange> changes, std::vector<std::st
   ChangeLook l;
   l.from = kStart + to - 300;
   l.to = kStart + to;
+  l.windows = 10;
   l.changes = std::move(changes);
   l.different = std::move(different);
   return l;
@@ -118,6 +119,53 @@ TEST(ChangeLedger, TheEndThatWasToldIsNoFurtherChange) {
   // What falls further than to where it was begins another change.
   ledger.take(look(5000, {coulomb(4950, -0.6)}));
   EXPECT_EQ(ledger.take(look(5060, {coulomb(4950, -0.6)})), std::vector<long>{2});
+}
+
+// The machine stood still, or nobody listened, while it was mended.
+TEST(ChangeLedger, AnEndThatNoLookSawIsNoLongerSeen) {
+  ChangeLedger ledger;
+  ledger.take(look(1000, {coulomb(950, 0.6)}));
+  ledger.take(look(1060, {coulomb(950, 0.6)}));
+  for (int to = 1300; to < 2000; to += 60) EXPECT_TRUE(ledger.take(look(to, {}, {"motor_coulomb"})).empty());
+  EXPECT_TRUE(ledger.take(look(5000, {})).empty());
+  EXPECT_TRUE(ledger.take(look(5060, {})).empty());
+  EXPECT_EQ(ledger.change(1).state, ChangeState::standing);
+  EXPECT_EQ(ledger.take(look(5120, {})), std::vector<long>{1});
+  EXPECT_EQ(ledger.change(1).state, ChangeState::unseen);
+  EXPECT_FALSE(ledger.change(1).found.until);  // when, no look saw
+  // It was the motion that did not show it.
+  EXPECT_EQ(ledger.take(look(6000, {}, {"motor_coulomb"})), std::vector<long>{1});
+  EXPECT_EQ(ledger.change(1).state, ChangeState::standing);
+}
+
+TEST(ChangeLedger, WhatIsNoLongerSeenDoesNotComeBackWithAnotherChange) {
+  ChangeLedger ledger;
+  ledger.take(look(1000, {coulomb(950, 0.6)}));
+  ledger.take(look(1060, {coulomb(950, 0.6)}));
+  ledger.take(look(1300, {}, {"motor_coulomb"}));
+  for (int to = 5000; to < 5200; to += 60) ledger.take(look(to, {}));
+  ASSERT_EQ(ledger.change(1).state, ChangeState::unseen);
+  ledger.take(look(6000, {coulomb(5950, 0.4)}));
+  EXPECT_EQ(ledger.take(look(6060, {coulomb(5950, 0.4)})), std::vector<long>{2});
+  EXPECT_TRUE(ledger.take(look(7000, {}, {"motor_coulomb"})).empty());
+  EXPECT_EQ(ledger.change(1).state, ChangeState::unseen);
+  EXPECT_EQ(ledger.change(2).state, ChangeState::standing);
+}
+
+TEST(ChangeLedger, WhatLooksAfterItsOnsetNeverShowedIsNotTakenForGone) {
+  ChangeLedger ledger;
+  ledger.take(look(1000, {coulomb(950, 0.6)}));
+  ledger.take(look(1060, {coulomb(950, 0.6)}));
+  for (int to = 1300; to < 5000; to += 60) EXPECT_TRUE(ledger.take(look(to, {})).empty());
+  EXPECT_EQ(ledger.change(1).state, ChangeState::standing);
+  // Nor do looks that could judge nothing say that it has gone.
+  ledger.take(look(5000, {}, {"motor_coulomb"}));
+  for (int to = 5300; to < 7000; to += 60) {
+    ChangeLook nothing = look(to, {});
+    nothing.windows = 0;
+    EXPECT_TRUE(ledger.take(nothing).empty());
+  }
+  EXPECT_EQ(ledger.change(1).state, ChangeState::standing);
 }
 
 TEST(ChangeLedger, EndsASineOfOppositePhase) {

@@ -48,6 +48,8 @@ struct ChangeLook {
 enum class ChangeState {
   suspected,  // found by one look
   standing,
+  unseen,  // the last looks do not differ from the healthy machine, as earlier ones after the onset did: it
+           // has ended at a time that no look saw, or the motion no longer shows it
   ended,
   withdrawn,  // later looks at the same time found none
 };
@@ -58,11 +60,13 @@ std::optional<ChangeState> change_state_from(const std::string& name);
 struct KnownChange {
   long id = 0;  // counted from 1 in the order in which they are told; 0: not told
   ChangeState state = ChangeState::suspected;
-  FoundChange found;  // the sharpest so far
-  double seen = 0;    // s, end of the last stretch in which it was found
-  int missed = 0;     // looks in a row that should have found it
-  long key = 0;       // of the ledger
-  long ends = 0;      // the change that this one undoes, by id; 0: none. Not told by itself
+  FoundChange found;      // the sharpest so far
+  double seen = 0;        // s, end of the last stretch in which it was found
+  int missed = 0;         // looks in a row that should have found it
+  long key = 0;           // of the ledger
+  long ends = 0;          // the change that this one undoes, by id; 0: none. Not told by itself
+  bool differed = false;  // a look at the time after its onset saw the machine differ from its beginning
+  int alike = 0;          // looks in a row, since then, that saw no difference
   bool told() const { return id > 0; }
 };
 
@@ -93,6 +97,7 @@ class ChangeLedger {
   long undone_by(const FoundChange& found) const;
   bool confirm(KnownChange& known);
   void miss(const ChangeLook& look, const std::vector<long>& keys_taken, std::vector<long>& news);
+  void lose(const ChangeLook& look, std::vector<long>& news);
   void note_difference(const ChangeLook& look);
 
   std::vector<KnownChange> known_;
