@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/base/text.h"
+#include "joint_effects.h"
 
 namespace backlash::arm {
 
@@ -72,6 +73,8 @@ JointDrive read_joint(const YamlReader& yaml) {
   }
   joint.delay = yaml.number_or("delay", 0, Range::between(-kLongestDelay, kLongestDelay));
   yaml.uncertainty("delay");
+  if (yaml.has("effects"))
+    for (const YamlReader& effect : yaml.maps("effects")) joint.effects.push_back(read_joint_effect(effect));
   // of the room geared_arm
   for (const char* key :
        {"gear", "limits", "link_coulomb", "link_viscous", "held", "excitation", "motion_limits"})
@@ -144,9 +147,19 @@ void read_drives(const YamlReader& yaml, ArmRig& rig) {
       joint.fail("torque_constant", "a torque is recorded: must be 1 or absent");
   }
   if (rig.joints.empty()) yaml.fail("joints", "must name at least one");
+  for (const JointDrive& joint : rig.joints)
+    for (const JointEffect& effect : joint.effects)
+      if (is_coupling(effect) && (effect.other == joint.name || !index_of(rig, effect.other)))
+        yaml.fail("joints", joint.name + ", effects: '" + printable(effect.other) + "' is no other joint");
 }
 
 }  // namespace
+
+std::optional<std::size_t> index_of(const ArmRig& rig, const std::string& joint) {
+  for (std::size_t j = 0; j < rig.joints.size(); ++j)
+    if (rig.joints[j].name == joint) return j;
+  return std::nullopt;
+}
 
 std::vector<std::string> ArmRig::joint_names() const {
   std::vector<std::string> names;
@@ -250,6 +263,8 @@ std::string joint_text(const ArmRig& rig, const JointDrive& joint) {
   }
   if (joint.training_error > 0)
     text += fmt::format("    training_error: {:.4g}  # relative\n", joint.training_error);
+  if (!joint.effects.empty()) text += "    effects:\n";
+  for (const JointEffect& effect : joint.effects) text += "      - " + joint_effect_text(effect) + "\n";
   return text + fmt::format("    delay: {:.6g}  # s\n", joint.delay);
 }
 

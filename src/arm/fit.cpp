@@ -21,6 +21,8 @@ constexpr double kLongestMemory = 3;  // s; choice
 constexpr double kSettled = 1e-3;     // standard errors; choice
 constexpr double kLag = 0.1;  // of Coulomb friction, bristles and Stribeck; choice, tried on drawn arms
 
+constexpr double kLeastShape = 0.2;  // of what it was, after a step; choice
+
 using Mask = Eigen::Matrix<char, Eigen::Dynamic, Eigen::Dynamic>;
 
 /// How many successive rows say the same once: 1 + 2 sum of the residual's autocorrelation.
@@ -53,7 +55,7 @@ class Fit {
         freedom_(freedom),
         settings_(settings),
         model_(rig, freedom),
-        layout_{Eigen::Index(rig.joints.size())},
+        layout_(layout_of(rig, freedom)),
         state_(model_.start()),
         weight_(rig.joints.size(), 0),
         deviation_(rig.joints.size(), kNaN) {}
@@ -183,13 +185,20 @@ std::vector<char> Fit::free_unknowns(bool first) const {
   for (Eigen::Index j = 0; j < layout_.joints; ++j) {
     if (!moves_[std::size_t(j)]) continue;
     if (freedom_.friction) set(layout_.friction(j), 1), set(layout_.shift(j), 1);
-    if (freedom_.drives)
+    if (freedom_.of_drive(std::size_t(j)))
       for (const DriveTerm t : rig_.terms) set(layout_.drive(j) + Eigen::Index(t), 1);
     if (freedom_.load && rig_.joints[std::size_t(j)].load_error > 0)
       set(layout_.drive(j) + Eigen::Index(DriveTerm::load), 1);
     if (freedom_.constants && !first && rig_.joints[std::size_t(j)].constant_error > 0)
       set(layout_.kappa(j), 1);
     if (freedom_.drives && !first) set(layout_.delay(j), 1);
+  }
+  for (std::size_t i = 0; i < freedom_.effects.size(); ++i) {
+    const JointEffectSpec& spec = freedom_.effects[i].effect.spec();
+    if (!moves_[freedom_.effects[i].joint]) continue;
+    const Eigen::Index place = layout_.effect(Eigen::Index(i));
+    set(place, spec.columns);
+    if (spec.has_shape() && !first) set(place + kEffectUnknowns - 1, 1);
   }
   return free;
 }
@@ -203,6 +212,12 @@ void Fit::apply(const Eigen::VectorXd& step) {
   state_.shift += step.segment(layout_.shift(0), layout_.joints);
   for (Eigen::Index j = 0; j < layout_.joints; ++j)
     state_.drives.row(j) += step.segment(layout_.drive(j), kDriveUnknowns).transpose();
+  for (std::size_t i = 0; i < state_.effects.size(); ++i) {
+    const auto own = step.segment<kEffectUnknowns>(layout_.effect(Eigen::Index(i)));
+    state_.effects[i].values += own.head<2>();
+    double& shape = state_.effects[i].shape;  // > 0, of those that have one
+    shape = std::max(shape + own[2], kLeastShape * shape);
+  }
 }
 
 ArmFit Fit::run(const Progress& progress) {
@@ -378,6 +393,10 @@ ArmFit Fit::result(const Eigen::MatrixXd& covariance, const std::vector<std::vec
     const Eigen::Index place = layout_.friction(j);
     fit.shifts.push_back(state_.shift[j]);
     fit.friction_factors.push_back({factor, factor * std::sqrt(std::max(0.0, covariance(place, place)))});
+  }
+  for (std::size_t i = 0; i < state_.effects.size(); ++i) {
+    const Eigen::Index place = layout_.effect(Eigen::Index(i));
+    fit.effects.push_back({state_.effects[i], covariance.block<3, 3>(place, place)});
   }
   set_errors(fit, all);
   if (freedom_.links) fit.base = base_parameters(rig_, motions_, state_, covariance);

@@ -2,15 +2,15 @@
 #include "fit_model.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/arm/dynamics.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "joint_effects.h"
 
 namespace backlash::arm {
-namespace {
 
-/// Low-passed as the signal is, at the rows.
 Eigen::VectorXd at_rows(const Eigen::VectorXd& all, const ArmMotion& m, double cutoff) {
   const std::vector<double> smooth =
       signal::low_pass({all.data(), all.data() + all.size()}, m.interval, cutoff);
@@ -18,6 +18,10 @@ Eigen::VectorXd at_rows(const Eigen::VectorXd& all, const ArmMotion& m, double c
   for (std::size_t k = 0; k < m.rows.size(); ++k) out[Eigen::Index(k)] = smooth[m.rows[k]];
   return out;
 }
+
+namespace {
+
+constexpr double kShapeStep = 1e-3;  // of a shape, to see what it changes; choice: of smooth functions
 
 /// The signal `delay` later, and its rate, at the rows.
 std::pair<Eigen::VectorXd, Eigen::VectorXd> later(const ArmMotion& m, std::size_t j, double delay) {
@@ -41,6 +45,19 @@ Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& ti
          Eigen::AngleAxisd(tilt[1], Eigen::Vector3d::UnitY()) * gravity;
 }
 
+bool FitFreedom::of_drive(std::size_t joint) const {
+  return drives ||
+         std::any_of(effects.begin(), effects.end(), [&](const FreeEffect& e) { return e.joint == joint; });
+}
+
+Layout layout_of(const ArmRig& rig, const FitFreedom& freedom) {
+  return {Eigen::Index(rig.joints.size()), Eigen::Index(freedom.effects.size())};
+}
+
+double FitModel::factor(const State& state, std::size_t j) const {
+  return std::exp(-state.drives(Eigen::Index(j), kDriveTerms)) / rig_.joints[j].constant;
+}
+
 State FitModel::start() const {
   State state;
   state.links = rig_.chain.links;
@@ -51,6 +68,7 @@ State FitModel::start() const {
       state.drives(Eigen::Index(j), Eigen::Index(t)) = rig_.joints[j].terms[t];
     state.drives(Eigen::Index(j), kDriveUnknowns - 1) = rig_.joints[j].delay;
   }
+  for (const FreeEffect& e : freedom_.effects) state.effects.push_back(e.effect);
   return state;
 }
 
@@ -66,20 +84,27 @@ Chain FitModel::chain(const State& state, bool marked) const {
   return chain;
 }
 
+Eigen::MatrixXd FitModel::chain_torque(const State& state, const FittedMotion& motion) const {
+  const ArmMotion& m = *motion.motion;
+  const Chain loaded = chain(state, motion.marked);
+  Eigen::MatrixXd torque(Eigen::Index(m.time.size()), m.q.cols());
+  for (Eigen::Index k = 0; k < torque.rows(); ++k)
+    torque.row(k) = inverse_dynamics(loaded, m.q.row(k), m.v.row(k), m.a.row(k)).transpose();
+  return torque;
+}
+
 std::vector<Linearised> FitModel::linearised(const State& state, const FittedMotion& motion) const {
   const ArmMotion& m = *motion.motion;
   const Chain loaded = chain(state, motion.marked);
   const auto n = Eigen::Index(m.time.size()), count = m.q.cols();
   const bool tilts = freedom_.tilt && motion.marked;
-  Eigen::MatrixXd load(n, count);
+  const Eigen::MatrixXd load = chain_torque(state, motion);
   std::vector<Eigen::MatrixXd> tilt(tilts ? 3 : 0, Eigen::MatrixXd(n, count));
   const Eigen::Matrix3d turns =
       (Eigen::Matrix3d() << Eigen::Vector3d::UnitX().cross(loaded.gravity),
        Eigen::Vector3d::UnitY().cross(loaded.gravity), loaded.gravity - rig_.chain.gravity)
           .finished();
-  for (Eigen::Index k = 0; k < n; ++k) {
-    load.row(k) = inverse_dynamics(loaded, m.q.row(k), m.v.row(k), m.a.row(k)).transpose();
-    if (!tilts) continue;
+  for (Eigen::Index k = 0; tilts && k < n; ++k) {
     const Eigen::MatrixXd by_tilt = gravity_regressor(loaded, m.q.row(k)) * turns;
     for (int i = 0; i < 3; ++i) tilt[std::size_t(i)].row(k) = by_tilt.col(i).transpose();
   }
@@ -93,7 +118,52 @@ std::vector<Linearised> FitModel::linearised(const State& state, const FittedMot
     all.push_back(joint(state, motion, j,
                         at_rows(m.sign.col(c).cwiseProduct(load.col(c).cwiseAbs()), m, cutoff), by_tilt));
   }
+  add_effects(state, motion, load, all);
   return all;
+}
+
+Eigen::MatrixXd FitModel::effect_at_rows(const State& state, const JointEffect& effect, std::size_t j,
+                                         const ArmMotion& m, const Eigen::MatrixXd& chain,
+                                         const std::vector<Eigen::VectorXd>& drives) const {
+  if (is_coupling(effect)) return factor(state, j) * drives[*index_of(rig_, effect.other)];
+  const Eigen::MatrixXd all = effect_columns(effect, m, j, chain.col(Eigen::Index(j)));
+  Eigen::MatrixXd out(Eigen::Index(m.rows.size()), all.cols());
+  for (Eigen::Index i = 0; i < all.cols(); ++i)
+    out.col(i) = factor(state, j) * at_rows(all.col(i), m, rig_.identification.torque_cutoff);
+  return out;
+}
+
+void FitModel::add_effects(const State& state, const FittedMotion& motion, const Eigen::MatrixXd& chain,
+                           std::vector<Linearised>& all) const {
+  const Layout at = layout_of(rig_, freedom_);
+  std::vector<Eigen::VectorXd> drives;
+  for (std::size_t j = 0; j < all.size(); ++j) drives.emplace_back(all[j].predicted / factor(state, j));
+  const auto columns = [&](const JointEffect& e, std::size_t j) {
+    return effect_at_rows(state, e, j, *motion.motion, chain, drives);
+  };
+  for (std::size_t j = 0; j < all.size(); ++j)
+    for (const JointEffect& e : rig_.joints[j].effects)
+      all[j].predicted += columns(e, j) * e.values.head(e.spec().columns);
+  for (std::size_t i = 0; i < freedom_.effects.size(); ++i) {
+    if (!freedom_.effects[i].everywhere && !motion.marked) continue;
+    const std::size_t j = freedom_.effects[i].joint;
+    JointEffect e = state.effects[i];
+    const JointEffectSpec& spec = e.spec();
+    Eigen::MatrixXd& s = all[j].sensitivity;
+    const Eigen::Index count = spec.columns, before = s.cols(), place = at.effect(Eigen::Index(i));
+    s.conservativeResize(Eigen::NoChange, before + count + (spec.has_shape() ? 1 : 0));
+    s.middleCols(before, count) = columns(e, j);
+    const Eigen::VectorXd torque = s.middleCols(before, count) * e.values.head(count);
+    all[j].predicted += torque;
+    for (Eigen::Index c = 0; c < count; ++c) all[j].unknowns.push_back(place + c);
+    if (!spec.has_shape()) continue;
+    const double step = kShapeStep * e.shape;
+    e.shape += step;
+    s.rightCols(1) = (columns(e, j) * e.values.head(count) - torque) / step;
+    all[j].unknowns.push_back(place + kEffectUnknowns - 1);
+  }
+  for (Linearised& joint : all)
+    joint.sensitivity.col(10 * at.joints + Eigen::Index(kDriveTerms)) = -joint.predicted;
 }
 
 Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::size_t j,
@@ -103,7 +173,7 @@ Linearised FitModel::joint(const State& state, const FittedMotion& motion, std::
   const Layout at{Eigen::Index(rig_.joints.size())};
   const bool carries = freedom_.payload && motion.marked, rubs = freedom_.friction && motion.marked,
              tilts = tilt.cols() > 0;
-  const double factor = std::exp(-state.drives(c, kDriveTerms)) / rig_.joints[j].constant;
+  const double factor = this->factor(state, j);
   Linearised out;
   const Eigen::Index links = 10 * at.joints, rows = Eigen::Index(m.rows.size());
   out.sensitivity.resize(rows,

@@ -11,6 +11,7 @@
 namespace backlash::arm {
 
 constexpr Eigen::Index kDriveUnknowns = kDriveTerms + 2;  // the terms, kappa, delay
+constexpr Eigen::Index kEffectUnknowns = 3;               // two values, shape
 
 /// All that a fit may change.
 struct State {
@@ -20,11 +21,12 @@ struct State {
   Eigen::VectorXd friction;                         // logarithms of the factors, one per joint
   Eigen::VectorXd shift;                            // N m, of the offsets
   Eigen::MatrixXd drives;                           // joints x kDriveUnknowns
+  std::vector<JointEffect> effects;                 // those that are free
 };
 
 /// Where the unknowns stand in one vector.
 struct Layout {
-  Eigen::Index joints = 0;
+  Eigen::Index joints = 0, effects = 0;
   Eigen::Index link(Eigen::Index i) const { return 10 * i; }
   Eigen::Index payload() const { return 10 * joints; }
   Eigen::Index tilt() const { return payload() + 10; }
@@ -33,7 +35,8 @@ struct Layout {
   Eigen::Index drive(Eigen::Index j) const { return shift(joints) + kDriveUnknowns * j; }
   Eigen::Index kappa(Eigen::Index j) const { return drive(j) + Eigen::Index(kDriveTerms); }
   Eigen::Index delay(Eigen::Index j) const { return kappa(j) + 1; }
-  Eigen::Index size() const { return drive(joints); }
+  Eigen::Index effect(Eigen::Index i) const { return drive(joints) + kEffectUnknowns * i; }
+  Eigen::Index size() const { return effect(effects); }
 };
 
 /// One joint in one motion: residual ~ sensitivity * step. All rows; those that do not count are to be left
@@ -44,11 +47,23 @@ struct Linearised {
   Eigen::VectorXd measured, predicted;
 };
 
+Layout layout_of(const ArmRig& rig, const FitFreedom& freedom);
+
+/// Low-passed as the signal is, at the rows.
+Eigen::VectorXd at_rows(const Eigen::VectorXd& all, const ArmMotion& motion, double cutoff);
+
 class FitModel {
  public:
   FitModel(const ArmRig& rig, const FitFreedom& freedom) : rig_(rig), freedom_(freedom) {}
 
   State start() const;
+  /// The chain's own torque of each joint at all samples.
+  Eigen::MatrixXd chain_torque(const State& state, const FittedMotion& motion) const;
+  /// What one unit of each value of an effect adds to the channel of joint `j`, at the rows. `chain`: of
+  /// chain_torque(); `drives`: torques of all drives at the rows, without effects.
+  Eigen::MatrixXd effect_at_rows(const State& state, const JointEffect& effect, std::size_t j,
+                                 const ArmMotion& motion, const Eigen::MatrixXd& chain,
+                                 const std::vector<Eigen::VectorXd>& drives) const;
   std::vector<Linearised> linearised(const State& state, const FittedMotion& motion) const;
   Chain chain(const State& state, bool marked) const;
 
@@ -56,9 +71,15 @@ class FitModel {
   /// `tilt`: of the tilt's sensitivity, and what the tilt of the state adds to the torque; empty without.
   Linearised joint(const State& state, const FittedMotion& motion, std::size_t j, const Eigen::VectorXd& load,
                    const Eigen::MatrixXd& tilt) const;
+  void add_effects(const State& state, const FittedMotion& motion, const Eigen::MatrixXd& chain,
+                   std::vector<Linearised>& all) const;
+  double factor(const State& state, std::size_t j) const;  // channel per torque
   const ArmRig& rig_;
   const FitFreedom& freedom_;
 };
+
+/// What a fit has found.
+State state_of(const ArmFit& fit, const FitFreedom& freedom);
 
 /// Gravity turned by tilt[0] about x and tilt[1] about y of the base.
 Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& tilt);

@@ -37,7 +37,7 @@ Eigen::Matrix4d inverse(const Eigen::Matrix4d& p) {
 
 Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& settings,
                const std::vector<char>& moves)
-    : layout_{Eigen::Index(rig.joints.size())},
+    : layout_(layout_of(rig, freedom)),
       weight_(settings.declared_weight),
       mass_(settings.payload_mass),
       radius_(settings.payload_radius),
@@ -53,7 +53,7 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
     const auto c = Eigen::Index(j);
     if (!moves[j]) continue;
     const JointDrive& drive = rig.joints[j];
-    if (freedom.drives) {
+    if (freedom.of_drive(j)) {
       for (const DriveTerm t : rig.terms) {
         if (!kDriveTermSpecs[std::size_t(t)].dissipates) continue;
         const double declared = drive.terms[std::size_t(t)];
@@ -62,8 +62,8 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
                                                         : drive.constant;  // that of 1 A: a size, it follows
         positive_.push_back({layout_.drive(c) + Eigen::Index(t), declared > 0 ? declared : otherwise});
       }
-      normal_.push_back({layout_.delay(c), drive.delay, 1 / (kDelayError * kDelayError)});
     }
+    if (freedom.drives) normal_.push_back({layout_.delay(c), drive.delay, 1 / (kDelayError * kDelayError)});
     if (freedom.friction) {
       normal_.push_back({layout_.friction(c), 0, 1 / (settings.day * settings.day)});
       day_.push_back(c);
@@ -72,10 +72,16 @@ Priors::Priors(const ArmRig& rig, const FitFreedom& freedom, const FitSettings& 
       const Eigen::Index place = layout_.drive(c) + Eigen::Index(DriveTerm::load);
       normal_.push_back(
           {place, drive.terms[std::size_t(DriveTerm::load)], 1 / (drive.load_error * drive.load_error)});
-      positive_.push_back({place, drive.terms[std::size_t(DriveTerm::load)]});
+      if (!freedom.of_drive(j)) positive_.push_back({place, drive.terms[std::size_t(DriveTerm::load)]});
     }
     if (freedom.constants && drive.constant_error > 0)
       normal_.push_back({layout_.kappa(c), 0, 1 / (drive.constant_error * drive.constant_error)});
+  }
+  for (std::size_t i = 0; i < freedom.effects.size(); ++i) {
+    const FreeEffect& e = freedom.effects[i];
+    if (e.effect.spec().has_shape())
+      normal_.push_back({layout_.effect(Eigen::Index(i)) + kEffectUnknowns - 1, e.effect.shape,
+                         1 / (e.shape_spread * e.shape_spread)});
   }
 }
 
@@ -89,6 +95,9 @@ Eigen::VectorXd Priors::vector_of(const State& state) const {
   x.segment(layout_.shift(0), layout_.joints) = state.shift;
   for (Eigen::Index j = 0; j < layout_.joints; ++j)
     x.segment(layout_.drive(j), kDriveUnknowns) = state.drives.row(j).transpose();
+  for (std::size_t i = 0; i < state.effects.size(); ++i)
+    x.segment<kEffectUnknowns>(layout_.effect(Eigen::Index(i))) << state.effects[i].values,
+        state.effects[i].shape;
   return x;
 }
 

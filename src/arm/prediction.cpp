@@ -9,24 +9,21 @@
 
 namespace backlash::arm {
 
-namespace {
-
-State state_of(const ArmFit& fit, const FitFreedom& freedom, const FitModel& model) {
-  State state = model.start();
+State state_of(const ArmFit& fit, const FitFreedom& freedom) {
+  State state = FitModel(fit.rig, freedom).start();
   state.payload = freedom.payload_sign * fit.payload;
   if (freedom.tilt) state.tilt = {fit.tilt[0].value, fit.tilt[1].value};
   if (freedom.friction)
     for (std::size_t j = 0; j < fit.friction_factors.size(); ++j)
       state.friction[Eigen::Index(j)] = std::log(fit.friction_factors[j].value),
       state.shift[Eigen::Index(j)] = fit.shifts[j];
+  for (std::size_t i = 0; i < state.effects.size(); ++i) state.effects[i] = fit.effects[i].effect;
   return state;
 }
 
-}  // namespace
-
 Prediction predict(const ArmFit& fit, const FitFreedom& freedom, const FittedMotion& motion) {
   const FitModel model(fit.rig, freedom);
-  const std::vector<Linearised> all = model.linearised(state_of(fit, freedom, model), motion);
+  const std::vector<Linearised> all = model.linearised(state_of(fit, freedom), motion);
   const auto rows = Eigen::Index(motion.motion->rows.size());
   Prediction out{Eigen::MatrixXd(rows, Eigen::Index(all.size())),
                  Eigen::MatrixXd(rows, Eigen::Index(all.size()))};
@@ -69,7 +66,7 @@ std::vector<double> foretold_errors(const ArmFit& fit, const FitFreedom& freedom
   std::vector<double> count(joints, 0), sum(joints, 0), squares(joints, 0), expected(joints, 0),
       seconds(joints, 0);
   for (const FittedMotion& m : motions) {
-    const std::vector<Linearised> all = model.linearised(state_of(fit, freedom, model), m);
+    const std::vector<Linearised> all = model.linearised(state_of(fit, freedom), m);
     for (std::size_t j = 0; j < joints; ++j) {
       seconds[j] += moving_seconds(*m.motion, j);
       const std::vector<Eigen::Index>& at = all[j].unknowns;

@@ -91,6 +91,15 @@ double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::Mat
   return std::sqrt((v.transpose() * signal::solve_symmetric(c, v))(0, 0));
 }
 
+const char* const kNotConfirmed = "the part that was not fitted does not confirm it in all blocks of time";
+
+std::string gain_refusal(const Candidate& c, const ArmRig& rig, double least) {
+  if (c.gain >= least) return "";
+  return fmt::format(
+      "takes {:.0f} % of the squared error of {} away in the part that was not fitted, {:.0f} % are needed",
+      100 * c.gain, rig.joints[c.joint].name, 100 * least);
+}
+
 }  // namespace
 
 void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
@@ -98,13 +107,29 @@ void judge(Candidate& c, const Candidate& without, const Motions& judged, const 
   bootstrap(c, squares_of(without, c, judged, rig, settings.block), settings);
 }
 
+std::string effect_refusal(Candidate& c, const Candidate& without, const Motions& judged,
+                           const ArmTraceSettings& settings) {
+  c.joint = c.freedom.effects.back().joint;
+  c.gain = c.gains[c.joint], c.lower = c.lowers[c.joint], c.upper = c.uppers[c.joint];
+  if (std::string reason = gain_refusal(c, c.fit.rig, settings.least_at_joint); !reason.empty())
+    return reason;
+  if (!(c.lower > 0) || !(c.all > 0)) return kNotConfirmed;
+  std::vector<FittedMotion> motions;
+  for (const ArmMotion& m : judged) motions.push_back({&m, true});
+  const double error = relative_errors(without.fit, without.freedom, motions, 0)[c.joint];
+  if (const double explained = std::sqrt(c.gain) * error; explained < settings.least_of_signal)
+    return fmt::format("explains {:.1f} % of the channel, {:.1f} % are needed", 100 * explained,
+                       100 * settings.least_of_signal);
+  const FittedEffect& e = c.fit.effects.back();
+  const Eigen::Index n = e.effect.spec().columns;
+  const double errors = standard_errors_from_none(e.effect.values.head(n), e.covariance, 0);
+  if (!(errors > settings.sure)) return fmt::format("its size is {:.1f} standard errors from none", errors);
+  return "";
+}
+
 std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
-  if (c.gain < settings.least_gain)
-    return fmt::format(
-        "takes {:.0f} % of the squared error of {} away in the part that was not fitted, {:.0f} % are needed",
-        100 * c.gain, rig.joints[c.joint].name, 100 * settings.least_gain);
-  if (!(c.lower > 0) || !(c.all_lower > 0))
-    return "the part that was not fitted does not confirm it in all blocks of time";
+  if (std::string reason = gain_refusal(c, rig, settings.least_gain); !reason.empty()) return reason;
+  if (!(c.lower > 0) || !(c.all_lower > 0)) return kNotConfirmed;
   const Layout layout{Eigen::Index(rig.joints.size())};
   if (c.freedom.payload) {  // of mass and moments together: an arm may tell the moments only
     const double errors =

@@ -20,7 +20,8 @@ struct Candidate {
   std::size_t joint = 0;
   double all_lower = 0;  // of the mean of all joints' logarithms, lower end
   double all = 0;
-  std::string reason;  // why not; empty: believed
+  std::vector<std::string> alike;  // effects that the last one was not told from
+  std::string reason;              // why not; empty: believed
 };
 
 /// Gains of `c` over `without` on `judged`, with blocks of time drawn at random.
@@ -29,5 +30,9 @@ void judge(Candidate& c, const Candidate& without, const Motions& judged, const 
 
 /// Why a candidate that was judged is not believed; empty: it is.
 std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings);
+
+/// The same of the last of its effects of a joint; what it gains is from then on that of this joint.
+std::string effect_refusal(Candidate& c, const Candidate& without, const Motions& judged,
+                           const ArmTraceSettings& settings);
 
 }  // namespace backlash::arm

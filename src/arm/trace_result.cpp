@@ -13,6 +13,27 @@ std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked) {
   return all;
 }
 
+std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted) {
+  const JointEffect& e = fitted.effect;
+  const JointEffectSpec& spec = e.spec();
+  const Eigen::Matrix2d c = fitted.covariance.topLeftCorner<2, 2>();
+  std::vector<ArmParameter> out;
+  if (spec.columns == 1) {
+    out.push_back({spec.strength, spec.strength_unit, {e.values[0], std::sqrt(c(0, 0))}});
+  } else {  // v0 cos x + v1 sin x = A sin(x + p)
+    const double amplitude = e.values.norm();
+    const Eigen::Vector2d along = e.values / amplitude, across(along[1], -along[0]);
+    out.push_back({spec.strength, spec.strength_unit, {amplitude, std::sqrt(along.dot(c * along))}});
+    out.push_back({"phase",
+                   "rad",
+                   {std::atan2(e.values[0], e.values[1]), std::sqrt(across.dot(c * across)) / amplitude}});
+  }
+  if (spec.has_shape())
+    out.push_back(
+        {shape_name(spec.shape), shape_unit(spec.shape), {e.shape, std::sqrt(fitted.covariance(2, 2))}});
+  return out;
+}
+
 ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken) {
   const FitFreedom& freedom = taken.freedom;
   ArmRig out = taken.fit.rig;
@@ -28,6 +49,8 @@ ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken) {
          {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
       out.joints[j].terms[std::size_t(t)] *= taken.fit.friction_factors[j].value;
   }
+  for (std::size_t i = 0; i < freedom.effects.size(); ++i)
+    out.joints[freedom.effects[i].joint].effects.push_back(taken.fit.effects[i].effect);
   return out;
 }
 

@@ -12,6 +12,9 @@ namespace backlash::arm {
 
 std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked);
 
+/// Values of an effect with their standard errors; of a wave amplitude and phase.
+std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted);
+
 /// The rig with what the candidate adds to it.
 ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken);
 

@@ -128,6 +128,7 @@ report::Json step_json(const arm::ArmStep& step, const std::vector<std::string>&
   report::Json json = {{"effect", step.effect}, {"channel", step.channel}};
   if (!step.joint.empty()) json["joint"] = step.joint;
   if (!step.link.empty()) json["link"] = step.link;
+  if (!step.other_joint.empty()) json["other_joint"] = step.other_joint;
   for (const arm::ArmParameter& p : step.parameters) {
     json["parameters"][p.name] = with_unit(p.measured, p.unit);
     const double half = signal::kNormalQuantile975 * p.measured.standard_error;
@@ -159,7 +160,8 @@ std::string arm_verdict_sentence(const arm::ArmTrace& trace) {
   for (const arm::ArmStep& step : trace.steps) {
     if (!text.empty()) text += " ";
     text += step.effect + (step.link.empty() ? "" : " at " + step.link) +
-            (step.joint.empty() ? "" : " of " + step.joint);
+            (step.joint.empty() ? "" : " of " + step.joint) +
+            (step.other_joint.empty() ? "" : " with " + step.other_joint);
     if (step.push)
       text += fmt::format(" from {:.2f} s, {} {:.2f} s, {:.3g} N m.", step.push->begin,
                           step.push->released ? "released at" : "not released by the end,", step.push->end,
@@ -196,8 +198,10 @@ std::string arm_trace_json(const arm::ArmTrace& trace, const TraceInputs& inputs
                                                          {"floor", report::json_number(trace.floor[j])},
                                                          {"train", report::json_number(trace.train[j])}};
   for (const arm::ArmStep& step : trace.steps) json["steps"].push_back(step_json(step, trace.joints));
-  for (const arm::ArmTrace::Rejected& r : trace.rejected)
+  for (const arm::ArmTrace::Rejected& r : trace.rejected) {
     json["rejected"].push_back({{"effect", r.effect}, {"reason", r.reason}});
+    if (!r.joint.empty()) json["rejected"].back()["joint"] = r.joint;
+  }
   if (trace.unexplained)
     json["unexplained"] = {{"channel", trace.unexplained->channel},
                            {"signature", trace.unexplained->signature},

@@ -108,11 +108,13 @@ struct Machine {
   arm::ArmRig declared = arm::load_arm_rig(package_file("config/ur5_arm/ur5_arm.yaml"));
   arm::Chain chain = declared.chain;
   std::vector<arm::JointDrive> drives = declared.joints;
-  double noise = 0.02;  // A, white
-  double coloured = 0;  // A, standard deviation of noise of first order, 0.2 s
-  double wander = 0;    // - of dry and viscous friction, amplitude over two minutes, each joint by itself
-  double jitter = 0;    // s, by which the delay of a joint swings over 7 s
-  double cold = 0;      // - by which dry and viscous friction is larger at t = 0, for some 80 s
+  double noise = 0.02;      // A, white
+  double coloured = 0;      // A, standard deviation of noise of first order, 0.2 s
+  double wander = 0;        // - of dry and viscous friction, amplitude over two minutes, each joint by itself
+  double jitter = 0;        // s, by which the delay of a joint swings over 7 s
+  double cold = 0;          // - by which dry and viscous friction is larger at t = 0, for some 80 s
+  arm::JointEffect effect;  // that no rig file knows, of the joint `affected`; no id: none
+  std::size_t affected = 0, coupled = 0;
   arm::Joints slip = arm::Joints::Zero(Eigen::Index(declared.joints.size()));  // rad, encoders show more
 
   /// Links, constants and friction off by some ten percent.
@@ -161,6 +163,7 @@ struct Machine {
     };
     const Torques before(chain), after(later.chain);
     Random rough(seed + 77);
+    double dahl = 0;  // friction that builds up, of its end value
     arm::Joints slow = arm::Joints::Zero(n), swing = arm::Joints::Zero(n);
     for (Eigen::Index j = 0; j < n; ++j) swing[j] = rough.uniform(0, 2 * M_PI);
     for (double t = 0; t < duration; t += 0.01) {
@@ -176,19 +179,41 @@ struct Machine {
         arm::Joints q = earlier[0];
         q -= machine.slip;
         const double load = (t < since ? before : after)(q, earlier[1], earlier[2])[k];
+        double more = 0;
+        if (j == machine.affected) {
+          const auto i = Eigen::Index(machine.coupled);
+          const double other = torque(machine.drives[machine.coupled],
+                                      (t < since ? before : after)(q, earlier[1], earlier[2])[i],
+                                      earlier[1][i], earlier[2][i], 1);
+          more = machine.effect_torque(q[k], earlier[1][k], load, other, dahl);
+        }
         record::Record& r = out.joints[j];
         r.time.push_back(t);
         r.column(record::Channel::motor_position).push_back(std::round(now[0][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_velocity).push_back(std::round(now[1][k] * 1e4) / 1e4);
         r.column(record::Channel::motor_current)
-            .push_back(torque(drive, load, earlier[1][k], earlier[2][k], rubs) / drive.constant + slow[k] +
-                       noise * random.normal());
+            .push_back((torque(drive, load, earlier[1][k], earlier[2][k], rubs) + more) / drive.constant +
+                       slow[k] + noise * random.normal());
       }
     }
     return out;
   }
 
  private:
+  /// The equations of joint_effect.h; presliding as Dahl's differential equation.
+  double effect_torque(double q, double v, double load, double other, double& dahl) const {
+    const double size = effect.values[0], shape = effect.shape, sign = std::tanh(v / 0.01);
+    if (effect.id == "cogging") return size * std::sin(shape * q + 0.4);
+    if (effect.id == "position_dependent_friction") return sign * size * std::sin(shape * q + 0.4);
+    if (effect.id == "stribeck") return size * sign * std::exp(-v * v / (shape * shape));
+    if (effect.id == "asymmetric_viscous") return size * std::fabs(v);
+    if (effect.id == "transmission_coupling") return size * other;
+    if (effect.id == "load_dependent_friction") return size * sign * std::fabs(load);
+    if (effect.id != "presliding") return 0;
+    for (int i = 0; i < 20; ++i) dahl += 0.01 / 20 * (v - std::fabs(v) * dahl) / shape;
+    return size * (dahl - sign);
+  }
+
   static double torque(const arm::JointDrive& drive, double load, double v, double a, double friction) {
     const auto& f = drive.terms;
     const double sign = std::tanh(v / 0.01);

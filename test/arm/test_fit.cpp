@@ -2,6 +2,8 @@
 // Oracle: machines whose torques KDL computes.
 #include <gtest/gtest.h>
 
+#include <iostream>
+
 #include "arm_machines.h"
 #include "backlash_diagnosis/arm/fit.h"
 #include "backlash_diagnosis/arm/trace.h"
@@ -186,6 +188,98 @@ TEST(Trace, FindsFrictionOfOneJoint) {
   EXPECT_EQ(trace.steps[0].joint, "wrist_1_joint");
   EXPECT_NEAR(trace.steps[0].parameters[0].measured.value, 1.6, 0.1);
 }
+
+/// An effect of one joint that the rig file does not know.
+JointEffect unknown_effect(const std::string& id, double size, double shape = 0) {
+  return {id, shape, id == "transmission_coupling" ? "elbow_joint" : "", Eigen::Vector2d(size, 0)};
+}
+
+enum class When { always, since_training, fitted_before };
+
+struct EffectCase {
+  When when;
+  JointEffect effect;
+  std::size_t joint;
+};
+
+void PrintTo(const EffectCase& c, std::ostream* out) {
+  *out << c.effect.id << " of joint " << c.joint;
+}
+
+class JointEffects : public testing::TestWithParam<EffectCase> {
+ protected:
+  static test::Machine machine_with(const EffectCase& c) {
+    test::Machine out(c.when == When::always ? 31 : 32);
+    out.effect = c.effect;
+    out.affected = c.joint;
+    out.coupled = 2;  // elbow_joint
+    return out;
+  }
+
+  static void expect_named(const ArmTrace& trace, const EffectCase& c) {
+    for (const ArmTrace::Rejected& r : trace.rejected)
+      std::cout << r.effect << " of " << r.joint << ": " << r.reason << '\n';
+    ASSERT_EQ(trace.steps.size(), 1u);
+    const ArmStep& step = trace.steps[0];
+    EXPECT_EQ(step.effect, c.effect.id);
+    EXPECT_EQ(step.joint, trace.joints[c.joint]);
+    EXPECT_EQ(step.other_joint, c.effect.other);
+    // Four standard errors, and 2 % for what low-passes leave of shapes.
+    const auto near = [](const signal::Measured& m, double truth) {
+      EXPECT_LT(std::fabs(m.value - truth), 4 * m.standard_error + 0.02 * truth)
+          << m.value << " +- " << m.standard_error;
+    };
+    near(step.parameters[0].measured, c.effect.values[0]);
+    if (c.effect.shape > 0) near(step.parameters.back().measured, c.effect.shape);
+    EXPECT_LT(trace.after[c.joint], 0.7 * trace.before[c.joint]);
+    EXPECT_FALSE(trace.unexplained) << trace.unexplained->signature;
+  }
+};
+
+TEST_P(JointEffects, AreNamed) {
+  const EffectCase& c = GetParam();
+  const test::Machine machine = machine_with(c), healthy(c.when == When::always ? 31 : 32);
+  const test::Machine& trained = c.when == When::always ? machine : healthy;
+  const std::vector<ArmRecord> train = {trained.record(1), trained.record(2)};
+  if (c.when == When::fitted_before) {
+    const auto base = motions(healthy, train);
+    const ArmRig rig = fit_arm(healthy.declared, fitted(base)).rig;
+    return expect_named(trace_arm(rig, {machine.record(3)}, machine.record(4), false), c);
+  }
+  const ArmTrace trace = trace_arm(healthy.declared, train, machine.record(3), false);
+  expect_named(trace, c);
+  EXPECT_EQ(trace.notes.size(), c.when == When::always ? 0u : 1u);  // the training does not have it
+}
+
+// With the effect in the rig file nothing is missing any more, on records that nobody has seen.
+TEST(Trace, TheRigThatIsWrittenClosesTheLoop) {
+  const EffectCase c = {When::always, unknown_effect("cogging", 1.5, 7.3), 1};
+  test::Machine machine(31);
+  machine.effect = c.effect, machine.affected = c.joint;
+  const std::vector<ArmRecord> train = {machine.record(1), machine.record(2)};
+  const ArmTrace trace = trace_arm(machine.declared, train, machine.record(3), false);
+  const ArmRig known = arm_rig_from_text(arm_rig_text(trace.augmented, {}), "known.yaml", "");
+  ArmRig without = known;
+  without.joints[c.joint].effects.clear();
+  const ArmTrace again = trace_arm(known, {machine.record(4)}, machine.record(5), false),
+                 before = trace_arm(without, {machine.record(4)}, machine.record(5), false);
+  EXPECT_TRUE(again.steps.empty()) << again.steps[0].effect;
+  EXPECT_FALSE(again.unexplained) << again.unexplained->signature;
+  EXPECT_LT(again.after[c.joint], 0.3 * before.before[c.joint]);
+  ASSERT_EQ(before.steps.size(), 1u);
+  EXPECT_EQ(before.steps[0].effect, c.effect.id);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Arm, JointEffects,
+    testing::Values(EffectCase{When::always, unknown_effect("stribeck", 6, 0.15), 0},
+                    EffectCase{When::always, unknown_effect("transmission_coupling", 0.12), 4},
+                    EffectCase{When::since_training, unknown_effect("position_dependent_friction", 1.2, 3),
+                               2},
+                    EffectCase{When::since_training, unknown_effect("presliding", 4, 0.06), 1},
+                    EffectCase{When::fitted_before, unknown_effect("asymmetric_viscous", 4), 0},
+                    EffectCase{When::fitted_before, unknown_effect("cogging", 1.5, 7.3), 1}),
+    [](const auto& info) { return info.param.effect.id; });
 
 }  // namespace
 }  // namespace backlash::arm

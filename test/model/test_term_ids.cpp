@@ -30,8 +30,9 @@ const std::set<std::pair<std::string, std::string>> kOtherMeanings = {
 
 /// What changes with the time is looked for in columns of a regression, each of which is one term's law; a
 /// term that another simulator's language has is translated by name.
-const std::set<std::string> kOtherDictionaries = {
-    "src/changes/change_effects.cpp", "src/changes/local_fault.cpp", "src/report/joint_model.cpp"};
+const std::set<std::string> kOtherDictionaries = {"src/changes/change_effects.cpp",
+                                                  "src/changes/local_fault.cpp", "src/arm/joint_effect.cpp",
+                                                  "src/report/joint_model.cpp"};
 
 std::string text_of(const fs::path& path) {
   std::ifstream in(path);

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/arm/chain.h"
+#include "backlash_diagnosis/arm/joint_effect.h"
 #include "backlash_diagnosis/base/yaml_reader.h"
 #include "backlash_diagnosis/record/record.h"
 
@@ -37,9 +38,10 @@ struct JointDrive {
   double constant = 1;        // k: N m per unit of the channel, > 0
   double constant_error = 0;  // of it, relative, one standard deviation; 0: exact
   std::array<double, kDriveTerms> terms = {};
-  double load_error = 0;      // of the term `load`, one standard deviation; 0: not said
-  double delay = 0;           // d [s]
-  double training_error = 0;  // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
+  double load_error = 0;             // of the term `load`, one standard deviation; 0: not said
+  double delay = 0;                  // d [s]
+  std::vector<JointEffect> effects;  // that it shows beside the terms; as declared, never fitted
+  double training_error = 0;         // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
 };
 
 struct ArmIdentification {
@@ -72,6 +74,9 @@ struct ArmRig {
 
   std::vector<std::string> joint_names() const;
 };
+
+/// Of a joint by its name; none: there is no such joint.
+std::optional<std::size_t> index_of(const ArmRig& rig, const std::string& joint);
 
 /// Whether a file is a URDF, as it begins like XML. Throws MissingInput.
 bool is_urdf(const std::string& path);

@@ -38,14 +38,26 @@ struct FitSettings {
   double payload_radius = 0.1;  // m, to start from; choice
 };
 
+/// An effect of one joint, with values to start from.
+struct FreeEffect {
+  std::size_t joint = 0;
+  JointEffect effect;
+  double shape_spread = 0;  // how far its shape may be off
+  bool everywhere = false;  // in all motions; else in those that are marked
+};
+
 /// What a fit may change.
 struct FitFreedom {
   bool links = true, drives = true, constants = true;
   std::optional<std::size_t> payload;  // at this link, in the motions that are marked
   double payload_sign = 1;
-  bool tilt = false;      // of gravity, in the motions that are marked
-  bool load = false;      // friction that follows the load, about what is known of it
-  bool friction = false;  // of each joint, in the motions that are marked: a factor
+  bool tilt = false;                // of gravity, in the motions that are marked
+  bool load = false;                // friction that follows the load, about what is known of it
+  bool friction = false;            // of each joint, in the motions that are marked: a factor
+  std::vector<FreeEffect> effects;  // and with one the drive of its joint
+
+  /// Whether the terms of a joint's drive are free.
+  bool of_drive(std::size_t joint) const;
 };
 
 struct FittedMotion {
@@ -60,13 +72,20 @@ struct BaseParameter {
   std::string unit;
 };
 
+/// Values of an effect: of its columns and its shape.
+struct FittedEffect {
+  JointEffect effect;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
 struct ArmFit {
-  ArmRig rig;  // with fitted values; payload and tilt are not in its chain
+  ArmRig rig;  // with fitted values; payload and tilt are not in its chain, free effects not in its joints
   BodyParameters payload = BodyParameters::Zero();  // times the sign
   signal::Measured mass, centre[3];  // of the payload, without the common error of the constants
   signal::Measured tilt[2];          // rad, about x and y of the base
   std::vector<double> shifts;        // N m, of the joints' offsets, with the factors
   std::vector<signal::Measured> friction_factors;     // of the joints
+  std::vector<FittedEffect> effects;                  // those that were free
   std::vector<std::vector<signal::Measured>> drives;  // per joint: kDriveTerms, constant, delay
   std::vector<BaseParameter> base;
   std::vector<double> deviation;     // sigma_j, unit of the channel; NaN for a joint that does not move

@@ -27,8 +27,14 @@ struct ArmTraceSettings {
   double least_friction = 0.25;  // of a factor from one, to be told: less is a robot that warms up; choice
   double same_link =
       0.3;  // share of the squared error by which another link must do better than the last; choice
-  double foretold = 4;     // times what the fit expects of itself: a joint above it is unexplained; choice:
-                           // friction of another day has given 3.3
+  double foretold = 4;   // times what the fit expects of itself: a joint above it is unexplained; choice:
+                         // friction of another day has given 3.3
+  int most_effects = 3;  // of single joints; choice
+  double least_at_joint = 0.4;  // share of its joint's squared error that such an effect must take away, and
+  double least_of_signal = 0.025;  // rms of what it explains, of the signal's deviation; choice: bristles of
+                                   // a UR5's joints take 0.3 and 0.012, see doc/measured/ur5_arm.md
+  double clearly = 0.1;    // share of the squared error by which an effect of the test record alone must do
+                           // better than one of all records; choice
   double block = 2;        // s, of the bootstrap; as FitSettings::block
   int draws = 400;         // choice (time)
   std::uint64_t seed = 1;  // choice
@@ -41,8 +47,9 @@ struct ArmParameter {
 };
 
 struct ArmStep {
-  std::string effect;       // payload, gravity_direction, friction_drift, external_torque
+  std::string effect;       // payload, gravity_direction, friction_drift, external_torque, or that of a joint
   std::string joint, link;  // where it has one
+  std::string other_joint;  // of a transmission_coupling
   std::string channel;      // that it helps most
   std::vector<ArmParameter> parameters;
   std::vector<double> before, after;                // relative error per joint on the judged part
@@ -56,7 +63,7 @@ struct ArmTrace {
   std::vector<double> train, before, after, floor;  // per joint; NaN: does not move
   std::vector<ArmStep> steps;
   struct Rejected {
-    std::string effect, reason;
+    std::string effect, reason, joint;  // joint: of one that acts at a joint
   };
   std::vector<Rejected> rejected;
   struct Unexplained {

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which effect of one joint takes most of what a fit leaves, beside all that the fit could have changed.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "backlash_diagnosis/signal/linear_algebra.h"
+#include "fit_model.h"
+#include "joint_effects.h"
+
+namespace backlash::arm {
+namespace {
+
+constexpr double kToldApart =
+    1e-4;                        // - of a column's squares that must not follow from the fit's own; choice
+constexpr double kNone = 1e-9;   // - of a column, of what follows from others; rounding
+constexpr double kNearly = 0.9;  // - of the best's share: not told from it; choice
+constexpr double kSpeeds[] = {0.05, 0.1, 0.2, 0.4, 0.7};  // of the rms speed; choice
+constexpr double kDistances[] = {0.01, 0.03, 0.08, 0.2};  // s, times the rms speed; choice
+constexpr double kMostOrder = 80;                         // 1/rad; choice
+constexpr double kOrdersPerTurn = 4;  // steps of 2 pi over the travel, by which orders are told; choice
+constexpr double kLeastStep = 0.1;    // 1/rad; choice (time)
+constexpr double kFastest = 2;        // times torque_cutoff, of a wave at the rms speed; choice
+constexpr double kScaleStep = 0.7;    // of a speed or distance, between those tried; choice
+constexpr int kRefinements = 4;       // of a shape, each a third of the step before; choice
+
+/// What the fit leaves of one joint, without what it could have changed. Links are known from the training,
+/// where an effect is of the test record alone.
+struct Left {
+  std::vector<std::vector<Eigen::Index>> rows;  // that count, per motion
+  Eigen::MatrixXd basis;                        // orthonormal, of the fit's own columns
+  Eigen::VectorXd residual;                     // beside them
+};
+
+Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns) {
+  const Eigen::VectorXd scale = columns.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::MatrixXd scaled = columns * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(signal::gram(scaled));
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < scaled.cols(); ++i)
+    if (solver.eigenvalues()[i] > kNone) kept.push_back(i);
+  Eigen::MatrixXd basis(columns.rows(), Eigen::Index(kept.size()));
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    basis.col(Eigen::Index(i)) =
+        scaled * solver.eigenvectors().col(kept[i]) / std::sqrt(solver.eigenvalues()[kept[i]]);
+  return basis;
+}
+
+class Search {
+ public:
+  Search(const ArmFit& fit, const FitFreedom& freedom, const std::vector<FittedMotion>& motions,
+         bool everywhere);
+  std::vector<EffectGuess> run() const;
+
+ private:
+  Left left_of(std::size_t j) const;
+  std::vector<JointEffect> effects_of(std::size_t j) const;
+  Eigen::MatrixXd columns(const Left& left, const JointEffect& effect, std::size_t j) const;
+  /// Share of the residual's squares that it takes; its values.
+  double share(const Left& left, JointEffect& effect, std::size_t j) const;
+  double order_step(std::size_t j) const;
+  void refine(const Left& left, EffectGuess& guess, std::size_t j) const;
+  std::optional<EffectGuess> best_of(std::size_t j) const;
+
+  const ArmFit& fit_;
+  const FitFreedom& freedom_;
+  const std::vector<FittedMotion>& motions_;
+  const bool everywhere_;
+  FitModel model_;
+  State state_;
+  std::vector<std::vector<Linearised>> linear_;       // per motion
+  std::vector<Eigen::MatrixXd> chain_;                // per motion, see FitModel::chain_torque()
+  std::vector<std::vector<Eigen::VectorXd>> drives_;  // per motion and joint, at the rows
+  std::vector<double> speed_, travel_;                // per joint: rms, rad/s; rad
+};
+
+Search::Search(const ArmFit& fit, const FitFreedom& freedom, const std::vector<FittedMotion>& motions,
+               bool everywhere)
+    : fit_(fit),
+      freedom_(freedom),
+      motions_(motions),
+      everywhere_(everywhere),
+      model_(fit.rig, freedom),
+      state_(state_of(fit, freedom)) {
+  for (const FittedMotion& m : motions) {
+    linear_.push_back(model_.linearised(state_, m));
+    chain_.push_back(model_.chain_torque(state_, m));
+    drives_.emplace_back();
+    for (std::size_t j = 0; j < fit.rig.joints.size(); ++j)
+      drives_.back().emplace_back(fit.rig.joints[j].constant * linear_.back()[j].predicted);
+  }
+  for (std::size_t j = 0; j < fit.rig.joints.size(); ++j) {
+    double squares = 0, count = 0, lowest = INFINITY, highest = -INFINITY;
+    for (const FittedMotion& m : motions) {
+      const auto c = Eigen::Index(j);
+      squares += m.motion->motor_v.col(c).squaredNorm(), count += double(m.motion->motor_v.rows());
+      lowest = std::min(lowest, m.motion->q.col(c).minCoeff());
+      highest = std::max(highest, m.motion->q.col(c).maxCoeff());
+    }
+    speed_.push_back(std::sqrt(squares / count));
+    travel_.push_back(highest - lowest);
+  }
+}
+
+Left Search::left_of(std::size_t j) const {
+  Left left;
+  const Eigen::Index links = 10 * Eigen::Index(fit_.rig.joints.size());
+  Eigen::Index rows = 0, columns = 0;
+  for (std::size_t m = 0; m < motions_.size(); ++m) {
+    left.rows.emplace_back();
+    for (Eigen::Index k = 0; k < motions_[m].motion->counts.rows(); ++k)
+      if (motions_[m].motion->counts(k, Eigen::Index(j))) left.rows.back().push_back(k);
+    rows += Eigen::Index(left.rows.back().size());
+    for (const Eigen::Index u : linear_[m][j].unknowns) columns = std::max(columns, u + 1);
+  }
+  // One column per unknown, of all motions.
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(rows, columns);
+  Eigen::VectorXd residual(rows);
+  Eigen::Index row = 0;
+  for (std::size_t m = 0; m < motions_.size(); ++m) {
+    const Linearised& joint = linear_[m][j];
+    for (const Eigen::Index k : left.rows[m]) {
+      residual[row] = joint.measured[k] - joint.predicted[k];
+      for (std::size_t i = 0; i < joint.unknowns.size(); ++i)
+        if (everywhere_ || joint.unknowns[i] >= links)
+          own(row, joint.unknowns[i]) = joint.sensitivity(k, Eigen::Index(i));
+      ++row;
+    }
+  }
+  left.basis = orthonormal(own);
+  left.residual = residual - left.basis * (left.basis.transpose() * residual);
+  return left;
+}
+
+std::vector<JointEffect> Search::effects_of(std::size_t j) const {
+  std::vector<JointEffect> all;
+  const auto add = [&](const JointEffectSpec& spec, double shape = 0, const std::string& other = "") {
+    all.push_back({spec.id, shape, other, Eigen::Vector2d::Zero()});
+  };
+  const auto has = [&](const JointEffectSpec& spec) {
+    return std::any_of(fit_.rig.terms.begin(), fit_.rig.terms.end(), [&](DriveTerm t) {
+      return std::string(kDriveTermSpecs[std::size_t(t)].name) == spec.drive_term;
+    });
+  };
+  const double most =
+      std::min(kMostOrder, 2 * M_PI * kFastest * fit_.rig.identification.torque_cutoff / speed_[j]);
+  for (const JointEffectSpec& spec : joint_effect_specs()) switch (spec.shape) {
+      case EffectShape::order:
+        for (double n = spec.least_order; n <= most; n += order_step(j)) add(spec, n);
+        break;
+      case EffectShape::speed:
+        for (const double share : kSpeeds) add(spec, share * speed_[j]);
+        break;
+      case EffectShape::distance:
+        for (const double time : kDistances) add(spec, time * speed_[j]);
+        break;
+      case EffectShape::none:
+        if (has(spec)) break;
+        if (!is_coupling({spec.id, 0, "", Eigen::Vector2d::Zero()}))
+          add(spec);
+        else
+          for (std::size_t i = 0; i < fit_.rig.joints.size(); ++i)
+            if (i != j) add(spec, 0, fit_.rig.joints[i].name);
+    }
+  return all;
+}
+
+double Search::order_step(std::size_t j) const {
+  return std::max(kLeastStep, 2 * M_PI / travel_[j] / kOrdersPerTurn);
+}
+
+Eigen::MatrixXd Search::columns(const Left& left, const JointEffect& effect, std::size_t j) const {
+  Eigen::MatrixXd out(left.residual.size(), effect.spec().columns);
+  Eigen::Index row = 0;
+  for (std::size_t m = 0; m < motions_.size(); ++m) {
+    const Eigen::MatrixXd z =
+        model_.effect_at_rows(state_, effect, j, *motions_[m].motion, chain_[m], drives_[m]);
+    for (const Eigen::Index k : left.rows[m]) out.row(row++) = z.row(k);
+  }
+  return out;
+}
+
+double Search::share(const Left& left, JointEffect& effect, std::size_t j) const {
+  const Eigen::MatrixXd z = columns(left, effect, j);
+  const Eigen::MatrixXd own = z - left.basis * (left.basis.transpose() * z);
+  const Eigen::MatrixXd gram = own.transpose() * own;
+  for (Eigen::Index i = 0; i < z.cols(); ++i)
+    if (!(gram(i, i) > kToldApart * z.col(i).squaredNorm())) return 0;
+  const Eigen::VectorXd moment = own.transpose() * left.residual;
+  const Eigen::VectorXd values = gram.ldlt().solve(moment);
+  effect.values.head(z.cols()) = values;
+  if (effect.spec().positive && !(values[0] > 0)) return 0;
+  const double taken = moment.dot(values) / left.residual.squaredNorm();
+  return std::isfinite(taken) ? taken : 0;
+}
+
+void Search::refine(const Left& left, EffectGuess& guess, std::size_t j) const {
+  JointEffect& best = guess.effect.effect;
+  const EffectShape shape = best.spec().shape;
+  double step = shape == EffectShape::order ? order_step(j) : kScaleStep * best.shape;
+  for (int i = 0; i < kRefinements; ++i) {
+    step /= 3;
+    const double middle = best.shape;
+    for (const int k : {-2, -1, 1, 2}) {
+      JointEffect e = best;
+      e.shape = middle + step * k;
+      if (!(e.shape > 0)) continue;
+      const double taken = share(left, e, j);
+      if (taken > guess.share) guess.share = taken, best = e;
+    }
+  }
+  guess.effect.shape_spread = shape == EffectShape::order ? order_step(j) : best.shape / 2;
+}
+
+std::optional<EffectGuess> Search::best_of(std::size_t j) const {
+  const Left left = left_of(j);
+  if (left.residual.size() <= 2 * left.basis.cols()) return std::nullopt;
+  std::map<std::string, EffectGuess> best;  // of each effect by its name
+  for (JointEffect& e : effects_of(j)) {
+    const double taken = share(left, e, j);
+    EffectGuess& known = best[e.id];
+    if (taken > known.share) known = {{j, e, 0, false}, taken, {}};
+  }
+  EffectGuess chosen;
+  for (auto& [id, guess] : best) {
+    if (guess.share > 0 && guess.effect.effect.spec().has_shape()) refine(left, guess, j);
+    if (guess.share > chosen.share) chosen = guess;
+  }
+  if (!(chosen.share > 0)) return std::nullopt;
+  for (const auto& [id, guess] : best)
+    if (id != chosen.effect.effect.id && guess.share > kNearly * chosen.share) chosen.alike.push_back(id);
+  return chosen;
+}
+
+std::vector<EffectGuess> Search::run() const {
+  std::vector<EffectGuess> all;
+  for (std::size_t j = 0; j < fit_.rig.joints.size(); ++j) {
+    if (std::isnan(fit_.deviation[j])) continue;
+    if (std::optional<EffectGuess> one = best_of(j)) all.push_back(std::move(*one));
+  }
+  std::sort(all.begin(), all.end(),
+            [](const EffectGuess& a, const EffectGuess& b) { return a.share > b.share; });
+  return all;
+}
+
+}  // namespace
+
+std::vector<EffectGuess> guess_effects(const ArmFit& fit, const FitFreedom& freedom,
+                                       const std::vector<FittedMotion>& motions, bool everywhere) {
+  return Search(fit, freedom, motions, everywhere).run();
+}
+
+}  // namespace backlash::arm

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Effects of one joint in records of an arm: their columns, and the search for them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backlash_diagnosis/arm/fit.h"
+#include "backlash_diagnosis/arm/joint_effect.h"
+#include "backlash_diagnosis/arm/motion.h"
+
+namespace backlash::arm {
+
+/// Whether its column is the torque of another joint's drive.
+bool is_coupling(const JointEffect& effect);
+
+/// Torque that one unit of each value takes, N m, at all samples, not filtered; not of a coupling. `load`:
+/// the chain's own torque at the joint.
+Eigen::MatrixXd effect_columns(const JointEffect& effect, const ArmMotion& motion, std::size_t joint,
+                               const Eigen::VectorXd& load);
+
+/// An effect that the residual of a joint may be, with values to start from.
+struct EffectGuess {
+  FreeEffect effect;
+  double share = 0;                // of the joint's squared residual that it would take away
+  std::vector<std::string> alike;  // other effects there that take nearly as much
+};
+
+/// The best guess of each joint, the largest share first, of what the fit leaves in `motions`. `everywhere`:
+/// those are all that links and drives are fitted to.
+std::vector<EffectGuess> guess_effects(const ArmFit& fit, const FitFreedom& freedom,
+                                       const std::vector<FittedMotion>& motions, bool everywhere);
+
+}  // namespace backlash::arm
