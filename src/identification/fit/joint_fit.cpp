@@ -133,6 +133,7 @@ RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double f
   for (const ServoData& d : data) {
     records_.emplace_back(d, cutoff, feedback);
     const PreparedServo& record = records_.back();
+    noises_.push_back(record_noise(d));
     spreads_.push_back({spread(signal::low_pass(d.torque, d.interval, cutoff), record.counts), 0});
     if (d.load.empty()) continue;
     std::vector<double> deflection(d.size());
@@ -163,7 +164,7 @@ void RecordSet::weigh(const Machine& machine) {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), noises_[i], r.load->load, record.cutoff, record.feedback);
     weights_[i] = {machine.deflection_only ? INFINITY : std::max(floor.torque, rms(r.torque, record.counts)),
                    std::max(floor.deflection, rms(r.deflection, record.settled))};
   }
@@ -187,7 +188,7 @@ Misfit RecordSet::misfit(const Machine& machine) const {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), noises_[i], r.load->load, record.cutoff, record.feedback);
     const double torque = std::max(floor.torque, kNegligible * spreads_[i].torque);
     const double torque_left = rms(r.torque, record.counts);
     sum.torque += std::pow(torque_left / torque, 2);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/identification/fit/output_error.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "fit_parameter.h"
@@ -75,6 +76,7 @@ class RecordSet {
 
  private:
   std::vector<PreparedServo> records_;
+  std::vector<RecordNoise> noises_;
   std::vector<Weights> weights_, spreads_;
   std::vector<Row> layout_;
 };

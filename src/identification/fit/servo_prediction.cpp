@@ -280,7 +280,8 @@ ServoPrediction predict_servo(const model::Rig& rig, const ServoData& data, cons
   ServoPrediction p;
   p.counts = prepared.counts;
   p.settled = prepared.settled;
-  const NoiseFloors floors = noise_floors(rig, data, r.load->load, settings.cutoff, settings.feedback);
+  const NoiseFloors floors =
+      noise_floors(rig, data, record_noise(data), r.load->load, settings.cutoff, settings.feedback);
   p.torque_floor = floors.torque;
   low_pass_torques(prepared, prepared.acting_torque(rig, calibration), r.predicted_torque, p);
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);
