@@ -66,6 +66,18 @@ Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, con
   return rows;
 }
 
+/// Points that the rig refuses are left out.
+signal::AheadFunction ahead(const Unknowns& unknowns, const RecordSet& records) {
+  return [&](const std::vector<Eigen::VectorXd>& points) {
+    std::vector<Machine> machines;
+    for (const Eigen::VectorXd& p : points) try {
+        machines.push_back(unknowns.machine(p));
+      } catch (const InvalidParameter&) {
+      }
+    records.prepare(machines);
+  };
+}
+
 /// A logarithm that approaches kFarthest either way.
 double limited(double logarithm) {
   const double most = std::log(kFarthest);
@@ -220,6 +232,15 @@ Eigen::VectorXd RecordSet::rows(const model::Rig& rig, const std::vector<Calibra
   return rows;
 }
 
+void RecordSet::prepare(const std::vector<Machine>& machines) const {
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    std::vector<LoadAsked> asked;
+    for (const Machine& machine : machines)
+      if (!machine.rig.coupled) asked.push_back({machine.rig, machine.calibrations[i]});
+    records_[i].prepare(asked);
+  }
+}
+
 Unknowns::Unknowns(const Machine& start)
     : start_(start),
       delays_(start.largest_delay > 0),
@@ -303,9 +324,9 @@ std::map<std::string, signal::Measured> Unknowns::parameters(const signal::Least
   return all;
 }
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records,
-                       const signal::NonlinearOptions& options) {
+MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::NonlinearOptions options) {
   const Unknowns unknowns(start);
+  options.ahead = ahead(unknowns, records);
   MachineFit out;
   out.fit = signal::fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
                                   unknowns.values(), unknowns.scale(), options);
@@ -324,7 +345,7 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (kFewestBlocks * unknowns.size()), 1, wanted);
   signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
-      kWideStep * unknowns.scale(), true);
+      kWideStep * unknowns.scale(), ahead(unknowns, records), true);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
   const double free = double(rows) / double(block) - double(unknowns.size());  // degrees of freedom
   fit.fit.covariance *=

@@ -62,6 +62,8 @@ class RecordSet {
   RecordSet of_others(const std::vector<ServoData>& data) const;
 
   Eigen::VectorXd rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const;
+  /// Saves time where the rows of these are asked for next.
+  void prepare(const std::vector<Machine>& machines) const;
 
   struct Row {
     std::size_t record;
@@ -113,8 +115,7 @@ class Unknowns {
   std::size_t per_record_;
 };
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records,
-                       const signal::NonlinearOptions& options);
+MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::NonlinearOptions options);
 
 /// Takes off what sampling makes of the values (sampling.h), and gives their covariance from wide steps and
 /// from blocks of the records as long as the time between two reversals of the motor, the larger: until the
