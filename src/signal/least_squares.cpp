@@ -109,11 +109,30 @@ Eigen::VectorXd try_residuals(const ResidualFunction& f, const Eigen::VectorXd& 
   }
 }
 
-void for_each_column(Eigen::Index n, bool parallel, const std::function<void(int)>& column) {
-  if (parallel)
-    for_each_in_parallel(int(n), column);
-  else
-    for (int i = 0; i < n; ++i) column(i);
+/// p with one of its values moved.
+Eigen::VectorXd beside(Eigen::VectorXd p, Eigen::Index i, double step) {
+  p[i] += step;
+  return p;
+}
+
+/// Steps of each column that it begins with.
+using Steps = std::vector<Eigen::VectorXd>;
+
+/// As many columns in turn as `ahead` can be told of.
+void for_each_column(const Eigen::VectorXd& p, const Steps& steps, bool parallel, const AheadFunction& ahead,
+                     const std::function<void(int)>& column) {
+  const int n = int(p.size()), at_once = kPointsAtOnce / int(steps.size());
+  for (int first = 0; first < n; first += at_once) {
+    const int end = std::min(first + at_once, n);
+    if (ahead) {
+      std::vector<Eigen::VectorXd> points;
+      for (int i = first; i < end; ++i)
+        for (const Eigen::VectorXd& each : steps) points.push_back(beside(p, i, each[i]));
+      ahead(points);
+    }
+    for_each_in_parallel(
+        end - first, [&](int i) { column(first + i); }, parallel ? 0 : 1);
+  }
 }
 
 void require_effect(const Eigen::MatrixXd& j, Eigen::Index i) {
@@ -125,14 +144,12 @@ void require_effect(const Eigen::MatrixXd& j, Eigen::Index i) {
 Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, const Eigen::VectorXd& r,
                          const Eigen::VectorXd& scale, const NonlinearOptions& options) {
   Eigen::MatrixXd j(r.size(), p.size());
-  for_each_column(p.size(), options.parallel, [&](int i) {
+  for_each_column(p, {options.step * scale}, options.parallel, options.ahead, [&](int i) {
     Eigen::VectorXd moved;
     double h = options.step;
     for (const double sign : {1.0, -1.0}) {
-      Eigen::VectorXd q = p;
       h = sign * options.step;
-      q[i] += h * scale[i];
-      moved = try_residuals(f, q);
+      moved = try_residuals(f, beside(p, i, h * scale[i]));
       if (moved.size() == r.size()) break;
     }
     if (moved.size() != r.size())
@@ -144,13 +161,11 @@ Eigen::MatrixXd jacobian(const ResidualFunction& f, const Eigen::VectorXd& p, co
 }
 
 Eigen::MatrixXd central_jacobian(const ResidualFunction& residuals, const Eigen::VectorXd& p,
-                                 const Eigen::VectorXd& steps, bool parallel) {
+                                 const Eigen::VectorXd& steps, const AheadFunction& ahead, bool parallel) {
   std::vector<Eigen::VectorXd> columns(std::size_t(p.size()));
-  for_each_column(p.size(), parallel, [&](int i) {
-    Eigen::VectorXd above = p, below = p;
-    above[i] += steps[i];
-    below[i] -= steps[i];
-    above = try_residuals(residuals, above), below = try_residuals(residuals, below);
+  for_each_column(p, {steps, -steps}, parallel, ahead, [&](int i) {
+    const Eigen::VectorXd above = try_residuals(residuals, beside(p, i, steps[i])),
+                          below = try_residuals(residuals, beside(p, i, -steps[i]));
     if (above.size() == 0 || above.size() != below.size())
       throw CannotIdentify("the model cannot be evaluated beside parameter " + std::to_string(i));
     columns[std::size_t(i)] = (above - below) / (2 * steps[i]);
@@ -217,7 +232,8 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
   damping = 1e-3;
   for (int i = 0; i < options.wide_iterations; ++i) {
     const Eigen::MatrixXd wide =
-        central_jacobian(residuals, at.p, options.wide_step * scale, options.parallel) * scale.asDiagonal();
+        central_jacobian(residuals, at.p, options.wide_step * scale, options.ahead, options.parallel) *
+        scale.asDiagonal();
     if (!advance(at, wide, damping, residuals, scale, options)) break;
   }
   fit.values = at.p;
@@ -229,8 +245,8 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
 }
 
 void widen_jacobian(LeastSquaresFit& fit, const ResidualFunction& residuals, const Eigen::VectorXd& steps,
-                    bool parallel) {
-  fit.jacobian = central_jacobian(residuals, fit.values, steps, parallel);
+                    const AheadFunction& ahead, bool parallel) {
+  fit.jacobian = central_jacobian(residuals, fit.values, steps, ahead, parallel);
   fit.covariance = covariance(fit.jacobian, fit.residuals);
 }
 

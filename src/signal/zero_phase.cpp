@@ -148,13 +148,22 @@ std::vector<double> derivative(const std::vector<double>& values, double interva
 std::vector<double> delayed(const std::vector<double>& values, double samples) {
   const long n = static_cast<long>(values.size());
   const double whole = std::floor(-samples), t = -samples - whole;
-  const auto at = [&](long k) { return values[std::clamp(k, 0L, n - 1)]; };
+  const auto between = [t](double a, double b, double c, double d) {
+    return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)));
+  };
+  const auto shift = static_cast<long>(whole);
+  const long begin = std::clamp(1 - shift, 0L, n), end = std::clamp(n - 2 - shift, begin, n);
   std::vector<double> out(values.size());
-  for (long k = 0; k < n; ++k) {
-    const long j = k + static_cast<long>(whole);
-    const double a = at(j - 1), b = at(j), c = at(j + 1), d = at(j + 2);
-    out[k] = b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)));
+  const auto near_an_end = [&](long k) {
+    const auto at = [&](long j) { return values[std::clamp(k + shift + j, 0L, n - 1)]; };
+    out[k] = between(at(-1), at(0), at(1), at(2));
+  };
+  for (long k = 0; k < begin; ++k) near_an_end(k);
+  for (long k = begin; k < end; ++k) {
+    const double* const x = &values[k + shift];
+    out[k] = between(x[-1], x[0], x[1], x[2]);
   }
+  for (long k = end; k < n; ++k) near_an_end(k);
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "lane_step.h"
 #include "lanes.h"
+#include "take_lane.h"
 #include "tolerances.h"
 #include "work_limit.h"
 
@@ -124,27 +125,12 @@ LaneGroup<Real>::LaneGroup(const std::vector<model::GearTrain>& trains, const So
 
 template <typename Real>
 void LaneGroup<Real>::take(const model::GearTrain& rig, int at, bool at_load) {
-  const auto set = [at](Real& to, double value) { set_lane(to, at, value); };
-  const model::EquationsOfMotion<double>& one = rig.equations();
-  for (int part = 0; part < model::TrainParts::kPartCount; ++part) {
-    set(step_.train.damping[part], one.damping[part]);
-    set(step_.train.asymmetry[part], one.asymmetry[part]);
-    set(step_.train.inverse_inertia[part], one.inverse_inertia[part]);
-  }
-  set(step_.train.input_stiffness, one.input_stiffness);
-  set(step_.train.input_damping, one.input_damping);
-  set(step_.train.output_stiffness, one.output_stiffness);
-  set(step_.train.output_damping, one.output_damping);
-  set(step_.train.lever, one.lever);
-  set(step_.train.start, one.start);
   const model::PowerContact law = *rig.power_contact();
-  step_.teeth.exponent = law.exponent;
-  set(step_.teeth.stiffness, law.stiffness);
-  set(step_.teeth.loss, law.loss);
-  set(step_.teeth.damping, law.damping);
-  set(step_.teeth.half_gap, 0.5 * rig.backlash());
-  set(step_.torque_gain[0], at_load ? 0 : rig.ratio());
-  set(step_.torque_gain[1], at_load ? 1 : 0);
+  take_lane(step_.train, at, rig.equations());
+  take_lane(step_.teeth, at,
+            PowerTeeth<double>{law.exponent, law.stiffness, law.loss, law.damping, 0.5 * rig.backlash()});
+  set_lane(step_.torque_gain[0], at, at_load ? 0 : rig.ratio());
+  set_lane(step_.torque_gain[1], at, at_load ? 1 : 0);
 }
 
 template <typename Real>

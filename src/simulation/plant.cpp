@@ -52,6 +52,7 @@ void Plant::reset() {
   state_.fill(0);
   time_ = 0;
   segment_ = 0;
+  torque_until_ = std::numeric_limits<double>::infinity();
   gear_train_.begin_friction(time_, state_.data(), model::AppliedTorque());
   excitation_->begin_segment(segment_, gear_train_.observe(state_.data(), model::AppliedTorque()));
   begin();
@@ -102,7 +103,9 @@ void Plant::restart() {
   if (gear_train_.friction_event_count() > 0)
     longest = std::min(excitation_->shortest_period(segment_) / 100,
                        gear_train_.presliding_time(time_, state_.data(), applied_torque()));
-  integrator_.restart(time_, state_.data(), excitation_->segment_end(segment_), longest);
+  const double left = torque_until_ - time_;
+  integrator_.restart(time_, state_.data(), std::min(torque_until_, excitation_->segment_end(segment_)),
+                      longest, left > 0 && std::isfinite(left) ? left : 0);
 }
 
 /// Starts from a state in which contact did not come about by motion.
@@ -167,8 +170,9 @@ void Plant::set_machine(const model::Rig& rig) {
   begin();
 }
 
-bool Plant::set_torque(double torque) {
+bool Plant::set_torque(double torque, double until) {
   if (!excitation_->set_torque(torque)) return false;
+  torque_until_ = until;
   gear_train_.update_friction(time_, state_.data(), applied_torque());
   restart();
   return true;

@@ -16,6 +16,8 @@
 #define ARKodeGetReturnFlagName ERKStepGetReturnFlagName
 #define ARKodeGetRootInfo ERKStepGetRootInfo
 #define ARKodeRootInit ERKStepRootInit
+#define ARKodeSetInitStep ERKStepSetInitStep
+#define ARKodeSetMaxErrTestFails ERKStepSetMaxErrTestFails
 #define ARKodeSetMaxHnilWarns ERKStepSetMaxHnilWarns
 #define ARKodeSetMaxNumSteps ERKStepSetMaxNumSteps
 #define ARKodeSetMaxStep ERKStepSetMaxStep

@@ -218,6 +218,46 @@ TEST(DrivenLoad, APlainLoadMovesAsTheTrainDoes) {
   }
 }
 
+// Number by number, whatever happens to each: other gaps and frictions touch and stick at other samples.
+TEST(DrivenLoad, SeveralAtOnceMoveAsEachAlone) {
+  for (const char* law : {"linear", "hunt_crossley"}) {
+    model::Rig rig = other_servo();
+    if (law == std::string("hunt_crossley"))
+      rig.mesh.contact =
+          model::make_contact_law(law, {{"stiffness", 4e6}, {"exponent", 1.5}, {"alpha", 0.4}});
+    const record::Record record = simulate_record(rig, test::servo_run(3, false), 2);
+    RecordedMotion motion = motion_of(record);
+    motion.load_rate = &record.column(record::Channel::load_velocity);
+    std::vector<model::Rig> rigs;
+    std::vector<double> first_loads;
+    for (std::size_t count = 1; count <= loads_at_once(); ++count) {
+      rigs.push_back(rig);
+      rigs.back().mesh.backlash *= 0.5 * double(count);
+      rigs.back().link.inertia *= 1 + 0.1 * double(count);
+      rigs.back().link.coulomb_friction *= double(count - 1);
+      first_loads.push_back(motion.first_load + 1e-4 * double(count));
+      const std::vector<DrivenLoad> all = simulate_driven_loads(rigs, first_loads, motion, 50);
+      ASSERT_EQ(all.size(), count > 1 ? count : 0);
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        RecordedMotion own = motion;
+        own.first_load = first_loads[i];
+        EXPECT_TRUE(same_motion(all[i], simulate_driven_load(rigs[i], own, 50))) << law << " " << i;
+      }
+    }
+  }
+}
+
+TEST(DrivenLoad, OthersDoNotMoveAtOnce) {
+  const model::Rig rig = other_servo();
+  const record::Record record = simulate_record(rig, test::servo_run(3, false), 0.1);
+  model::Rig with_term = rig, other_law = rig;
+  with_term.terms.push_back(std::make_shared<Nothing>());
+  other_law.mesh.contact =
+      model::make_contact_law("hunt_crossley", {{"stiffness", 4e6}, {"exponent", 1.5}, {"alpha", 0.4}});
+  for (const model::Rig& other : {with_term, other_law})
+    EXPECT_TRUE(simulate_driven_loads({rig, other}, {0, 0}, motion_of(record), 50).empty());
+}
+
 // Whoever keeps a simulated load must not take it for that of another machine.
 TEST(DrivenLoad, AnyChangeOfTheRigThatMovesTheLoadIsSeen) {
   const model::Rig rig = other_servo();

@@ -236,6 +236,21 @@ TEST(DryFriction, ATorqueSetFromOutsideBreaksAwayAtOnce) {
   EXPECT_EQ(plant.state()[1], 0);
 }
 
+// The same closed form in pieces of 10 ms, each with an error of its own: a hundred tolerances.
+TEST(DryFriction, ATorqueThatIsKnownToLastMovesItAlike) {
+  for (const std::string& method : integrator_methods()) {
+    Plant plant(block({2, 0, 0, 5, 1}), test::topic(), test::solver(1e-9, method));
+    for (int k = 1; k <= 500; ++k) {
+      plant.set_torque(k <= 100 ? -10 : 5.9, 0.01 * k);
+      plant.advance_to(0.01 * k);
+      if (k == 100) EXPECT_NEAR(plant.state()[0], -0.5 * 6 / 2, 1e-7) << method;
+    }
+    EXPECT_NEAR(plant.state()[0], -1.5 - 0.5 * 9 * 2 / 9.9, 1e-7) << method;
+    EXPECT_EQ(plant.state()[1], 0) << method;
+    EXPECT_THROW(plant.advance_to(6), IntegrationError) << method;
+  }
+}
+
 /// Two inertias with backlash and dry friction in steps of `step` [s]: Heun, a speed that changes its sign
 /// stops at zero, and a resting body moves where its friction is too small to hold it.
 class TimeStepping {

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <vector>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/measured.h"
@@ -33,6 +34,11 @@ LeastSquaresFit fit_robust(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 /// Residuals of a model at given parameters, each divided by its own standard deviation.
 using ResidualFunction = std::function<Eigen::VectorXd(const Eigen::VectorXd& parameters)>;
 
+/// Told the points, at most kPointsAtOnce, at which the residuals are asked for next: what they have in
+/// common may be computed at once.
+using AheadFunction = std::function<void(const std::vector<Eigen::VectorXd>& points)>;
+constexpr int kPointsAtOnce = 16;
+
 struct NonlinearOptions {
   int iterations = 30;
   double tolerance =
@@ -43,6 +49,7 @@ struct NonlinearOptions {
   int wide_iterations = 0;
   double wide_step = 1e-2;
   bool parallel = false;  // differences on all processors: the function is called from several threads
+  AheadFunction ahead;    // of the differences; may be empty
 };
 
 /// Levenberg and Marquardt with forward differences. `scale` holds one typical size > 0 per parameter. Values
@@ -56,7 +63,7 @@ LeastSquaresFit fit_nonlinear(const ResidualFunction& residuals, const Eigen::Ve
 /// Where the model stumbles - a touch or a standstill more or less - a difference over a tiny step takes that
 /// for sensitivity.
 void widen_jacobian(LeastSquaresFit& fit, const ResidualFunction& residuals, const Eigen::VectorXd& steps,
-                    bool parallel = false);
+                    const AheadFunction& ahead = {}, bool parallel = false);
 
 /// Covariance of the values where neighbouring rows are not independent: the gradients of the sum of squares
 /// are summed over blocks of `block` successive rows, which count as independent (Liang and Zeger 1986), each

@@ -59,6 +59,20 @@ bool load_moves_freely(const model::Rig& rig);
 DrivenLoad simulate_driven_load(const model::Rig& rig, const RecordedMotion& motion,
                                 double feedback = kLoadFeedback);
 
+/// How many loads this processor follows at once.
+std::size_t loads_at_once();
+
+/// At most so many rigs with the same motor, each from its own first position [rad]: number by number what
+/// simulate_driven_load() gives, in a fraction of the time. Empty where they cannot be moved at once: terms
+/// that move the load, presliding, teeth with a memory or of different exponents. Throws likewise.
+std::vector<DrivenLoad> simulate_driven_loads(const std::vector<model::Rig>& rigs,
+                                              const std::vector<double>& first_loads,
+                                              const RecordedMotion& motion, double feedback);
+
+/// A rig reduced to what acts on its load. What is taken away is all that does not: a new member of Rig
+/// counts until it is named there.
+model::Rig acting_on_load(model::Rig rig);
+
 /// Whether the loads of both rigs move equally when the motor moves equally. False where any member of Rig
 /// differs but those that are known to act on the motor or on what is shown only.
 bool moves_same_load(const model::Rig& a, const model::Rig& b);

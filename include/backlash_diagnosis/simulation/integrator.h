@@ -60,9 +60,10 @@ class Integrator {
 
   /// Starts anew from `state` at `t`, forgetting step size and history. `stop` is a time beyond which the
   /// derivative is not evaluated (infinite: none): the next jump of the right-hand side. `longest_step` [s]
-  /// (infinite: as the error allows) for events that depend on time more than the state does.
+  /// (infinite: as the error allows) for events that depend on time more than the state does. `first_step`
+  /// [s]: tried first, 0: estimated, which takes three derivatives and is far too short of a smooth motion.
   void restart(double t, const double* state, double stop,
-               double longest_step = std::numeric_limits<double>::infinity());
+               double longest_step = std::numeric_limits<double>::infinity(), double first_step = 0);
 
   /// State at `t`, or at the first event on the way: then time() is that of the event (to some 100 roundings
   /// of t and of the step; the value has risen to 0 or above) and its index is returned, kNoEvent otherwise.

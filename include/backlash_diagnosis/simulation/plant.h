@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <memory>
 
 #include "backlash_diagnosis/model/gear_train.h"
@@ -35,7 +36,9 @@ class Plant {
   /// contact law forget the last touch; a flank that then just closes is a touch at time(), with its jump if
   /// the law has one.
   void set_backlash(double backlash);  // m (angular mesh: rad), total free play
-  bool set_torque(double torque);      // N m; false unless the excitation is `topic`
+  /// N m; false unless the excitation is `topic`. `until` [s]: when it is set again, where that is known and
+  /// soon: saves time, and until then advance_to() goes no further.
+  bool set_torque(double torque, double until = std::numeric_limits<double>::infinity());
   void set_state(const State& state);
   /// Another machine in the same motion: as if it had broken, worn or been loaded at this moment. Throws
   /// InvalidParameter, and changes nothing, for one with other degrees of freedom, dry friction at other
@@ -68,8 +71,9 @@ class Plant {
   State state_{};
   double time_ = 0;
   long segment_ = 0;
-  const model::Rig initial_;  // what reset() goes back to
-  bool other_ = false;        // set_machine() was called since
+  double torque_until_ = std::numeric_limits<double>::infinity();  // s, if known
+  const model::Rig initial_;                                       // what reset() goes back to
+  bool other_ = false;                                             // set_machine() was called since
 };
 
 }  // namespace backlash::simulation

@@ -66,6 +66,18 @@ Eigen::VectorXd all_rows(const Unknowns& unknowns, const RecordSet& records, con
   return rows;
 }
 
+/// Points that the rig refuses are left out.
+signal::AheadFunction ahead(const Unknowns& unknowns, const RecordSet& records) {
+  return [&](const std::vector<Eigen::VectorXd>& points) {
+    std::vector<Machine> machines;
+    for (const Eigen::VectorXd& p : points) try {
+        machines.push_back(unknowns.machine(p));
+      } catch (const InvalidParameter&) {
+      }
+    records.prepare(machines);
+  };
+}
+
 /// A logarithm that approaches kFarthest either way.
 double limited(double logarithm) {
   const double most = std::log(kFarthest);
@@ -133,6 +145,7 @@ RecordSet::RecordSet(const std::vector<ServoData>& data, double cutoff, double f
   for (const ServoData& d : data) {
     records_.emplace_back(d, cutoff, feedback);
     const PreparedServo& record = records_.back();
+    noises_.push_back(record_noise(d));
     spreads_.push_back({spread(signal::low_pass(d.torque, d.interval, cutoff), record.counts), 0});
     if (d.load.empty()) continue;
     std::vector<double> deflection(d.size());
@@ -163,7 +176,7 @@ void RecordSet::weigh(const Machine& machine) {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), noises_[i], r.load->load, record.cutoff, record.feedback);
     weights_[i] = {machine.deflection_only ? INFINITY : std::max(floor.torque, rms(r.torque, record.counts)),
                    std::max(floor.deflection, rms(r.deflection, record.settled))};
   }
@@ -187,7 +200,7 @@ Misfit RecordSet::misfit(const Machine& machine) const {
     const PreparedServo& record = records_[i];
     const ServoResiduals r = record.residuals(machine.rig, machine.calibrations[i]);
     const NoiseFloors floor =
-        noise_floors(machine.rig, record.data(), r.load->load, record.cutoff, record.feedback);
+        noise_floors(machine.rig, record.data(), noises_[i], r.load->load, record.cutoff, record.feedback);
     const double torque = std::max(floor.torque, kNegligible * spreads_[i].torque);
     const double torque_left = rms(r.torque, record.counts);
     sum.torque += std::pow(torque_left / torque, 2);
@@ -217,6 +230,15 @@ Eigen::VectorXd RecordSet::rows(const model::Rig& rig, const std::vector<Calibra
     }
   }
   return rows;
+}
+
+void RecordSet::prepare(const std::vector<Machine>& machines) const {
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    std::vector<LoadAsked> asked;
+    for (const Machine& machine : machines)
+      if (!machine.rig.coupled) asked.push_back({machine.rig, machine.calibrations[i]});
+    records_[i].prepare(asked);
+  }
 }
 
 Unknowns::Unknowns(const Machine& start)
@@ -302,9 +324,9 @@ std::map<std::string, signal::Measured> Unknowns::parameters(const signal::Least
   return all;
 }
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records,
-                       const signal::NonlinearOptions& options) {
+MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::NonlinearOptions options) {
   const Unknowns unknowns(start);
+  options.ahead = ahead(unknowns, records);
   MachineFit out;
   out.fit = signal::fit_nonlinear([&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
                                   unknowns.values(), unknowns.scale(), options);
@@ -323,7 +345,7 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   const Eigen::Index block = std::clamp<Eigen::Index>(rows / (kFewestBlocks * unknowns.size()), 1, wanted);
   signal::widen_jacobian(
       fit.fit, [&](const Eigen::VectorXd& p) { return all_rows(unknowns, records, p); },
-      kWideStep * unknowns.scale(), true);
+      kWideStep * unknowns.scale(), ahead(unknowns, records), true);
   take_larger(fit.fit.covariance, signal::block_covariance(fit.fit, block, known));
   const double free = double(rows) / double(block) - double(unknowns.size());  // degrees of freedom
   fit.fit.covariance *=

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/identification/fit/output_error.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "fit_parameter.h"
@@ -61,6 +62,8 @@ class RecordSet {
   RecordSet of_others(const std::vector<ServoData>& data) const;
 
   Eigen::VectorXd rows(const model::Rig& rig, const std::vector<Calibration>& calibrations) const;
+  /// Saves time where the rows of these are asked for next.
+  void prepare(const std::vector<Machine>& machines) const;
 
   struct Row {
     std::size_t record;
@@ -75,6 +78,7 @@ class RecordSet {
 
  private:
   std::vector<PreparedServo> records_;
+  std::vector<RecordNoise> noises_;
   std::vector<Weights> weights_, spreads_;
   std::vector<Row> layout_;
 };
@@ -111,8 +115,7 @@ class Unknowns {
   std::size_t per_record_;
 };
 
-MachineFit fit_machine(const Machine& start, const RecordSet& records,
-                       const signal::NonlinearOptions& options);
+MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::NonlinearOptions options);
 
 /// Takes off what sampling makes of the values (sampling.h), and gives their covariance from wide steps and
 /// from blocks of the records as long as the time between two reversals of the motor, the larger: until the

@@ -9,6 +9,34 @@
 #include "calibration.h"
 
 namespace backlash::identification {
+namespace {
+
+/// With the weights that the records have.
+BandFit fit_weighed(RecordSet records, Machine start, double tolerance, const FitSettings& settings) {
+  MachineFit fit = fit_machine(start, records, fit_options(settings, tolerance, start.has_map));
+  const Misfit misfit = records.misfit(fit.machine);
+  return {std::move(fit), std::move(start), std::move(records), misfit};
+}
+
+BandFit fit_with_own_weights(RecordSet records, Machine start, double tolerance,
+                             const FitSettings& settings) {
+  records.weigh(start);
+  return fit_weighed(std::move(records), std::move(start), tolerance, settings);
+}
+
+BandFit fit_until_settled(const RecordSet& records, const Machine& start, double tolerance,
+                          const FitSettings& settings) {
+  BandFit fit = fit_with_own_weights(records, start, tolerance, settings);
+  for (int i = 0; i < settings.renewals; ++i) {
+    RecordSet renewed = fit.records;
+    renewed.weigh(fit.fit.machine);
+    if (fit.fit.fit.converged && renewed.difference_of_weights(fit.records) < settings.same_weights) break;
+    fit = fit_weighed(std::move(renewed), fit.fit.machine, tolerance, settings);
+  }
+  return fit;
+}
+
+}  // namespace
 
 signal::NonlinearOptions fit_options(const FitSettings& settings, double tolerance, bool with_map) {
   signal::NonlinearOptions options;
@@ -22,23 +50,12 @@ signal::NonlinearOptions fit_options(const FitSettings& settings, double toleran
 
 BandFit fit_in_band(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
                     const FitSettings& settings) {
-  RecordSet records(data, cutoff, settings.feedback);
-  records.weigh(start);
-  MachineFit fit = fit_machine(start, records, fit_options(settings, tolerance, start.has_map));
-  const Misfit misfit = records.misfit(fit.machine);
-  return {std::move(fit), std::move(start), std::move(records), misfit};
+  return fit_with_own_weights({data, cutoff, settings.feedback}, std::move(start), tolerance, settings);
 }
 
-BandFit fit_settled(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
+BandFit fit_settled(const std::vector<ServoData>& data, const Machine& start, double cutoff, double tolerance,
                     const FitSettings& settings) {
-  BandFit fit = fit_in_band(data, std::move(start), cutoff, tolerance, settings);
-  for (int i = 0; i < settings.renewals; ++i) {
-    RecordSet renewed = fit.records;
-    renewed.weigh(fit.fit.machine);
-    if (fit.fit.fit.converged && renewed.difference_of_weights(fit.records) < settings.same_weights) break;
-    fit = fit_in_band(data, fit.fit.machine, cutoff, tolerance, settings);
-  }
-  return fit;
+  return fit_until_settled({data, cutoff, settings.feedback}, start, tolerance, settings);
 }
 
 Machine other_start(Machine machine, double spread, std::uint64_t seed) {
@@ -53,12 +70,13 @@ Machine other_start(Machine machine, double spread, std::uint64_t seed) {
 BandFit fit_from_starts(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
                         const BeforeFit& before_fit) {
   const int others = start.parameters.empty() ? 0 : settings.other_starts;
+  const RecordSet records(data, settings.rough_cutoff, settings.feedback);
   std::optional<BandFit> best;
   for (int i = 0; i <= others; ++i) {
     if (before_fit) before_fit();
     const Machine from = i == 0 ? start : other_start(start, settings.start_spread, settings.seed + i);
     try {
-      BandFit one = fit_in_band(data, from, settings.rough_cutoff, settings.rough_tolerance, settings);
+      BandFit one = fit_with_own_weights(records, from, settings.rough_tolerance, settings);
       const double least = best ? size(best->misfit) : INFINITY, left = size(one.misfit);
       if (left < least) best = std::move(one);
       if (left < settings.at_floor || std::fabs(left / least - 1) < settings.same_minimum) break;
@@ -71,11 +89,12 @@ BandFit fit_from_starts(const std::vector<ServoData>& data, const Machine& start
 
 BandFit fit_to_records(const std::vector<ServoData>& data, const Machine& start, const FitSettings& settings,
                        const BeforeFit& before_fit) {
+  Machine machine = fit_from_starts(data, start, settings, before_fit).fit.machine;
+  const RecordSet records(data, settings.cutoff, settings.feedback);
   const auto fit = [&](const Machine& from, double tolerance) {
     if (before_fit) before_fit();
-    return fit_settled(data, from, settings.cutoff, tolerance, settings);
+    return fit_until_settled(records, from, tolerance, settings);
   };
-  Machine machine = fit_from_starts(data, start, settings, before_fit).fit.machine;
   release_hold(machine);
   machine = fit(machine, settings.rough_tolerance).fit.machine;
   release_hold(machine);

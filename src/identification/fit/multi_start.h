@@ -33,7 +33,7 @@ BandFit fit_in_band(const std::vector<ServoData>& data, Machine start, double cu
 
 /// The same again and again from where it has ended, until the weights no longer change: those of a start
 /// that lacks an effect, or is far off, hold what it leaves and not the noise.
-BandFit fit_settled(const std::vector<ServoData>& data, Machine start, double cutoff, double tolerance,
+BandFit fit_settled(const std::vector<ServoData>& data, const Machine& start, double cutoff, double tolerance,
                     const FitSettings& settings);
 
 /// The same machine from another start: each parameter > 0 times exp(spread u), u in [-1, 1) from a generator

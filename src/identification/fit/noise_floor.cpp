@@ -37,8 +37,8 @@ double noise_deviation(const std::vector<double>& position) {
 
 /// Variance per line of the load position's noise at (i + 1/2) / (2 lines interval): white beyond the
 /// resolution, and the rounding of this motion.
-std::vector<double> load_noise(const ServoData& data, const std::vector<double>& load) {
-  const double step = signal::resolution(data.load), noise = noise_deviation(data.load);
+std::vector<double> load_noise(const RecordNoise& record, const std::vector<double>& load) {
+  const double step = record.load_step, noise = record.load;
   std::size_t size = 2;
   while (size < load.size()) size *= 2;
   const double white = std::max(0.0, noise * noise - step * step / 12);
@@ -74,18 +74,28 @@ Spring mesh_spring(const model::Rig& rig, const std::vector<double>& torque) {
 
 }  // namespace
 
-NoiseFloors noise_floors(const model::Rig& rig, const ServoData& data, const std::vector<double>& load,
-                         double cutoff, double feedback) {
+RecordNoise record_noise(const ServoData& data) {
+  RecordNoise noise;
+  noise.motor = noise_deviation(data.motor);
+  noise.torque = by_median(data.torque, signal::white_noise(data.torque));
+  if (data.load.empty()) return noise;
+  noise.load = noise_deviation(data.load);
+  noise.load_step = signal::resolution(data.load);
+  return noise;
+}
+
+NoiseFloors noise_floors(const model::Rig& rig, const ServoData& data, const RecordNoise& noise,
+                         const std::vector<double>& load, double cutoff, double feedback) {
   const model::GearTrain train(rig);
   const bool free = simulation::load_moves_freely(rig);
   const double motor_inertia = train.motor_inertia(), load_inertia = train.load_inertia();
   const auto [k, b] = mesh_spring(rig, data.torque);
   const double rate_cutoff = data.load_rate_cutoff;
   const std::vector<double> load_power =
-      free ? load_noise(data, load) : std::vector<double>(data.size() / 2, 0.0);
+      free ? load_noise(noise, load) : std::vector<double>(data.size() / 2, 0.0);
   const double lines = double(load_power.size());
-  const double motor_power = std::pow(noise_deviation(data.motor), 2) / lines,
-               torque_power = std::pow(by_median(data.torque, signal::white_noise(data.torque)), 2) / lines;
+  const double motor_power = std::pow(noise.motor, 2) / lines,
+               torque_power = std::pow(noise.torque, 2) / lines;
   double torque = 0, deflection = 0;
   for (std::size_t i = 0; i < load_power.size(); ++i) {
     const double f = 0.5 * (double(i) + 0.5) / (lines * data.interval);

@@ -40,11 +40,8 @@ OutputError fit_output_error(const model::Rig& start, const std::vector<ServoDat
   result.rig = machine.rig;
   result.parameters = Unknowns(fitted.start).parameters(fitted.fit.fit);
   result.calibrations = machine.calibrations;
-  for (std::size_t r = 0; r < records.size(); ++r) {
-    const ServoPrediction p = predict_servo(machine.rig, records[r], settings, machine.calibrations[r]);
-    result.torque.push_back(p.torque_error);
-    result.deflection.push_back(p.deflection_error);
-  }
+  for (std::size_t r = 0; r < records.size(); ++r)
+    result.predictions.push_back(predict_servo(machine.rig, records[r], settings, machine.calibrations[r]));
   return result;
 }
 
@@ -52,8 +49,9 @@ ServoPrediction predict_calibrated(const model::Rig& rig, const ServoData& data,
                                    Calibration& calibration) {
   OutputErrorSettings alone;
   alone.fit = with_bands(asked, rig, {data});
-  calibration = fit_output_error(rig, {data}, alone).calibrations.front();
-  return predict_servo(rig, data, alone.fit, calibration);
+  OutputError fit = fit_output_error(rig, {data}, alone);
+  calibration = fit.calibrations.front();
+  return std::move(fit.predictions.front());
 }
 
 }  // namespace backlash::identification

@@ -8,10 +8,12 @@
 #include <mutex>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/model/presliding.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
+#include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
 namespace backlash::identification {
@@ -75,14 +77,18 @@ ChannelError relative(const std::vector<double>& measured, const std::vector<dou
   return {std::sqrt(residual) / spread, floor * std::sqrt(n) / spread};
 }
 
+}  // namespace
+
 /// How a rig's load is driven by a record.
 struct Drive {
   simulation::RecordedMotion motion;
   double gain = 1;              // of the load encoder
   double skew = 0;              // samples, by which it is late
+  double offset = 0;            // rad, of the encoders
   std::vector<double> changed;  // column that is not as recorded
 
-  Drive(const ServoData& data, const model::Rig& rig, const Calibration& calibration) {
+  Drive(const ServoData& data, const model::Rig& rig, const Calibration& calibration)
+      : offset(calibration.encoder_offset) {
     motion.interval = data.interval;
     motion.motor = &data.motor;
     motion.motor_rate = &data.motor_rate;
@@ -91,69 +97,130 @@ struct Drive {
       gain = model::sensing(rig.terms).load_position_gain;
       skew = rig.encoder_skew / data.interval;
       motion.load_rate = &data.load_rate;
-      motion.first_load =
-          (data.first_load + rig.encoder_skew * data.first_load_rate - calibration.encoder_offset) / gain;
+      motion.first_load = (data.first_load + rig.encoder_skew * data.first_load_rate - offset) / gain;
       motion.first_load_rate = data.first_load_rate / gain;
-      if (gain == 1 && skew == 0) return;
-      changed = signal::delayed(data.load_rate, -skew);
-      for (double& rate : changed) rate /= gain;
-      motion.load_rate = &changed;
-    } else if (calibration.encoder_offset != 0) {
+    } else if (offset != 0) {
       changed = data.motor;
-      for (double& position : changed) position += calibration.encoder_offset;
+      for (double& position : changed) position += offset;
       motion.motor = &changed;
     }
   }
   Drive(const Drive&) = delete;  // points into itself
+
+  /// The load's speed as an encoder without error would show it, which only a simulation needs.
+  void correct_load_rate() {
+    if (!motion.load_rate || (gain == 1 && skew == 0)) return;
+    changed = signal::delayed(*motion.load_rate, -skew);
+    for (double& rate : changed) rate /= gain;
+    motion.load_rate = &changed;
+  }
 };
 
 struct SimulatedLoad {
-  model::Rig rig;
+  model::Rig acting;  // of the rig what acts on its load
   double gain, skew, offset;
   simulation::DrivenLoad motion;
   std::vector<double> deflection;  // simulated load as shown minus recorded, without offset, low-passed
 };
+
+/// Loads that are simulated together: encoders with the same error, so that the same speed draws them.
+struct LoadGroup {
+  double gain, skew;
+  std::vector<model::Rig> rigs;
+  std::vector<Calibration> calibrations;
+  std::vector<double> first_loads;
+};
+
+namespace {
+
+std::shared_ptr<const SimulatedLoad> simulated_load(const PreparedServo& record, const Drive& drive,
+                                                    const model::Rig& rig, double offset,
+                                                    simulation::DrivenLoad motion) {
+  auto made = std::make_shared<SimulatedLoad>(
+      SimulatedLoad{simulation::acting_on_load(rig), drive.gain, drive.skew, offset, std::move(motion), {}});
+  if (!simulation::load_moves_freely(rig)) return made;
+  const ServoData& data = record.data();
+  std::vector<double> difference = signal::delayed(made->motion.load, drive.skew);
+  for (std::size_t k = 0; k < data.size(); ++k) difference[k] = drive.gain * difference[k] - data.load[k];
+  made->deflection = signal::low_pass(difference, data.interval, record.cutoff);
+  return made;
+}
+
+std::vector<std::shared_ptr<const SimulatedLoad>> simulated_loads(const PreparedServo& record,
+                                                                  const LoadGroup& group) {
+  Drive drive(record.data(), group.rigs.front(), group.calibrations.front());
+  drive.correct_load_rate();
+  std::vector<simulation::DrivenLoad> motions =
+      simulation::simulate_driven_loads(group.rigs, group.first_loads, drive.motion, record.feedback);
+  std::vector<std::shared_ptr<const SimulatedLoad>> made;
+  for (std::size_t i = 0; i < motions.size(); ++i)
+    made.push_back(simulated_load(record, drive, group.rigs[i], group.calibrations[i].encoder_offset,
+                                  std::move(motions[i])));
+  return made;
+}
 
 }  // namespace
 
 /// The last loads that were simulated, the last that was asked for first.
 class SimulatedLoads {
  public:
-  std::shared_ptr<const SimulatedLoad> get(const PreparedServo& record, const Drive& drive,
-                                           const model::Rig& rig, const Calibration& calibration) {
-    if (auto known = find(rig, drive, calibration.encoder_offset)) return known;
-    auto made = std::make_shared<SimulatedLoad>();
-    made->rig = rig;
-    made->gain = drive.gain;
-    made->skew = drive.skew;
-    made->offset = calibration.encoder_offset;
-    made->motion = simulation::simulate_driven_load(rig, drive.motion, record.feedback);
-    if (simulation::load_moves_freely(rig)) {
-      const ServoData& data = record.data();
-      std::vector<double> difference = signal::delayed(made->motion.load, drive.skew);
-      for (std::size_t k = 0; k < data.size(); ++k) difference[k] = drive.gain * difference[k] - data.load[k];
-      made->deflection = signal::low_pass(difference, data.interval, record.cutoff);
-    }
-    const std::lock_guard<std::mutex> lock(mutex_);
-    kept_.push_front(made);
-    if (kept_.size() > kKept) kept_.pop_back();
+  std::shared_ptr<const SimulatedLoad> get(const PreparedServo& record, Drive& drive, const model::Rig& rig) {
+    if (auto known = find(simulation::acting_on_load(rig), drive)) return known;
+    drive.correct_load_rate();
+    const auto made = simulated_load(record, drive, rig, drive.offset,
+                                     simulation::simulate_driven_load(rig, drive.motion, record.feedback));
+    keep(made);
     return made;
   }
 
- private:
-  static constexpr std::size_t kKept = 8;  // that a Jacobian's columns come upon the load of its centre again
+  /// Those that are not known yet; what cannot be simulated is left to whoever asks for it.
+  void prepare(const PreparedServo& record, const std::vector<LoadAsked>& asked) {
+    std::vector<LoadGroup> groups;
+    std::vector<std::pair<model::Rig, double>> seen;  // with the offset of the encoders
+    for (const auto& [rig, calibration] : asked) {
+      if (!simulation::load_moves_freely(rig)) continue;
+      const Drive drive(record.data(), rig, calibration);
+      std::pair<model::Rig, double> load = {simulation::acting_on_load(rig), drive.offset};
+      if (find(load.first, drive) || std::find(seen.begin(), seen.end(), load) != seen.end()) continue;
+      seen.push_back(std::move(load));
+      const auto joins = [&](const LoadGroup& g) {
+        return g.gain == drive.gain && g.skew == drive.skew && g.rigs.size() < simulation::loads_at_once();
+      };
+      auto group = std::find_if(groups.begin(), groups.end(), joins);
+      if (group == groups.end()) group = groups.insert(group, LoadGroup{drive.gain, drive.skew, {}, {}, {}});
+      group->rigs.push_back(rig);
+      group->calibrations.push_back(calibration);
+      group->first_loads.push_back(drive.motion.first_load);
+    }
+    for_each_in_parallel(int(groups.size()), [&](int i) {
+      try {
+        for (auto& load : simulated_loads(record, groups[std::size_t(i)])) keep(std::move(load));
+      } catch (const Error&) {
+      }
+    });
+  }
 
-  std::shared_ptr<const SimulatedLoad> find(const model::Rig& rig, const Drive& drive, double offset) {
+ private:
+  // That a Jacobian's columns come upon the load of its centre, and upon those that were prepared.
+  static constexpr std::size_t kKept = signal::kPointsAtOnce + 2;
+
+  std::shared_ptr<const SimulatedLoad> find(const model::Rig& acting, const Drive& drive) {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (auto at = kept_.begin(); at != kept_.end(); ++at) {
       const SimulatedLoad& known = **at;
-      if (known.gain != drive.gain || known.skew != drive.skew || known.offset != offset ||
-          !simulation::moves_same_load(known.rig, rig))
+      if (known.gain != drive.gain || known.skew != drive.skew || known.offset != drive.offset ||
+          !(known.acting == acting))
         continue;
       kept_.splice(kept_.begin(), kept_, at);
       return kept_.front();
     }
     return nullptr;
+  }
+
+  void keep(std::shared_ptr<const SimulatedLoad> made) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    kept_.push_front(std::move(made));
+    if (kept_.size() > kKept) kept_.pop_back();
   }
 
   std::mutex mutex_;
@@ -177,6 +244,10 @@ PreparedServo::PreparedServo(const ServoData& servo, double low_pass_cutoff, dou
     settled[k] = 1;
     counts[k] = direction[k] != 0;
   }
+}
+
+void PreparedServo::prepare(const std::vector<LoadAsked>& asked) const {
+  loads_->prepare(*this, asked);
 }
 
 std::vector<double> PreparedServo::acting_torque(const model::Rig& rig,
@@ -219,8 +290,8 @@ ServoResiduals PreparedServo::coupled_residuals(const model::Rig& rig, const Cal
 
 ServoResiduals PreparedServo::residuals(const model::Rig& rig, const Calibration& calibration) const {
   if (rig.coupled) return coupled_residuals(rig, calibration);
-  const Drive drive(data(), rig, calibration);
-  const auto load = loads_->get(*this, drive, rig, calibration);
+  Drive drive(data(), rig, calibration);
+  const auto load = loads_->get(*this, drive, rig);
   simulation::MotorTorques motor = simulation::motor_torques(rig, drive.motion, load->motion);
   const double inertia = model::GearTrain(rig).motor_inertia();
   ServoResiduals r;
@@ -280,7 +351,8 @@ ServoPrediction predict_servo(const model::Rig& rig, const ServoData& data, cons
   ServoPrediction p;
   p.counts = prepared.counts;
   p.settled = prepared.settled;
-  const NoiseFloors floors = noise_floors(rig, data, r.load->load, settings.cutoff, settings.feedback);
+  const NoiseFloors floors =
+      noise_floors(rig, data, record_noise(data), r.load->load, settings.cutoff, settings.feedback);
   p.torque_floor = floors.torque;
   low_pass_torques(prepared, prepared.acting_torque(rig, calibration), r.predicted_torque, p);
   p.torque_error = relative(p.measured_torque, p.torque, p.counts, p.torque_floor);

@@ -21,6 +21,11 @@ struct ServoResiduals {
 
 class SimulatedLoads;
 
+struct LoadAsked {
+  model::Rig rig;
+  Calibration calibration;
+};
+
 struct PreparedServo {
   /// `data` must outlive it.
   PreparedServo(const ServoData& data, double cutoff, double feedback);
@@ -30,6 +35,9 @@ struct PreparedServo {
   /// Safe to call from several threads. Simulated loads are cached: a rig that differs only in parameters
   /// that do not move the load is not simulated again.
   ServoResiduals residuals(const model::Rig& rig, const Calibration& calibration) const;
+
+  /// Simulates at once the loads that residuals() will be asked for next, which it then finds.
+  void prepare(const std::vector<LoadAsked>& asked) const;
 
   const ServoData& data() const { return *data_; }
   double cutoff, feedback;     // Hz, 1/s

@@ -381,7 +381,8 @@ LockedOutput identify_locked_output(const record::Record& record, const model::R
           fmt::format("{}: the flank that holds {} torque is touched in {:.2g} % of the samples in which the "
                       "motor slides",
                       record.name, plus ? "positive" : "negative", 100 * fit.share_beyond(plus)));
-  const double floor = noise_floors(rig, signals.data(), {}, signals.cutoff(), 0).torque;
+  const double floor =
+      noise_floors(rig, signals.data(), record_noise(signals.data()), {}, signals.cutoff(), 0).torque;
   fit.judge(floor);
   LockedOutput out;
   fill(fit, signals, rig, floor, out);

@@ -69,12 +69,13 @@ std::vector<Stretch> telling_stretches(const IdentificationCase& c) {
 }
 
 /// Over all records: norms add up.
-ChannelError total(const std::vector<ChannelError>& errors, const std::vector<double>& weights) {
+ChannelError total(const std::vector<ServoPrediction>& predictions, ChannelError ServoPrediction::*of,
+                   const std::vector<double>& weights) {
   ChannelError sum;
   double all = 0;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    sum.error += std::pow(weights[i] * errors[i].error, 2);
-    sum.floor += std::pow(weights[i] * errors[i].floor, 2);
+  for (std::size_t i = 0; i < predictions.size(); ++i) {
+    sum.error += std::pow(weights[i] * (predictions[i].*of).error, 2);
+    sum.floor += std::pow(weights[i] * (predictions[i].*of).floor, 2);
     all += weights[i] * weights[i];
   }
   return {std::sqrt(sum.error / all), std::sqrt(sum.floor / all)};
@@ -116,15 +117,15 @@ ProcedureReport run_output_error(IdentificationCase& c) {
       signal::Measured{fit.calibrations.front().torque_delay * data.front().interval, std::nan("")};
   std::vector<double> torque, deflection;
   for (std::size_t i = 0; i < data.size(); ++i) {
-    const ServoPrediction p = predict_servo(fit.rig, data[i], settings.fit, fit.calibrations[i]);
+    const ServoPrediction& p = fit.predictions[i];
     torque.push_back(spread(p.measured_torque));
     deflection.push_back(spread(p.measured_deflection));
     c.result.torque.push_back({report.records[i], data[i].interval, p.measured_torque, p.torque, p.counts});
     c.result.deflection.push_back(
         {report.records[i], data[i].interval, p.measured_deflection, p.deflection, {}});
   }
-  c.result.channels["torque"] = total(fit.torque, torque);
-  c.result.channels["deflection"] = total(fit.deflection, deflection);
+  c.result.channels["torque"] = total(fit.predictions, &ServoPrediction::torque_error, torque);
+  c.result.channels["deflection"] = total(fit.predictions, &ServoPrediction::deflection_error, deflection);
   if (fit.rig.coupled) {
     c.result.channels.erase("torque");
     c.result.torque.clear();

@@ -39,8 +39,9 @@ TEST(OutputError, FindsAMachineThirtyPercentAway) {
   EXPECT_FALSE(fit.calibrations[0].held);  // this torque is that of the moment
   EXPECT_NEAR(fit.calibrations[0].torque_delay, 0, 0.1);
   EXPECT_NEAR(fit.calibrations[0].encoder_offset, 0, 2e-6);
-  EXPECT_LT(fit.torque[0].error, 1.3 * fit.torque[0].floor);
-  EXPECT_LT(fit.deflection[0].error, 1.5 * fit.deflection[0].floor);
+  const ServoPrediction& p = fit.predictions[0];
+  EXPECT_LT(p.torque_error.error, 1.3 * p.torque_error.floor);
+  EXPECT_LT(p.deflection_error.error, 1.5 * p.deflection_error.floor);
 }
 
 // Three standard errors: of three fits none misses by that in 99 of 100 cases.

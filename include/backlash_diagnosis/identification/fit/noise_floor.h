@@ -22,9 +22,17 @@ struct NoiseFloors {
   double torque = 0, deflection = 0;  // N m, rad; standard deviations after the low-pass
 };
 
+/// Standard deviations of what the sensors add to a record. It takes as long as some runs of the load.
+struct RecordNoise {
+  double motor = 0, torque = 0;    // rad, N m
+  double load = 0, load_step = 0;  // rad, with and of its resolution
+};
+
+RecordNoise record_noise(const ServoData& data);
+
 /// `load` [rad]: the simulated motion. Of a contact law that is not linear the noise of the positions counts
 /// without the mesh.
-NoiseFloors noise_floors(const model::Rig& rig, const ServoData& data, const std::vector<double>& load,
-                         double cutoff, double feedback);
+NoiseFloors noise_floors(const model::Rig& rig, const ServoData& data, const RecordNoise& noise,
+                         const std::vector<double>& load, double cutoff, double feedback);
 
 }  // namespace backlash::identification

@@ -45,13 +45,6 @@ struct Calibration {
                      // of the moment
 };
 
-struct OutputError {
-  model::Rig rig;                                      // fitted
-  std::map<std::string, signal::Measured> parameters;  // in the units of the rig file
-  std::vector<Calibration> calibrations;               // one per record
-  std::vector<ChannelError> torque, deflection;        // one per record
-};
-
 /// What a rig predicts for a record; no deflection where the load has no motion of its own.
 struct ServoPrediction {
   simulation::DrivenLoad load;
@@ -60,6 +53,13 @@ struct ServoPrediction {
   std::vector<char> settled, counts;                    // whether the sample of deflection and torque counts
   double torque_floor, deflection_floor;  // N m, rad: standard deviation of what noise alone leaves
   ChannelError torque_error, deflection_error;
+};
+
+struct OutputError {
+  model::Rig rig;                                      // fitted
+  std::map<std::string, signal::Measured> parameters;  // in the units of the rig file
+  std::vector<Calibration> calibrations;               // one per record
+  std::vector<ServoPrediction> predictions;            // one per record
 };
 
 /// `settings` have their bands, see with_bands(); throws InvalidParameter for a cutoff that is not > 0.
