@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "fit_model.h"
@@ -62,7 +61,7 @@ class Search {
   double share(const Left& left, JointEffect& effect, std::size_t j) const;
   double order_step(std::size_t j) const;
   void refine(const Left& left, EffectGuess& guess, std::size_t j) const;
-  std::optional<EffectGuess> best_of(std::size_t j) const;
+  std::vector<EffectGuess> best_of(std::size_t j) const;
 
   const ArmFit& fit_;
   const FitFreedom& freedom_;
@@ -214,31 +213,33 @@ void Search::refine(const Left& left, EffectGuess& guess, std::size_t j) const {
   guess.effect.shape_spread = shape == EffectShape::order ? order_step(j) : best.shape / 2;
 }
 
-std::optional<EffectGuess> Search::best_of(std::size_t j) const {
+std::vector<EffectGuess> Search::best_of(std::size_t j) const {
   const Left left = left_of(j);
-  if (left.residual.size() <= 2 * left.basis.cols()) return std::nullopt;
+  if (left.residual.size() <= 2 * left.basis.cols()) return {};
   std::map<std::string, EffectGuess> best;  // of each effect by its name
   for (JointEffect& e : effects_of(j)) {
     const double taken = share(left, e, j);
     EffectGuess& known = best[e.id];
     if (taken > known.share) known = {{j, e, 0, false}, taken, {}};
   }
-  EffectGuess chosen;
+  std::vector<EffectGuess> all;
   for (auto& [id, guess] : best) {
-    if (guess.share > 0 && guess.effect.effect.spec().has_shape()) refine(left, guess, j);
-    if (guess.share > chosen.share) chosen = guess;
+    if (!(guess.share > 0)) continue;
+    if (guess.effect.effect.spec().has_shape()) refine(left, guess, j);
+    all.push_back(guess);
   }
-  if (!(chosen.share > 0)) return std::nullopt;
-  for (const auto& [id, guess] : best)
-    if (id != chosen.effect.effect.id && guess.share > kNearly * chosen.share) chosen.alike.push_back(id);
-  return chosen;
+  for (EffectGuess& guess : all)
+    for (const EffectGuess& other : all)
+      if (&other != &guess && other.share > kNearly * guess.share)
+        guess.alike.push_back(other.effect.effect.id);
+  return all;
 }
 
 std::vector<EffectGuess> Search::run() const {
   std::vector<EffectGuess> all;
   for (std::size_t j = 0; j < fit_.rig.joints.size(); ++j) {
     if (std::isnan(fit_.deviation[j])) continue;
-    if (std::optional<EffectGuess> one = best_of(j)) all.push_back(std::move(*one));
+    for (EffectGuess& guess : best_of(j)) all.push_back(std::move(guess));
   }
   std::sort(all.begin(), all.end(),
             [](const EffectGuess& a, const EffectGuess& b) { return a.share > b.share; });

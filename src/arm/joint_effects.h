@@ -26,8 +26,8 @@ struct EffectGuess {
   std::vector<std::string> alike;  // other effects there that take nearly as much
 };
 
-/// The best guess of each joint, the largest share first, of what the fit leaves in `motions`. `everywhere`:
-/// those are all that links and drives are fitted to.
+/// The best guess of each effect and joint, the largest share first, of what the fit leaves in `motions`.
+/// `everywhere`: those are all that links and drives are fitted to.
 std::vector<EffectGuess> guess_effects(const ArmFit& fit, const FitFreedom& freedom,
                                        const std::vector<FittedMotion>& motions, bool everywhere);
 

@@ -9,7 +9,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "fit_model.h"
-#include "joint_effects.h"
+#include "trace_effects.h"
 #include "trace_evidence.h"
 #include "trace_result.h"
 
@@ -41,7 +41,7 @@ double middle(const Motions& motions) {
 class Tracer {
  public:
   Tracer(const ArmRig& rig, const ArmTraceSettings& settings, const Progress& progress)
-      : rig_(rig), settings_(settings), progress_(progress) {}
+      : rig_(rig), settings_(settings), progress_(progress), fits_(rig, train_, settings) {}
 
   ArmTrace run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record);
 
@@ -56,13 +56,7 @@ class Tracer {
   void look_for_pushes(const ArmRecord& test);
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
   std::vector<Candidate> candidates() const;
-  std::vector<FittedMotion> with_training(const Motions& fitted) const;
-  void fit_candidate(Candidate& c, const Motions& fitted) const;
-  void try_out(Candidate& c, const Candidate& without, const Motions& fitted, const Motions& judged) const;
-  Candidate with_effects(Candidate model, const Motions& fitted, const Motions& judged);
-  std::optional<Candidate> next_effect(const Candidate& model, const Motions& fitted, const Motions& judged,
-                                       bool everywhere);
-  ArmStep effect_step(const Candidate& c) const;
+  void tell_effects(const std::vector<Candidate>& found);
   ArmStep step_of(const Candidate& c) const;
   const Candidate* rival_of(const std::vector<Candidate>& all, std::size_t chosen) const;
   std::size_t best_of(const std::vector<Candidate>& all) const;
@@ -77,6 +71,7 @@ class Tracer {
   const ArmTraceSettings& settings_;
   const Progress& progress_;
   Motions train_, test_;
+  CandidateFits fits_;
   ArmFit base_;
   Candidate taken_;    // what was named
   Candidate unnamed_;  // what foretells the test record best where nothing is named
@@ -90,30 +85,6 @@ void Tracer::set_base() {
   }
   base_ = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
   for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
-}
-
-std::vector<FittedMotion> Tracer::with_training(const Motions& fitted) const {
-  std::vector<FittedMotion> motions = as_fitted(fitted, true);
-  if (!rig_.fitted)
-    for (const FittedMotion& m : as_fitted(train_, false)) motions.push_back(m);
-  return motions;
-}
-
-/// The model with what may differ from day to day, and with the effect.
-void Tracer::fit_candidate(Candidate& c, const Motions& fitted) const {
-  const std::vector<FittedMotion> motions = with_training(fitted);
-  c.freedom.links = c.freedom.drives = !rig_.fitted;
-  c.freedom.load = rig_.fitted && c.freedom.payload;
-  c.freedom.friction = true;
-  c.fit = fit_arm(rig_, motions, c.freedom, settings_.fit);
-  if (rig_.fitted) c.fit.rig.common_error = rig_.common_error;
-}
-
-void Tracer::try_out(Candidate& c, const Candidate& without, const Motions& fitted,
-                     const Motions& judged) const {
-  fit_candidate(c, fitted);
-  judge(c, without, judged, rig_, settings_);
-  c.reason = refusal(c, rig_, settings_);
 }
 
 /// In their order: a payload at the last link, come or gone, first.
@@ -153,66 +124,23 @@ ArmStep Tracer::step_of(const Candidate& c) const {
   return step;
 }
 
-ArmStep Tracer::effect_step(const Candidate& c) const {
-  ArmStep step;
-  step.effect = c.fit.effects.back().effect.id;
-  step.joint = rig_.joints[c.joint].name;
-  step.other_joint = c.fit.effects.back().effect.other;
-  step.channel = step.joint + "/torque";
-  step.parameters = effect_parameters(c.fit.effects.back());
-  if (signal::Measured& size = step.parameters.front().measured; rig_.fitted)  // as well known as all torques
-    size.standard_error = std::hypot(size.standard_error, size.value * rig_.common_error);
-  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
-  step.equivalent_to = c.alike;
-  return step;
-}
-
-/// One more effect of a joint: of all records, or of the test record alone.
-std::optional<Candidate> Tracer::next_effect(const Candidate& model, const Motions& fitted,
-                                             const Motions& judged, bool everywhere) {
-  const std::vector<FittedMotion> motions = everywhere ? with_training(fitted) : as_fitted(fitted, true);
-  for (const EffectGuess& guess : guess_effects(model.fit, model.freedom, motions, everywhere)) {
-    if (guess.share < settings_.least_at_joint / 2) break;
-    Candidate c = model;
-    c.alike = guess.alike;
-    c.freedom.effects.push_back(guess.effect);
-    c.freedom.effects.back().everywhere = everywhere;
-    fit_candidate(c, fitted);
-    judge(c, model, judged, rig_, settings_);
-    const std::string reason = effect_refusal(c, model, judged, settings_);
-    if (reason.empty()) return c;
-    const ArmTrace::Rejected rejected = {guess.effect.effect.id, reason, rig_.joints[c.joint].name};
-    const auto known =
-        std::find_if(trace_.rejected.begin(), trace_.rejected.end(), [&](const ArmTrace::Rejected& r) {
-          return r.effect == rejected.effect && r.joint == rejected.joint;
-        });
-    if (known != trace_.rejected.end())
-      *known = rejected;
-    else
-      trace_.rejected.push_back(rejected);
+void Tracer::tell_effects(const std::vector<Candidate>& found) {
+  for (const Candidate& c : found) {
+    const FittedEffect& effect = c.fit.effects.back();
+    ArmStep step;
+    step.effect = effect.effect.id;
+    step.joint = rig_.joints[c.joint].name;
+    step.other_joint = effect.effect.other;
+    step.channel = step.joint + "/torque";
+    step.parameters = effect_parameters(effect);
+    if (signal::Measured& size = step.parameters.front().measured; rig_.fitted)  // as torques are known
+      size.standard_error = std::hypot(size.standard_error, size.value * rig_.common_error);
+    step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
+    step.equivalent_to = c.alike;
+    if (!rig_.fitted && !c.freedom.effects.back().everywhere)
+      trace_.notes.push_back("the training records do not have " + step.effect + " of " + step.joint);
+    trace_.steps.push_back(step);
   }
-  return std::nullopt;
-}
-
-/// Adds effects of single joints as long as the part that was not fitted confirms them.
-Candidate Tracer::with_effects(Candidate model, const Motions& fitted, const Motions& judged) {
-  for (int i = 0; i < settings_.most_effects; ++i) {
-    std::optional<Candidate> next, own = next_effect(model, fitted, judged, false);
-    if (!rig_.fitted) next = next_effect(model, fitted, judged, true);
-    if (own && next && own->joint == next->joint) {  // of the training records, too?
-      Candidate against = *own;
-      judge(against, *next, judged, rig_, settings_);
-      if (against.gains[own->joint] > settings_.clearly && against.lowers[own->joint] > 0) next = own;
-    }
-    if (!next) next = std::move(own);
-    if (!next) break;
-    model = std::move(*next);
-    trace_.steps.push_back(effect_step(model));
-    if (!rig_.fitted && !model.freedom.effects.back().everywhere)
-      trace_.notes.push_back("the training records do not have " + trace_.steps.back().effect + " of " +
-                             trace_.steps.back().joint);
-  }
-  return model;
 }
 
 /// What is taken away on one side does nearly what a body on the other side does: values hold both.
@@ -284,7 +212,7 @@ std::size_t Tracer::best_of(const std::vector<Candidate>& all) const {
 /// True where something was found.
 bool Tracer::search(const Motions& fitted, const Motions& judged, const std::string& words) {
   Candidate without;
-  fit_candidate(without, fitted);
+  fits_.fit(without, fitted);
   std::vector<Candidate> all = candidates();
   for (std::size_t i = 0; i < all.size(); ++i) {
     tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
@@ -292,7 +220,7 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
     if (all[i].freedom.payload && i > 1 && (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0))
       all[i].reason = "not tried";
     else
-      try_out(all[i], without, fitted, judged);
+      fits_.try_out(all[i], without, fitted, judged);
   }
   trace_.rejected.clear();
   for (std::size_t i = 0; i < all.size(); ++i)
@@ -307,7 +235,9 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
     if (const Candidate* rival = rival_of(all, best)) tell_rival(trace_.steps.back(), *rival);
   }
   tell(0.9, "trying effects of single joints");
-  const Candidate taken = with_effects(of_chain, fitted, judged);
+  const std::vector<Candidate> effects = joint_effects(of_chain, fits_, fitted, judged, trace_.rejected);
+  const Candidate& taken = effects.empty() ? of_chain : effects.back();
+  tell_effects(effects);
   tell_friction(taken, judged);
   for (std::size_t i = 0; best < all.size() && i < all.size(); ++i)
     if (all[i].reason.empty() && of_chain.freedom.payload && all[i].freedom.payload &&

@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "fit_model.h"
+#include "trace_result.h"
 
 namespace backlash::arm {
 namespace {
@@ -148,6 +149,29 @@ std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
                          tilt.norm(), errors);
   }
   return "";
+}
+
+std::vector<FittedMotion> CandidateFits::motions(const Motions& fitted) const {
+  std::vector<FittedMotion> motions = as_fitted(fitted, true);
+  if (!rig.fitted)
+    for (const FittedMotion& m : as_fitted(train_, false)) motions.push_back(m);
+  return motions;
+}
+
+void CandidateFits::fit(Candidate& c, const Motions& fitted) const {
+  const std::vector<FittedMotion> motions = this->motions(fitted);
+  c.freedom.links = c.freedom.drives = !rig.fitted;
+  c.freedom.load = rig.fitted && c.freedom.payload;
+  c.freedom.friction = true;
+  c.fit = fit_arm(rig, motions, c.freedom, settings.fit);
+  if (rig.fitted) c.fit.rig.common_error = rig.common_error;
+}
+
+void CandidateFits::try_out(Candidate& c, const Candidate& without, const Motions& fitted,
+                            const Motions& judged) const {
+  fit(c, fitted);
+  judge(c, without, judged, rig, settings);
+  c.reason = refusal(c, rig, settings);
 }
 
 }  // namespace backlash::arm

@@ -35,4 +35,25 @@ std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
 std::string effect_refusal(Candidate& c, const Candidate& without, const Motions& judged,
                            const ArmTraceSettings& settings);
 
+/// Fits what is tried: to a part of the test record and, where the rig file has no fitted links and drives,
+/// to the training records with it.
+class CandidateFits {
+ public:
+  CandidateFits(const ArmRig& rig, const Motions& train, const ArmTraceSettings& settings)
+      : rig(rig), settings(settings), train_(train) {}
+
+  /// All that links and drives are fitted to.
+  std::vector<FittedMotion> motions(const Motions& fitted) const;
+  /// The model with what may differ from day to day, and with the effect.
+  void fit(Candidate& c, const Motions& fitted) const;
+  /// Fitted, judged and believed or not.
+  void try_out(Candidate& c, const Candidate& without, const Motions& fitted, const Motions& judged) const;
+
+  const ArmRig& rig;
+  const ArmTraceSettings& settings;
+
+ private:
+  const Motions& train_;
+};
+
 }  // namespace backlash::arm

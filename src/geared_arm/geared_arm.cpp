@@ -37,6 +37,7 @@ GearedJoint read_joint(const YamlReader& yaml, const arm::JointDrive& drive, boo
   if (!simulated) return joint;
   const auto term = [&](arm::DriveTerm t) { return drive.terms[std::size_t(t)]; };
   if (term(arm::DriveTerm::load) != 0) yaml.fail("load", "cannot be simulated: must be 0 or absent");
+  if (!drive.effects.empty()) yaml.fail("effects", "cannot be simulated: must be absent");
   if (joint.held) {
     yaml.ignore("excitation");
     return joint;

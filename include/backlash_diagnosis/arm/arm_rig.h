@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The rig file of an arm: its URDF, gravity, and a drive per joint.
 //
-//   k_j s_j(t + d_j) = tau_j(q, v, a) + J_j a_j + friction_j
+//   k_j s_j(t + d_j) = tau_j(q, v, a) + J_j a_j + friction_j + what `effects` say, see joint_effect.h
 //   friction_j = c_j S + b_j v + n_j v |v| + h_j v^3 + o_j + l_j S |tau_j|,   S = tanh(v / v_0)
 //
 // s_j is the recorded channel: a current with k_j [N m/A], or a torque with k_j = 1; later than the motion by

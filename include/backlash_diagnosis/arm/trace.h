@@ -30,6 +30,7 @@ struct ArmTraceSettings {
   double foretold = 4;   // times what the fit expects of itself: a joint above it is unexplained; choice:
                          // friction of another day has given 3.3
   int most_effects = 3;  // of single joints; choice
+  int most_tried = 3;    // guesses for each; choice (time)
   double least_at_joint = 0.4;  // share of its joint's squared error that such an effect must take away, and
   double least_of_signal = 0.025;  // rms of what it explains, of the signal's deviation; choice: bristles of
                                    // a UR5's joints take 0.3 and 0.012, see doc/measured/ur5_arm.md
