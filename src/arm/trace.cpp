@@ -150,7 +150,7 @@ void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
     signal::Measured& m = step.parameters[i].measured;
     m.standard_error = std::hypot(m.standard_error, other.parameters[i].measured.value - m.value);
   }
-  step.equivalent_to.push_back("payload (taken away)");
+  step.equivalent_to.emplace_back("payload (taken away)");
   trace_.notes.push_back(fmt::format(
       "a body that is gone does nearly as well as one that has come: {:.3g} kg; motion with faster turns, or "
       "other poses, would tell them apart",

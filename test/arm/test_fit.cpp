@@ -202,8 +202,8 @@ struct EffectCase {
   std::size_t joint;
 };
 
-void PrintTo(const EffectCase& c, std::ostream* out) {
-  *out << c.effect.id << " of joint " << c.joint;
+std::ostream& operator<<(std::ostream& out, const EffectCase& c) {
+  return out << c.effect.id << " of joint " << c.joint;
 }
 
 class JointEffects : public testing::TestWithParam<EffectCase> {

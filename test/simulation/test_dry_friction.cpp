@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/simulation/plant.h"
 #include "support/rigs.h"
 
