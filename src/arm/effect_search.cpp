@@ -19,11 +19,35 @@ constexpr double kNearly = 0.9;  // - of the best's share: not told from it; cho
 constexpr double kSpeeds[] = {0.05, 0.1, 0.2, 0.4, 0.7};  // of the rms speed; choice
 constexpr double kDistances[] = {0.01, 0.03, 0.08, 0.2};  // s, times the rms speed; choice
 constexpr double kMostOrder = 80;                         // 1/rad; choice
-constexpr double kOrdersPerTurn = 4;  // steps of 2 pi over the travel, by which orders are told; choice
-constexpr double kLeastStep = 0.1;    // 1/rad; choice (time)
-constexpr double kFastest = 2;        // times torque_cutoff, of a wave at the rms speed; choice
-constexpr double kScaleStep = 0.7;    // of a speed or distance, between those tried; choice
-constexpr int kRefinements = 4;       // of a shape, each a third of the step before; choice
+constexpr double kOrdersPerTurn = 4;       // steps of 2 pi over the travel, by which orders are told; choice
+constexpr double kLeastStep = 0.1;         // 1/rad; choice (time)
+constexpr double kFastest = 2;             // times torque_cutoff, of a wave at the rms speed; choice
+constexpr double kScaleStep = 0.7;         // of a speed or distance, between those tried; choice
+constexpr std::size_t kSamplesPerRow = 8;  // of a column before its low-pass, at least; choice
+constexpr int kRefinements = 4;            // of a shape, each a third of the step before; choice
+
+/// With fewer samples, where there are far more than the low-pass leaves: a search takes hundreds of columns.
+ArmMotion thinned(const ArmMotion& m) {
+  const std::size_t apart = m.rows.size() > 1 ? m.rows[1] - m.rows[0] : 1;
+  std::size_t by = std::max<std::size_t>(1, apart / kSamplesPerRow);
+  while (apart % by != 0) --by;
+  const std::size_t first = m.rows.empty() ? 0 : m.rows.front() % by;
+  std::vector<Eigen::Index> kept;
+  ArmMotion out;
+  out.interval = m.interval * double(by);
+  for (std::size_t k = first; k < m.time.size(); k += by) {
+    kept.push_back(Eigen::Index(k));
+    out.time.push_back(m.time[k]);
+  }
+  for (const auto member :
+       {&ArmMotion::q, &ArmMotion::v, &ArmMotion::a, &ArmMotion::motor_v, &ArmMotion::sign}) {
+    (out.*member).resize(Eigen::Index(kept.size()), m.q.cols());
+    for (std::size_t k = 0; k < kept.size(); ++k)
+      (out.*member).row(Eigen::Index(k)) = (m.*member).row(kept[k]);
+  }
+  for (const std::size_t row : m.rows) out.rows.push_back((row - first) / by);
+  return out;
+}
 
 /// What the fit leaves of one joint, without what it could have changed. Links are known from the training,
 /// where an effect is of the test record alone.
@@ -70,7 +94,8 @@ class Search {
   FitModel model_;
   State state_;
   std::vector<std::vector<Linearised>> linear_;       // per motion
-  std::vector<Eigen::MatrixXd> chain_;                // per motion, see FitModel::chain_torque()
+  std::vector<ArmMotion> thin_;                       // per motion
+  std::vector<Eigen::MatrixXd> chain_;                // of those, see FitModel::chain_torque()
   std::vector<std::vector<Eigen::VectorXd>> drives_;  // per motion and joint, at the rows
   std::vector<double> speed_, travel_;                // per joint: rms, rad/s; rad
 };
@@ -85,7 +110,8 @@ Search::Search(const ArmFit& fit, const FitFreedom& freedom, const std::vector<F
       state_(state_of(fit, freedom)) {
   for (const FittedMotion& m : motions) {
     linear_.push_back(model_.linearised(state_, m));
-    chain_.push_back(model_.chain_torque(state_, m));
+    thin_.push_back(thinned(*m.motion));
+    chain_.push_back(model_.chain_torque(state_, {&thin_.back(), m.marked}));
     drives_.emplace_back();
     for (std::size_t j = 0; j < fit.rig.joints.size(); ++j)
       drives_.back().emplace_back(fit.rig.joints[j].constant * linear_.back()[j].predicted);
@@ -174,8 +200,7 @@ Eigen::MatrixXd Search::columns(const Left& left, const JointEffect& effect, std
   Eigen::MatrixXd out(left.residual.size(), effect.spec().columns);
   Eigen::Index row = 0;
   for (std::size_t m = 0; m < motions_.size(); ++m) {
-    const Eigen::MatrixXd z =
-        model_.effect_at_rows(state_, effect, j, *motions_[m].motion, chain_[m], drives_[m]);
+    const Eigen::MatrixXd z = model_.effect_at_rows(state_, effect, j, thin_[m], chain_[m], drives_[m]);
     for (const Eigen::Index k : left.rows[m]) out.row(row++) = z.row(k);
   }
   return out;
