@@ -92,6 +92,8 @@ double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::Mat
   return std::sqrt((v.transpose() * signal::solve_symmetric(c, v))(0, 0));
 }
 
+constexpr double kFarFromGuess = 0.4;  // of a shape's logarithm; choice: its prior is half of it
+
 const char* const kNotConfirmed = "the part that was not fitted does not confirm it in all blocks of time";
 
 std::string gain_refusal(const Candidate& c, const ArmRig& rig, double least) {
@@ -121,7 +123,19 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   if (const double explained = std::sqrt(c.gain) * error; explained < settings.least_of_signal)
     return fmt::format("explains {:.1f} % of the channel, {:.1f} % are needed", 100 * explained,
                        100 * settings.least_of_signal);
+  // What is gained is its own work, not that the others were fitted anew beside it.
+  Candidate taken_out = c;
+  taken_out.fit.effects.back().effect.values.setZero();
+  const double with = relative_errors(c.fit, c.freedom, motions, 0)[c.joint],
+               none = relative_errors(taken_out.fit, c.freedom, motions, 0)[c.joint];
+  if (!(with * with < (1 - settings.least_at_joint) * none * none))
+    return fmt::format("the error is {:.2f} % without its torque and {:.2f} % with it: others have gained",
+                       100 * none, 100 * with);
   const FittedEffect& e = c.fit.effects.back();
+  const FreeEffect& guess = c.freedom.effects.back();
+  if (e.effect.spec().has_shape() && std::fabs(std::log(e.effect.shape / guess.effect.shape)) > kFarFromGuess)
+    return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not tell it",
+                       shape_name(e.effect.spec().shape), e.effect.shape, guess.effect.shape);
   const Eigen::Index n = e.effect.spec().columns;
   const double errors = standard_errors_from_none(e.effect.values.head(n), e.covariance, 0);
   if (!(errors > settings.sure)) return fmt::format("its size is {:.1f} standard errors from none", errors);
