@@ -50,6 +50,11 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
     c.freedom.effects.push_back(guess.effect);
     c.freedom.effects.back().everywhere = everywhere;
     fits_.fit(c, fitted_);
+    // From where it has come to, so that what is found next does not gain by settling this one.
+    for (std::size_t i = 0; i < c.freedom.effects.size(); ++i)
+      c.freedom.effects[i].effect = c.fit.effects[i].effect;
+    fits_.fit(c, fitted_);
+    c.freedom.effects.back().effect.shape = guess.effect.effect.shape;
     judge(c, model, judged_, fits_.rig, settings);
     const std::string reason = effect_refusal(c, model, judged_, settings);
     if (reason.empty()) return c;
