@@ -132,6 +132,9 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
     return fmt::format("the error is {:.2f} % without its torque and {:.2f} % with it: others have gained",
                        100 * none, 100 * with);
   const FittedEffect& e = c.fit.effects.back();
+  if (e.effect.spec().positive && !(e.effect.values[0] > 0))
+    return fmt::format("its {} is {:.2g}: no friction is negative", e.effect.spec().strength,
+                       e.effect.values[0]);
   const FreeEffect& guess = c.freedom.effects.back();
   if (e.effect.spec().has_shape() && std::fabs(std::log(e.effect.shape / guess.effect.shape)) > kFarFromGuess)
     return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not tell it",

@@ -257,7 +257,9 @@ namespace {
 
 report::Json page_step(const arm::ArmStep& step) {
   report::Json json = {
-      {"id", step.effect}, {"where", step.link + step.joint}, {"parameters", report::Json::array()}};
+      {"id", step.effect},
+      {"where", step.link + step.joint + (step.other_joint.empty() ? "" : " with " + step.other_joint)},
+      {"parameters", report::Json::array()}};
   for (const arm::ArmParameter& p : step.parameters) {
     const ValueText text = value_text(p.measured);
     json["parameters"].push_back({{"name", p.name},

@@ -93,6 +93,22 @@ TEST_F(ArmRigFile, WrongFilesAreRefusedWithTheirPlace) {
             std::string::npos);
 }
 
+TEST_F(ArmRigFile, WrongEffectsOfAJointAreRefused) {
+  const auto told = [&](const std::string& effect) {
+    return refusal(
+        with(rig_, "  - name: wrist_3_joint", "  - name: wrist_3_joint\n    effects: [{" + effect + "}]"));
+  };
+  EXPECT_EQ(told("id: stribeck, torque: 1, speed: 0.1"), "accepted");
+  EXPECT_NE(told("id: stribek, torque: 1, speed: 0.1").find("stribek"), std::string::npos);
+  EXPECT_NE(told("id: stribeck, torque: -1, speed: 0.1").find("torque"), std::string::npos);
+  EXPECT_NE(told("id: stribeck, torque: 1, speed: 0").find("speed"), std::string::npos);
+  EXPECT_NE(told("id: stribeck, torque: 1, speed: 0.1, sped: 1").find("sped"), std::string::npos);
+  EXPECT_NE(told("id: cogging, amplitude: 1, order: 3").find("phase"), std::string::npos);
+  for (const char* joint : {"wrist_3_joint", "wrist_9_joint"})
+    EXPECT_NE(told(std::string("id: transmission_coupling, ratio: 0.1, joint: ") + joint).find(joint),
+              std::string::npos);
+}
+
 TEST_F(ArmRigFile, WrongRobotsAreRefused) {
   const std::vector<std::string> joints = load_arm_rig(path("ur5_arm.yaml")).joint_names();
   const auto told = [&](const std::string& text, std::vector<std::string> names) {
