@@ -49,8 +49,8 @@ ArmMotion thinned(const ArmMotion& m) {
   return out;
 }
 
-/// What the fit leaves of one joint, without what it could have changed. Links are known from the training,
-/// where an effect is of the test record alone.
+/// What the fit leaves of one joint, without what it could have changed. Links and drives are known from the
+/// training, where an effect is of the test record alone.
 struct Left {
   std::vector<std::vector<Eigen::Index>> rows;  // that count, per motion
   Eigen::MatrixXd basis;                        // orthonormal, of the fit's own columns
@@ -79,6 +79,7 @@ class Search {
 
  private:
   Left left_of(std::size_t j) const;
+  bool could_change(Eigen::Index unknown) const;
   std::vector<JointEffect> effects_of(std::size_t j) const;
   Eigen::MatrixXd columns(const Left& left, const JointEffect& effect, std::size_t j) const;
   /// Share of the residual's squares that it takes; its values.
@@ -129,9 +130,17 @@ Search::Search(const ArmFit& fit, const FitFreedom& freedom, const std::vector<F
   }
 }
 
+bool Search::could_change(Eigen::Index unknown) const {
+  const Layout at = layout_of(fit_.rig, freedom_);
+  for (const std::size_t joint : freedom_.steady)
+    if (unknown == at.friction(Eigen::Index(joint))) return false;
+  if (everywhere_) return true;
+  const bool drive = unknown >= at.drive(0) && unknown < at.effect(0);
+  return unknown >= at.payload() && !drive;
+}
+
 Left Search::left_of(std::size_t j) const {
   Left left;
-  const Eigen::Index links = 10 * Eigen::Index(fit_.rig.joints.size());
   Eigen::Index rows = 0, columns = 0;
   for (std::size_t m = 0; m < motions_.size(); ++m) {
     left.rows.emplace_back();
@@ -149,7 +158,7 @@ Left Search::left_of(std::size_t j) const {
     for (const Eigen::Index k : left.rows[m]) {
       residual[row] = joint.measured[k] - joint.predicted[k];
       for (std::size_t i = 0; i < joint.unknowns.size(); ++i)
-        if (everywhere_ || joint.unknowns[i] >= links)
+        if (could_change(joint.unknowns[i]))
           own(row, joint.unknowns[i]) = joint.sensitivity(k, Eigen::Index(i));
       ++row;
     }
@@ -182,7 +191,7 @@ std::vector<JointEffect> Search::effects_of(std::size_t j) const {
         for (const double time : kDistances) add(spec, time * speed_[j]);
         break;
       case EffectShape::none:
-        if (has(spec)) break;
+        if (has(spec) || (everywhere_ && spec.id == gain_of_drive().id)) break;
         if (!is_coupling({spec.id, 0, "", Eigen::Vector2d::Zero()}))
           add(spec);
         else

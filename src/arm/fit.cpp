@@ -184,7 +184,8 @@ std::vector<char> Fit::free_unknowns(bool first) const {
   if (freedom_.tilt) set(layout_.tilt(), 2);
   for (Eigen::Index j = 0; j < layout_.joints; ++j) {
     if (!moves_[std::size_t(j)]) continue;
-    if (freedom_.friction) set(layout_.friction(j), 1), set(layout_.shift(j), 1);
+    if (freedom_.friction) set(layout_.shift(j), 1);
+    if (freedom_.rubs_otherwise(std::size_t(j))) set(layout_.friction(j), 1);
     if (freedom_.of_drive(std::size_t(j)))
       for (const DriveTerm t : rig_.terms) set(layout_.drive(j) + Eigen::Index(t), 1);
     if (freedom_.load && rig_.joints[std::size_t(j)].load_error > 0)

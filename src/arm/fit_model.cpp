@@ -45,6 +45,10 @@ Eigen::Vector3d tilted(const Eigen::Vector3d& gravity, const Eigen::Vector2d& ti
          Eigen::AngleAxisd(tilt[1], Eigen::Vector3d::UnitY()) * gravity;
 }
 
+bool FitFreedom::rubs_otherwise(std::size_t joint) const {
+  return friction && std::find(steady.begin(), steady.end(), joint) == steady.end();
+}
+
 bool FitFreedom::of_drive(std::size_t joint) const {
   return drives ||
          std::any_of(effects.begin(), effects.end(), [&](const FreeEffect& e) { return e.joint == joint; });
@@ -125,7 +129,8 @@ std::vector<Linearised> FitModel::linearised(const State& state, const FittedMot
 Eigen::MatrixXd FitModel::effect_at_rows(const State& state, const JointEffect& effect, std::size_t j,
                                          const ArmMotion& m, const Eigen::MatrixXd& chain,
                                          const std::vector<Eigen::VectorXd>& drives) const {
-  if (is_coupling(effect)) return factor(state, j) * drives[*index_of(rig_, effect.other)];
+  if (is_of_drives(effect))
+    return factor(state, j) * drives[is_coupling(effect) ? *index_of(rig_, effect.other) : j];
   const Eigen::MatrixXd all = effect_columns(effect, m, j, chain.col(Eigen::Index(j)));
   Eigen::MatrixXd out(Eigen::Index(m.rows.size()), all.cols());
   for (Eigen::Index i = 0; i < all.cols(); ++i)

@@ -18,6 +18,7 @@ const std::vector<JointEffectSpec>& joint_effect_specs() {
       {"asymmetric_viscous", 1, "damping", "N m s/rad", false},
       {"stribeck", 1, "torque", "N m", true, EffectShape::speed},
       {"presliding", 1, "torque", "N m", true, EffectShape::distance},
+      {"motor_torque_gain", 1, "gain", "-", false},
       {"transmission_coupling", 1, "ratio", "-", false},
       {"position_dependent_friction", 2, "amplitude", "N m", false, EffectShape::order, 1},
       {"cogging", 2, "amplitude", "N m", false, EffectShape::order, 2}};
@@ -40,6 +41,14 @@ const JointEffectSpec& JointEffect::spec() const {
 
 bool is_coupling(const JointEffect& effect) {
   return effect.id == "transmission_coupling";
+}
+
+JointEffect gain_of_drive() {
+  return {"motor_torque_gain", 0, "", Eigen::Vector2d::Zero()};
+}
+
+bool is_of_drives(const JointEffect& effect) {
+  return is_coupling(effect) || effect.id == gain_of_drive().id;
 }
 
 JointEffect read_joint_effect(const YamlReader& yaml) {

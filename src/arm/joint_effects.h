@@ -14,8 +14,14 @@ namespace backlash::arm {
 /// Whether its column is the torque of another joint's drive.
 bool is_coupling(const JointEffect& effect);
 
-/// Torque that one unit of each value takes, N m, at all samples, not filtered; not of a coupling. `load`:
-/// the chain's own torque at the joint.
+/// Whose column is the torque of its own drive.
+JointEffect gain_of_drive();
+
+/// Whether its column is the torque of a drive: of its own, or of another joint's.
+bool is_of_drives(const JointEffect& effect);
+
+/// Torque that one unit of each value takes, N m, at all samples, not filtered; not of is_of_drives().
+/// `load`: the chain's own torque at the joint.
 Eigen::MatrixXd effect_columns(const JointEffect& effect, const ArmMotion& motion, std::size_t joint,
                                const Eigen::VectorXd& load);
 

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "fit_model.h"
+#include "joint_effects.h"
 #include "trace_effects.h"
 #include "trace_evidence.h"
 #include "trace_result.h"
@@ -27,6 +29,10 @@ Motions parts(const Motions& motions, double from, double to) {
   return out;
 }
 
+bool of_joint(const Candidate& c) {
+  return !c.freedom.effects.empty();
+}
+
 /// Where one half of the samples lies before.
 double middle(const Motions& motions) {
   std::size_t all = 0, seen = 0;
@@ -37,6 +43,8 @@ double middle(const Motions& motions) {
   }
   return 0;
 }
+
+using FrictionAlike = std::map<std::size_t, std::vector<std::string>>;  // effects, by joint
 
 class Tracer {
  public:
@@ -58,10 +66,12 @@ class Tracer {
   std::vector<Candidate> candidates() const;
   void tell_effects(const std::vector<Candidate>& found);
   ArmStep step_of(const Candidate& c) const;
+  ArmStep effect_step(const Candidate& c) const;
   const Candidate* rival_of(const std::vector<Candidate>& all, std::size_t chosen) const;
   std::size_t best_of(const std::vector<Candidate>& all) const;
+  void tell_alike(ArmStep& step, const std::vector<Candidate>& all, std::size_t chosen) const;
   void tell_rival(ArmStep& step, const Candidate& rival);
-  void tell_friction(const Candidate& c, const Motions& judged);
+  void tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike);
   void finish(const Motions& judged, const Candidate& taken, bool named);
   std::vector<double> foretold(const Candidate& taken, const Motions& judged) const;
   std::optional<ArmTrace::Unexplained> worst_unexplained(const std::vector<double>& errors,
@@ -87,7 +97,7 @@ void Tracer::set_base() {
   for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
 }
 
-/// In their order: a payload at the last link, come or gone, first.
+/// In their order: a payload at the last link, come or gone, first; what a joint by itself shows last.
 std::vector<Candidate> Tracer::candidates() const {
   std::vector<Candidate> all;
   for (std::size_t i = rig_.chain.size(); i-- > 0;)
@@ -102,10 +112,17 @@ std::vector<Candidate> Tracer::candidates() const {
   tilt.effect = "gravity_direction";
   tilt.freedom.tilt = true;
   all.push_back(tilt);
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    Candidate gain;
+    gain.effect = gain_of_drive().id;
+    gain.freedom.effects.push_back({j, gain_of_drive(), 0, false});
+    all.push_back(gain);
+  }
   return all;
 }
 
 ArmStep Tracer::step_of(const Candidate& c) const {
+  if (!c.freedom.effects.empty()) return effect_step(c);
   ArmStep step;
   step.effect = c.effect;
   step.channel = rig_.joints[c.joint].name + "/torque";
@@ -124,19 +141,25 @@ ArmStep Tracer::step_of(const Candidate& c) const {
   return step;
 }
 
+/// The last effect of a joint.
+ArmStep Tracer::effect_step(const Candidate& c) const {
+  const FittedEffect& effect = c.fit.effects.back();
+  ArmStep step;
+  step.effect = effect.effect.id;
+  step.joint = rig_.joints[c.joint].name;
+  step.other_joint = effect.effect.other;
+  step.channel = step.joint + "/torque";
+  step.parameters = effect_parameters(effect);
+  if (signal::Measured& size = step.parameters.front().measured; rig_.fitted)  // as torques are known
+    size.standard_error = std::hypot(size.standard_error, size.value * rig_.common_error);
+  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
+  step.equivalent_to = c.alike;
+  return step;
+}
+
 void Tracer::tell_effects(const std::vector<Candidate>& found) {
   for (const Candidate& c : found) {
-    const FittedEffect& effect = c.fit.effects.back();
-    ArmStep step;
-    step.effect = effect.effect.id;
-    step.joint = rig_.joints[c.joint].name;
-    step.other_joint = effect.effect.other;
-    step.channel = step.joint + "/torque";
-    step.parameters = effect_parameters(effect);
-    if (signal::Measured& size = step.parameters.front().measured; rig_.fitted)  // as torques are known
-      size.standard_error = std::hypot(size.standard_error, size.value * rig_.common_error);
-    step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
-    step.equivalent_to = c.alike;
+    const ArmStep step = effect_step(c);
     if (!rig_.fitted && !c.freedom.effects.back().everywhere)
       trace_.notes.push_back("the training records do not have " + step.effect + " of " + step.joint);
     trace_.steps.push_back(step);
@@ -159,7 +182,7 @@ void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
 
 /// Where friction is not that of the training: a step where it is more than a robot's warming up, else a
 /// note.
-void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
+void Tracer::tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike) {
   Candidate base;
   base.fit = base_;
   Candidate against = c;
@@ -167,7 +190,7 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     const signal::Measured& f = c.fit.friction_factors[j];
     if (!(std::fabs(f.value - 1) > settings_.sure * f.standard_error)) continue;
-    const bool much = std::fabs(f.value - 1) > settings_.least_friction;
+    const bool much = other_friction_than_trained(c.fit, j, settings_);
     const std::string words =
         fmt::format("friction of {} is {:.2f} +- {:.2f} times that of the training records",
                     rig_.joints[j].name, f.value, f.standard_error);
@@ -182,6 +205,7 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged) {
     step.channel = step.joint + "/torque";
     step.parameters = {{"factor", "-", f}};
     step.gain = against.gains[j], step.gain_lower = against.lowers[j], step.gain_upper = against.uppers[j];
+    if (const auto others = alike.find(j); others != alike.end()) step.equivalent_to = others->second;
     trace_.steps.push_back(step);
   }
 }
@@ -205,8 +229,21 @@ std::size_t Tracer::best_of(const std::vector<Candidate>& all) const {
   }
   const bool same = best < all.size() && last < all.size() && all[best].freedom.payload &&
                     all[best].all - all[last].all < -std::log(1 - settings_.same_link);
-  const std::size_t chosen = same ? last : best;
+  std::size_t chosen = same ? last : best;
+  for (std::size_t i = 0; i < all.size(); ++i)  // one value where a body has ten
+    if (chosen < all.size() && !of_joint(all[chosen]) && all[i].reason.empty() && of_joint(all[i]) &&
+        all[chosen].all - all[i].all < -std::log(1 - settings_.clearly))
+      chosen = i;
   return chosen < 2 && rival_of(all, chosen) ? 0 : chosen;
+}
+
+/// Names of effects of another kind that do nearly as well.
+void Tracer::tell_alike(ArmStep& step, const std::vector<Candidate>& all, std::size_t chosen) const {
+  for (const Candidate& c : all)
+    if (c.reason.empty() && c.effect != step.effect &&
+        all[chosen].all - c.all < -std::log(1 - settings_.same_link) &&
+        std::find(step.equivalent_to.begin(), step.equivalent_to.end(), c.effect) == step.equivalent_to.end())
+      step.equivalent_to.push_back(c.effect);
 }
 
 /// True where something was found.
@@ -224,21 +261,23 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   }
   trace_.rejected.clear();
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (!all[i].reason.empty() && (i < 2 || all[i].freedom.tilt))
-      trace_.rejected.push_back(
-          {all[i].effect + (all[i].freedom.payload_sign < 0 ? " (taken away)" : ""), all[i].reason, ""});
+    if (!all[i].reason.empty() && (i < 2 || !all[i].freedom.payload))
+      trace_.rejected.push_back({all[i].effect + (all[i].freedom.payload_sign < 0 ? " (taken away)" : ""),
+                                 all[i].reason, of_joint(all[i]) ? rig_.joints[all[i].joint].name : ""});
   trace_.notes.clear();
   const std::size_t best = best_of(all);
   const Candidate& of_chain = best < all.size() ? all[best] : without;
   if (best < all.size()) {
     trace_.steps.push_back(step_of(of_chain));
     if (const Candidate* rival = rival_of(all, best)) tell_rival(trace_.steps.back(), *rival);
+    tell_alike(trace_.steps.back(), all, best);
   }
   tell(0.9, "trying effects of single joints");
-  const std::vector<Candidate> effects = joint_effects(of_chain, fits_, fitted, judged, trace_.rejected);
-  const Candidate& taken = effects.empty() ? of_chain : effects.back();
-  tell_effects(effects);
-  tell_friction(taken, judged);
+  const JointEffectsFound effects = joint_effects(of_chain, fits_, fitted, judged);
+  trace_.rejected.insert(trace_.rejected.end(), effects.rejected.begin(), effects.rejected.end());
+  const Candidate& taken = effects.steps.empty() ? of_chain : effects.steps.back();
+  tell_effects(effects.steps);
+  tell_friction(taken, judged, effects.friction_alike);
   for (std::size_t i = 0; best < all.size() && i < all.size(); ++i)
     if (all[i].reason.empty() && of_chain.freedom.payload && all[i].freedom.payload &&
         *all[i].freedom.payload != *of_chain.freedom.payload &&

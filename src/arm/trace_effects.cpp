@@ -13,19 +13,22 @@ namespace {
 class EffectSteps {
  public:
   EffectSteps(const CandidateFits& fits, const Motions& fitted, const Motions& judged,
-              std::vector<ArmTrace::Rejected>& rejected)
-      : fits_(fits), fitted_(fitted), judged_(judged), rejected_(rejected) {}
+              JointEffectsFound& found)
+      : fits_(fits), fitted_(fitted), judged_(judged), found_(found) {}
 
   std::optional<Candidate> next(const Candidate& model) const;
+  /// Instead of a factor of all friction of that joint.
+  std::optional<Candidate> other_friction(const Candidate& model, std::size_t joint) const;
 
  private:
   std::optional<Candidate> next(const Candidate& model, bool everywhere) const;
+  Candidate with(const Candidate& model, const EffectGuess& guess, bool everywhere) const;
   void reject(const ArmTrace::Rejected& one) const;
 
   const CandidateFits& fits_;
   const Motions& fitted_;
   const Motions& judged_;
-  std::vector<ArmTrace::Rejected>& rejected_;
+  JointEffectsFound& found_;
 };
 
 std::optional<Candidate> EffectSteps::next(const Candidate& model) const {
@@ -39,22 +42,28 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model) const {
   return better ? own : all;
 }
 
+/// Fitted with it.
+Candidate EffectSteps::with(const Candidate& model, const EffectGuess& guess, bool everywhere) const {
+  Candidate c = model;
+  c.alike = guess.alike;
+  c.freedom.effects.push_back(guess.effect);
+  c.freedom.effects.back().everywhere = everywhere;
+  fits_.fit(c, fitted_);
+  // From where it has come to, so that what is found next does not gain by settling this one.
+  for (std::size_t i = 0; i < c.freedom.effects.size(); ++i)
+    c.freedom.effects[i].effect = c.fit.effects[i].effect;
+  fits_.fit(c, fitted_);
+  c.freedom.effects.back().effect.shape = guess.effect.effect.shape;
+  return c;
+}
+
 std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhere) const {
   const ArmTraceSettings& settings = fits_.settings;
   const std::vector<FittedMotion> motions = everywhere ? fits_.motions(fitted_) : as_fitted(fitted_, true);
   int tried = 0;
   for (const EffectGuess& guess : guess_effects(model.fit, model.freedom, motions, everywhere)) {
     if (guess.share < settings.least_at_joint / 2 || tried++ == settings.most_tried) break;
-    Candidate c = model;
-    c.alike = guess.alike;
-    c.freedom.effects.push_back(guess.effect);
-    c.freedom.effects.back().everywhere = everywhere;
-    fits_.fit(c, fitted_);
-    // From where it has come to, so that what is found next does not gain by settling this one.
-    for (std::size_t i = 0; i < c.freedom.effects.size(); ++i)
-      c.freedom.effects[i].effect = c.fit.effects[i].effect;
-    fits_.fit(c, fitted_);
-    c.freedom.effects.back().effect.shape = guess.effect.effect.shape;
+    Candidate c = with(model, guess, everywhere);
     judge(c, model, judged_, fits_.rig, settings);
     const std::string reason = effect_refusal(c, model, judged_, settings);
     if (reason.empty()) return c;
@@ -63,27 +72,56 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
   return std::nullopt;
 }
 
+std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std::size_t joint) const {
+  const ArmTraceSettings& settings = fits_.settings;
+  Candidate steady = model;
+  steady.freedom.steady.push_back(joint);
+  fits_.fit(steady, fitted_);
+  std::optional<Candidate> best;
+  int tried = 0;
+  for (const EffectGuess& guess :
+       guess_effects(steady.fit, steady.freedom, as_fitted(fitted_, true), false)) {
+    if (guess.effect.joint != joint) continue;
+    if (guess.share < settings.least_at_joint / 2 || tried++ == settings.most_tried) break;
+    Candidate c = with(steady, guess, false), against = c;
+    judge(c, steady, judged_, fits_.rig, settings);
+    judge(against, model, judged_, fits_.rig, settings);
+    const double gain = against.gains[joint];
+    if (!effect_refusal(c, steady, judged_, settings).empty()) continue;
+    if (gain > -settings.nearly) found_.friction_alike[joint].push_back(guess.effect.effect.id);
+    if (gain > settings.clearly && against.lowers[joint] > 0 && (!best || c.gain > best->gain)) best = c;
+  }
+  return best;
+}
+
 /// Each effect of a joint once, with the last reason.
 void EffectSteps::reject(const ArmTrace::Rejected& one) const {
-  const auto known = std::find_if(rejected_.begin(), rejected_.end(), [&](const ArmTrace::Rejected& r) {
-    return r.effect == one.effect && r.joint == one.joint;
-  });
-  if (known != rejected_.end())
+  const auto known = std::find_if(
+      found_.rejected.begin(), found_.rejected.end(),
+      [&](const ArmTrace::Rejected& r) { return r.effect == one.effect && r.joint == one.joint; });
+  if (known != found_.rejected.end())
     *known = one;
   else
-    rejected_.push_back(one);
+    found_.rejected.push_back(one);
 }
 
 }  // namespace
 
-std::vector<Candidate> joint_effects(const Candidate& model, const CandidateFits& fits, const Motions& fitted,
-                                     const Motions& judged, std::vector<ArmTrace::Rejected>& rejected) {
-  const EffectSteps steps(fits, fitted, judged, rejected);
-  std::vector<Candidate> found;
-  while (int(found.size()) < fits.settings.most_effects) {
-    std::optional<Candidate> next = steps.next(found.empty() ? model : found.back());
+JointEffectsFound joint_effects(const Candidate& model, const CandidateFits& fits, const Motions& fitted,
+                                const Motions& judged) {
+  JointEffectsFound found;
+  const EffectSteps steps(fits, fitted, judged, found);
+  const auto last = [&]() -> const Candidate& { return found.steps.empty() ? model : found.steps.back(); };
+  const auto most = std::size_t(fits.settings.most_effects);
+  while (found.steps.size() < most) {
+    std::optional<Candidate> next = steps.next(last());
     if (!next) break;
-    found.push_back(std::move(*next));
+    found.steps.push_back(std::move(*next));
+  }
+  for (std::size_t j = 0; j < fits.rig.joints.size() && found.steps.size() < most; ++j) {
+    if (!other_friction_than_trained(last().fit, j, fits.settings)) continue;
+    if (std::optional<Candidate> other = steps.other_friction(last(), j))
+      found.steps.push_back(std::move(*other));
   }
   return found;
 }

@@ -3,15 +3,24 @@
 // that was not fitted confirms them.
 #pragma once
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "trace_evidence.h"
 
 namespace backlash::arm {
 
-/// Beside `model`: one candidate for each effect, with those before it. Where an effect of all records does
-/// as well as one of the test record alone, it is of all. What is not believed goes to `rejected`.
-std::vector<Candidate> joint_effects(const Candidate& model, const CandidateFits& fits, const Motions& fitted,
-                                     const Motions& judged, std::vector<ArmTrace::Rejected>& rejected);
+struct JointEffectsFound {
+  std::vector<Candidate> steps;  // one for each effect, with those before it
+  std::vector<ArmTrace::Rejected> rejected;
+  /// By joint: effects that do nearly as well as all its friction by a factor.
+  std::map<std::size_t, std::vector<std::string>> friction_alike;
+};
+
+/// Beside `model`. Where an effect of all records does as well as one of the test record alone, it is of all.
+/// Where friction of a joint is not that of the training, effects that rub are tried instead of the factor.
+JointEffectsFound joint_effects(const Candidate& model, const CandidateFits& fits, const Motions& fitted,
+                                const Motions& judged);
 
 }  // namespace backlash::arm

@@ -110,6 +110,12 @@ void judge(Candidate& c, const Candidate& without, const Motions& judged, const 
   bootstrap(c, squares_of(without, c, judged, rig, settings.block), settings);
 }
 
+bool other_friction_than_trained(const ArmFit& fit, std::size_t joint, const ArmTraceSettings& settings) {
+  const signal::Measured& f = fit.friction_factors[joint];
+  return std::fabs(f.value - 1) > settings.sure * f.standard_error &&
+         std::fabs(f.value - 1) > settings.least_friction;
+}
+
 std::string effect_refusal(Candidate& c, const Candidate& without, const Motions& judged,
                            const ArmTraceSettings& settings) {
   c.joint = c.freedom.effects.back().joint;
@@ -188,7 +194,8 @@ void CandidateFits::try_out(Candidate& c, const Candidate& without, const Motion
                             const Motions& judged) const {
   fit(c, fitted);
   judge(c, without, judged, rig, settings);
-  c.reason = refusal(c, rig, settings);
+  c.reason =
+      c.freedom.effects.empty() ? refusal(c, rig, settings) : effect_refusal(c, without, judged, settings);
 }
 
 }  // namespace backlash::arm

@@ -31,6 +31,9 @@ void judge(Candidate& c, const Candidate& without, const Motions& judged, const 
 /// Why a candidate that was judged is not believed; empty: it is.
 std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings);
 
+/// Whether the factor of a joint's friction is sure, and more than a robot's warming up.
+bool other_friction_than_trained(const ArmFit& fit, std::size_t joint, const ArmTraceSettings& settings);
+
 /// The same of the last of its effects of a joint; what it gains is from then on that of this joint.
 std::string effect_refusal(Candidate& c, const Candidate& without, const Motions& judged,
                            const ArmTraceSettings& settings);

@@ -54,10 +54,13 @@ struct FitFreedom {
   bool tilt = false;                // of gravity, in the motions that are marked
   bool load = false;                // friction that follows the load, about what is known of it
   bool friction = false;            // of each joint, in the motions that are marked: a factor
+  std::vector<std::size_t> steady;  // joints without such a factor
   std::vector<FreeEffect> effects;  // and with one the drive of its joint
 
   /// Whether the terms of a joint's drive are free.
   bool of_drive(std::size_t joint) const;
+  /// Whether it has a factor of friction.
+  bool rubs_otherwise(std::size_t joint) const;
 };
 
 struct FittedMotion {

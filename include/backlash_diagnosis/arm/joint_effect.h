@@ -11,6 +11,10 @@
 //   asymmetric_viscous            a |v|                      a: half the difference of the directions
 //   quadratic_drag                A v |v|
 //   load_dependent_friction       mu S |tau|                 tau: the chain's own torque
+//   motor_torque_gain             g u_j                      u_j: what the model has this drive supply: what
+//   is
+//                                                            recorded is more by the share g, and the motor's
+//                                                            torque 1 / (1 + g) of it
 //   transmission_coupling         c u_i                      u_i: what the model has the drive of joint i
 //   supply; as
 //                                                            where the motor of a wrist sits on a shaft that

@@ -34,10 +34,12 @@ struct ArmTraceSettings {
   double least_at_joint = 0.5;  // share of its joint's squared error that such an effect must take away, and
   double least_of_signal = 0.025;  // rms of what it explains, of the signal's deviation; choice: bristles of
                                    // a UR5's joints take up to 0.4 and 0.03, see doc/measured/ur5_arm.md
-  double clearly = 0.1;    // share of the squared error by which an effect of the test record alone must do
-                           // better than one of all records; choice
-  double block = 2;        // s, of the bootstrap; as FitSettings::block
-  int draws = 400;         // choice (time)
+  double clearly = 0.1;  // share of the squared error by which an effect of the test record alone must do
+                         // better than one of all records; choice
+  double nearly = 0.5;   // share of the squared error by which another effect may do worse that is told to be
+                         // like it; choice
+  double block = 2;      // s, of the bootstrap; as FitSettings::block
+  int draws = 400;       // choice (time)
   std::uint64_t seed = 1;  // choice
   PushSettings push;
 };

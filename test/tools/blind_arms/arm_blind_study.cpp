@@ -8,6 +8,7 @@
 
 #include "backlash_diagnosis/base/scratch_folder.h"
 #include "blind_arm.h"
+#include "flaws.h"
 #include "questions.h"
 
 namespace blind_arms {
@@ -27,10 +28,10 @@ bool read_options(int argc, char** argv, Options& o) {
   auto add = options.add_options();
   add("help", "this text");
   add("ask", po::value(&o.ask)->default_value(o.ask),
-      "encoders: plays by two encoders; motors: plays by the motors' encoders alone; changes: "
-      "trace_residual");
+      "encoders: plays by two encoders; motors: plays by the motors' encoders alone; changes, "
+      "effects: trace_residual");
   add("kind", po::value(&o.kind)->default_value(o.kind),
-      "what the rig file does not know; all: plays take each in turn, changes all of an arm");
+      "what the rig file does not know; all: plays take each in turn, changes and effects all of an arm");
   add("seed", po::value(&o.seed)->default_value(o.seed), "of the first arm; the others follow");
   add("arms", po::value(&o.arms)->default_value(o.arms), "how many");
   add("duration", po::value(&o.duration)->default_value(o.duration), "of each record [s]");
@@ -40,14 +41,17 @@ bool read_options(int argc, char** argv, Options& o) {
   po::store(po::parse_command_line(argc, argv, options), given);
   po::notify(given);
   if (given.count("help") == 0) return true;
-  std::cout << options << "\nkinds, of plays:\n" << listed(kinds()) << "of changes:\n" << listed(changes());
+  std::cout << options << "\nkinds, of plays:\n"
+            << listed(kinds()) << "of changes:\n"
+            << listed(changes()) << "of effects:\n"
+            << listed(flaws());
   return false;
 }
 
 int run(Options options) {
   const backlash::ScratchFolder scratch;
   if (options.out.empty()) options.out = scratch.path("arms");
-  if (options.ask == "changes") return ask_changes(options);
+  if (options.ask == "changes" || options.ask == "effects") return ask_changes(options);
   if (options.ask == "encoders" || options.ask == "motors") return ask_plays(options);
   throw std::invalid_argument("--ask " + options.ask + ": not known");
 }

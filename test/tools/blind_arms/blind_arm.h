@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,6 +15,12 @@ using Vector = std::array<double, 3>;
 
 /// How the teeth yield once the gap is closed by `depth` [rad].
 enum class Teeth { spring, power, hardening };
+
+/// size sin(order x + phase)
+struct Wave {
+  double size = 0, order = 1, phase = 0;
+  double at(double x) const { return size == 0 ? 0 : size * std::sin(order * x + phase); }
+};
 
 /// A joint, its drive, and the link that it turns; all at the joint's side of the reduction.
 struct Joint {
@@ -36,6 +43,16 @@ struct Joint {
   double transmission = 0,
          transmission_phase = 0;  // rad, of the motor's encoder, `transmission_order` per turn
   int transmission_order = 30;
+  Wave cogging, ripple;                         // of torque, of friction: N m
+  double breakaway = 0, breakaway_speed = 0.1;  // N m, rad/s: as Stribeck's
+  double drag = 0, lopsided = 0;                // N m s^2/rad^2, N m s/rad: v |v|, |v|
+  double rubbing = 0;                           // friction over the teeth's torque
+  double coupling = 0;                          // of the motor of joint `coupled`
+  std::size_t coupled = 0;
+  double gain = 1;                                              // torque over what the record shows
+  double cable = 0;                                             // N m/rad
+  double spot = 0, spot_place = 0, spot_width = 1;              // N m of friction, rad
+  double drift = 0;                                             // 1/s, by which Coulomb friction grows
   double zero = 0;                                              // rad, of the link's encoder
   double lower = 0, upper = 0;                                  // rad, of the motion
   double position_gain = 0, speed_gain = 0, integral_gain = 0;  // 1/s, N m s/rad, 1/s
@@ -55,6 +72,13 @@ struct DeclaredJoint {
   double mass = 1, centre = 1, friction = 1, link_friction = 1, rotor = 1, stiffness = 1;
 };
 
+/// What should be told: an effect by the package's name; strength and shape in its units.
+struct Added {
+  std::string effect;
+  std::size_t joint = 0;
+  double strength = 0, shape = 0;
+};
+
 struct Arm {
   std::uint64_t seed = 0;
   std::vector<Joint> joints;
@@ -72,6 +96,7 @@ struct Arm {
   std::size_t changed = 0;               // joint whose friction is `more_friction` times what it was
   double more_friction = 1;
   std::vector<Push> pushes;
+  std::vector<Added> added;  // see flaws.h
 };
 
 /// What the rig file does not know, beside the errors of all: see kinds().

@@ -8,7 +8,7 @@
 namespace blind_arms {
 
 struct Options {
-  std::string ask = "encoders";  // encoders, motors, changes
+  std::string ask = "encoders";  // encoders, motors, changes, effects
   std::string kind = "all";
   std::uint64_t seed = 1000;
   int arms = 10;
@@ -17,8 +17,8 @@ struct Options {
   std::string json;      // file of the answers
 };
 
-/// Both return how many answers were wrong and sure.
+/// Return how many answers were wrong and sure.
 int ask_plays(const Options& options);
-int ask_changes(const Options& options);
+int ask_changes(const Options& options);  // and effects
 
 }  // namespace blind_arms

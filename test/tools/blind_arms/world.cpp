@@ -95,13 +95,24 @@ World::World(const Arm& arm, const std::string& path)
   mj_forward(model_.get(), data_.get());
 }
 
+/// At which the motor slides now.
+double World::dry_friction(std::size_t joint) const {
+  const Joint& j = arm_.joints[joint];
+  const auto bell = [](double x) { return std::exp(-x * x); };
+  const double speed = motor_rate(joint), held = std::fabs(teeth_torque(j, twist(joint), 0));
+  return j.coulomb * (1 + j.stribeck * bell(speed / j.stribeck_speed) + j.drift * time()) +
+         j.breakaway * bell(speed / j.breakaway_speed) + j.ripple.at(motor(joint)) + j.rubbing * held +
+         j.spot * bell((motor(joint) - j.spot_place) / j.spot_width);
+}
+
 /// Puts friction of motor and link on the joint's coordinates.
 double World::friction(std::size_t joint) {
   const Joint& j = arm_.joints[joint];
   const double speed = motor_rate(joint), link_speed = link_rate(joint);
-  const double coulomb = j.coulomb * (1 + j.stribeck * std::exp(-std::pow(speed / j.stribeck_speed, 2)));
   const double motor =
-      bristle_friction(bristles_[joint].motor, speed, coulomb, j.coulomb / j.bristle) + j.viscous * speed;
+      bristle_friction(bristles_[joint].motor, speed, dry_friction(joint), j.coulomb / j.bristle) +
+      j.viscous * speed + j.drag * speed * std::fabs(speed) + j.lopsided * std::fabs(speed) +
+      j.cogging.at(this->motor(joint)) + j.cable * (this->motor(joint) - (j.lower + j.upper) / 2);
   const double link =
       bristle_friction(bristles_[joint].link, link_speed, j.link_coulomb, j.link_coulomb / kLinkBristle) +
       j.link_viscous * link_speed;
@@ -109,10 +120,15 @@ double World::friction(std::size_t joint) {
   return motor + link;  // the coordinate of the motor moves both
 }
 
+double World::drive_torque(const std::vector<double>& motors, std::size_t joint) const {
+  const Joint& j = arm_.joints[joint];
+  return j.gain * motors[joint] - (j.coupling == 0 ? 0 : j.coupling * motors[j.coupled]);
+}
+
 void World::step(const std::vector<double>& motors) {
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     const Places& at = joints_[i];
-    data_->qfrc_applied[at.motor] = motors[i] - friction(i);
+    data_->qfrc_applied[at.motor] = drive_torque(motors, i) - friction(i);
     data_->qfrc_applied[at.link] += teeth_torque(arm_.joints[i], twist(i), -data_->qvel[at.link]);
   }
   for (int a = 0; a < 3; ++a) data_->xfrc_applied[6 * last_body_ + a] = 0;

@@ -47,7 +47,9 @@ class World {
   struct Friction {
     double motor = 0, link = 0;  // N m, of bristles
   };
+  double dry_friction(std::size_t joint) const;
   double friction(std::size_t joint);
+  double drive_torque(const std::vector<double>& motors, std::size_t joint) const;
 
   Arm arm_;
   std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model_;
