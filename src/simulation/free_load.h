@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A load that follows the motor of a record through teeth, sample by sample (driven_load.h).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/model/stick_slip.h"
+#include "backlash_diagnosis/simulation/driven_load.h"
+#include "lanes.h"
+// Beyond the lanes.
+#include "driven_step.h"
+
+namespace backlash::simulation {
+
+constexpr double kFarthest = 1e3;  // rad/s, beyond which the load has run away
+
+BACKLASH_LANES Segment segment_after(const RecordedMotion& motion, std::size_t k) {
+  const auto &q = *motion.motor, &w = *motion.motor_rate;
+  const std::size_t j = std::min(k + 1, q.size() - 1);
+  return {{q[k], q[j], motion.interval * w[k], motion.interval * w[j]},
+          motion.load_rate ? between(*motion.load_rate, k) : Cubic{0, 0, 0, 0},
+          double(k) * motion.interval,
+          motion.interval};
+}
+
+inline DrivenLoad columns(std::size_t samples) {
+  DrivenLoad out;
+  for (auto* column : {&out.load, &out.load_rate, &out.mesh_torque, &out.mesh_on_motor})
+    column->resize(samples);
+  return out;
+}
+
+[[noreturn]] inline void run_away(double time) {
+  throw IntegrationError("the load runs away at t = " + std::to_string(time) + " s");
+}
+
+class FreeLoad {
+ public:
+  FreeLoad(const model::Rig& rig, double feedback)
+      : train_(rig),
+        inertia_(train_.load_inertia()),
+        feedback_(feedback),
+        rubs_(train_.friction_event_count() > 0),
+        shaped_(train_.flanks_shift_with_position()),
+        plain_(train_.plain_load()) {
+    if (!plain_) return;
+    const model::PowerContact law = *train_.power_contact();
+    forces_ = {train_.equations(),
+               {law.exponent, law.stiffness, law.loss, law.damping, 0.5 * train_.backlash()},
+               inertia_,
+               inertia_ * feedback_};
+    friction_ = train_.load_forces({}).friction;
+  }
+
+  double q = 0, w = 0;
+
+  double begin(const Segment& s) {
+    last_ = forces(s.at(0), q, w);
+    mode_.begin(last_.net, w, last_.friction, q);
+    return last_.mesh_torque;
+  }
+
+  /// One sample, in pieces that end where the load comes to rest or breaks away and where teeth touch or
+  /// part. `sum` gathers the mesh torque on the motor; returns that through the teeth at the end.
+  double step(const Segment& s, Halves<double>& sum) {
+    double u = 0;
+    Forces f = last_;
+    for (int piece = 0; u < 1; ++piece) {
+      const bool divide = piece < kMostPieces;
+      u = mode_.stuck() ? hold(s, u, f, divide, sum) : slide(s, u, f, divide, sum);
+    }
+    last_ = f;
+    return f.mesh_torque;
+  }
+
+  /// Whether it can move beside another: in sliding with the same friction all along.
+  bool joins(const FreeLoad& other) const {
+    return plain_ && !(friction_.presliding > 0) && forces_.teeth.exponent == other.forces_.teeth.exponent;
+  }
+  const PlainLoad<double>& plain_forces() const { return forces_; }
+  bool stuck() const { return mode_.stuck(); }
+  int stops_against() const { return rubs_ ? mode_.direction() : 0; }
+  double friction() const { return mode_.torque(friction_); }
+  PlainLoad<double>::Forces last() const { return {last_.net, last_.mesh_torque}; }
+  /// Goes on from where it has slid to beside others.
+  void slid_to(double position, double rate, const PlainLoad<double>::Forces& f) {
+    q = position;
+    w = rate;
+    last_ = {{f.net, f.mesh_torque, -f.mesh_torque, friction_}, position, rate};
+    flanks_.reset();
+  }
+
+ private:
+  static constexpr int kMostPieces = 30;
+  static constexpr int kHalvings = 10;  // of a sample, that place an event
+  using Flanks = std::optional<model::GearTrain::Flanks>;
+  struct Forces : model::GearTrain::LoadForces {  // net with what draws the load
+    double position, rate;                        // rad, rad/s, of the load
+    int side() const { return (mesh_torque > 0) - (mesh_torque < 0); }
+  };
+  struct Move {
+    double q, w;
+    int side;              // that touches halfway
+    double mesh_on_motor;  // N m, halfway
+    Forces end;
+    Flanks flanks;  // at the end
+  };
+
+  bool holds(const Forces& f) const {
+    if (f.friction.presliding > 0) return mode_.event(f.net, 0, f.friction) < 0;
+    return f.net < f.friction.forward && -f.net < f.friction.backward;
+  }
+
+  /// `flanks`: where they are at nearly this position, if known.
+  Forces forces(const Moment& m, double position, double rate, const Flanks& flanks = {}) const {
+    if (plain_) {
+      const PlainLoad<double>::Forces f = forces_.forces(m, position, rate);
+      return {{f.net, f.mesh_torque, -f.mesh_torque, friction_}, position, rate};
+    }
+    const model::Motion motion{m.time, m.motor, m.motor_rate, position, rate, 0};
+    Forces f{flanks ? train_.load_forces(motion, *flanks) : train_.load_forces(motion), position, rate};
+    f.net += inertia_ * feedback_ * (m.load_rate - rate);
+    return f;
+  }
+
+  double acceleration(const Forces& f) const {
+    return (f.net + mode_.torque(f.friction, f.position, f.rate)) / inertia_;
+  }
+
+  /// From u to v. Flanks are looked up twice only, halfway and at the end, where the load will be to within
+  /// h^3: their shape hardly changes over less.
+  Move moved(const Segment& s, double u, double v, const Forces& f) const {
+    const double h = (v - u) * s.interval;
+    const Moment middle = s.at(0.5 * (u + v)), end = s.at(v);
+    Flanks halfway, beyond;
+    Forces stages[2];
+    const auto at_stage = [&](int stage, double position, double rate) {
+      if (shaped_ && stage == 0) {
+        halfway = train_.flanks(middle.motor, q + 0.25 * h * (w + rate));
+        beyond = train_.flanks(end.motor, q + h * rate);
+      }
+      if (stage == 2) return acceleration(forces(end, position, rate, beyond));
+      stages[stage] = forces(middle, position, rate, halfway);
+      return acceleration(stages[stage]);
+    };
+    double to_q = q, to_w = w;
+    runge_kutta(h, acceleration(f), at_stage, to_q, to_w);
+    // Halfway the first estimate of the position lags by h^2 a / 8, the second leads by as much.
+    return {to_q,
+            to_w,
+            stages[1].side(),
+            0.5 * (stages[0].mesh_on_motor + stages[1].mesh_on_motor),
+            forces(end, to_q, to_w, beyond),
+            beyond};
+  }
+
+  /// The first change between u and v, known to lie there: last moment before and first after it.
+  template <typename Changed>
+  static std::pair<double, double> bracket(double u, double v, const Changed& changed) {
+    double before = u, after = v;
+    for (int i = 0; i < kHalvings; ++i)
+      (changed(0.5 * (before + after)) ? after : before) = 0.5 * (before + after);
+    return {before, after};
+  }
+
+  double slide(const Segment& s, double u, Forces& f, bool divide, Halves<double>& sum) {
+    const auto changes = [&](const Move& to) {
+      return to.end.side() != f.side() || (rubs_ && mode_.direction() * to.w < 0);
+    };
+    double v = 1;
+    Move to = moved(s, u, v, f);
+    if (divide && to.side != f.side() && !changes(to)) {  // touched and left within
+      v = 0.5 * (u + v);
+      to = moved(s, u, v, f);
+    }
+    if (!divide || !changes(to)) {
+      sum.add(u, v, f.mesh_on_motor, to.mesh_on_motor, to.end.mesh_on_motor);
+      q = to.q;
+      w = to.w;
+      f = to.end;
+      flanks_ = to.flanks;
+      return v;
+    }
+    const auto [before, after] = bracket(u, v, [&](double at) { return changes(moved(s, u, at, f)); });
+    to = moved(s, u, before, f);
+    sum.add(u, before, f.mesh_on_motor, to.mesh_on_motor, to.end.mesh_on_motor);
+    const double h = (after - before) * s.interval;
+    q = to.q + h * to.w;
+    w = to.w + h * acceleration(to.end);
+    cross(s, before, after, to.end, f, sum);
+    return after;
+  }
+
+  double hold(const Segment& s, double u, Forces& f, bool divide, Halves<double>& sum) {
+    const auto at = [&](double v) { return forces(s.at(v), q, 0); };
+    const auto changes = [&](const Forces& end) { return end.side() != f.side() || !holds(end); };
+    double before = 1, after = 1;
+    if (divide && changes(at(1)))
+      std::tie(before, after) = bracket(u, 1, [&](double v) { return changes(at(v)); });
+    const Forces end = at(before);
+    sum.add(u, before, f.mesh_on_motor, at(0.5 * (u + before)).mesh_on_motor, end.mesh_on_motor);
+    if (before == after) {
+      f = end;
+      flanks_.reset();
+    } else {
+      cross(s, before, after, end, f, sum);
+    }
+    return after;
+  }
+
+  /// The moment of the change itself.
+  void cross(const Segment& s, double before, double after, const Forces& from, Forces& f,
+             Halves<double>& sum) {
+    flanks_.reset();
+    const bool sticks = !(from.friction.presliding > 0);
+    if (sticks && mode_.direction() * w <= 0) w = 0;
+    f = forces(s.at(after), q, w);
+    mode_.update(f.net, w, f.friction, q);
+    const double mean = 0.5 * (from.mesh_on_motor + f.mesh_on_motor);
+    sum.add(before, after, mean, mean, mean);
+  }
+
+  model::GearTrain train_;
+  double inertia_, feedback_;
+  bool rubs_, shaped_, plain_;
+  PlainLoad<double> forces_{};      // of a plain load
+  model::FrictionLimits friction_;  // of a plain load
+  model::StickSlip mode_;
+  Forces last_{};  // at the end of the sample before
+  Flanks flanks_;  // there, if known
+};
+
+}  // namespace backlash::simulation
