@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "fit_model.h"
-#include "joint_effects.h"
+#include "trace_chain.h"
 #include "trace_effects.h"
 #include "trace_evidence.h"
 #include "trace_result.h"
@@ -27,10 +27,6 @@ Motions parts(const Motions& motions, double from, double to) {
   for (const ArmMotion& m : motions)
     if (ArmMotion part = part_of(m, from, to); !part.rows.empty()) out.push_back(std::move(part));
   return out;
-}
-
-bool of_joint(const Candidate& c) {
-  return !c.freedom.effects.empty();
 }
 
 /// Where one half of the samples lies before.
@@ -63,13 +59,7 @@ class Tracer {
   void cannot_judge(const std::string& why);
   void look_for_pushes(const ArmRecord& test);
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
-  std::vector<Candidate> candidates() const;
   void tell_effects(const std::vector<Candidate>& found);
-  ArmStep step_of(const Candidate& c) const;
-  ArmStep effect_step(const Candidate& c) const;
-  const Candidate* rival_of(const std::vector<Candidate>& all, std::size_t chosen) const;
-  std::size_t best_of(const std::vector<Candidate>& all) const;
-  void tell_alike(ArmStep& step, const std::vector<Candidate>& all, std::size_t chosen) const;
   void tell_rival(ArmStep& step, const Candidate& rival);
   void tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike);
   void finish(const Motions& judged, const Candidate& taken, bool named);
@@ -89,77 +79,17 @@ class Tracer {
 };
 
 void Tracer::set_base() {
-  if (rig_.fitted) {
+  if (rig_.fitted)
     base_.rig = rig_;
-    return;
-  }
-  base_ = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
+  else
+    base_ = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
   for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
-}
-
-/// In their order: a payload at the last link, come or gone, first; what a joint by itself shows last.
-std::vector<Candidate> Tracer::candidates() const {
-  std::vector<Candidate> all;
-  for (std::size_t i = rig_.chain.size(); i-- > 0;)
-    for (const double sign : {1.0, -1.0}) {
-      Candidate c;
-      c.effect = "payload";
-      c.freedom.payload = i;
-      c.freedom.payload_sign = sign;
-      all.push_back(c);
-    }
-  Candidate tilt;
-  tilt.effect = "gravity_direction";
-  tilt.freedom.tilt = true;
-  all.push_back(tilt);
-  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
-    Candidate gain;
-    gain.effect = gain_of_drive().id;
-    gain.freedom.effects.push_back({j, gain_of_drive(), 0, false});
-    all.push_back(gain);
-  }
-  return all;
-}
-
-ArmStep Tracer::step_of(const Candidate& c) const {
-  if (!c.freedom.effects.empty()) return effect_step(c);
-  ArmStep step;
-  step.effect = c.effect;
-  step.channel = rig_.joints[c.joint].name + "/torque";
-  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
-  if (c.freedom.payload) {
-    step.link = rig_.chain.joints[*c.freedom.payload].link;
-    const double mass = c.fit.mass.value;
-    const double error = rig_.fitted ? std::hypot(c.fit.mass.standard_error, mass * rig_.common_error)
-                                     : c.fit.mass.standard_error;
-    step.parameters.push_back({"mass", "kg", {mass, error}});
-    static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
-    for (int i = 0; i < 3; ++i) step.parameters.push_back({names[i], "m", c.fit.centre[i]});
-  } else {
-    step.parameters = {{"about_x", "rad", c.fit.tilt[0]}, {"about_y", "rad", c.fit.tilt[1]}};
-  }
-  return step;
-}
-
-/// The last effect of a joint.
-ArmStep Tracer::effect_step(const Candidate& c) const {
-  const FittedEffect& effect = c.fit.effects.back();
-  ArmStep step;
-  step.effect = effect.effect.id;
-  step.joint = rig_.joints[c.joint].name;
-  step.other_joint = effect.effect.other;
-  step.channel = step.joint + "/torque";
-  step.parameters = effect_parameters(effect);
-  if (signal::Measured& size = step.parameters.front().measured; rig_.fitted)  // as torques are known
-    size.standard_error = std::hypot(size.standard_error, size.value * rig_.common_error);
-  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
-  step.equivalent_to = c.alike;
-  return step;
+  trace_.train = relative_errors(base_, {}, as_fitted(train_, false), settings_.fit.least_seconds);
 }
 
 void Tracer::tell_effects(const std::vector<Candidate>& found) {
   for (const Candidate& c : found) {
-    const ArmStep step = effect_step(c);
+    const ArmStep step = step_of(c, rig_, settings_);
     if (!rig_.fitted && !c.freedom.effects.back().everywhere)
       trace_.notes.push_back("the training records do not have " + step.effect + " of " + step.joint);
     trace_.steps.push_back(step);
@@ -168,7 +98,7 @@ void Tracer::tell_effects(const std::vector<Candidate>& found) {
 
 /// What is taken away on one side does nearly what a body on the other side does: values hold both.
 void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
-  const ArmStep other = step_of(rival);
+  const ArmStep other = step_of(rival, rig_, settings_);
   for (std::size_t i = 0; i < step.parameters.size(); ++i) {
     signal::Measured& m = step.parameters[i].measured;
     m.standard_error = std::hypot(m.standard_error, other.parameters[i].measured.value - m.value);
@@ -187,6 +117,8 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged, const Fric
   base.fit = base_;
   Candidate against = c;
   judge(against, base, judged, rig_, settings_);
+  const std::vector<double> expected = foretold(c, judged),
+                            errors = relative_errors(c.fit, c.freedom, as_fitted(judged, true), 0);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     const signal::Measured& f = c.fit.friction_factors[j];
     if (!(std::fabs(f.value - 1) > settings_.sure * f.standard_error)) continue;
@@ -194,9 +126,19 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged, const Fric
     const std::string words =
         fmt::format("friction of {} is {:.2f} +- {:.2f} times that of the training records",
                     rig_.joints[j].name, f.value, f.standard_error);
-    if (!much || !(against.gains[j] > settings_.least_gain) || !(against.lowers[j] > 0)) {
-      trace_.notes.push_back(words + (much ? ", which the part that was not fitted does not confirm"
-                                           : ", as a robot's that warms up"));
+    const double left = errors[j] / expected[j];
+    std::string doubt;
+    if (!much)
+      doubt = ", as a robot's that warms up";
+    else if (!(against.gains[j] > settings_.least_gain) || !(against.lowers[j] > 0))
+      doubt = ", which the part that was not fitted does not confirm";
+    else if (!(left < settings_.explained))
+      doubt = fmt::format(
+          ", but that is not what it lacks: the error is then {:.3g} times what the training records let "
+          "expect",
+          left);
+    if (!doubt.empty()) {
+      trace_.notes.push_back(words + doubt);
       continue;
     }
     ArmStep step;
@@ -210,47 +152,11 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged, const Fric
   }
 }
 
-/// A body at the last link that has come, or is gone, and does as well as the other of the two.
-const Candidate* Tracer::rival_of(const std::vector<Candidate>& all, std::size_t chosen) const {
-  if (chosen > 1) return nullptr;
-  const Candidate& other = all[1 - chosen];
-  const bool alike =
-      other.reason.empty() && std::fabs(all[chosen].all - other.all) < -std::log(1 - settings_.same_link);
-  return alike ? &other : nullptr;
-}
-
-/// The best of the candidates that are believed; none: the end of the list.
-std::size_t Tracer::best_of(const std::vector<Candidate>& all) const {
-  std::size_t best = all.size(), last = all.size();
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!all[i].reason.empty()) continue;
-    if (best == all.size() || all[i].all > all[best].all) best = i;
-    if (i < 2 && (last == all.size() || all[i].all > all[last].all)) last = i;
-  }
-  const bool same = best < all.size() && last < all.size() && all[best].freedom.payload &&
-                    all[best].all - all[last].all < -std::log(1 - settings_.same_link);
-  std::size_t chosen = same ? last : best;
-  for (std::size_t i = 0; i < all.size(); ++i)  // one value where a body has ten
-    if (chosen < all.size() && !of_joint(all[chosen]) && all[i].reason.empty() && of_joint(all[i]) &&
-        all[chosen].all - all[i].all < -std::log(1 - settings_.clearly))
-      chosen = i;
-  return chosen < 2 && rival_of(all, chosen) ? 0 : chosen;
-}
-
-/// Names of effects of another kind that do nearly as well.
-void Tracer::tell_alike(ArmStep& step, const std::vector<Candidate>& all, std::size_t chosen) const {
-  for (const Candidate& c : all)
-    if (c.reason.empty() && c.effect != step.effect &&
-        all[chosen].all - c.all < -std::log(1 - settings_.same_link) &&
-        std::find(step.equivalent_to.begin(), step.equivalent_to.end(), c.effect) == step.equivalent_to.end())
-      step.equivalent_to.push_back(c.effect);
-}
-
 /// True where something was found.
 bool Tracer::search(const Motions& fitted, const Motions& judged, const std::string& words) {
   Candidate without;
   fits_.fit(without, fitted);
-  std::vector<Candidate> all = candidates();
+  std::vector<Candidate> all = chain_candidates(rig_);
   for (std::size_t i = 0; i < all.size(); ++i) {
     tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
     // Whether something has come or gone is clear from the last link.
@@ -265,12 +171,13 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
       trace_.rejected.push_back({all[i].effect + (all[i].freedom.payload_sign < 0 ? " (taken away)" : ""),
                                  all[i].reason, of_joint(all[i]) ? rig_.joints[all[i].joint].name : ""});
   trace_.notes.clear();
-  const std::size_t best = best_of(all);
+  const std::size_t best = best_of(all, settings_);
   const Candidate& of_chain = best < all.size() ? all[best] : without;
   if (best < all.size()) {
-    trace_.steps.push_back(step_of(of_chain));
-    if (const Candidate* rival = rival_of(all, best)) tell_rival(trace_.steps.back(), *rival);
-    tell_alike(trace_.steps.back(), all, best);
+    trace_.steps.push_back(step_of(of_chain, rig_, settings_));
+    if (const Candidate* rival = rival_of(all, best, settings_)) tell_rival(trace_.steps.back(), *rival);
+    for (const std::string& name : as_good_as(all, best, settings_))
+      trace_.steps.back().equivalent_to.push_back(name);
   }
   tell(0.9, "trying effects of single joints");
   const JointEffectsFound effects = joint_effects(of_chain, fits_, fitted, judged);
@@ -302,7 +209,6 @@ void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   const std::vector<double> best = relative_errors(taken.fit, taken.freedom, as_fitted(judged, true), least);
   trace_.before = relative_errors(base_, {}, as_fitted(judged, false), least);
   trace_.after = named ? best : trace_.before;
-  trace_.train = relative_errors(base_, {}, as_fitted(train_, false), least);
   trace_.floor = noise_floors(judged, trace_.before);
   if (named) trace_.augmented = augmented_rig(rig_, taken);
   trace_.series = named ? series_of(judged, base_, taken.freedom, taken.fit, true)

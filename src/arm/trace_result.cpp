@@ -34,6 +34,47 @@ std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted) {
   return out;
 }
 
+namespace {
+
+/// The last effect of a joint.
+ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
+  const FittedEffect& effect = c.fit.effects.back();
+  ArmStep step;
+  step.effect = effect.effect.id;
+  step.joint = rig.joints[c.joint].name;
+  step.other_joint = effect.effect.other;
+  step.channel = step.joint + "/torque";
+  step.parameters = effect_parameters(effect);
+  signal::Measured& size = step.parameters.front().measured;  // as its law and all torques are known
+  const double share = std::hypot(settings.law, rig.fitted ? rig.common_error : 0);
+  size.standard_error = std::hypot(size.standard_error, size.value * share);
+  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
+  step.equivalent_to = c.alike;
+  return step;
+}
+
+}  // namespace
+
+ArmStep step_of(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
+  if (!c.freedom.effects.empty()) return effect_step(c, rig, settings);
+  ArmStep step;
+  step.effect = c.effect;
+  step.channel = rig.joints[c.joint].name + "/torque";
+  step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
+  if (c.freedom.payload) {
+    step.link = rig.chain.joints[*c.freedom.payload].link;
+    const double mass = c.fit.mass.value;
+    const double error = rig.fitted ? std::hypot(c.fit.mass.standard_error, mass * rig.common_error)
+                                    : c.fit.mass.standard_error;
+    step.parameters.push_back({"mass", "kg", {mass, error}});
+    static const char* const names[] = {"centre_x", "centre_y", "centre_z"};
+    for (int i = 0; i < 3; ++i) step.parameters.push_back({names[i], "m", c.fit.centre[i]});
+  } else {
+    step.parameters = {{"about_x", "rad", c.fit.tilt[0]}, {"about_y", "rad", c.fit.tilt[1]}};
+  }
+  return step;
+}
+
 ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken) {
   const FitFreedom& freedom = taken.freedom;
   ArmRig out = taken.fit.rig;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a trace of an arm gives beside its verdict: the rig with the effect, the series before and after, the
-// noise.
+// What a trace of an arm gives: a candidate in words and values, the rig with the effect, the series before
+// and after, the noise.
 #pragma once
 
 #include <vector>
@@ -14,6 +14,9 @@ std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked);
 
 /// Values of an effect with their standard errors; of a wave amplitude and phase.
 std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted);
+
+/// A candidate that is told: the last of its effects of a joint, else what it adds to the chain.
+ArmStep step_of(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings);
 
 /// The rig with what the candidate adds to it.
 ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken);

@@ -114,7 +114,9 @@ void add(Count& c, const ArmTrace& trace, const std::string& kind, const Arm& ar
     const Added* truth = found(step, step.effect, all);
     const bool alike = !truth && among(step, all), good = truth || alike || may(step, kind, arm);
     c.named += truth != nullptr, c.among += alike, c.wrong += !good;
-    const bool values = truth && (step.effect == "payload" || truth->strength != 0);
+    // Of Stribeck's friction a record tells all, also what the drive had before.
+    const bool values = truth && step.effect != "friction_drift" && step.effect != "gravity_direction" &&
+                        step.effect != "stribeck";
     if (!good || values)
       fmt::print("{}: {} {}: {}; true: {}\n", good ? "told" : "wrong", arm.seed, kind, words_of(step),
                  truth_of(arm));
