@@ -59,6 +59,7 @@ class Tracer {
   void cannot_judge(const std::string& why);
   void look_for_pushes(const ArmRecord& test);
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
+  void tell_chain(const std::vector<Candidate>& all, std::size_t best, const ArmFit& fit);
   void tell_effects(const std::vector<Candidate>& found);
   void tell_rival(ArmStep& step, const Candidate& rival);
   void tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike);
@@ -89,7 +90,7 @@ void Tracer::set_base() {
 
 void Tracer::tell_effects(const std::vector<Candidate>& found) {
   for (const Candidate& c : found) {
-    const ArmStep step = step_of(c, rig_, settings_);
+    const ArmStep step = step_of(c, found.back().fit, rig_, settings_);
     if (!rig_.fitted && !c.freedom.effects.back().everywhere)
       trace_.notes.push_back("the training records do not have " + step.effect + " of " + step.joint);
     trace_.steps.push_back(step);
@@ -98,7 +99,7 @@ void Tracer::tell_effects(const std::vector<Candidate>& found) {
 
 /// What is taken away on one side does nearly what a body on the other side does: values hold both.
 void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
-  const ArmStep other = step_of(rival, rig_, settings_);
+  const ArmStep other = step_of(rival, rival.fit, rig_, settings_);
   for (std::size_t i = 0; i < step.parameters.size(); ++i) {
     signal::Measured& m = step.parameters[i].measured;
     m.standard_error = std::hypot(m.standard_error, other.parameters[i].measured.value - m.value);
@@ -152,6 +153,20 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged, const Fric
   }
 }
 
+/// What is told of the chain, with values of a fit that has all that was found.
+void Tracer::tell_chain(const std::vector<Candidate>& all, std::size_t best, const ArmFit& fit) {
+  const Candidate& told = all[best];
+  ArmStep step = step_of(told, fit, rig_, settings_);
+  if (const Candidate* rival = rival_of(all, best, settings_)) tell_rival(step, *rival);
+  for (const std::string& name : as_good_as(all, best, settings_)) step.equivalent_to.push_back(name);
+  trace_.steps.push_back(step);
+  for (const Candidate& c : all)
+    if (c.reason.empty() && told.freedom.payload && c.freedom.payload &&
+        *c.freedom.payload != *told.freedom.payload && told.all - c.all < -std::log(1 - settings_.same_link))
+      trace_.notes.push_back("a payload at " + rig_.chain.joints[*c.freedom.payload].link +
+                             " does nearly as well");
+}
+
 /// True where something was found.
 bool Tracer::search(const Motions& fitted, const Motions& judged, const std::string& words) {
   Candidate without;
@@ -173,24 +188,13 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   trace_.notes.clear();
   const std::size_t best = best_of(all, settings_);
   const Candidate& of_chain = best < all.size() ? all[best] : without;
-  if (best < all.size()) {
-    trace_.steps.push_back(step_of(of_chain, rig_, settings_));
-    if (const Candidate* rival = rival_of(all, best, settings_)) tell_rival(trace_.steps.back(), *rival);
-    for (const std::string& name : as_good_as(all, best, settings_))
-      trace_.steps.back().equivalent_to.push_back(name);
-  }
   tell(0.9, "trying effects of single joints");
   const JointEffectsFound effects = joint_effects(of_chain, fits_, fitted, judged);
   trace_.rejected.insert(trace_.rejected.end(), effects.rejected.begin(), effects.rejected.end());
   const Candidate& taken = effects.steps.empty() ? of_chain : effects.steps.back();
+  if (best < all.size()) tell_chain(all, best, taken.fit);
   tell_effects(effects.steps);
   tell_friction(taken, judged, effects.friction_alike);
-  for (std::size_t i = 0; best < all.size() && i < all.size(); ++i)
-    if (all[i].reason.empty() && of_chain.freedom.payload && all[i].freedom.payload &&
-        *all[i].freedom.payload != *of_chain.freedom.payload &&
-        of_chain.all - all[i].all < -std::log(1 - settings_.same_link))
-      trace_.notes.push_back("a payload at " + rig_.chain.joints[*all[i].freedom.payload].link +
-                             " does nearly as well");
   if (trace_.steps.empty()) {
     unnamed_ = without;
     return false;

@@ -38,7 +38,7 @@ namespace {
 
 /// The last effect of a joint.
 ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
-  const FittedEffect& effect = c.fit.effects.back();
+  const FittedEffect& effect = c.fit.effects[c.freedom.effects.size() - 1];
   ArmStep step;
   step.effect = effect.effect.id;
   step.joint = rig.joints[c.joint].name;
@@ -55,7 +55,10 @@ ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
 
 }  // namespace
 
-ArmStep step_of(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
+ArmStep step_of(const Candidate& named, const ArmFit& fit, const ArmRig& rig,
+                const ArmTraceSettings& settings) {
+  Candidate c = named;
+  c.fit = fit;
   if (!c.freedom.effects.empty()) return effect_step(c, rig, settings);
   ArmStep step;
   step.effect = c.effect;

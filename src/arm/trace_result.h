@@ -15,8 +15,9 @@ std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked);
 /// Values of an effect with their standard errors; of a wave amplitude and phase.
 std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted);
 
-/// A candidate that is told: the last of its effects of a joint, else what it adds to the chain.
-ArmStep step_of(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings);
+/// A candidate that is told: the last of its effects of a joint, else what it adds to the chain; values of
+/// a fit that has it, and what was found after it.
+ArmStep step_of(const Candidate& c, const ArmFit& fit, const ArmRig& rig, const ArmTraceSettings& settings);
 
 /// The rig with what the candidate adds to it.
 ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken);
