@@ -173,11 +173,6 @@ std::vector<JointEffect> Search::effects_of(std::size_t j) const {
   const auto add = [&](const JointEffectSpec& spec, double shape = 0, const std::string& other = "") {
     all.push_back({spec.id, shape, other, Eigen::Vector2d::Zero()});
   };
-  const auto has = [&](const JointEffectSpec& spec) {
-    return std::any_of(fit_.rig.terms.begin(), fit_.rig.terms.end(), [&](DriveTerm t) {
-      return std::string(kDriveTermSpecs[std::size_t(t)].name) == spec.drive_term;
-    });
-  };
   const double most =
       std::min(kMostOrder, 2 * M_PI * kFastest * fit_.rig.identification.torque_cutoff / speed_[j]);
   for (const JointEffectSpec& spec : joint_effect_specs()) switch (spec.shape) {
@@ -191,7 +186,8 @@ std::vector<JointEffect> Search::effects_of(std::size_t j) const {
         for (const double time : kDistances) add(spec, time * speed_[j]);
         break;
       case EffectShape::none:
-        if (has(spec) || (everywhere_ && spec.id == gain_of_drive().id)) break;
+        // What the fit has of a drive it has of all records.
+        if (everywhere_ && (stands_for_term(spec, fit_.rig) || spec.id == gain_of_drive().id)) break;
         if (!is_coupling({spec.id, 0, "", Eigen::Vector2d::Zero()}))
           add(spec);
         else

@@ -50,8 +50,8 @@ bool FitFreedom::rubs_otherwise(std::size_t joint) const {
 }
 
 bool FitFreedom::of_drive(std::size_t joint) const {
-  return drives ||
-         std::any_of(effects.begin(), effects.end(), [&](const FreeEffect& e) { return e.joint == joint; });
+  return drives || std::any_of(effects.begin(), effects.end(),
+                               [&](const FreeEffect& e) { return e.joint == joint && !e.of_term; });
 }
 
 Layout layout_of(const ArmRig& rig, const FitFreedom& freedom) {

@@ -13,6 +13,8 @@ namespace backlash::arm {
 
 const std::vector<JointEffectSpec>& joint_effect_specs() {
   static const std::vector<JointEffectSpec> all = {
+      {"motor_coulomb", 1, "torque", "N m", false, EffectShape::none, 0, "coulomb"},
+      {"motor_viscous", 1, "damping", "N m s/rad", false, EffectShape::none, 0, "viscous"},
       {"load_dependent_friction", 1, "coefficient", "-", true, EffectShape::none, 0, "load"},
       {"quadratic_drag", 1, "drag", "N m s^2/rad^2", true, EffectShape::none, 0, "quadratic"},
       {"asymmetric_viscous", 1, "damping", "N m s/rad", false},
@@ -41,6 +43,12 @@ const JointEffectSpec& JointEffect::spec() const {
 
 bool is_coupling(const JointEffect& effect) {
   return effect.id == "transmission_coupling";
+}
+
+bool stands_for_term(const JointEffectSpec& spec, const ArmRig& rig) {
+  return std::any_of(rig.terms.begin(), rig.terms.end(), [&](DriveTerm t) {
+    return std::string(kDriveTermSpecs[std::size_t(t)].name) == spec.drive_term;
+  });
 }
 
 JointEffect gain_of_drive() {
@@ -112,6 +120,10 @@ Eigen::MatrixXd effect_columns(const JointEffect& effect, const ArmMotion& m, st
     out << s * (-(v / effect.shape).square()).exp();
   else if (id == "presliding")
     out << -2 * s * (-way_since_reversal(m, j) / effect.shape).exp();
+  else if (id == "motor_coulomb")
+    out << s;
+  else if (id == "motor_viscous")
+    out << v;
   else if (id == "asymmetric_viscous")
     out << v.abs();
   else if (id == "quadratic_drag")

@@ -14,6 +14,9 @@ namespace backlash::arm {
 /// Whether its column is the torque of another joint's drive.
 bool is_coupling(const JointEffect& effect);
 
+/// Whether the drives of the rig have it as a term.
+bool stands_for_term(const JointEffectSpec& spec, const ArmRig& rig);
+
 /// Whose column is the torque of its own drive.
 JointEffect gain_of_drive();
 

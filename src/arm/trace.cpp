@@ -61,10 +61,10 @@ class Tracer {
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
   void tell_chain(const std::vector<Candidate>& all, std::size_t best, const ArmFit& fit);
   void tell_effects(const std::vector<Candidate>& found);
+  void tell_when(const Candidate& c);
   void tell_rival(ArmStep& step, const Candidate& rival);
   void tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike);
   void finish(const Motions& judged, const Candidate& taken, bool named);
-  std::vector<double> foretold(const Candidate& taken, const Motions& judged) const;
   std::optional<ArmTrace::Unexplained> worst_unexplained(const std::vector<double>& errors,
                                                          const std::vector<double>& expected) const;
 
@@ -73,7 +73,6 @@ class Tracer {
   const Progress& progress_;
   Motions train_, test_;
   CandidateFits fits_;
-  ArmFit base_;
   Candidate taken_;    // what was named
   Candidate unnamed_;  // what foretells the test record best where nothing is named
   ArmTrace trace_;
@@ -81,20 +80,27 @@ class Tracer {
 
 void Tracer::set_base() {
   if (rig_.fitted)
-    base_.rig = rig_;
+    fits_.base.rig = rig_;
   else
-    base_ = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
-  for (const std::string& warning : base_.warnings) trace_.warnings.push_back(warning);
-  trace_.train = relative_errors(base_, {}, as_fitted(train_, false), settings_.fit.least_seconds);
+    fits_.base = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
+  for (const std::string& warning : fits_.base.warnings) trace_.warnings.push_back(warning);
+  fits_.train_errors = relative_errors(fits_.base, {}, as_fitted(train_, false), settings_.fit.least_seconds);
+  trace_.train = fits_.train_errors;
 }
 
 void Tracer::tell_effects(const std::vector<Candidate>& found) {
   for (const Candidate& c : found) {
-    const ArmStep step = step_of(c, found.back().fit, rig_, settings_);
-    if (!rig_.fitted && !c.freedom.effects.back().everywhere)
-      trace_.notes.push_back("the training records do not have " + step.effect + " of " + step.joint);
-    trace_.steps.push_back(step);
+    trace_.steps.push_back(step_of(c, found.back().fit, rig_, settings_));
+    tell_when(c);
   }
+}
+
+/// Of an effect of a joint whether the training records have it.
+void Tracer::tell_when(const Candidate& c) {
+  const FreeEffect& effect = c.freedom.effects.back();
+  if (!rig_.fitted && !effect.everywhere)
+    trace_.notes.push_back(effect.effect.id + " of " + rig_.joints[effect.joint].name +
+                           " is of the test record, the training records do not have it");
 }
 
 /// What is taken away on one side does nearly what a body on the other side does: values hold both.
@@ -115,10 +121,10 @@ void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
 /// note.
 void Tracer::tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike) {
   Candidate base;
-  base.fit = base_;
+  base.fit = fits_.base;
   Candidate against = c;
   judge(against, base, judged, rig_, settings_);
-  const std::vector<double> expected = foretold(c, judged),
+  const std::vector<double> expected = fits_.foretold(c, judged),
                             errors = relative_errors(c.fit, c.freedom, as_fitted(judged, true), 0);
   for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
     const signal::Measured& f = c.fit.friction_factors[j];
@@ -160,6 +166,7 @@ void Tracer::tell_chain(const std::vector<Candidate>& all, std::size_t best, con
   if (const Candidate* rival = rival_of(all, best, settings_)) tell_rival(step, *rival);
   for (const std::string& name : as_good_as(all, best, settings_)) step.equivalent_to.push_back(name);
   trace_.steps.push_back(step);
+  if (of_joint(told)) tell_when(told);
   for (const Candidate& c : all)
     if (c.reason.empty() && told.freedom.payload && c.freedom.payload &&
         *c.freedom.payload != *told.freedom.payload && told.all - c.all < -std::log(1 - settings_.same_link))
@@ -211,29 +218,13 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
 void Tracer::finish(const Motions& judged, const Candidate& taken, bool named) {
   const double least = settings_.fit.least_seconds;
   const std::vector<double> best = relative_errors(taken.fit, taken.freedom, as_fitted(judged, true), least);
-  trace_.before = relative_errors(base_, {}, as_fitted(judged, false), least);
+  trace_.before = relative_errors(fits_.base, {}, as_fitted(judged, false), least);
   trace_.after = named ? best : trace_.before;
   trace_.floor = noise_floors(judged, trace_.before);
   if (named) trace_.augmented = augmented_rig(rig_, taken);
-  trace_.series = named ? series_of(judged, base_, taken.freedom, taken.fit, true)
-                        : series_of(judged, base_, {}, base_, false);
-  trace_.unexplained = worst_unexplained(best, foretold(taken, judged));
-}
-
-/// The errors that are expected of it: what was left of the training records, and what the effect is not
-/// known to. What a half of the test record leaves may be what is missing.
-std::vector<double> Tracer::foretold(const Candidate& taken, const Motions& judged) const {
-  ArmFit known = taken.fit;
-  for (std::size_t j = 0; !rig_.fitted && j < rig_.joints.size(); ++j)
-    known.deviation[j] = std::fmin(known.deviation[j], base_.deviation[j]);
-  if (rig_.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
-  std::vector<double> errors =
-      foretold_errors(known, taken.freedom, as_fitted(judged, true), settings_.fit.least_seconds);
-  for (std::size_t j = 0; rig_.fitted && j < rig_.joints.size(); ++j) {
-    const double said = rig_.joints[j].training_error;
-    errors[j] = std::hypot(errors[j], said > 0 ? said : trace_.train[j]);
-  }
-  return errors;
+  trace_.series = named ? series_of(judged, fits_.base, taken.freedom, taken.fit, true)
+                        : series_of(judged, fits_.base, {}, fits_.base, false);
+  trace_.unexplained = worst_unexplained(best, fits_.foretold(taken, judged));
 }
 
 std::optional<ArmTrace::Unexplained> Tracer::worst_unexplained(const std::vector<double>& errors,
@@ -251,7 +242,7 @@ std::optional<ArmTrace::Unexplained> Tracer::worst_unexplained(const std::vector
 }
 
 void Tracer::look_for_pushes(const ArmRecord& test) {
-  for (const PushEvent& e : pushes(test, base_.rig, settings_.push)) {
+  for (const PushEvent& e : pushes(test, fits_.base.rig, settings_.push)) {
     ArmStep step;
     step.effect = "external_torque";
     step.joint = rig_.joints[e.joint].name;
@@ -323,7 +314,7 @@ ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test,
   test_ = motions_of(test, rig_, trace_.warnings);
   tell(0.1, "fitting the base machine");
   set_base();
-  trace_.augmented = base_.rig;
+  trace_.augmented = fits_.base.rig;
   if (holds_pose(test, settings_.push)) {
     look_for_pushes(test);
     trace_.series = held_series(test, rig_.channel);

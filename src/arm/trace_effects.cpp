@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "trace_effects.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 
@@ -19,11 +21,16 @@ class EffectSteps {
   std::optional<Candidate> next(const Candidate& model) const;
   /// Instead of a factor of all friction of that joint.
   std::optional<Candidate> other_friction(const Candidate& model, std::size_t joint) const;
+  /// Where a joint is left unexplained, what takes the most of it away need not be what it lacks.
+  void drop_what_does_not_explain(const Candidate& model) const;
 
  private:
   std::optional<Candidate> next(const Candidate& model, bool everywhere) const;
   Candidate with(const Candidate& model, const EffectGuess& guess, bool everywhere) const;
   void reject(const ArmTrace::Rejected& one) const;
+  bool is_of_term(const EffectGuess& guess) const {
+    return stands_for_term(guess.effect.effect.spec(), fits_.rig);
+  }
 
   const CandidateFits& fits_;
   const Motions& fitted_;
@@ -48,6 +55,7 @@ Candidate EffectSteps::with(const Candidate& model, const EffectGuess& guess, bo
   c.alike = guess.alike;
   c.freedom.effects.push_back(guess.effect);
   c.freedom.effects.back().everywhere = everywhere;
+  c.freedom.effects.back().of_term = is_of_term(guess);
   fits_.fit(c, fitted_);
   // From where it has come to, so that what is found next does not gain by settling this one.
   for (std::size_t i = 0; i < c.freedom.effects.size(); ++i)
@@ -62,6 +70,8 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
   const std::vector<FittedMotion> motions = everywhere ? fits_.motions(fitted_) : as_fitted(fitted_, true);
   int tried = 0;
   for (const EffectGuess& guess : guess_effects(model.fit, model.freedom, motions, everywhere)) {
+    // A factor of all friction beside more of one kind of it may be a factor and more of another kind.
+    if (is_of_term(guess) && model.freedom.rubs_otherwise(guess.effect.joint)) continue;
     if (guess.share < settings.least_at_joint / 2 || tried++ == settings.most_tried) break;
     Candidate c = with(model, guess, everywhere);
     judge(c, model, judged_, fits_.rig, settings);
@@ -74,6 +84,7 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
 
 std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std::size_t joint) const {
   const ArmTraceSettings& settings = fits_.settings;
+  found_.friction_alike[joint].clear();
   Candidate steady = model;
   steady.freedom.steady.push_back(joint);
   fits_.fit(steady, fitted_);
@@ -92,6 +103,38 @@ std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std
     if (gain > settings.clearly && against.lowers[joint] > 0 && (!best || c.gain > best->gain)) best = c;
   }
   return best;
+}
+
+void EffectSteps::drop_what_does_not_explain(const Candidate& model) const {
+  if (found_.steps.empty()) return;
+  const Candidate last = found_.steps.back();
+  const std::vector<double> expected = fits_.foretold(last, judged_),
+                            errors = relative_errors(last.fit, last.freedom, as_fitted(judged_, true), 0);
+  const auto left_of = [&](const Candidate& c) {
+    const std::size_t joint = c.freedom.effects.back().joint;
+    return errors[joint] / expected[joint];
+  };
+  const auto explains = [&](const Candidate& c) { return left_of(c) <= fits_.settings.foretold; };
+  if (std::all_of(found_.steps.begin(), found_.steps.end(), explains)) return;
+  std::vector<Candidate> kept;
+  for (const Candidate& c : found_.steps) {
+    const FreeEffect& own = c.freedom.effects.back();
+    if (!explains(c)) {
+      reject({own.effect.id,
+              fmt::format("leaves {:.3g} times the error that the training records let expect", left_of(c)),
+              fits_.rig.joints[own.joint].name});
+      continue;
+    }
+    const Candidate before = kept.empty() ? model : kept.back();
+    Candidate again = before;
+    if (!c.freedom.rubs_otherwise(own.joint)) again.freedom.steady.push_back(own.joint);
+    again.alike = c.alike;
+    again.freedom.effects.push_back(own);
+    fits_.fit(again, fitted_);
+    judge(again, before, judged_, fits_.rig, fits_.settings);
+    if (effect_refusal(again, before, judged_, fits_.settings).empty()) kept.push_back(std::move(again));
+  }
+  found_.steps = std::move(kept);
 }
 
 /// Each effect of a joint once, with the last reason.
@@ -113,16 +156,22 @@ JointEffectsFound joint_effects(const Candidate& model, const CandidateFits& fit
   const EffectSteps steps(fits, fitted, judged, found);
   const auto last = [&]() -> const Candidate& { return found.steps.empty() ? model : found.steps.back(); };
   const auto most = std::size_t(fits.settings.most_effects);
+  const auto look_at_friction = [&] {
+    for (std::size_t j = 0; j < fits.rig.joints.size() && found.steps.size() < most; ++j) {
+      if (!other_friction_than_trained(last().fit, j, fits.settings)) continue;
+      if (std::optional<Candidate> other = steps.other_friction(last(), j))
+        found.steps.push_back(std::move(*other));
+    }
+  };
+  look_at_friction();
+  const std::size_t known = found.steps.size();
   while (found.steps.size() < most) {
     std::optional<Candidate> next = steps.next(last());
     if (!next) break;
     found.steps.push_back(std::move(*next));
   }
-  for (std::size_t j = 0; j < fits.rig.joints.size() && found.steps.size() < most; ++j) {
-    if (!other_friction_than_trained(last().fit, j, fits.settings)) continue;
-    if (std::optional<Candidate> other = steps.other_friction(last(), j))
-      found.steps.push_back(std::move(*other));
-  }
+  if (found.steps.size() > known) look_at_friction();
+  steps.drop_what_does_not_explain(model);
   return found;
 }
 

@@ -94,6 +94,26 @@ double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::Mat
 
 constexpr double kFarFromGuess = 0.4;  // of a shape's logarithm; choice: its prior is half of it
 
+/// Of the rms of what rubs in the drive of its joint, without it.
+double share_of_friction(const Candidate& c, const Motions& judged) {
+  double own = 0, all = 0;
+  const JointDrive& drive = c.fit.rig.joints[c.joint];
+  Candidate less = c, more = c;
+  less.fit.effects.back().effect.values.setZero();
+  for (const DriveTerm t :
+       {DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::quadratic, DriveTerm::cubic, DriveTerm::load})
+    more.fit.rig.joints[c.joint].terms[std::size_t(t)] = 0;
+  if (!(drive.terms[std::size_t(DriveTerm::coulomb)] > 0)) return INFINITY;
+  for (const ArmMotion& m : judged) {
+    const auto at = [&](const Candidate& one) {
+      return Eigen::VectorXd(predict(one.fit, one.freedom, {&m, true}).predicted.col(Eigen::Index(c.joint)));
+    };
+    const Eigen::VectorXd with = at(c);
+    own += (with - at(less)).squaredNorm(), all += (with - at(more)).squaredNorm();
+  }
+  return std::sqrt(own / all);
+}
+
 const char* const kNotConfirmed = "the part that was not fitted does not confirm it in all blocks of time";
 
 std::string gain_refusal(const Candidate& c, const ArmRig& rig, double least) {
@@ -138,6 +158,9 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
     return fmt::format("the error is {:.2f} % without its torque and {:.2f} % with it: others have gained",
                        100 * none, 100 * with);
   const FittedEffect& e = c.fit.effects.back();
+  if (c.freedom.effects.back().of_term)
+    if (const double share = share_of_friction(c, judged); share < settings.least_friction)
+      return fmt::format("is {:.2f} of the joint's friction: no more than a robot's warming up", share);
   if (e.effect.spec().positive && !(e.effect.values[0] > 0))
     return fmt::format("its {} is {:.2g}: no friction is negative", e.effect.spec().strength,
                        e.effect.values[0]);
@@ -196,6 +219,20 @@ void CandidateFits::try_out(Candidate& c, const Candidate& without, const Motion
   judge(c, without, judged, rig, settings);
   c.reason =
       c.freedom.effects.empty() ? refusal(c, rig, settings) : effect_refusal(c, without, judged, settings);
+}
+
+std::vector<double> CandidateFits::foretold(const Candidate& taken, const Motions& judged) const {
+  ArmFit known = taken.fit;
+  for (std::size_t j = 0; !rig.fitted && j < rig.joints.size(); ++j)
+    known.deviation[j] = std::fmin(known.deviation[j], base.deviation[j]);
+  if (rig.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
+  std::vector<double> errors =
+      foretold_errors(known, taken.freedom, as_fitted(judged, true), settings.fit.least_seconds);
+  for (std::size_t j = 0; rig.fitted && j < rig.joints.size(); ++j) {
+    const double said = rig.joints[j].training_error;
+    errors[j] = std::hypot(errors[j], said > 0 ? said : train_errors[j]);
+  }
+  return errors;
 }
 
 }  // namespace backlash::arm

@@ -52,8 +52,14 @@ class CandidateFits {
   /// Fitted, judged and believed or not.
   void try_out(Candidate& c, const Candidate& without, const Motions& fitted, const Motions& judged) const;
 
+  /// The errors that are expected of it, per joint: what was left of the training records, and what the
+  /// effect is not known to. What a half of the test record leaves may be what is missing.
+  std::vector<double> foretold(const Candidate& taken, const Motions& judged) const;
+
   const ArmRig& rig;
   const ArmTraceSettings& settings;
+  ArmFit base;  // of the training records alone, or as the rig file has it
+  std::vector<double> train_errors;
 
  private:
   const Motions& train_;

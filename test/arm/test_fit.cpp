@@ -189,6 +189,21 @@ TEST(Trace, FindsFrictionOfOneJoint) {
   EXPECT_NEAR(trace.steps[0].parameters[0].measured.value, 1.6, 0.1);
 }
 
+// A factor of all friction explains part of it, and so does a wave of the position.
+TEST(Trace, ViscousFrictionAloneIsNoFactorOfAllFriction) {
+  const test::Machine machine(8);
+  test::Machine thick = machine;
+  thick.drives[1].terms[2] *= 6;
+  const ArmTrace trace =
+      trace_arm(machine.declared, {machine.record(1), machine.record(2)}, thick.record(3), false);
+  ASSERT_EQ(trace.steps.size(), 1u);
+  EXPECT_EQ(trace.steps[0].effect, "motor_viscous");
+  EXPECT_EQ(trace.steps[0].joint, "shoulder_lift_joint");
+  const signal::Measured& more = trace.steps[0].parameters[0].measured;
+  EXPECT_NEAR(more.value, 5 * machine.drives[1].terms[2], 4 * more.standard_error);
+  EXPECT_LT(more.standard_error, 0.1 * more.value);
+}
+
 /// An effect of one joint that the rig file does not know.
 JointEffect unknown_effect(const std::string& id, double size, double shape = 0) {
   return {id, shape, id == "transmission_coupling" ? "elbow_joint" : "", Eigen::Vector2d(size, 0)};
@@ -212,7 +227,7 @@ class JointEffects : public testing::TestWithParam<EffectCase> {
     test::Machine out(c.when == When::always ? 31 : 32);
     out.effect = c.effect;
     out.affected = c.joint;
-    out.coupled = 2;  // elbow_joint
+    out.coupled = c.effect.other.empty() ? c.joint : 2;  // elbow_joint
     return out;
   }
 
@@ -277,9 +292,12 @@ INSTANTIATE_TEST_SUITE_P(
                     EffectCase{When::since_training, unknown_effect("position_dependent_friction", 1.2, 3),
                                2},
                     EffectCase{When::since_training, unknown_effect("presliding", 4, 0.06), 1},
+                    EffectCase{When::since_training, unknown_effect("motor_torque_gain", 0.12), 2},
+                    EffectCase{When::since_training, unknown_effect("stribeck", 3, 0.5), 3},
+                    EffectCase{When::fitted_before, unknown_effect("motor_torque_gain", -0.1), 1},
                     EffectCase{When::fitted_before, unknown_effect("asymmetric_viscous", 4), 0},
                     EffectCase{When::fitted_before, unknown_effect("cogging", 1.5, 7.3), 1}),
-    [](const auto& info) { return info.param.effect.id; });
+    [](const auto& info) { return info.param.effect.id + std::to_string(info.param.joint); });
 
 }  // namespace
 }  // namespace backlash::arm

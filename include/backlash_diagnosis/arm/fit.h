@@ -44,6 +44,7 @@ struct FreeEffect {
   JointEffect effect;
   double shape_spread = 0;  // how far its shape may be off
   bool everywhere = false;  // in all motions; else in those that are marked
+  bool of_term = false;     // more or less of a term of the drive, which is then known
 };
 
 /// What a fit may change.

@@ -2,6 +2,8 @@
 // What the drive of one joint of an arm shows beside the terms of its equation (arm_rig.h): torque that it
 // has to supply at the joint, N m. The laws are those of the terms of the same names of a joint by itself.
 //
+//   motor_coulomb                 T S                        dry friction that is more, or less, than the
+//   motor_viscous                 b v                        term's; the same of viscous friction
 //   cogging                       A sin(n q + p)             n periods per turn of the joint
 //   position_dependent_friction   S A sin(n q + p)
 //   stribeck                      T S exp(-(v / w_s)^2)      dry friction that is more at low speed

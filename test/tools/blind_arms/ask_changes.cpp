@@ -25,11 +25,16 @@ struct Count {
   int values = 0, beyond_two = 0, beyond_three = 0;  // of payloads and effects, standard errors
 };
 
+/// By which Coulomb friction of the changed joint is more than it was.
+double more_coulomb(const Arm& arm) {
+  return arm.joints[arm.changed].coulomb * (1 - 1 / arm.more_friction);
+}
+
 /// What the package should name.
 std::vector<Added> expected(const std::string& kind, const Arm& arm) {
   std::vector<Added> all = arm.added;
   if (arm.payload > 0) all.push_back({"payload"});
-  if (kind == "friction") all.push_back({"friction_drift", arm.changed});
+  if (kind == "friction") all.push_back({"motor_coulomb", arm.changed, more_coulomb(arm), 0});
   if (kind == "tilt") all.push_back({"gravity_direction"});
   return all;
 }
@@ -39,7 +44,8 @@ std::vector<Added> expected(const std::string& kind, const Arm& arm) {
 bool may(const ArmStep& step, const std::string& kind, const Arm& arm) {
   if (step.effect == "stribeck" || step.effect == "presliding") return true;
   if (step.effect != "friction_drift") return false;
-  return kind == "warm" || ((kind == "drift" || kind == "spot") && step.joint == joint_name(arm.changed));
+  const bool here = step.joint == joint_name(arm.changed);
+  return kind == "warm" || ((kind == "friction" || kind == "drift" || kind == "spot") && here);
 }
 
 const Added* found(const ArmStep& step, const std::string& effect, const std::vector<Added>& all) {
@@ -64,9 +70,26 @@ std::vector<double> effect_errors(const ArmStep& step, const Added& truth) {
   return z;
 }
 
+/// As the encoders have it: where their zeros are off, about axes along the last joint's, its link is taken
+/// to be turned by as much.
+Vector payload_centre(const Arm& arm) {
+  const Vector& axis = arm.joints.back().axis;
+  double turn = 0;
+  std::size_t about = 0;
+  for (std::size_t a = 0; a < 3; ++a)
+    if (axis[a] != 0) about = a;
+  for (const Joint& j : arm.joints) turn -= j.zero * j.axis[about];
+  const std::size_t x = (about + 1) % 3, y = (about + 2) % 3;
+  Vector centre = arm.payload_centre;
+  centre[x] = arm.payload_centre[x] * std::cos(turn) - arm.payload_centre[y] * std::sin(turn);
+  centre[y] = arm.payload_centre[x] * std::sin(turn) + arm.payload_centre[y] * std::cos(turn);
+  return centre;
+}
+
 /// Of mass and centre.
 std::vector<double> payload_errors(const ArmStep& step, const Arm& arm) {
-  const double truth[] = {arm.payload, arm.payload_centre[0], arm.payload_centre[1], arm.payload_centre[2]};
+  const Vector centre = payload_centre(arm);
+  const double truth[] = {arm.payload, centre[0], centre[1], centre[2]};
   std::vector<double> z;
   for (std::size_t k = 0; k < 4 && k < step.parameters.size(); ++k)
     z.push_back((step.parameters[k].measured.value - truth[k]) / step.parameters[k].measured.standard_error);
@@ -83,9 +106,10 @@ std::string words_of(const ArmStep& step) {
 
 std::string truth_of(const Arm& arm) {
   std::vector<std::string> all;
+  const Vector centre = payload_centre(arm);
   if (arm.payload > 0)
-    all.push_back(fmt::format("{:.4g} kg at {:.3f} {:.3f} {:.3f} m", arm.payload, arm.payload_centre[0],
-                              arm.payload_centre[1], arm.payload_centre[2]));
+    all.push_back(
+        fmt::format("{:.4g} kg at {:.3f} {:.3f} {:.3f} m", arm.payload, centre[0], centre[1], centre[2]));
   if (arm.more_friction > 1)
     all.push_back(fmt::format("{}, {:.2f} times", joint_name(arm.changed), arm.more_friction));
   if (arm.tilt != 0) all.push_back(fmt::format("{:.3f} rad", arm.tilt));
