@@ -10,6 +10,12 @@
 #include "joint_effects.h"
 
 namespace backlash::arm {
+namespace {
+
+constexpr double kLeastGain = -0.9,
+                 kMostGain = 10;  // -: a motor gives 1 / (1 + g) of what is recorded; choice
+
+}  // namespace
 
 const std::vector<JointEffectSpec>& joint_effect_specs() {
   static const std::vector<JointEffectSpec> all = {
@@ -65,7 +71,10 @@ JointEffect read_joint_effect(const YamlReader& yaml) {
   for (const JointEffectSpec& spec : joint_effect_specs()) known.emplace_back(spec.id);
   e.id = yaml.choice("id", known);
   const JointEffectSpec& spec = e.spec();
-  const double strength = yaml.number(spec.strength, spec.positive ? Range::positive() : Range::any());
+  const Range range = e.id == gain_of_drive().id ? Range::between(kLeastGain, kMostGain)
+                      : spec.positive            ? Range::positive()
+                                                 : Range::any();
+  const double strength = yaml.number(spec.strength, range);
   e.values[0] = strength;
   if (spec.columns == 2) {  // A sin(x + p) = A sin(p) cos(x) + A cos(p) sin(x)
     const double phase = yaml.number("phase", Range::any());

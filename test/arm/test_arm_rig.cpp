@@ -103,6 +103,9 @@ TEST_F(ArmRigFile, WrongEffectsOfAJointAreRefused) {
   EXPECT_NE(told("id: stribeck, torque: -1, speed: 0.1").find("torque"), std::string::npos);
   EXPECT_NE(told("id: stribeck, torque: 1, speed: 0").find("speed"), std::string::npos);
   EXPECT_NE(told("id: stribeck, torque: 1, speed: 0.1, sped: 1").find("sped"), std::string::npos);
+  EXPECT_EQ(told("id: motor_torque_gain, gain: -0.2"), "accepted");
+  EXPECT_NE(told("id: motor_torque_gain, gain: -1").find("gain"),
+            std::string::npos);  // a motor without torque
   EXPECT_NE(told("id: cogging, amplitude: 1, order: 3").find("phase"), std::string::npos);
   for (const char* joint : {"wrist_3_joint", "wrist_9_joint"})
     EXPECT_NE(told(std::string("id: transmission_coupling, ratio: 0.1, joint: ") + joint).find(joint),
