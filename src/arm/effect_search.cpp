@@ -76,6 +76,7 @@ class Search {
   Search(const ArmFit& fit, const FitFreedom& freedom, const std::vector<FittedMotion>& motions,
          bool everywhere);
   std::vector<EffectGuess> run() const;
+  std::vector<double> gain_shares() const;
 
  private:
   Left left_of(std::size_t j) const;
@@ -276,7 +277,22 @@ std::vector<EffectGuess> Search::run() const {
   return all;
 }
 
+std::vector<double> Search::gain_shares() const {
+  std::vector<double> shares(fit_.rig.joints.size(), 0);
+  for (std::size_t j = 0; j < shares.size(); ++j) {
+    if (std::isnan(fit_.deviation[j])) continue;
+    JointEffect gain = gain_of_drive();
+    shares[j] = share(left_of(j), gain, j);
+  }
+  return shares;
+}
+
 }  // namespace
+
+std::vector<double> gain_shares(const ArmFit& fit, const FitFreedom& freedom,
+                                const std::vector<FittedMotion>& motions) {
+  return Search(fit, freedom, motions, false).gain_shares();
+}
 
 std::vector<EffectGuess> guess_effects(const ArmFit& fit, const FitFreedom& freedom,
                                        const std::vector<FittedMotion>& motions, bool everywhere) {

@@ -15,21 +15,48 @@ namespace {
 constexpr double kLeastGain = -0.9,
                  kMostGain = 10;  // -: a motor gives 1 / (1 + g) of what is recorded; choice
 
+Eigen::Vector2d coulomb(double, const DriveMoment& now) {
+  return {now.sign, 0};
+}
+Eigen::Vector2d viscous(double, const DriveMoment& now) {
+  return {now.v, 0};
+}
+Eigen::Vector2d load_friction(double, const DriveMoment& now) {
+  return {now.sign * std::fabs(now.load), 0};
+}
+Eigen::Vector2d drag(double, const DriveMoment& now) {
+  return {now.v * std::fabs(now.v), 0};
+}
+Eigen::Vector2d asymmetric(double, const DriveMoment& now) {
+  return {std::fabs(now.v), 0};
+}
+Eigen::Vector2d stribeck(double speed, const DriveMoment& now) {
+  const double x = now.v / speed;
+  return {now.sign * std::exp(-x * x), 0};
+}
+Eigen::Vector2d wave(double order, const DriveMoment& now) {
+  return {std::cos(order * now.q), std::sin(order * now.q)};
+}
+Eigen::Vector2d rubbing_wave(double order, const DriveMoment& now) {
+  return now.sign * wave(order, now);
+}
+
 }  // namespace
 
 const std::vector<JointEffectSpec>& joint_effect_specs() {
+  constexpr EffectShape kNone = EffectShape::none, kOrder = EffectShape::order;
   static const std::vector<JointEffectSpec> all = {
-      {"motor_coulomb", 1, "torque", "N m", false, EffectShape::none, 0, "coulomb"},
-      {"motor_viscous", 1, "damping", "N m s/rad", false, EffectShape::none, 0, "viscous"},
-      {"load_dependent_friction", 1, "coefficient", "-", true, EffectShape::none, 0, "load"},
-      {"quadratic_drag", 1, "drag", "N m s^2/rad^2", true, EffectShape::none, 0, "quadratic"},
-      {"asymmetric_viscous", 1, "damping", "N m s/rad", false},
-      {"stribeck", 1, "torque", "N m", true, EffectShape::speed},
+      {"motor_coulomb", 1, "torque", "N m", false, kNone, 0, "coulomb", coulomb},
+      {"motor_viscous", 1, "damping", "N m s/rad", false, kNone, 0, "viscous", viscous},
+      {"load_dependent_friction", 1, "coefficient", "-", true, kNone, 0, "load", load_friction},
+      {"quadratic_drag", 1, "drag", "N m s^2/rad^2", true, kNone, 0, "quadratic", drag},
+      {"asymmetric_viscous", 1, "damping", "N m s/rad", false, kNone, 0, "", asymmetric},
+      {"stribeck", 1, "torque", "N m", true, EffectShape::speed, 0, "", stribeck},
       {"presliding", 1, "torque", "N m", true, EffectShape::distance},
       {"motor_torque_gain", 1, "gain", "-", false},
       {"transmission_coupling", 1, "ratio", "-", false},
-      {"position_dependent_friction", 2, "amplitude", "N m", false, EffectShape::order, 1},
-      {"cogging", 2, "amplitude", "N m", false, EffectShape::order, 2}};
+      {"position_dependent_friction", 2, "amplitude", "N m", false, kOrder, 1, "", rubbing_wave},
+      {"cogging", 2, "amplitude", "N m", false, kOrder, 2, "", wave}};
   return all;
 }
 
@@ -118,29 +145,14 @@ Eigen::ArrayXd way_since_reversal(const ArmMotion& m, Eigen::Index j) {
 Eigen::MatrixXd effect_columns(const JointEffect& effect, const ArmMotion& m, std::size_t joint,
                                const Eigen::VectorXd& load) {
   const auto j = Eigen::Index(joint);
-  const Eigen::ArrayXd v = m.motor_v.col(j), s = m.sign.col(j), x = effect.shape * m.q.col(j).array();
-  Eigen::MatrixXd out(v.size(), effect.spec().columns);
-  const std::string& id = effect.id;
-  if (id == "cogging")
-    out << x.cos(), x.sin();
-  else if (id == "position_dependent_friction")
-    out << s * x.cos(), s * x.sin();
-  else if (id == "stribeck")
-    out << s * (-(v / effect.shape).square()).exp();
-  else if (id == "presliding")
-    out << -2 * s * (-way_since_reversal(m, j) / effect.shape).exp();
-  else if (id == "motor_coulomb")
-    out << s;
-  else if (id == "motor_viscous")
-    out << v;
-  else if (id == "asymmetric_viscous")
-    out << v.abs();
-  else if (id == "quadratic_drag")
-    out << v * v.abs();
-  else if (id == "load_dependent_friction")
-    out << s * load.array().abs();
-  else
-    throw InvalidParameter("effect", id, "has no column of one joint");
+  const JointEffectSpec& spec = effect.spec();
+  if (spec.shape == EffectShape::distance)
+    return -2 * m.sign.col(j).array() * (-way_since_reversal(m, j) / effect.shape).exp();
+  if (!spec.units) throw InvalidParameter("effect", effect.id, "has no column of one joint");
+  Eigen::MatrixXd out(m.q.rows(), spec.columns);
+  for (Eigen::Index k = 0; k < out.rows(); ++k)
+    out.row(k) =
+        spec.units(effect.shape, {m.q(k, j), m.motor_v(k, j), m.sign(k, j), load[k]}).head(spec.columns);
   return out;
 }
 

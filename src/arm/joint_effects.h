@@ -40,4 +40,8 @@ struct EffectGuess {
 std::vector<EffectGuess> guess_effects(const ArmFit& fit, const FitFreedom& freedom,
                                        const std::vector<FittedMotion>& motions, bool everywhere);
 
+/// Of each joint's squared residual in `motions`, what another gain of its motor there would take away.
+std::vector<double> gain_shares(const ArmFit& fit, const FitFreedom& freedom,
+                                const std::vector<FittedMotion>& motions);
+
 }  // namespace backlash::arm

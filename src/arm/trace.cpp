@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "fit_model.h"
+#include "joint_effects.h"
 #include "trace_chain.h"
 #include "trace_effects.h"
 #include "trace_evidence.h"
@@ -58,6 +59,7 @@ class Tracer {
   void search_all(bool same_record);
   void cannot_judge(const std::string& why);
   void look_for_pushes(const ArmRecord& test);
+  bool holds(const Candidate& found, const Candidate& last, const Motions& judged) const;
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
   void tell_chain(const std::vector<Candidate>& all, std::size_t best, const ArmFit& fit);
   void tell_effects(const std::vector<Candidate>& found);
@@ -174,16 +176,29 @@ void Tracer::tell_chain(const std::vector<Candidate>& all, std::size_t best, con
                              " does nearly as well");
 }
 
+/// Whether what was found of the chain is still there beside what was found after it, and, of a joint by
+/// itself, explains that joint.
+bool Tracer::holds(const Candidate& found, const Candidate& last, const Motions& judged) const {
+  if (!(errors_from_none(found, last.fit) > settings_.sure)) return false;
+  if (!of_joint(found)) return true;
+  const double error = relative_errors(last.fit, last.freedom, as_fitted(judged, true), 0)[found.joint];
+  return error <= settings_.foretold * fits_.foretold(last, judged)[found.joint];
+}
+
 /// True where something was found.
 bool Tracer::search(const Motions& fitted, const Motions& judged, const std::string& words) {
   Candidate without;
   fits_.fit(without, fitted);
   std::vector<Candidate> all = chain_candidates(rig_);
+  const std::vector<double> gains = gain_shares(without.fit, without.freedom, as_fitted(fitted, true));
   for (std::size_t i = 0; i < all.size(); ++i) {
     tell(0.2 + 0.7 * double(i) / double(all.size()), "trying effects");
     // Whether something has come or gone is clear from the last link.
     if (all[i].freedom.payload && i > 1 && (all[0].all > all[1].all) != (all[i].freedom.payload_sign > 0))
       all[i].reason = "not tried";
+    else if (of_joint(all[i]) && gains[all[i].joint] < settings_.least_at_joint / 2)
+      all[i].reason =
+          fmt::format("would take {:.0f} % of what is left of the joint", 100 * gains[all[i].joint]);
     else
       fits_.try_out(all[i], without, fitted, judged);
   }
@@ -193,10 +208,15 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
       trace_.rejected.push_back({all[i].effect + (all[i].freedom.payload_sign < 0 ? " (taken away)" : ""),
                                  all[i].reason, of_joint(all[i]) ? rig_.joints[all[i].joint].name : ""});
   trace_.notes.clear();
-  const std::size_t best = best_of(all, settings_);
-  const Candidate& of_chain = best < all.size() ? all[best] : without;
+  std::size_t best = best_of(all, settings_);
   tell(0.9, "trying effects of single joints");
-  const JointEffectsFound effects = joint_effects(of_chain, fits_, fitted, judged);
+  JointEffectsFound effects = joint_effects(best < all.size() ? all[best] : without, fits_, fitted, judged);
+  if (best < all.size() &&
+      !holds(all[best], effects.steps.empty() ? all[best] : effects.steps.back(), judged)) {
+    best = all.size();
+    effects = joint_effects(without, fits_, fitted, judged);
+  }
+  const Candidate& of_chain = best < all.size() ? all[best] : without;
   trace_.rejected.insert(trace_.rejected.end(), effects.rejected.begin(), effects.rejected.end());
   const Candidate& taken = effects.steps.empty() ? of_chain : effects.steps.back();
   if (best < all.size()) tell_chain(all, best, taken.fit);

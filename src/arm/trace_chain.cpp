@@ -29,6 +29,7 @@ std::vector<Candidate> chain_candidates(const ArmRig& rig) {
   for (std::size_t j = 0; j < rig.joints.size(); ++j) {
     Candidate gain;
     gain.effect = gain_of_drive().id;
+    gain.joint = j;
     gain.freedom.effects.push_back({j, gain_of_drive(), 0, false});
     all.push_back(gain);
   }

@@ -114,15 +114,20 @@ void EffectSteps::drop_what_does_not_explain(const Candidate& model) const {
     const std::size_t joint = c.freedom.effects.back().joint;
     return errors[joint] / expected[joint];
   };
-  const auto explains = [&](const Candidate& c) { return left_of(c) <= fits_.settings.foretold; };
+  const auto doubt = [&](const Candidate& c) -> std::string {
+    if (left_of(c) > fits_.settings.foretold)
+      return fmt::format("leaves {:.3g} times the error that the training records let expect", left_of(c));
+    if (!(errors_from_none(c, last.fit) > fits_.settings.sure))
+      return "is none beside what was found after it";
+    return "";
+  };
+  const auto explains = [&](const Candidate& c) { return doubt(c).empty(); };
   if (std::all_of(found_.steps.begin(), found_.steps.end(), explains)) return;
   std::vector<Candidate> kept;
   for (const Candidate& c : found_.steps) {
     const FreeEffect& own = c.freedom.effects.back();
     if (!explains(c)) {
-      reject({own.effect.id,
-              fmt::format("leaves {:.3g} times the error that the training records let expect", left_of(c)),
-              fits_.rig.joints[own.joint].name});
+      reject({own.effect.id, doubt(c), fits_.rig.joints[own.joint].name});
       continue;
     }
     const Candidate before = kept.empty() ? model : kept.back();

@@ -125,6 +125,18 @@ std::string gain_refusal(const Candidate& c, const ArmRig& rig, double least) {
 
 }  // namespace
 
+double errors_from_none(const Candidate& c, const ArmFit& fit) {
+  const Layout layout{Eigen::Index(fit.rig.joints.size())};
+  if (!c.freedom.effects.empty()) {
+    const FittedEffect& e = fit.effects[c.freedom.effects.size() - 1];
+    return standard_errors_from_none(e.effect.values.head(e.effect.spec().columns), e.covariance, 0);
+  }
+  if (c.freedom.payload)  // of mass and moments together: an arm may tell the moments only
+    return standard_errors_from_none(fit.payload.head<4>(), fit.covariance, layout.payload());
+  const Eigen::Vector2d tilt(fit.tilt[0].value, fit.tilt[1].value);
+  return standard_errors_from_none(tilt, fit.covariance, layout.tilt());
+}
+
 void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
            const ArmTraceSettings& settings) {
   bootstrap(c, squares_of(without, c, judged, rig, settings.block), settings);
@@ -168,8 +180,7 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   if (e.effect.spec().has_shape() && std::fabs(std::log(e.effect.shape / guess.effect.shape)) > kFarFromGuess)
     return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not tell it",
                        shape_name(e.effect.spec().shape), e.effect.shape, guess.effect.shape);
-  const Eigen::Index n = e.effect.spec().columns;
-  const double errors = standard_errors_from_none(e.effect.values.head(n), e.covariance, 0);
+  const double errors = errors_from_none(c, c.fit);
   if (!(errors > settings.sure)) return fmt::format("its size is {:.1f} standard errors from none", errors);
   return "";
 }
@@ -177,10 +188,8 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
 std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
   if (std::string reason = gain_refusal(c, rig, settings.least_gain); !reason.empty()) return reason;
   if (!(c.lower > 0) || !(c.all_lower > 0)) return kNotConfirmed;
-  const Layout layout{Eigen::Index(rig.joints.size())};
-  if (c.freedom.payload) {  // of mass and moments together: an arm may tell the moments only
-    const double errors =
-        standard_errors_from_none(c.fit.payload.head<4>(), c.fit.covariance, layout.payload());
+  const double errors = errors_from_none(c, c.fit);
+  if (c.freedom.payload) {
     if (!(errors > settings.sure))
       return fmt::format(
           "its mass and moments are {:.1f} standard errors from none: mass {:.2g} +- {:.1g} kg", errors,
@@ -189,7 +198,6 @@ std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
   if (c.freedom.tilt) {
     // A planar arm tells the tilt about one axis only.
     const Eigen::Vector2d tilt(c.fit.tilt[0].value, c.fit.tilt[1].value);
-    const double errors = standard_errors_from_none(tilt, c.fit.covariance, layout.tilt());
     if (tilt.norm() < settings.least_tilt || !(errors > settings.sure))
       return fmt::format("the tilt is {:.2g} rad, {:.1f} standard errors: no more than a level base has",
                          tilt.norm(), errors);

@@ -24,6 +24,10 @@ struct Candidate {
   std::string reason;              // why not; empty: believed
 };
 
+/// Standard errors of what a candidate adds, of which it is the last, from none, in a fit that has it: its
+/// last effect of a joint, else body or tilt.
+double errors_from_none(const Candidate& c, const ArmFit& fit);
+
 /// Gains of `c` over `without` on `judged`, with blocks of time drawn at random.
 void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
            const ArmTraceSettings& settings);

@@ -36,8 +36,15 @@ GearedJoint read_joint(const YamlReader& yaml, const arm::JointDrive& drive, boo
   if (yaml.has("held")) joint.held = yaml.number("held", Range::any());
   if (!simulated) return joint;
   const auto term = [&](arm::DriveTerm t) { return drive.terms[std::size_t(t)]; };
-  if (term(arm::DriveTerm::load) != 0) yaml.fail("load", "cannot be simulated: must be 0 or absent");
-  if (!drive.effects.empty()) yaml.fail("effects", "cannot be simulated: must be absent");
+  const bool geared = joint.gear && !joint.held;
+  const std::string no_mesh =
+      "follows the torque of the teeth: a joint that is simulated needs a `gear` for it";
+  if (term(arm::DriveTerm::load) != 0 && !geared) yaml.fail("load", no_mesh);
+  for (const arm::JointEffect& effect : drive.effects) {
+    const arm::JointEffectSpec& spec = effect.spec();
+    if (spec.shape == arm::EffectShape::distance) yaml.fail("effects", effect.id + " cannot be simulated");
+    if (spec.drive_term == std::string("load") && !geared) yaml.fail("effects", effect.id + " " + no_mesh);
+  }
   if (joint.held) {
     yaml.ignore("excitation");
     return joint;

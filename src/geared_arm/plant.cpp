@@ -46,6 +46,7 @@ ArmPlant::ArmPlant(const GearedArm& arm)
       given_[Eigen::Index(j)] = 0;
     else
       drive.excitation = joint.excitation.create();
+    drive.effects = DriveEffects(arm_.rig, j);
     if (joint.gear && !joint.held)
       drive.motor = angles_++;
     else
@@ -93,10 +94,12 @@ double ArmPlant::mesh_torque(std::size_t joint, const double* state) const {
   return depth > 0 ? side * std::fmax(0, gear.contact->force(depth, side * rate, 0)) : 0;
 }
 
-double ArmPlant::motor_friction(std::size_t joint, double speed) const {
+double ArmPlant::motor_friction(std::size_t joint, double position, double speed, double load) const {
   const auto term = [&](arm::DriveTerm t) { return arm_.rig.joints[joint].terms[std::size_t(t)]; };
-  return term(arm::DriveTerm::coulomb) * std::tanh(speed / arm_.rig.identification.friction_speed) +
-         term(arm::DriveTerm::viscous) * speed + term(arm::DriveTerm::quadratic) * speed * std::fabs(speed) +
+  const double sign = std::tanh(speed / arm_.rig.identification.friction_speed);
+  return term(arm::DriveTerm::coulomb) * sign + drives_[joint].effects.torque({position, speed, sign, load}) +
+         term(arm::DriveTerm::load) * sign * std::fabs(load) + term(arm::DriveTerm::viscous) * speed +
+         term(arm::DriveTerm::quadratic) * speed * std::fabs(speed) +
          term(arm::DriveTerm::cubic) * speed * speed * speed + term(arm::DriveTerm::offset);
 }
 
@@ -105,21 +108,29 @@ double ArmPlant::motor_torque(std::size_t joint, double t) const {
   return drive.excitation ? drive.excitation->torque(t, drive.segment) + drive.compensation : 0;
 }
 
+/// What turns the motor, for what is recorded.
+double ArmPlant::acting_torque(std::size_t joint, double t) const {
+  const DriveEffects& effects = drives_[joint].effects;
+  double torque = motor_torque(joint, t) * effects.gain();
+  for (const auto& [other, share] : effects.couplings()) torque -= share * motor_torque(other, t);
+  return torque;
+}
+
 void ArmPlant::derivative(double t, const double* state, double* rate) const {
   arm::Joints torque(links_);
   for (std::size_t j = 0; j < drives_.size(); ++j) {
     const auto k = Eigen::Index(j), motor = drives_[j].motor;
     const GearedJoint& joint = arm_.joints[j];
     const double speed = state[angles_ + k];
-    double drive = motor_torque(j, t);
+    double drive = acting_torque(j, t);
     if (motor >= 0) {
       const double mesh = mesh_torque(j, state), motor_speed = state[angles_ + motor];
       rate[motor] = motor_speed;
-      rate[angles_ + motor] = (drive - motor_friction(j, motor_speed) - mesh) /
+      rate[angles_ + motor] = (drive - motor_friction(j, state[motor], motor_speed, mesh) - mesh) /
                               arm_.rig.joints[j].terms[std::size_t(arm::DriveTerm::rotor_inertia)];
       drive = mesh;
     } else {
-      drive -= motor_friction(j, speed);
+      drive -= motor_friction(j, state[k], speed, 0);
     }
     torque[k] = drive - joint.link_viscous * speed -
                 joint.link_coulomb * std::tanh(speed / arm_.rig.identification.friction_speed);
@@ -221,6 +232,7 @@ void ArmPlant::set_machine(const GearedArm& arm) {
   for (std::size_t j = 0; j < arm.joints.size(); ++j) {
     GearedJoint& joint = arm_.joints[j];
     joint.gear = arm.joints[j].gear;
+    drives_[j].effects = DriveEffects(arm_.rig, j);
     joint.link_coulomb = arm.joints[j].link_coulomb;
     joint.link_viscous = arm.joints[j].link_viscous;
     if (drives_[j].motor < 0)

@@ -163,6 +163,71 @@ TEST(GearedArm, JointsWithoutGearMoveAsKdlSays) {
   }
 }
 
+/// Cogging takes no energy: A sin(n q + p) is the slope of -A / n cos(n q + p).
+TEST(GearedArm, CoggingOfADriveKeepsTheEnergy) {
+  GearedArm arm = free_arm();
+  constexpr double kAmplitude = 1.5, kOrder = 7, kPhase = 0.4;
+  arm.rig.joints[0].effects = {
+      {"cogging", kOrder, "", {kAmplitude * std::sin(kPhase), kAmplitude * std::cos(kPhase)}}};
+  ArmPlant plant(arm);
+  const auto energy = [&] {
+    return plant.energy() - kAmplitude / kOrder * std::cos(kOrder * plant.observe(0).motor_position + kPhase);
+  };
+  const double before = energy();
+  double largest = 0, held = 0;
+  for (int i = 1; i <= 1000; ++i) {
+    plant.advance_to(i * 1e-3);
+    largest = std::fmax(largest, std::fabs(energy() - before));
+    held = std::fmax(held, std::fabs(plant.energy() - before));
+  }
+  EXPECT_GT(held, 0.2);           // J, in the wave
+  EXPECT_NEAR(largest, 0, 2e-5);  // as without
+}
+
+/// What acts is less than what is recorded by the gain, and by what another drive takes.
+TEST(GearedArm, GainAndCouplingOfADriveAreOtherTorques) {
+  GearedArm effects = free_arm();
+  for (std::size_t j = 0; j < 2; ++j) {
+    effects.joints[j].gear.reset();
+    effects.joints[j].excitation.amplitude = j == 0 ? 4.0 : -1.5;
+  }
+  GearedArm plain = effects;
+  effects.rig.joints[1].effects = {{"motor_torque_gain", 0, "", {0.25, 0}},
+                                   {"transmission_coupling", 0, effects.rig.joints[0].name, {0.1, 0}}};
+  plain.joints[1].excitation.amplitude = -1.5 / 1.25 - 0.1 * 4;
+  ArmPlant a(effects), b(plain);
+  a.advance_to(0.5), b.advance_to(0.5);
+  EXPECT_LT((a.link_positions() - b.link_positions()).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_EQ(a.observe(1).motor_torque, -1.5);  // is what the record has
+}
+
+/// Friction that follows the load stands against a motor that is pushed slowly through its mesh: with the
+/// load of the teeth T it is mu T, by the balance of torques at nearly constant speed.
+TEST(GearedArm, FrictionFollowsTheTorqueOfTheTeeth) {
+  GearedArm arm = two_links();
+  const auto driven = [&](double coefficient) {
+    GearedArm machine = arm;
+    if (coefficient > 0)
+      machine.rig.joints[0].effects = {{"load_dependent_friction", 0, "", {coefficient, 0}}};
+    return simulate_arm(machine, 3);
+  };
+  const record::Record with = driven(0.2)[0].record, without = driven(0)[0].record;
+  // Both follow the same positions, so that the difference of torques is the friction.
+  double own = 0, expected = 0;
+  for (std::size_t k = 0; k < with.size(); ++k) {
+    const double v = (with.column(record::Channel::motor_position)[std::min(k + 5, with.size() - 1)] -
+                      with.column(record::Channel::motor_position)[k]) /
+                     5e-3;
+    if (std::fabs(v) < 0.3) continue;
+    const double sign = v > 0 ? 1 : -1;
+    own += sign *
+           (with.column(record::Channel::motor_torque)[k] - without.column(record::Channel::motor_torque)[k]);
+    expected += 0.2 * std::fabs(without.column(record::Channel::motor_torque)[k] - 0.4 * sign - 0.3 * v);
+  }
+  EXPECT_GT(expected, 100);
+  EXPECT_NEAR(own, expected, 0.1 * expected);  // the controller's errors, the rotor's inertia
+}
+
 TEST(GearedArm, AGivenJointMovesAsToldAndTheOthersAsKdlSays) {
   Random random(5);
   for (int i = 0; i < 20; ++i) {
@@ -287,6 +352,29 @@ TEST(ArmSimulation, ShowsWhatTheFileDeclares) {
   EXPECT_EQ(ArmSimulation(arm).step()[0].load_velocity, 0);
   arm.simulated = false;
   EXPECT_THROW(ArmSimulation{arm}, BadData);
+}
+
+TEST(ArmSimulation, EffectsThatItCannotMoveAreRefused) {
+  const std::string folder = test::package_file("config/two_link_arm");
+  const std::string text = read_file(folder + "/two_link_arm.yaml");
+  const auto told = [&](const std::string& effect, bool geared) {
+    std::string changed = text;
+    const std::size_t place = changed.find("    gear:"), end = changed.find("    motion_limits", place);
+    if (!geared) changed.erase(place, end - place);
+    changed.insert(place, "    effects: [{" + effect + "}]\n");
+    try {
+      geared_arm_from_text(changed, "arm.yaml", folder);
+    } catch (const BadData& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  const std::string load = "id: load_dependent_friction, coefficient: 0.1";
+  EXPECT_EQ(told(load, true), "accepted");
+  EXPECT_NE(told(load, false).find("needs a `gear`"), std::string::npos) << told(load, false);
+  EXPECT_EQ(told("id: motor_torque_gain, gain: 0.1", false), "accepted");
+  EXPECT_NE(told("id: presliding, torque: 1, distance: 0.01", true).find("presliding cannot be simulated"),
+            std::string::npos);
 }
 
 }  // namespace

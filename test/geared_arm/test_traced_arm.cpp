@@ -46,6 +46,27 @@ TEST(TracedArm, APlanarArmTellsTheTiltThatItFeels) {
   for (const double after : trace.after) EXPECT_LT(after, 0.05);
 }
 
+/// Effects that the simulation puts on a drive are those that the trace names, by their values.
+TEST(TracedArm, EffectsOfADriveAreNamedAsTheyWereSimulated) {
+  const GearedArm declared = planar_arm();
+  GearedArm machine = declared;
+  machine.rig.joints[0].effects = {{"cogging", 6, "", {0.6, 0.8}}};
+  machine.rig.joints[1].effects = {{"motor_torque_gain", 0, "", {0.2, 0}}};
+  const arm::ArmTrace trace = arm::trace_arm(declared.rig, {recorded(declared, 0), recorded(declared, 0.2)},
+                                             recorded(machine, -0.2), false);
+  ASSERT_EQ(trace.steps.size(), 2u);
+  for (const arm::ArmStep& step : trace.steps) {
+    const bool gain = step.effect == "motor_torque_gain";
+    EXPECT_EQ(step.effect, gain ? "motor_torque_gain" : "cogging");
+    EXPECT_EQ(step.joint, gain ? "elbow" : "shoulder");
+    const signal::Measured& size = step.parameters[0].measured;
+    EXPECT_NEAR(size.value, gain ? 0.2 : 1, 3 * size.standard_error);
+    EXPECT_LT(size.standard_error, 0.1 * size.value);
+  }
+  EXPECT_NE(trace.steps[0].effect, trace.steps[1].effect);
+  EXPECT_FALSE(trace.unexplained) << trace.unexplained->signature;
+}
+
 /// Of a body at the end of a planar arm gravity tells moments; its mass follows from inertia alone. The right
 /// values lie within three standard errors, and a body that is gone is not told.
 TEST(TracedArm, ABodyWhoseMassIsHardlyToldIsToldAsThat) {

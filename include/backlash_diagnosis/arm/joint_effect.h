@@ -34,6 +34,13 @@ namespace backlash::arm {
 
 enum class EffectShape { none, order, speed, distance };  // what else it has beside its strength
 
+/// A drive now.
+struct DriveMoment {
+  double q, v;  // rad, rad/s
+  double sign;  // S
+  double load;  // N m, the chain's own torque
+};
+
 struct JointEffectSpec {
   const char* id;
   Eigen::Index columns;                  // 2: of cosine and sine, a wave along the position
@@ -42,6 +49,8 @@ struct JointEffectSpec {
   EffectShape shape = EffectShape::none;
   double least_order = 0;       // 1/rad, that is searched: below are links, and what drifts
   const char* drive_term = "";  // that is the same, where the rig file has it
+  /// Torque of one unit of each value [N m]; null: more than the moment counts, or other drives do.
+  Eigen::Vector2d (*units)(double shape, const DriveMoment& now) = nullptr;
   bool has_shape() const { return shape != EffectShape::none; }
 };
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/arm/dynamics.h"
+#include "backlash_diagnosis/geared_arm/drive_effects.h"
 #include "backlash_diagnosis/geared_arm/geared_arm.h"
 
 namespace backlash::geared_arm {
@@ -51,12 +52,14 @@ class ArmPlant {
     long segment = 0;
     double compensation = 0;  // N m, of gravity
     Eigen::Index motor = -1;  // place among the angles; -1: turns with the link
+    DriveEffects effects;
   };
   void begin_segments();
   void compensate_gravity();
   void derivative(double t, const double* state, double* rate) const;
   double mesh_torque(std::size_t joint, const double* state) const;
-  double motor_friction(std::size_t joint, double speed) const;
+  double motor_friction(std::size_t joint, double position, double speed, double load) const;
+  double acting_torque(std::size_t joint, double t) const;
   double motor_torque(std::size_t joint, double t) const;
   arm::Joints motor_positions() const;
 
