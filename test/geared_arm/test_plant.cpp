@@ -356,7 +356,7 @@ TEST(ArmSimulation, ShowsWhatTheFileDeclares) {
 
 TEST(ArmSimulation, EffectsThatItCannotMoveAreRefused) {
   const std::string folder = test::package_file("config/two_link_arm");
-  const std::string text = read_file(folder + "/two_link_arm.yaml");
+  const std::string text = read_start(folder + "/two_link_arm.yaml", 100000);
   const auto told = [&](const std::string& effect, bool geared) {
     std::string changed = text;
     const std::size_t place = changed.find("    gear:"), end = changed.find("    motion_limits", place);
