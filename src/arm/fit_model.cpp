@@ -97,12 +97,25 @@ Eigen::MatrixXd FitModel::chain_torque(const State& state, const FittedMotion& m
   return torque;
 }
 
+/// The chain's torque at all samples is half of the work.
+bool FitModel::something_follows_load() const {
+  const auto follows = [](const JointEffect& e) { return stands_for(e.spec(), DriveTerm::load); };
+  bool any =
+      freedom_.load || std::find(rig_.terms.begin(), rig_.terms.end(), DriveTerm::load) != rig_.terms.end();
+  for (const FreeEffect& e : freedom_.effects) any = any || follows(e.effect);
+  for (const JointDrive& drive : rig_.joints)
+    any = any || drive.terms[std::size_t(DriveTerm::load)] != 0 ||
+          std::any_of(drive.effects.begin(), drive.effects.end(), follows);
+  return any;
+}
+
 std::vector<Linearised> FitModel::linearised(const State& state, const FittedMotion& motion) const {
   const ArmMotion& m = *motion.motion;
   const Chain loaded = chain(state, motion.marked);
   const auto n = Eigen::Index(m.time.size()), count = m.q.cols();
   const bool tilts = freedom_.tilt && motion.marked;
-  const Eigen::MatrixXd load = chain_torque(state, motion);
+  const Eigen::MatrixXd load =
+      something_follows_load() ? chain_torque(state, motion) : Eigen::MatrixXd::Zero(n, count);
   std::vector<Eigen::MatrixXd> tilt(tilts ? 3 : 0, Eigen::MatrixXd(n, count));
   const Eigen::Matrix3d turns =
       (Eigen::Matrix3d() << Eigen::Vector3d::UnitX().cross(loaded.gravity),

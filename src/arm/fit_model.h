@@ -73,6 +73,7 @@ class FitModel {
                    const Eigen::MatrixXd& tilt) const;
   void add_effects(const State& state, const FittedMotion& motion, const Eigen::MatrixXd& chain,
                    std::vector<Linearised>& all) const;
+  bool something_follows_load() const;
   double factor(const State& state, std::size_t j) const;  // channel per torque
   const ArmRig& rig_;
   const FitFreedom& freedom_;

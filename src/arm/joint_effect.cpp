@@ -78,10 +78,12 @@ bool is_coupling(const JointEffect& effect) {
   return effect.id == "transmission_coupling";
 }
 
+bool stands_for(const JointEffectSpec& spec, DriveTerm term) {
+  return std::string(kDriveTermSpecs[std::size_t(term)].name) == spec.drive_term;
+}
+
 bool stands_for_term(const JointEffectSpec& spec, const ArmRig& rig) {
-  return std::any_of(rig.terms.begin(), rig.terms.end(), [&](DriveTerm t) {
-    return std::string(kDriveTermSpecs[std::size_t(t)].name) == spec.drive_term;
-  });
+  return std::any_of(rig.terms.begin(), rig.terms.end(), [&](DriveTerm t) { return stands_for(spec, t); });
 }
 
 JointEffect gain_of_drive() {

@@ -14,6 +14,7 @@ namespace backlash::arm {
 /// Whether its column is the torque of another joint's drive.
 bool is_coupling(const JointEffect& effect);
 
+bool stands_for(const JointEffectSpec& spec, DriveTerm term);
 /// Whether the drives of the rig have it as a term.
 bool stands_for_term(const JointEffectSpec& spec, const ArmRig& rig);
 

@@ -83,7 +83,10 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
 }
 
 std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std::size_t joint) const {
-  const ArmTraceSettings& settings = fits_.settings;
+  // That friction is another one is known; which one remains to be told, however small it is.
+  ArmTraceSettings settings = fits_.settings;
+  settings.least_at_joint = settings.least_gain;
+  settings.least_of_signal = 0;
   found_.friction_alike[joint].clear();
   Candidate steady = model;
   steady.freedom.steady.push_back(joint);
@@ -98,9 +101,16 @@ std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std
     judge(c, steady, judged_, fits_.rig, settings);
     judge(against, model, judged_, fits_.rig, settings);
     const double gain = against.gains[joint];
-    if (!effect_refusal(c, steady, judged_, settings).empty()) continue;
-    if (gain > -settings.nearly) found_.friction_alike[joint].push_back(guess.effect.effect.id);
-    if (gain > settings.clearly && against.lowers[joint] > 0 && (!best || c.gain > best->gain)) best = c;
+    std::string reason = effect_refusal(c, steady, judged_, settings);
+    if (reason.empty() && gain > -settings.nearly)
+      found_.friction_alike[joint].push_back(guess.effect.effect.id);
+    if (reason.empty() && !(gain > settings.clearly && against.lowers[joint] > 0))
+      reason =
+          fmt::format("leaves {:.2f} times the squared error that a factor of all friction leaves", 1 - gain);
+    if (!reason.empty())
+      reject({guess.effect.effect.id, reason, fits_.rig.joints[joint].name});
+    else if (!best || c.gain > best->gain)
+      best = c;
   }
   return best;
 }
