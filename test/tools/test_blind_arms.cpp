@@ -100,6 +100,18 @@ TEST_F(BlindArms, TheStudyCountsOnFilesThatItKeeps) {
   EXPECT_EQ(run("arm_blind_study --ask nobody").code, 64);
 }
 
+/// A motor that gives less than it shows: named, of its joint, the value as it was drawn.
+TEST_F(BlindArms, TheStudyCountsEffectsOfJoints) {
+  const Outcome outcome =
+      run("arm_blind_study --ask effects --kind gain --arms 1 --seed 3001 --duration 24 --out . --json "
+          "answers.json");
+  EXPECT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  expect_contains(outcome.out, "| gain | 1 | 1 | 1 | 0 | 0 |");
+  const auto answer = nlohmann::ordered_json::parse(read("answers.json"));
+  EXPECT_EQ(answer.at("truth").get<std::string>().substr(0, 24), "motor_torque_gain joint1");
+  EXPECT_EQ(answer.at("steps").at(0).get<std::string>().substr(0, 24), "motor_torque_gain joint1");
+}
+
 #else
 
 TEST(BlindArms, NeedMujoco) {
