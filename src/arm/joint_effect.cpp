@@ -53,10 +53,10 @@ const std::vector<JointEffectSpec>& joint_effect_specs() {
       {"asymmetric_viscous", 1, "damping", "N m s/rad", false, kNone, 0, "", asymmetric},
       {"stribeck", 1, "torque", "N m", true, EffectShape::speed, 0, "", stribeck},
       {"presliding", 1, "torque", "N m", true, EffectShape::distance},
-      {"motor_torque_gain", 1, "gain", "-", false},
-      {"transmission_coupling", 1, "ratio", "-", false},
+      {"motor_torque_gain", 1, "gain", "-", false, kNone, 0, "", nullptr, 0.3},
+      {"transmission_coupling", 1, "ratio", "-", false, kNone, 0, "", nullptr, 1},
       {"position_dependent_friction", 2, "amplitude", "N m", false, kOrder, 1, "", rubbing_wave},
-      {"cogging", 2, "amplitude", "N m", false, kOrder, 2, "", wave}};
+      {"cogging", 2, "amplitude", "N m", false, kOrder, 3, "", wave}};
   return all;
 }
 

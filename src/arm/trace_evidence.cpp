@@ -114,6 +114,14 @@ double share_of_friction(const Candidate& c, const Motions& judged) {
   return std::sqrt(own / all);
 }
 
+/// Of those that carry the body.
+int joints_that_gain(const Candidate& c, const ArmTraceSettings& settings) {
+  int count = 0;
+  for (std::size_t j = 0; j <= *c.freedom.payload; ++j)
+    count += c.gains[j] > settings.clearly && c.lowers[j] > 0;
+  return count;
+}
+
 const char* const kNotConfirmed = "the part that was not fitted does not confirm it in all blocks of time";
 
 std::string gain_refusal(const Candidate& c, const ArmRig& rig, double least) {
@@ -129,6 +137,10 @@ double errors_from_none(const Candidate& c, const ArmFit& fit) {
   const Layout layout{Eigen::Index(fit.rig.joints.size())};
   if (!c.freedom.effects.empty()) {
     const FittedEffect& e = fit.effects[c.freedom.effects.size() - 1];
+    if (e.effect.spec().columns == 2) {
+      const signal::Measured amplitude = effect_parameters(e).front().measured;
+      return amplitude.value / amplitude.standard_error;
+    }
     return standard_errors_from_none(e.effect.values.head(e.effect.spec().columns), e.covariance, 0);
   }
   if (c.freedom.payload)  // of mass and moments together: an arm may tell the moments only
@@ -173,6 +185,12 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   if (c.freedom.effects.back().of_term)
     if (const double share = share_of_friction(c, judged); share < settings.least_friction)
       return fmt::format("is {:.2f} of the joint's friction: no more than a robot's warming up", share);
+  if (const double most = e.effect.spec().most; std::fabs(e.effect.values[0]) > most)
+    return fmt::format("its {} is {:.2g}: beyond {:.2g} it is something else", e.effect.spec().strength,
+                       e.effect.values[0], most);
+  if (e.effect.spec().has_shape() && e.effect.shape < e.effect.spec().least_order)
+    return fmt::format("its {} is {:.2g}: what links and gravity do as well",
+                       shape_name(e.effect.spec().shape), e.effect.shape);
   if (e.effect.spec().positive && !(e.effect.values[0] > 0))
     return fmt::format("its {} is {:.2g}: no friction is negative", e.effect.spec().strength,
                        e.effect.values[0]);
@@ -190,6 +208,8 @@ std::string refusal(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
   if (!(c.lower > 0) || !(c.all_lower > 0)) return kNotConfirmed;
   const double errors = errors_from_none(c, c.fit);
   if (c.freedom.payload) {
+    if (const int joints = joints_that_gain(c, settings); joints < 2 && rig.joints.size() > 1)
+      return "only " + rig.joints[c.joint].name + " shows it: it may be what that joint itself has";
     if (!(errors > settings.sure))
       return fmt::format(
           "its mass and moments are {:.1f} standard errors from none: mass {:.2g} +- {:.1g} kg", errors,

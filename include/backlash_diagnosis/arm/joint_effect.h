@@ -25,6 +25,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,7 @@ struct JointEffectSpec {
   const char* drive_term = "";  // that is the same, where the rig file has it
   /// Torque of one unit of each value [N m]; null: more than the moment counts, or other drives do.
   Eigen::Vector2d (*units)(double shape, const DriveMoment& now) = nullptr;
+  double most = std::numeric_limits<double>::infinity();  // of its strength, that is believed of a machine
   bool has_shape() const { return shape != EffectShape::none; }
 };
 

@@ -18,7 +18,8 @@ using backlash::arm::ArmStep;
 using backlash::arm::ArmTrace;
 using Json = nlohmann::ordered_json;
 
-constexpr double kSure = 3;  // standard errors, beyond which a value is wrong
+constexpr double kSetByHand = 0.1;  // rad, as src/arm/motion.cpp has it
+constexpr double kSure = 3;         // standard errors, beyond which a value is wrong
 
 struct Count {
   int asked = 0, effects = 0, named = 0, among = 0, wrong = 0, none = 0, unexplained = 0;
@@ -43,6 +44,7 @@ std::vector<Added> expected(const std::string& kind, const Arm& arm) {
 /// a motor that is warm is another one, and so is what grows.
 bool may(const ArmStep& step, const std::string& kind, const Arm& arm) {
   if (step.effect == "stribeck" || step.effect == "presliding") return true;
+  if (kind == "spot" && step.effect == "position_dependent_friction") return true;
   if (step.effect != "friction_drift") return false;
   const bool here = step.joint == joint_name(arm.changed);
   return kind == "warm" || ((kind == "friction" || kind == "drift" || kind == "spot") && here);
@@ -70,15 +72,16 @@ std::vector<double> effect_errors(const ArmStep& step, const Added& truth) {
   return z;
 }
 
-/// As the encoders have it: where their zeros are off, about axes along the last joint's, its link is taken
-/// to be turned by as much.
+/// As the encoders have it: where their zeros are a little off, about axes along the last joint's, its link
+/// is taken to be turned by as much. Zeros that are further off than a gear yields are taken out.
 Vector payload_centre(const Arm& arm) {
   const Vector& axis = arm.joints.back().axis;
   double turn = 0;
   std::size_t about = 0;
   for (std::size_t a = 0; a < 3; ++a)
     if (axis[a] != 0) about = a;
-  for (const Joint& j : arm.joints) turn -= j.zero * j.axis[about];
+  for (const Joint& j : arm.joints)
+    if (std::fabs(j.zero) < kSetByHand) turn -= j.zero * j.axis[about];
   const std::size_t x = (about + 1) % 3, y = (about + 2) % 3;
   Vector centre = arm.payload_centre;
   centre[x] = arm.payload_centre[x] * std::cos(turn) - arm.payload_centre[y] * std::sin(turn);
