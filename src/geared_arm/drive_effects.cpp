@@ -6,19 +6,23 @@
 namespace backlash::geared_arm {
 
 DriveEffects::DriveEffects(const arm::ArmRig& rig, std::size_t joint) {
-  double more = 0;  // that is recorded, as a share
   for (const arm::JointEffect& effect : rig.joints[joint].effects) {
     if (const auto units = effect.spec().units) {
       momentary_.push_back({units, effect.shape, effect.values});
-    } else if (effect.other.empty()) {
-      more += effect.values[0];
-    } else {
+    } else if (!effect.other.empty()) {
       const std::vector<std::string> names = rig.joint_names();
       const auto other = std::find(names.begin(), names.end(), effect.other);
       couplings_.emplace_back(std::size_t(other - names.begin()), effect.values[0]);
     }
   }
-  gain_ = 1 / (1 + more);
+  gain_ = 1 / (1 + recorded_more(rig.joints[joint].effects));
+}
+
+double DriveEffects::recorded_more(const std::vector<arm::JointEffect>& effects) {
+  double more = 0;
+  for (const arm::JointEffect& effect : effects)
+    if (!effect.spec().units && !effect.spec().has_shape() && effect.other.empty()) more += effect.values[0];
+  return more;
 }
 
 double DriveEffects::torque(const arm::DriveMoment& now) const {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/geared_arm/drive_effects.h"
 
 namespace backlash::geared_arm {
 namespace {
@@ -40,6 +41,8 @@ GearedJoint read_joint(const YamlReader& yaml, const arm::JointDrive& drive, boo
   const std::string no_mesh =
       "follows the torque of the teeth: a joint that is simulated needs a `gear` for it";
   if (term(arm::DriveTerm::load) != 0 && !geared) yaml.fail("load", no_mesh);
+  if (!(DriveEffects::recorded_more(drive.effects) > -1))
+    yaml.fail("effects", "gains that together leave the motor no torque");
   for (const arm::JointEffect& effect : drive.effects) {
     const arm::JointEffectSpec& spec = effect.spec();
     if (spec.shape == arm::EffectShape::distance) yaml.fail("effects", effect.id + " cannot be simulated");

@@ -373,6 +373,9 @@ TEST(ArmSimulation, EffectsThatItCannotMoveAreRefused) {
   EXPECT_EQ(told(load, true), "accepted");
   EXPECT_NE(told(load, false).find("needs a `gear`"), std::string::npos) << told(load, false);
   EXPECT_EQ(told("id: motor_torque_gain, gain: 0.1", false), "accepted");
+  EXPECT_NE(
+      told("id: motor_torque_gain, gain: -0.6}, {id: motor_torque_gain, gain: -0.6", true).find("no torque"),
+      std::string::npos);
   EXPECT_NE(told("id: presliding, torque: 1, distance: 0.01", true).find("presliding cannot be simulated"),
             std::string::npos);
 }

@@ -16,6 +16,9 @@ class DriveEffects {
   DriveEffects() = default;
   DriveEffects(const arm::ArmRig& rig, std::size_t joint);
 
+  /// By which share more is recorded of the motor than it gives, by all gains together.
+  static double recorded_more(const std::vector<arm::JointEffect>& effects);
+
   /// What the drive has to supply for them [N m], without gain and couplings.
   double torque(const arm::DriveMoment& now) const;
   /// The motor's torque over what is recorded of it.
