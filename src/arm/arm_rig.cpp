@@ -73,6 +73,7 @@ JointDrive read_joint(const YamlReader& yaml) {
   }
   joint.delay = yaml.number_or("delay", 0, Range::between(-kLongestDelay, kLongestDelay));
   yaml.uncertainty("delay");
+  if (yaml.has("friction_speed")) joint.friction_speed = yaml.number("friction_speed", Range::positive());
   if (yaml.has("effects"))
     for (const YamlReader& effect : yaml.maps("effects")) joint.effects.push_back(read_joint_effect(effect));
   // of the room geared_arm
@@ -159,6 +160,11 @@ std::optional<std::size_t> index_of(const ArmRig& rig, const std::string& joint)
   for (std::size_t j = 0; j < rig.joints.size(); ++j)
     if (rig.joints[j].name == joint) return j;
   return std::nullopt;
+}
+
+double ArmRig::friction_speed(std::size_t joint) const {
+  const double own = joints[joint].friction_speed;
+  return own > 0 ? own : identification.friction_speed;
 }
 
 std::vector<std::string> ArmRig::joint_names() const {
@@ -261,6 +267,8 @@ std::string joint_text(const ArmRig& rig, const JointDrive& joint) {
                               joint.load_error, spec.unit)
                 : fmt::format("    {}: {:.8g}  # {}\n", spec.name, value, spec.unit);
   }
+  if (joint.friction_speed > 0)
+    text += fmt::format("    friction_speed: {:.8g}  # rad/s\n", joint.friction_speed);
   if (joint.training_error > 0)
     text += fmt::format("    training_error: {:.4g}  # relative\n", joint.training_error);
   if (!joint.effects.empty()) text += "    effects:\n";

@@ -398,6 +398,17 @@ ArmFit Fit::result(const Eigen::MatrixXd& covariance, const std::vector<std::vec
   for (std::size_t i = 0; i < state_.effects.size(); ++i) {
     const Eigen::Index place = layout_.effect(Eigen::Index(i));
     fit.effects.push_back({state_.effects[i], covariance.block<3, 3>(place, place)});
+    const auto joint = Eigen::Index(freedom_.effects[i].joint);
+    double count = 0, sum = 0, squares = 0;
+    for (const FittedMotion& m : motions_) {
+      if (!m.marked && !freedom_.effects[i].everywhere) continue;
+      for (const std::size_t row : m.motion->rows) {
+        const double q = m.motion->q(Eigen::Index(row), joint);
+        count += 1, sum += q, squares += q * q;
+      }
+    }
+    fit.effects.back().middle = sum / count;
+    fit.effects.back().spread = std::sqrt(std::max(0.0, squares / count - sum * sum / (count * count)));
   }
   set_errors(fit, all);
   if (freedom_.links) fit.base = base_parameters(rig_, motions_, state_, covariance);

@@ -72,8 +72,7 @@ void set_kinematics(ArmMotion& m, const std::vector<record::Record>& joints, con
                     std::vector<std::string>& warnings) {
   using record::Channel;
   const auto n = Eigen::Index(m.time.size()), count = Eigen::Index(joints.size());
-  for (Eigen::MatrixXd* each : {&m.q, &m.v, &m.a, &m.motor_v, &m.motor_a, &m.signal, &m.sign})
-    each->resize(n, count);
+  for (Eigen::MatrixXd* each : {&m.q, &m.v, &m.a, &m.motor_v, &m.motor_a, &m.signal}) each->resize(n, count);
   m.noise.resize(count);
   const double cutoff = rig.identification.kinematics_cutoff;
   for (Eigen::Index j = 0; j < count; ++j) {
@@ -94,12 +93,18 @@ void set_kinematics(ArmMotion& m, const std::vector<record::Record>& joints, con
     }
     m.q.col(j) = to_eigen(link.q), m.v.col(j) = to_eigen(link.v), m.a.col(j) = to_eigen(link.a);
     m.motor_v.col(j) = to_eigen(motor.v), m.motor_a.col(j) = to_eigen(motor.a);
-    m.sign.col(j) = (m.motor_v.col(j) / rig.identification.friction_speed).array().tanh();
     const std::vector<double>& s = r.column(rig.channel);
     m.signal.col(j) = to_eigen(signal::low_pass(s, m.interval, rig.identification.torque_cutoff));
     m.noise[j] = signal::noise_from_differences(s, kNoiseOrder) *
                  std::sqrt(2 * m.interval * rig.identification.torque_cutoff * kNoiseBandwidth);
   }
+}
+
+Eigen::MatrixXd signs(const ArmMotion& m, const ArmRig& rig) {
+  Eigen::MatrixXd out(m.motor_v.rows(), m.motor_v.cols());
+  for (Eigen::Index j = 0; j < out.cols(); ++j)
+    out.col(j) = (m.motor_v.col(j) / rig.friction_speed(std::size_t(j))).array().tanh();
+  return out;
 }
 
 void set_rows(ArmMotion& m, const ArmRig& rig) {
@@ -159,6 +164,7 @@ ArmMotion motion_of(const ArmRecord& record, const ArmRig& rig, double from, dou
     throw BadData(record.name, fmt::format("sampled at {:.4g} Hz: too slow for kinematics_cutoff = {} Hz",
                                            1 / m.interval, rig.identification.kinematics_cutoff));
   set_kinematics(m, joints, rig, warnings);
+  m.sign = signs(m, rig);
   set_rows(m, rig);
   return m;
 }
@@ -215,6 +221,12 @@ std::vector<ArmMotion> kinematics_of(const ArmRecord& record, const ArmRig& rig,
     throw BadData(record.name,
                   fmt::format("no stretch of {} s without a gap: too short for an arm", kShortestStretch));
   return all;
+}
+
+void set_friction_speeds(ArmMotion& motion, const ArmRig& rig) {
+  motion.sign = signs(motion, rig);
+  for (std::size_t j = 0; j < motion.drive.size(); ++j)
+    motion.drive[j].col(int(DriveTerm::coulomb)) = rows_of(motion.sign.col(Eigen::Index(j)), motion, rig);
 }
 
 ArmMotion part_of(const ArmMotion& motion, double from, double to) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "backlash_diagnosis/arm/friction_speed.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "fit_model.h"
@@ -70,7 +71,7 @@ class Tracer {
   std::optional<ArmTrace::Unexplained> worst_unexplained(const std::vector<double>& errors,
                                                          const std::vector<double>& expected) const;
 
-  const ArmRig& rig_;
+  ArmRig rig_;
   const ArmTraceSettings& settings_;
   const Progress& progress_;
   Motions train_, test_;
@@ -84,7 +85,8 @@ void Tracer::set_base() {
   if (rig_.fitted)
     fits_.base.rig = rig_;
   else
-    fits_.base = fit_arm(rig_, as_fitted(train_, false), {}, settings_.fit);
+    fits_.base = fit_arm_and_friction_speeds(rig_, train_, settings_.fit);
+  for (ArmMotion& m : test_) set_friction_speeds(m, rig_);
   for (const std::string& warning : fits_.base.warnings) trace_.warnings.push_back(warning);
   fits_.train_errors = relative_errors(fits_.base, {}, as_fitted(train_, false), settings_.fit.least_seconds);
   trace_.train = fits_.train_errors;

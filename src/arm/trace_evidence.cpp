@@ -194,6 +194,10 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   if (e.effect.spec().positive && !(e.effect.values[0] > 0))
     return fmt::format("its {} is {:.2g}: no friction is negative", e.effect.spec().strength,
                        e.effect.values[0]);
+  if (const double slowest = c.fit.rig.identification.slowest;
+      e.effect.spec().shape == EffectShape::speed && e.effect.shape < slowest)
+    return fmt::format("its speed is {:.2g} rad/s: samples below {:.2g} rad/s do not count (slowest)",
+                       e.effect.shape, slowest);
   const FreeEffect& guess = c.freedom.effects.back();
   if (e.effect.spec().has_shape() && std::fabs(std::log(e.effect.shape / guess.effect.shape)) > kFarFromGuess)
     return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not tell it",

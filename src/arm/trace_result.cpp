@@ -36,6 +36,31 @@ std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted) {
 
 namespace {
 
+constexpr double kOfUnseen = 0.5;  // of the part that no sample shows, an error; choice, tried on drawn arms
+
+/// No machine's law is that of an effect: sizes and shapes are known to a share of them, and a wave to as
+/// much of a radian in the middle of the joint's motion and, which tells its order, between there and its
+/// ends.
+void add_error_of_law(std::vector<ArmParameter>& parameters, const FittedEffect& fitted, double of_size,
+                      double law, double slowest) {
+  const auto add = [](signal::Measured& m, double error) {
+    m.standard_error = std::hypot(m.standard_error, error);
+  };
+  const JointEffectSpec& spec = fitted.effect.spec();
+  add(parameters.front().measured, parameters.front().measured.value * of_size);
+  if (!spec.has_shape()) return;
+  signal::Measured& shape = parameters.back().measured;
+  if (spec.shape == EffectShape::speed) {  // what it is at rest follows from faster samples, by its law
+    const double x = slowest / shape.value, unseen = 1 - std::exp(-x * x);
+    add(parameters.front().measured, parameters.front().measured.value * kOfUnseen * unseen);
+    add(shape, shape.value * kOfUnseen / 2 * unseen);
+  }
+  if (spec.shape != EffectShape::order) return add(shape, shape.value * law);
+  const double of_order = law / fitted.spread;
+  add(shape, of_order);
+  add(parameters[1].measured, std::hypot(law, of_order * fitted.middle));
+}
+
 /// The last effect of a joint.
 ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
   const FittedEffect& effect = c.fit.effects[c.freedom.effects.size() - 1];
@@ -45,9 +70,8 @@ ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
   step.other_joint = effect.effect.other;
   step.channel = step.joint + "/torque";
   step.parameters = effect_parameters(effect);
-  signal::Measured& size = step.parameters.front().measured;  // as its law and all torques are known
-  const double share = std::hypot(settings.law, rig.fitted ? rig.common_error : 0);
-  size.standard_error = std::hypot(size.standard_error, size.value * share);
+  add_error_of_law(step.parameters, effect, std::hypot(settings.law, rig.fitted ? rig.common_error : 0),
+                   settings.law, rig.identification.slowest);
   step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
   step.equivalent_to = c.alike;
   return step;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/arm/friction_speed.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/text.h"
 
@@ -15,9 +16,8 @@ arm::ArmFit fitted(const arm::ArmRig& rig, const std::vector<arm::ArmRecord>& he
   std::vector<arm::ArmMotion> motions;
   for (const arm::ArmRecord& record : healthy)
     for (arm::ArmMotion& m : motions_of(record, rig, warnings)) motions.push_back(std::move(m));
-  std::vector<arm::FittedMotion> all;
-  for (const arm::ArmMotion& m : motions) all.push_back({&m, false});
-  return arm::fit_arm(rig, all);
+  arm::ArmRig turned = rig;
+  return arm::fit_arm_and_friction_speeds(turned, motions);
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ Eigen::MatrixXd full_regressor(const arm::ArmRig& rig, const arm::Joints& q, con
   for (Eigen::Index j = 0; j < links.rows(); ++j)
     for (Eigen::Index t = 0; t < terms; ++t)
       y(j, links.cols() + j * terms + t) =
-          drive_column(rig.terms[std::size_t(t)], v[j], a[j], rig.identification.friction_speed);
+          drive_column(rig.terms[std::size_t(t)], v[j], a[j], rig.friction_speed(std::size_t(j)));
   return y;
 }
 

@@ -77,7 +77,7 @@ Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const a
 
 double motor_friction(const arm::ArmRig& rig, std::size_t joint, double speed, double load) {
   const auto term = [&](arm::DriveTerm t) { return rig.joints[joint].terms[std::size_t(t)]; };
-  const double sign = std::tanh(speed / rig.identification.friction_speed);
+  const double sign = std::tanh(speed / rig.friction_speed(joint));
   return (term(arm::DriveTerm::coulomb) + term(arm::DriveTerm::load) * std::fabs(load)) * sign +
          term(arm::DriveTerm::viscous) * speed + term(arm::DriveTerm::quadratic) * speed * std::fabs(speed) +
          term(arm::DriveTerm::cubic) * speed * speed * speed + term(arm::DriveTerm::offset);
@@ -125,7 +125,7 @@ CrossingWindow window_of(const CrossingData& data, const arm::ArmRig& rig, const
       w.position(i, c) = s.position(begin + i, j), w.rate(i, c) = s.rate(begin + i, j);
       w.torque(i, c) = s.torque(begin + i, j), w.chain(i, c) = s.load(begin + i, j);
       w.friction(i, c) = motor_friction(rig, joint.joint, w.rate(i, c), w.chain(i, c));
-      const double moving = std::tanh(w.rate(i, c) / (kStandstill * rig.identification.friction_speed));
+      const double moving = std::tanh(w.rate(i, c) / (kStandstill * rig.friction_speed(joint.joint)));
       w.unsure(i, c) = kUnsureFriction * joint.coulomb * (1 - moving * moving);
     }
     w.load[c] = w.chain(0, c);

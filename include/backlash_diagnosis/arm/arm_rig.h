@@ -41,6 +41,7 @@ struct JointDrive {
   double load_error = 0;             // of the term `load`, one standard deviation; 0: not said
   double delay = 0;                  // d [s]
   std::vector<JointEffect> effects;  // that it shows beside the terms; as declared, never fitted
+  double friction_speed = 0;         // v_0 of its own friction [rad/s]; 0: as of the whole rig
   double training_error = 0;         // norm(r) / norm(s - mean(s)) where a fitted rig was fitted; 0: not said
 };
 
@@ -73,6 +74,8 @@ struct ArmRig {
   std::string text;
 
   std::vector<std::string> joint_names() const;
+  /// v_0 of the friction in a drive [rad/s].
+  double friction_speed(std::size_t joint) const;
 };
 
 /// Of a joint by its name; none: there is no such joint.

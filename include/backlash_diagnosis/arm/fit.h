@@ -80,6 +80,7 @@ struct BaseParameter {
 struct FittedEffect {
   JointEffect effect;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  double middle = 0, spread = 0;  // rad, of its joint's position: mean and standard deviation
 };
 
 struct ArmFit {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "backlash_diagnosis/arm/friction_speed.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/findings/arm_report.h"
@@ -93,7 +94,7 @@ arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) 
 }
 
 int identify_arm(const Arguments& arguments) {
-  const arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
+  arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
   std::vector<arm::ArmMotion> motions;
   std::vector<std::string> warnings;
   for (const std::string& path : arguments.positionals()) {
@@ -101,12 +102,10 @@ int identify_arm(const Arguments& arguments) {
     for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
     for (arm::ArmMotion& m : arm::motions_of(record, rig, warnings)) motions.push_back(std::move(m));
   }
-  std::vector<arm::FittedMotion> fitted;
-  for (const arm::ArmMotion& m : motions) fitted.push_back({&m, false});
   ProgressBar bar;
   arm::ArmFit fit;
   try {
-    fit = arm::fit_arm(rig, fitted, {}, {}, bar.progress());
+    fit = arm::fit_arm_and_friction_speeds(rig, motions, {}, bar.progress());
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     return kInconclusive;

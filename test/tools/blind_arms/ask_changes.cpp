@@ -72,6 +72,14 @@ std::vector<double> effect_errors(const ArmStep& step, const Added& truth) {
   return z;
 }
 
+/// Stribeck's friction that the drive has beside what was put in.
+Added stribeck_of_drive(const ArmStep& step, const Arm& arm) {
+  std::size_t j = 0;
+  while (joint_name(j) != step.joint) ++j;
+  const Joint& joint = arm.joints[j];
+  return {"stribeck", j, joint.coulomb * joint.stribeck, joint.stribeck_speed};
+}
+
 /// As the encoders have it: where their zeros are a little off, about axes along the last joint's, its link
 /// is taken to be turned by as much. Zeros that are further off than a gear yields are taken out.
 Vector payload_centre(const Arm& arm) {
@@ -141,14 +149,17 @@ void add(Count& c, const ArmTrace& trace, const std::string& kind, const Arm& ar
     const Added* truth = found(step, step.effect, all);
     const bool alike = !truth && among(step, all), good = truth || alike || may(step, kind, arm);
     c.named += truth != nullptr, c.among += alike, c.wrong += !good;
-    // Of Stribeck's friction a record tells all, also what the drive had before.
-    const bool values = truth && step.effect != "friction_drift" && step.effect != "gravity_direction" &&
-                        step.effect != "stribeck";
+    // Where Stribeck's friction was put in, the record shows that and what the drive had before.
+    const bool of_drive = step.effect == "stribeck" && !truth,
+               values = of_drive || (truth && step.effect != "friction_drift" &&
+                                     step.effect != "gravity_direction" && step.effect != "stribeck");
     if (!good || values)
       fmt::print("{}: {} {}: {}; true: {}\n", good ? "told" : "wrong", arm.seed, kind, words_of(step),
                  truth_of(arm));
     if (values)
-      add_values(c, step.effect == "payload" ? payload_errors(step, arm) : effect_errors(step, *truth));
+      add_values(c, step.effect == "payload" ? payload_errors(step, arm)
+                    : of_drive               ? effect_errors(step, stribeck_of_drive(step, arm))
+                                             : effect_errors(step, *truth));
   }
   file.add({{"seed", arm.seed},
             {"kind", kind},
