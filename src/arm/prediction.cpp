@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "fit_model.h"
+#include "joint_effects.h"
 
 namespace backlash::arm {
 
@@ -59,6 +60,29 @@ std::vector<double> relative_errors(const ArmFit& fit, const FitFreedom& freedom
   return errors;
 }
 
+namespace {
+
+/// Variance of what couplings bring of other drives, whose torques are as well known as they are foretold;
+/// at rest to their dry friction.
+double of_couplings(const ArmFit& fit, const FitFreedom& freedom, const FittedMotion& m, std::size_t j,
+                    Eigen::Index row) {
+  double sum = 0;
+  for (std::size_t e = 0; e < freedom.effects.size(); ++e) {
+    const FreeEffect& free = freedom.effects[e];
+    if (free.joint != j || !is_coupling(free.effect) || (!free.everywhere && !m.marked)) continue;
+    const std::size_t i = *index_of(fit.rig, free.effect.other);
+    const JointDrive& other = fit.rig.joints[i];
+    const double torque = m.motion->counts(row, Eigen::Index(i))
+                              ? other.constant * fit.deviation[i]
+                              : other.terms[std::size_t(DriveTerm::coulomb)];
+    if (std::isfinite(torque))
+      sum += std::pow(fit.effects[e].effect.values[0] * torque / fit.rig.joints[j].constant, 2);
+  }
+  return sum;
+}
+
+}  // namespace
+
 std::vector<double> foretold_errors(const ArmFit& fit, const FitFreedom& freedom,
                                     const std::vector<FittedMotion>& motions, double least_seconds) {
   const std::size_t joints = fit.rig.joints.size();
@@ -80,7 +104,8 @@ std::vector<double> foretold_errors(const ArmFit& fit, const FitFreedom& freedom
         if (!m.motion->counts(k, Eigen::Index(j))) continue;
         const double s = all[j].measured[k];
         count[j] += 1, sum[j] += s, squares[j] += s * s;
-        expected[j] += fit.deviation[j] * fit.deviation[j] + spread.row(k).dot(all[j].sensitivity.row(k));
+        expected[j] += fit.deviation[j] * fit.deviation[j] + spread.row(k).dot(all[j].sensitivity.row(k)) +
+                       of_couplings(fit, freedom, m, j, k);
       }
     }
   }

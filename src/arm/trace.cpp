@@ -62,8 +62,9 @@ class Tracer {
   void look_for_pushes(const ArmRecord& test);
   bool holds(const Candidate& found, const Candidate& last, const Motions& judged) const;
   bool search(const Motions& fitted, const Motions& judged, const std::string& words);
-  void tell_chain(const std::vector<Candidate>& all, std::size_t best, const ArmFit& fit);
-  void tell_effects(const std::vector<Candidate>& found);
+  void tell_chain(const std::vector<Candidate>& all, std::size_t best, const Candidate& last,
+                  const Motions& judged);
+  void tell_effects(const std::vector<Candidate>& found, const Motions& judged);
   void tell_when(const Candidate& c);
   void tell_rival(ArmStep& step, const Candidate& rival);
   void tell_friction(const Candidate& c, const Motions& judged, const FrictionAlike& alike);
@@ -92,9 +93,10 @@ void Tracer::set_base() {
   trace_.train = fits_.train_errors;
 }
 
-void Tracer::tell_effects(const std::vector<Candidate>& found) {
+void Tracer::tell_effects(const std::vector<Candidate>& found, const Motions& judged) {
   for (const Candidate& c : found) {
-    trace_.steps.push_back(step_of(c, found.back().fit, rig_, settings_));
+    const double law = fits_.share_known(c, found.back(), judged);
+    trace_.steps.push_back(step_of(c, found.back().fit, rig_, law));
     tell_when(c);
   }
 }
@@ -109,7 +111,7 @@ void Tracer::tell_when(const Candidate& c) {
 
 /// What is taken away on one side does nearly what a body on the other side does: values hold both.
 void Tracer::tell_rival(ArmStep& step, const Candidate& rival) {
-  const ArmStep other = step_of(rival, rival.fit, rig_, settings_);
+  const ArmStep other = step_of(rival, rival.fit, rig_, settings_.law);
   for (std::size_t i = 0; i < step.parameters.size(); ++i) {
     signal::Measured& m = step.parameters[i].measured;
     m.standard_error = std::hypot(m.standard_error, other.parameters[i].measured.value - m.value);
@@ -164,9 +166,11 @@ void Tracer::tell_friction(const Candidate& c, const Motions& judged, const Fric
 }
 
 /// What is told of the chain, with values of a fit that has all that was found.
-void Tracer::tell_chain(const std::vector<Candidate>& all, std::size_t best, const ArmFit& fit) {
+void Tracer::tell_chain(const std::vector<Candidate>& all, std::size_t best, const Candidate& last,
+                        const Motions& judged) {
   const Candidate& told = all[best];
-  ArmStep step = step_of(told, fit, rig_, settings_);
+  const double law = of_joint(told) ? fits_.share_known(told, last, judged) : settings_.law;
+  ArmStep step = step_of(told, last.fit, rig_, law);
   if (const Candidate* rival = rival_of(all, best, settings_)) tell_rival(step, *rival);
   for (const std::string& name : as_good_as(all, best, settings_)) step.equivalent_to.push_back(name);
   trace_.steps.push_back(step);
@@ -224,8 +228,8 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   const Candidate& of_chain = best < all.size() ? all[best] : without;
   trace_.rejected.insert(trace_.rejected.end(), effects.rejected.begin(), effects.rejected.end());
   const Candidate& taken = effects.steps.empty() ? of_chain : effects.steps.back();
-  if (best < all.size()) tell_chain(all, best, taken.fit);
-  tell_effects(effects.steps);
+  if (best < all.size()) tell_chain(all, best, taken, judged);
+  tell_effects(effects.steps, judged);
   tell_friction(taken, judged, effects.friction_alike);
   if (trace_.steps.empty()) {
     unnamed_ = without;

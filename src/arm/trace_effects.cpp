@@ -28,6 +28,7 @@ class EffectSteps {
   std::optional<Candidate> next(const Candidate& model, bool everywhere) const;
   Candidate with(const Candidate& model, const EffectGuess& guess, bool everywhere) const;
   void reject(const ArmTrace::Rejected& one) const;
+  ArmTraceSettings settings_for_other_friction() const;
   bool is_of_term(const EffectGuess& guess) const {
     return stands_for_term(guess.effect.effect.spec(), fits_.rig);
   }
@@ -37,6 +38,14 @@ class EffectSteps {
   const Motions& judged_;
   JointEffectsFound& found_;
 };
+
+/// That friction is another one is known; which one remains to be told, however small it is.
+ArmTraceSettings EffectSteps::settings_for_other_friction() const {
+  ArmTraceSettings settings = fits_.settings;
+  settings.least_at_joint = settings.least_gain;
+  settings.least_of_signal = 0;
+  return settings;
+}
 
 std::optional<Candidate> EffectSteps::next(const Candidate& model) const {
   std::optional<Candidate> own = next(model, false), all;
@@ -83,10 +92,7 @@ std::optional<Candidate> EffectSteps::next(const Candidate& model, bool everywhe
 }
 
 std::optional<Candidate> EffectSteps::other_friction(const Candidate& model, std::size_t joint) const {
-  // That friction is another one is known; which one remains to be told, however small it is.
-  ArmTraceSettings settings = fits_.settings;
-  settings.least_at_joint = settings.least_gain;
-  settings.least_of_signal = 0;
+  const ArmTraceSettings settings = settings_for_other_friction();
   found_.friction_alike[joint].clear();
   Candidate steady = model;
   steady.freedom.steady.push_back(joint);
@@ -142,12 +148,18 @@ void EffectSteps::drop_what_does_not_explain(const Candidate& model) const {
     }
     const Candidate before = kept.empty() ? model : kept.back();
     Candidate again = before;
-    if (!c.freedom.rubs_otherwise(own.joint)) again.freedom.steady.push_back(own.joint);
+    const bool instead = !c.freedom.rubs_otherwise(own.joint);
+    if (instead) again.freedom.steady.push_back(own.joint);
     again.alike = c.alike;
     again.freedom.effects.push_back(own);
     fits_.fit(again, fitted_);
     judge(again, before, judged_, fits_.rig, fits_.settings);
-    if (effect_refusal(again, before, judged_, fits_.settings).empty()) kept.push_back(std::move(again));
+    const std::string reason =
+        effect_refusal(again, before, judged_, instead ? settings_for_other_friction() : fits_.settings);
+    if (reason.empty())
+      kept.push_back(std::move(again));
+    else
+      reject({own.effect.id, reason, fits_.rig.joints[own.joint].name});
   }
   found_.steps = std::move(kept);
 }

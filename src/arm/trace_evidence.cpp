@@ -94,6 +94,8 @@ double standard_errors_from_none(const Eigen::VectorXd& values, const Eigen::Mat
 
 constexpr double kFarFromGuess = 0.4;  // of a shape's logarithm; choice: its prior is half of it
 
+constexpr double kShapeKnown = 0.25;  // of a shape, its standard error: else it has none; choice
+
 /// Of the rms of what rubs in the drive of its joint, without it.
 double share_of_friction(const Candidate& c, const Motions& judged) {
   double own = 0, all = 0;
@@ -202,6 +204,10 @@ std::string effect_refusal(Candidate& c, const Candidate& without, const Motions
   if (e.effect.spec().has_shape() && std::fabs(std::log(e.effect.shape / guess.effect.shape)) > kFarFromGuess)
     return fmt::format("its {} is {:.2g} where the residual had {:.2g}: the records do not tell it",
                        shape_name(e.effect.spec().shape), e.effect.shape, guess.effect.shape);
+  if (const double shape_error = std::sqrt(e.covariance(2, 2));
+      e.effect.spec().has_shape() && shape_error > kShapeKnown * e.effect.shape)
+    return fmt::format("its {} is {:.2g} +- {:.1g}: the records do not tell it",
+                       shape_name(e.effect.spec().shape), e.effect.shape, shape_error);
   const double errors = errors_from_none(c, c.fit);
   if (!(errors > settings.sure)) return fmt::format("its size is {:.1f} standard errors from none", errors);
   return "";
@@ -254,17 +260,37 @@ void CandidateFits::try_out(Candidate& c, const Candidate& without, const Motion
 }
 
 std::vector<double> CandidateFits::foretold(const Candidate& taken, const Motions& judged) const {
+  const double least = settings.fit.least_seconds;
   ArmFit known = taken.fit;
   for (std::size_t j = 0; !rig.fitted && j < rig.joints.size(); ++j)
     known.deviation[j] = std::fmin(known.deviation[j], base.deviation[j]);
   if (rig.fitted) std::fill(known.deviation.begin(), known.deviation.end(), 0.0);
-  std::vector<double> errors =
-      foretold_errors(known, taken.freedom, as_fitted(judged, true), settings.fit.least_seconds);
+  std::vector<double> errors = foretold_errors(known, taken.freedom, as_fitted(judged, true), least);
   for (std::size_t j = 0; rig.fitted && j < rig.joints.size(); ++j) {
     const double said = rig.joints[j].training_error;
     errors[j] = std::hypot(errors[j], said > 0 ? said : train_errors[j]);
   }
+  if (rig.fitted || taken.freedom.payload || taken.freedom.tilt) return errors;
+  // A joint that nothing was found at: what is missing there would make the fit of the test record unsure.
+  const std::vector<double> trained = foretold_errors(base, {}, as_fitted(judged, false), least);
+  for (std::size_t j = 0; j < errors.size(); ++j)
+    if (std::none_of(taken.freedom.effects.begin(), taken.freedom.effects.end(),
+                     [&](const FreeEffect& e) { return e.joint == j; }))
+      errors[j] = trained[j];
   return errors;
+}
+
+double CandidateFits::share_known(const Candidate& told, const Candidate& last, const Motions& judged) const {
+  const std::size_t place = told.freedom.effects.size() - 1, joint = told.freedom.effects.back().joint;
+  Candidate without = last;
+  without.fit.effects[place].effect.values.setZero();
+  const auto error = [&](const Candidate& c) {
+    return relative_errors(c.fit, c.freedom, as_fitted(judged, true), 0)[joint];
+  };
+  const double left = error(last), own = error(without), expected = foretold(last, judged)[joint];
+  const double more = left * left - expected * expected, takes = own * own - left * left;
+  return more > 0 && takes > 0 ? std::hypot(settings.law, settings.of_left * std::sqrt(more / takes))
+                               : settings.law;
 }
 
 }  // namespace backlash::arm

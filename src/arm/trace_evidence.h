@@ -60,6 +60,10 @@ class CandidateFits {
   /// effect is not known to. What a half of the test record leaves may be what is missing.
   std::vector<double> foretold(const Candidate& taken, const Motions& judged) const;
 
+  /// To what share an effect of a joint is known where its joint is left with more than is expected: what is
+  /// left may have its shape. `told` has it last, `last` what was found after it, too.
+  double share_known(const Candidate& told, const Candidate& last, const Motions& judged) const;
+
   const ArmRig& rig;
   const ArmTraceSettings& settings;
   ArmFit base;  // of the training records alone, or as the rig file has it

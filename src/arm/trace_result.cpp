@@ -41,17 +41,18 @@ constexpr double kOfUnseen = 0.5;  // of the part that no sample shows, an error
 /// No machine's law is that of an effect: sizes and shapes are known to a share of them, and a wave to as
 /// much of a radian in the middle of the joint's motion and, which tells its order, between there and its
 /// ends.
-void add_error_of_law(std::vector<ArmParameter>& parameters, const FittedEffect& fitted, double of_size,
-                      double law, double slowest) {
+void add_error_of_law(std::vector<ArmParameter>& parameters, const FittedEffect& fitted, const ArmRig& rig,
+                      double law) {
   const auto add = [](signal::Measured& m, double error) {
     m.standard_error = std::hypot(m.standard_error, error);
   };
   const JointEffectSpec& spec = fitted.effect.spec();
+  const double of_size = std::hypot(law, rig.fitted ? rig.common_error : 0);
   add(parameters.front().measured, parameters.front().measured.value * of_size);
   if (!spec.has_shape()) return;
   signal::Measured& shape = parameters.back().measured;
   if (spec.shape == EffectShape::speed) {  // what it is at rest follows from faster samples, by its law
-    const double x = slowest / shape.value, unseen = 1 - std::exp(-x * x);
+    const double x = rig.identification.slowest / shape.value, unseen = 1 - std::exp(-x * x);
     add(parameters.front().measured, parameters.front().measured.value * kOfUnseen * unseen);
     add(shape, shape.value * kOfUnseen / 2 * unseen);
   }
@@ -62,7 +63,7 @@ void add_error_of_law(std::vector<ArmParameter>& parameters, const FittedEffect&
 }
 
 /// The last effect of a joint.
-ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSettings& settings) {
+ArmStep effect_step(const Candidate& c, const ArmRig& rig, double law) {
   const FittedEffect& effect = c.fit.effects[c.freedom.effects.size() - 1];
   ArmStep step;
   step.effect = effect.effect.id;
@@ -70,8 +71,7 @@ ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
   step.other_joint = effect.effect.other;
   step.channel = step.joint + "/torque";
   step.parameters = effect_parameters(effect);
-  add_error_of_law(step.parameters, effect, std::hypot(settings.law, rig.fitted ? rig.common_error : 0),
-                   settings.law, rig.identification.slowest);
+  add_error_of_law(step.parameters, effect, rig, law);
   step.gain = c.gain, step.gain_lower = c.lower, step.gain_upper = c.upper;
   step.equivalent_to = c.alike;
   return step;
@@ -79,11 +79,10 @@ ArmStep effect_step(const Candidate& c, const ArmRig& rig, const ArmTraceSetting
 
 }  // namespace
 
-ArmStep step_of(const Candidate& named, const ArmFit& fit, const ArmRig& rig,
-                const ArmTraceSettings& settings) {
+ArmStep step_of(const Candidate& named, const ArmFit& fit, const ArmRig& rig, double law) {
   Candidate c = named;
   c.fit = fit;
-  if (!c.freedom.effects.empty()) return effect_step(c, rig, settings);
+  if (!c.freedom.effects.empty()) return effect_step(c, rig, law);
   ArmStep step;
   step.effect = c.effect;
   step.channel = rig.joints[c.joint].name + "/torque";

@@ -16,8 +16,8 @@ std::vector<FittedMotion> as_fitted(const Motions& motions, bool marked);
 std::vector<ArmParameter> effect_parameters(const FittedEffect& fitted);
 
 /// A candidate that is told: the last of its effects of a joint, else what it adds to the chain; values of
-/// a fit that has it, and what was found after it.
-ArmStep step_of(const Candidate& c, const ArmFit& fit, const ArmRig& rig, const ArmTraceSettings& settings);
+/// a fit that has it, and what was found after it. `law`: the share to which effects of joints are known.
+ArmStep step_of(const Candidate& c, const ArmFit& fit, const ArmRig& rig, double law);
 
 /// The rig with what the candidate adds to it.
 ArmRig augmented_rig(const ArmRig& rig, const Candidate& taken);

@@ -38,6 +38,8 @@ struct ArmTraceSettings {
                                    // a UR5's joints take up to 0.4 and 0.03, see doc/measured/ur5_arm.md
   double law = 0.03;  // of the size of an effect of a joint: its law is not the machine's; choice, tried on
                       // drawn arms, see doc/arm.md
+  double of_left = 0.5;  // of what its joint is left with beyond what is expected, that may have its shape;
+                         // choice, tried on drawn arms
   double clearly = 0.1;  // share of the squared error by which an effect of the test record alone must do
                          // better than one of all records; choice
   double nearly = 0.5;   // share of the squared error by which another effect may do worse that is told to be
