@@ -163,6 +163,19 @@ TEST(Trace, WarmingUpIsNoEffect) {
   EXPECT_EQ(trace.notes.size(), 6u);  // told, joint by joint
 }
 
+// A cable that pulls as a spring: no effect of the dictionary, and the joint is not as it was trained.
+TEST(Trace, WhatItDoesNotKnowIsUnexplained) {
+  const test::Machine healthy(33);
+  test::Machine machine = healthy;
+  machine.effect.id = "cable", machine.effect.values[0] = 25;  // N m/rad
+  machine.affected = 1;
+  const ArmTrace trace =
+      trace_arm(healthy.declared, {healthy.record(1), healthy.record(2)}, machine.record(3), false);
+  for (const ArmStep& step : trace.steps) EXPECT_NE(step.joint, trace.joints[1]) << step.effect;
+  ASSERT_TRUE(trace.unexplained);
+  EXPECT_EQ(trace.unexplained->channel, trace.joints[1] + "/torque") << trace.unexplained->signature;
+}
+
 TEST(Trace, FindsGravityFromAnotherDirection) {
   const test::Machine machine(7);
   test::Machine tilted = machine;
