@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/arm/dynamics.h"
+#include "backlash_diagnosis/geared_arm/drive_effects.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 
@@ -44,7 +45,8 @@ void smooth(const std::vector<double>& x, Eigen::Index reach, double interval, E
   }
 }
 
-/// Motors of one stretch of the record: rows all samples, columns all joints of the rig.
+/// Motors of one stretch of the record: rows all samples, columns all joints of the rig. Torques are those
+/// that turn the motors.
 struct Stretch {
   Eigen::MatrixXd position, rate, torque, load;
 };
@@ -64,6 +66,13 @@ Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const a
         signal::delayed(even.column(rig.channel), -drive.delay / motion.interval);
     for (Eigen::Index i = 0; i < n; ++i) s.torque(i, j) = drive.constant * torque[std::size_t(i)];
   }
+  const Eigen::MatrixXd recorded = s.torque;
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    const DriveEffects effects(rig, std::size_t(j));
+    s.torque.col(j) *= effects.gain();
+    for (const auto& [other, share] : effects.couplings())
+      s.torque.col(j) -= share * recorded.col(Eigen::Index(other));
+  }
   for (Eigen::Index i = 0; i < n; ++i)
     s.load.row(i) = arm::inverse_dynamics(chain, motion.q.row(i), motion.v.row(i), motion.a.row(i));
   for (Eigen::Index j = 0; j < joints; ++j) {
@@ -75,12 +84,14 @@ Stretch stretch_of(const arm::ArmRig& rig, const arm::ArmRecord& record, const a
   return s;
 }
 
-double motor_friction(const arm::ArmRig& rig, std::size_t joint, double speed, double load) {
+double motor_friction(const arm::ArmRig& rig, std::size_t joint, const DriveEffects& effects, double position,
+                      double speed, double load) {
   const auto term = [&](arm::DriveTerm t) { return rig.joints[joint].terms[std::size_t(t)]; };
   const double sign = std::tanh(speed / rig.friction_speed(joint));
   return (term(arm::DriveTerm::coulomb) + term(arm::DriveTerm::load) * std::fabs(load)) * sign +
          term(arm::DriveTerm::viscous) * speed + term(arm::DriveTerm::quadratic) * speed * std::fabs(speed) +
-         term(arm::DriveTerm::cubic) * speed * speed * speed + term(arm::DriveTerm::offset);
+         term(arm::DriveTerm::cubic) * speed * speed * speed + term(arm::DriveTerm::offset) +
+         effects.torque({position, speed, sign, load});
 }
 
 /// Mass matrix and bias of the joints that have a gap, the others moving as their motors do.
@@ -121,10 +132,12 @@ CrossingWindow window_of(const CrossingData& data, const arm::ArmRig& rig, const
   for (Eigen::Index c = 0; c < n; ++c) {
     const TraverseJoint& joint = data.joints[std::size_t(c)];
     const auto j = Eigen::Index(joint.joint);
+    const DriveEffects effects(rig, joint.joint);
     for (Eigen::Index i = 0; i < samples; ++i) {
       w.position(i, c) = s.position(begin + i, j), w.rate(i, c) = s.rate(begin + i, j);
       w.torque(i, c) = s.torque(begin + i, j), w.chain(i, c) = s.load(begin + i, j);
-      w.friction(i, c) = motor_friction(rig, joint.joint, w.rate(i, c), w.chain(i, c));
+      w.friction(i, c) =
+          motor_friction(rig, joint.joint, effects, w.position(i, c), w.rate(i, c), w.chain(i, c));
       const double moving = std::tanh(w.rate(i, c) / (kStandstill * rig.friction_speed(joint.joint)));
       w.unsure(i, c) = kUnsureFriction * joint.coulomb * (1 - moving * moving);
     }

@@ -56,6 +56,21 @@ TEST(ArmTraverse, TheMotorsAloneTellBothPlaysAndWhereTheyWereCrossed) {
   }
 }
 
+TEST(ArmTraverse, EffectsOfTheRigFileAreTakenOffTheTorque) {
+  const GearedArm plain = arm_of("two_link_arm");
+  GearedArm machine = plain;
+  machine.rig.joints[0].effects = {{"cogging", 6, "", {0.3, 0.4}},
+                                   {"transmission_coupling", 0, plain.rig.joints[1].name, {0.2, 0}}};
+  machine.rig.joints[1].effects = {{"motor_torque_gain", 0, "", {0.3, 0}}};
+  const std::vector<JointTraverse> known = diagnosed(machine, machine), unknown = diagnosed(machine, plain);
+  const double truth[] = {2e-3, 3e-3};
+  for (std::size_t j = 0; j < 2; ++j) {
+    expect_told(known[j].estimate, truth[j]);
+    EXPECT_LT(known[j].misfit, 1.5) << j;  // as of a machine without effects
+    if (unknown[j].estimate.status == Status::ok) expect_told(unknown[j].estimate, truth[j]);
+  }
+}
+
 TEST(ArmTraverse, NeverTheWrongJoint) {
   const GearedArm declared = arm_of("two_link_arm");
   for (const std::size_t tight : {0, 1}) {
