@@ -90,8 +90,12 @@ JointEffect gain_of_drive() {
   return {"motor_torque_gain", 0, "", Eigen::Vector2d::Zero()};
 }
 
+bool is_gain(const JointEffect& effect) {
+  return effect.id == gain_of_drive().id;
+}
+
 bool is_of_drives(const JointEffect& effect) {
-  return is_coupling(effect) || effect.id == gain_of_drive().id;
+  return is_coupling(effect) || is_gain(effect);
 }
 
 JointEffect read_joint_effect(const YamlReader& yaml) {

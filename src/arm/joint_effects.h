@@ -20,6 +20,7 @@ bool stands_for_term(const JointEffectSpec& spec, const ArmRig& rig);
 
 /// Whose column is the torque of its own drive.
 JointEffect gain_of_drive();
+bool is_gain(const JointEffect& effect);
 
 /// Whether its column is the torque of a drive: of its own, or of another joint's.
 bool is_of_drives(const JointEffect& effect);

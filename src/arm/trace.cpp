@@ -189,8 +189,11 @@ bool Tracer::holds(const Candidate& found, const Candidate& last, const Motions&
   if (!(errors_from_none(found, last.fit) > settings_.sure)) return false;
   const std::vector<double> expected = fits_.foretold(last, judged),
                             errors = relative_errors(last.fit, last.freedom, as_fitted(judged, true), 0);
-  for (std::size_t j = 0; &judged != &test_ && j < errors.size(); ++j)
-    if (errors[j] > settings_.foretold * expected[j]) return false;
+  for (std::size_t j = 0; &judged != &test_ && j < errors.size(); ++j) {
+    const double most =
+        of_joint(found) && j == found.joint ? most_left(found, settings_) : settings_.foretold;
+    if (errors[j] > most * expected[j]) return false;
+  }
   return true;
 }
 
@@ -222,6 +225,9 @@ bool Tracer::search(const Motions& fitted, const Motions& judged, const std::str
   JointEffectsFound effects = joint_effects(best < all.size() ? all[best] : without, fits_, fitted, judged);
   if (best < all.size() &&
       !holds(all[best], effects.steps.empty() ? all[best] : effects.steps.back(), judged)) {
+    trace_.rejected.push_back({all[best].effect,
+                               "leaves a joint unexplained, or is none beside what was found after it",
+                               of_joint(all[best]) ? rig_.joints[all[best].joint].name : ""});
     best = all.size();
     effects = joint_effects(without, fits_, fitted, judged);
   }

@@ -131,7 +131,7 @@ void EffectSteps::drop_what_does_not_explain(const Candidate& model) const {
     return errors[joint] / expected[joint];
   };
   const auto doubt = [&](const Candidate& c) -> std::string {
-    if (left_of(c) > fits_.settings.foretold)
+    if (left_of(c) > most_left(c, fits_.settings))
       return fmt::format("leaves {:.3g} times the error that the training records let expect", left_of(c));
     if (!(errors_from_none(c, last.fit) > fits_.settings.sure))
       return "is none beside what was found after it";

@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "fit_model.h"
+#include "joint_effects.h"
 #include "trace_result.h"
 
 namespace backlash::arm {
@@ -151,6 +152,10 @@ double errors_from_none(const Candidate& c, const ArmFit& fit) {
   return standard_errors_from_none(tilt, fit.covariance, layout.tilt());
 }
 
+double most_left(const Candidate& c, const ArmTraceSettings& settings) {
+  return is_gain(c.freedom.effects.back().effect) ? settings.explained : settings.foretold;
+}
+
 void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
            const ArmTraceSettings& settings) {
   bootstrap(c, squares_of(without, c, judged, rig, settings.block), settings);
@@ -271,11 +276,12 @@ std::vector<double> CandidateFits::foretold(const Candidate& taken, const Motion
     errors[j] = std::hypot(errors[j], said > 0 ? said : train_errors[j]);
   }
   if (rig.fitted || taken.freedom.payload || taken.freedom.tilt) return errors;
-  // A joint that nothing was found at: what is missing there would make the fit of the test record unsure.
+  // What is missing at a joint where nothing was found, or but one number, makes the fit of the test record
+  // unsure: then the training says it.
   const std::vector<double> trained = foretold_errors(base, {}, as_fitted(judged, false), least);
   for (std::size_t j = 0; j < errors.size(); ++j)
     if (std::none_of(taken.freedom.effects.begin(), taken.freedom.effects.end(),
-                     [&](const FreeEffect& e) { return e.joint == j; }))
+                     [&](const FreeEffect& e) { return e.joint == j && !is_gain(e.effect); }))
       errors[j] = trained[j];
   return errors;
 }

@@ -28,6 +28,9 @@ struct Candidate {
 /// last effect of a joint, else body or tilt.
 double errors_from_none(const Candidate& c, const ArmFit& fit);
 
+/// Times the expected error that the joint of the last effect may be left with, for that to be believed.
+double most_left(const Candidate& c, const ArmTraceSettings& settings);
+
 /// Gains of `c` over `without` on `judged`, with blocks of time drawn at random.
 void judge(Candidate& c, const Candidate& without, const Motions& judged, const ArmRig& rig,
            const ArmTraceSettings& settings);
