@@ -38,6 +38,35 @@ constexpr double kEnough = 1e-5;      // gain of the cost below which it ends, r
 constexpr double kFarOff = 3;         // times the median rms: a crossing is left out
 constexpr int kLook = 6;              // steps between two looks for such crossings
 constexpr int kTries = 8;
+constexpr std::size_t kTogether = 4;  // windows of a linearisation, which fill whole groups of runs
+constexpr int kUnmoved = kTraverseValues + kTraverseOwn;  // beside the values of machine and crossing
+
+/// Which loads a linearisation moves: of each window as it is, and with each value moved that moves the load.
+/// The first of a window make a group, as their teeth touch at about the same time; the others of several
+/// windows come after them.
+struct Columns {
+  std::size_t windows;
+  std::vector<int> moving;
+
+  explicit Columns(std::size_t of_windows) : windows(of_windows) {
+    for (int k = 0; k <= kUnmoved; ++k)
+      if (moves_load(k)) moving.push_back(k);
+  }
+
+  std::size_t count() const { return windows * moving.size(); }
+
+  std::size_t of(std::size_t window, int which) const {
+    const auto found = std::find(moving.begin(), moving.end(), moves_load(which) ? which : kUnmoved);
+    const auto i = static_cast<std::size_t>(found - moving.begin());
+    const auto group = std::min<std::size_t>(kTraverseRuns, moving.size()), others = moving.size() - group;
+    return i < group ? window * group + i : windows * group + window * others + i - group;
+  }
+};
+
+/// Of so many each.
+int groups(std::size_t count, std::size_t each) {
+  return static_cast<int>((count + each - 1) / each);
+}
 
 }  // namespace
 
@@ -126,25 +155,54 @@ TraverseMachine TraverseFit::machine(const VectorXd& z) const {
   return m;
 }
 
-/// In standard deviations, independent of each other.
-VectorXd TraverseFit::residual(std::size_t window, const VectorXd& z, const TraverseOwn& own) const {
-  const TraverseOwn scaled = own.cwiseProduct(own_spread_);
-  VectorXd all(static_cast<Eigen::Index>(data_.samples));
-  traverse_residual(data_, windows_[window], machine(z), scaled, all.data());
-  const VectorXd counted = all(weights_[window].counted);
-  return weights_[window].deviation.triangularView<Eigen::Lower>().solve(counted);
+TraverseRun TraverseFit::run_of(std::size_t window, const TraverseMachine& machine,
+                                const TraverseOwn& own) const {
+  return {&windows_[window], machine, own.cwiseProduct(own_spread_)};
 }
 
-TraverseFit::Part TraverseFit::linearise(std::size_t window) const {
-  const VectorXd r = residual(window, z_, own_[window]);
-  MatrixXd slopes(r.size(), kTraverseValues + kTraverseOwn);
-  for (int k = 0; k < kTraverseValues + kTraverseOwn; ++k) {
+std::vector<TraverseMachine> TraverseFit::moved_machines() const {
+  std::vector<TraverseMachine> machines;
+  for (int k = 0; k <= kUnmoved; ++k) {
     VectorXd z = z_;
-    TraverseOwn own = own_[window];
-    const double step = k < kTraverseValues ? kDifference : kStartDifference;
-    (k < kTraverseValues ? z[k] : own[k - kTraverseValues]) += step;
-    slopes.col(k) = (residual(window, z, own) - r) / step;
+    if (k < kTraverseValues) z[k] += kDifference;
+    machines.push_back(machine(z));
   }
+  return machines;
+}
+
+TraverseRun TraverseFit::moved_run(std::size_t window, const std::vector<TraverseMachine>& machines,
+                                   int which) const {
+  TraverseOwn own = own_[window];
+  if (which >= kTraverseValues && which < kUnmoved) own[which - kTraverseValues] += kStartDifference;
+  return run_of(window, machines[static_cast<std::size_t>(which)], own);
+}
+
+void TraverseFit::linearise(std::size_t first, std::size_t last,
+                            const std::vector<TraverseMachine>& machines) {
+  const Columns columns(last - first);
+  std::vector<TraverseRun> runs(columns.count());
+  for (std::size_t w = first; w < last; ++w)
+    for (const int k : columns.moving) runs[columns.of(w - first, k)] = moved_run(w, machines, k);
+  const MatrixXd teeth = traverse_teeth(data_, runs);
+  for (std::size_t w = first; w < last; ++w) {
+    const auto left = [&](int k) {
+      return traverse_residual(data_, moved_run(w, machines, k),
+                               teeth.col(Eigen::Index(columns.of(w - first, k))));
+    };
+    const VectorXd r = left(kUnmoved);
+    MatrixXd slopes(r.size(), kUnmoved);
+    for (int k = 0; k < kUnmoved; ++k)
+      slopes.col(k) = (left(k) - r) / (k < kTraverseValues ? kDifference : kStartDifference);
+    parts_[w] = part_of(w, r, slopes);
+  }
+}
+
+TraverseFit::Part TraverseFit::part_of(std::size_t window, const VectorXd& residual,
+                                       const MatrixXd& all_slopes) const {
+  const auto deviation = weights_[window].deviation.triangularView<Eigen::Lower>();
+  const VectorXd counted = residual(weights_[window].counted), r = deviation.solve(counted);
+  MatrixXd slopes = all_slopes(weights_[window].counted, Eigen::all);
+  deviation.solveInPlace(slopes);
   const MatrixXd normal = signal::gram(slopes);
   const VectorXd toward = -signal::transposed_product(slopes, r);
   Part part{normal.topLeftCorner(kTraverseValues, kTraverseValues),
@@ -156,15 +214,32 @@ TraverseFit::Part TraverseFit::linearise(std::size_t window) const {
   return part;
 }
 
+double TraverseFit::squares_of(std::size_t window, const VectorXd& residual) const {
+  const VectorXd counted = residual(weights_[window].counted);
+  return weights_[window].deviation.triangularView<Eigen::Lower>().solve(counted).squaredNorm();
+}
+
 double TraverseFit::cost_of(const VectorXd& z, const std::vector<TraverseOwn>& own,
                             std::vector<double>* rms) const {
+  const TraverseMachine here = machine(z);
+  std::vector<std::size_t> wanted;
+  for (std::size_t w = 0; w < windows_.size(); ++w)
+    if (used_[w] || rms != nullptr) wanted.push_back(w);
   std::vector<double> of(windows_.size(), 0.0);
-  for_each_in_parallel(int(of.size()), [&](int index) {
-    const auto w = static_cast<std::size_t>(index);
-    if (!used_[w] && rms == nullptr) return;
-    const double squares = residual(w, z, own[w]).squaredNorm();
-    if (rms != nullptr) (*rms)[w] = std::sqrt(squares / weights_[w].of_noise);
-    of[w] = used_[w] ? squares + own[w].squaredNorm() : 0;
+  const std::size_t count = wanted.size();
+  for_each_in_parallel(groups(count, kTraverseRuns), [&](int group) {
+    const std::size_t first = static_cast<std::size_t>(group) * kTraverseRuns,
+                      last = std::min<std::size_t>(first + kTraverseRuns, count);
+    std::vector<TraverseRun> runs;
+    for (std::size_t i = first; i < last; ++i) runs.push_back(run_of(wanted[i], here, own[wanted[i]]));
+    const MatrixXd teeth = traverse_teeth(data_, runs);
+    for (std::size_t i = first; i < last; ++i) {
+      const std::size_t w = wanted[i];
+      const double squares = squares_of(
+          w, traverse_residual(data_, runs[i - first], teeth.col(static_cast<Eigen::Index>(i - first))));
+      if (rms != nullptr) (*rms)[w] = std::sqrt(squares / weights_[w].of_noise);
+      of[w] = used_[w] ? squares + own[w].squaredNorm() : 0;
+    }
   });
   double sum = z.squaredNorm();
   for (const double each : of) sum += each;
@@ -174,8 +249,10 @@ double TraverseFit::cost_of(const VectorXd& z, const std::vector<TraverseOwn>& o
 /// One linearisation, and harder damping until a step improves. False where none does.
 bool TraverseFit::iterate() {
   parts_.resize(windows_.size());
-  for_each_in_parallel(int(windows_.size()), [&](int w) {
-    parts_[static_cast<std::size_t>(w)] = linearise(static_cast<std::size_t>(w));
+  const std::vector<TraverseMachine> machines = moved_machines();
+  for_each_in_parallel(groups(windows_.size(), kTogether), [&](int group) {
+    const std::size_t first = static_cast<std::size_t>(group) * kTogether;
+    linearise(first, std::min(first + kTogether, windows_.size()), machines);
   });
   for (int attempt = 0; attempt < kTries; ++attempt, damping_ *= kHarder) {
     MatrixXd normal = MatrixXd::Identity(kTraverseValues, kTraverseValues);

@@ -64,8 +64,16 @@ class TraverseFit {
   double value(int which, double z) const;
   void weigh(const TraverseWindow& window);
   TraverseMachine machine(const Eigen::VectorXd& z) const;
-  Eigen::VectorXd residual(std::size_t window, const Eigen::VectorXd& z, const TraverseOwn& own) const;
-  Part linearise(std::size_t window) const;
+  TraverseRun run_of(std::size_t window, const TraverseMachine& machine, const TraverseOwn& own) const;
+  /// With one value moved by a difference, for each of the machine; then those for the values of a crossing
+  /// and for none.
+  std::vector<TraverseMachine> moved_machines() const;
+  TraverseRun moved_run(std::size_t window, const std::vector<TraverseMachine>& machines, int which) const;
+  void linearise(std::size_t first, std::size_t last, const std::vector<TraverseMachine>& machines);
+  /// Of residuals and their slopes at each sample of a window.
+  Part part_of(std::size_t window, const Eigen::VectorXd& residual, const Eigen::MatrixXd& all_slopes) const;
+  /// Sum of them in standard deviations, independent of each other.
+  double squares_of(std::size_t window, const Eigen::VectorXd& residual) const;
   double cost_of(const Eigen::VectorXd& z, const std::vector<TraverseOwn>& own,
                  std::vector<double>* rms) const;
   bool iterate();

@@ -1,271 +1,305 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "traverse_motion.h"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "backlash_diagnosis/signal/noise.h"
-#include "backlash_diagnosis/signal/order_statistics.h"
-#include "refusal.h"
+#include "lanes_power.h"
 
 namespace backlash::diagnosis {
 namespace {
 
-// All choices, tried on simulated machines, but where another origin is given.
-constexpr double kCycleSamples = 8;  // fewest samples in a cycle of the motor against the load
-constexpr double kStep = 0.06;       // of the integration times the fastest frequency, rad
-constexpr double kBefore = 0.8;      // cycles of a window before a crossing: tell the start
-constexpr double kAfter = 2.6;       // and from its begin on: the first touches
-constexpr double kCounted = 0.5;     // share of a window in which the motor moves
-constexpr double kUneven = 0.25;     // of an interval, from one sample to the next
-constexpr double kClear = 4.4;       // noises of the averaged torque, above which it presses a flank
-constexpr double kAveraged = 0.16;   // cycles, half width of the average
-constexpr double kSlow = 0.02;       // of the rms speed: there dry friction takes any value
-constexpr double kFade = 0.01;       // of it: the load's friction turns its sign within
-constexpr std::size_t kFewestSamples = 256;
+// Deflections, in those under the usual torque, and powers beyond which no fit comes: they keep lanes_exp()
+// within its range.
+constexpr double kLeastDeflection = 1e-30, kMostDeflection = 1e30, kMostPower = 10;
 
-/// Value and slope per sample of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
-struct Quadratic {
-  std::vector<double> value, slope;
-  std::size_t reach;
+template <typename Lanes>
+constexpr int kLanesOf = static_cast<int>(sizeof(Lanes) / sizeof(double));
 
-  explicit Quadratic(std::size_t to_each_side) : reach(to_each_side) {
-    const auto m = static_cast<double>(reach);
-    for (double k = -m; k <= m; ++k) {
-      value.push_back((3 * (3 * m * m + 3 * m - 1) - 15 * k * k) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3)));
-      slope.push_back(3 * k / (m * (m + 1) * (2 * m + 1)));
+/// Motor between two samples at share u of the interval, a cubic through positions and rates: what their
+/// differences, and the rates at either end, count there.
+struct CubicWeights {
+  double position_step, position_begin, position_end;  // -, s, s
+  double rate_step, rate_begin, rate_end;              // 1/s, -, -
+
+  CubicWeights(double u, double interval)
+      : position_step(u * u * (3 - 2 * u)),
+        position_begin(u * (1 - u) * (1 - u) * interval),
+        position_end(u * u * (u - 1) * interval),
+        rate_step(6 * u * (1 - u) / interval),
+        rate_begin((3 * u - 1) * (u - 1)),
+        rate_end(u * (3 * u - 2)) {}
+};
+
+template <typename Lanes>
+struct Place {
+  Lanes position, rate;
+};
+
+/// How deep the teeth are pressed, how fast more so, and the sign bit of the flank.
+template <typename Lanes>
+struct Touch {
+  Lanes depth, rate;
+  LaneBits<Lanes> side;
+};
+
+template <typename Lanes>
+DIAGNOSIS_LANES Lanes turned(const Lanes& a, const LaneBits<Lanes>& sign) {
+  const LaneBits<Lanes> bits = reinterpret_cast<LaneBits<Lanes>>(a) ^ sign;
+  return reinterpret_cast<Lanes>(bits);
+}
+
+/// Of some runs side by side. The teeth yield as a spring does at the usual torque, and by a power of it
+/// elsewhere. Damping follows: constant for a spring and as the torque after Hertz (Hunt and Crossley 1975),
+/// between them by 3 (power - 1).
+template <typename Lanes>
+struct Machines {
+  Lanes half_gap, stiffness, damping, beyond_spring, per_deflection, per_inertia, friction, load_torque,
+      per_slow;
+
+  DIAGNOSIS_LANES Touch<Lanes> touch(const Place<Lanes>& motor, const Place<Lanes>& load) const {
+    const Lanes x = motor.position - load.position;
+    const LaneBits<Lanes> side = reinterpret_cast<LaneBits<Lanes>>(x) & INT64_MIN;
+    return {turned(x, side) - half_gap, turned(Lanes(motor.rate - load.rate), side), side};
+  }
+
+  /// Through the teeth, never tensile.
+  DIAGNOSIS_LANES Lanes torque(const Touch<Lanes>& touch) const {
+    const Lanes deflection = touch.depth * per_deflection;
+    const Lanes not_less = deflection > kLeastDeflection ? deflection : Lanes{} + kLeastDeflection;
+    const Lanes within = not_less < kMostDeflection ? not_less : Lanes{} + kMostDeflection;
+    const Lanes harder = lanes_exp(Lanes(beyond_spring * lanes_log(within)));
+    const Lanes damper = beyond_spring > 0 ? damping * harder * harder * harder : damping;
+    const Lanes force = stiffness * touch.depth * harder + damper * touch.rate;
+    const Lanes pushed = force > 0 ? force : Lanes{};
+    return turned(touch.depth > 0 ? pushed : Lanes{}, touch.side);
+  }
+
+  /// Of the load, rad/s^2.
+  DIAGNOSIS_LANES Lanes acceleration(const Lanes& teeth, const Lanes& rate) const {
+    const Lanes slip = rate * per_slow, most = slip < 1 ? slip : Lanes{} + 1,
+                share = most > -1 ? most : Lanes{} - 1;
+    return (teeth - load_torque - friction * share) * per_inertia;
+  }
+};
+
+template <typename Lanes>
+DIAGNOSIS_LANES Machines<Lanes> machines_of(const TraverseData& data, const TraverseRun* const* runs) {
+  Machines<Lanes> to;
+  to.per_slow = Lanes{} + 1 / data.slow;
+  for (int i = 0; i < kLanesOf<Lanes>; ++i) {
+    const TraverseMachine& m = runs[i]->machine;
+    to.half_gap[i] = 0.5 * m[kTraverseGap];
+    to.stiffness[i] = m[kTraverseStiffness];
+    to.damping[i] = m[kTraverseDamping];
+    to.beyond_spring[i] = std::min(m[kTraversePower], kMostPower) - 1;
+    to.per_deflection[i] = m[kTraverseStiffness] / data.level;
+    to.per_inertia[i] = 1 / m[kTraverseLoadInertia];
+    to.friction[i] = m[kTraverseLoadFriction];
+    to.load_torque[i] = runs[i]->own[kOwnLoadTorque];
+  }
+  return to;
+}
+
+/// The load as far behind the motor as the torque through the teeth at the first sample says.
+Place<double> start_of(const TraverseData& data, const TraverseRun& run) {
+  const TraverseWindow& w = *run.window;
+  const double stiffness = run.machine[kTraverseStiffness], power = run.machine[kTraversePower],
+               torque = std::fabs(w.torque);
+  const double in = data.level / stiffness * std::pow(torque / data.level, 1 / power);
+  return {data.position[w.first] - w.side * (0.5 * run.machine[kTraverseGap] + in) + run.own[kOwnPosition],
+          data.rate[w.first] - in * w.torque_rate / (power * torque) + run.own[kOwnRate]};
+}
+
+/// Loads of some runs, moved by the classical Runge-Kutta method, its stages one by one: the compiler mixes
+/// those of several of these, so that the processor need not wait.
+template <typename Lanes>
+class alignas(sizeof(Lanes)) Loads {
+ public:
+  DIAGNOSIS_LANES void start(const TraverseData& data, const TraverseRun* const* runs) {
+    machines_ = machines_of<Lanes>(data, runs);
+    for (int i = 0; i < kLanesOf<Lanes>; ++i) {
+      const std::size_t first = runs[i]->window->first;
+      const Place<double> place = start_of(data, *runs[i]);
+      load_.position[i] = place.position, load_.rate[i] = place.rate;
+      next_.position[i] = data.position[first], next_.rate[i] = data.rate[first];
+      positions_[i] = data.position.data() + first, rates_[i] = data.rate.data() + first;
     }
+    trial_ = load_;
   }
 
-  double of(const std::vector<double>& x, std::size_t i, const std::vector<double>& weights) const {
-    double sum = 0;
-    for (std::size_t k = 0; k < weights.size(); ++k) sum += weights[k] * x[i + k - reach];
-    return sum;
+  /// To the interval from sample k to the next.
+  DIAGNOSIS_LANES void begin(std::size_t k) {
+    here_ = motor_ = next_;
+    for (int i = 0; i < kLanesOf<Lanes>; ++i)
+      next_.position[i] = positions_[i][k + 1], next_.rate[i] = rates_[i][k + 1];
+    step_ = next_.position - here_.position;
+    mean_ = mean_of_next_, mean_of_next_ = Lanes{};
   }
-};
 
-/// What the weights leave of the noise of a torque of which two samples are averaged, and of second
-/// differences of positions [N m].
-double noise_of(const std::vector<double>& weights, double torque, double differences) {
-  double squares = 0;
-  const auto at = [&](std::ptrdiff_t i) {
-    return i < 0 || i >= std::ptrdiff_t(weights.size()) ? 0 : weights[std::size_t(i)];
-  };
-  for (std::ptrdiff_t i = -1; i <= std::ptrdiff_t(weights.size()); ++i)
-    squares += std::pow(0.5 * torque * (at(i) + at(i - 1)), 2) +
-               std::pow(differences * (at(i - 1) - 2 * at(i) + at(i + 1)), 2);
-  return std::sqrt(squares);
-}
-
-double cycle_of(const GapTraverseSettings& s) {
-  return 2 * M_PI / std::sqrt(s.stiffness * (1 / s.motor_inertia + 1 / s.load_inertia));
-}
-
-void check_samples(const record::Record& record, double interval, double cycle) {
-  if (record.size() < kFewestSamples) throw Refusal{Status::insufficient_data, "fewer than 256 samples"};
-  if (!(interval * kCycleSamples < cycle))
-    throw Refusal{Status::out_of_domain,
-                  fmt::format("a sample each {:.3g} s does not resolve the cycle of {:.3g} s of the motor "
-                              "against the load",
-                              interval, cycle)};
-  for (std::size_t i = 1; i < record.size(); ++i) {
-    const double step = record.time[i] - record.time[i - 1];
-    if (std::fabs(step - interval) > kUneven * interval)
-      throw Refusal{Status::out_of_domain,
-                    fmt::format("the samples are not evenly spaced in time at {:.6g} s", record.time[i])};
+  DIAGNOSIS_LANES void move_motor(const CubicWeights& w) {
+    motor_.position = here_.position + w.position_step * step_ + w.position_begin * here_.rate +
+                      w.position_end * next_.rate;
+    motor_.rate = w.rate_step * step_ + w.rate_begin * here_.rate + w.rate_end * next_.rate;
   }
-}
 
-/// What the motor leaves for the teeth.
-std::vector<double> torque_of_teeth(const TraverseData& d, const TraverseMotor& motor) {
-  std::vector<double> teeth(d.torque.size(), 0.0);
-  for (std::size_t i = 1; i + 1 < teeth.size(); ++i)
-    teeth[i] = 0.5 * (d.torque[i] + d.torque[i - 1]) - motor.inertia * d.acceleration[i] -
-               motor.damping * d.rate[i] - std::copysign(motor.friction, d.rate[i]);
-  return teeth;
-}
-
-std::size_t reach_of(const TraverseData& d, double cycle) {
-  return std::max<std::size_t>(2, std::size_t(std::lround(kAveraged * cycle / d.interval)));
-}
-
-void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle, double unsure) {
-  const std::size_t n = teeth.size();
-  const Quadratic quadratic(reach_of(d, cycle));
-  std::vector<double> smooth(n, 0.0), pressed;
-  std::vector<int> flank(n, 0);
-  const double clear = kClear * d.noise;
-  for (std::size_t i = quadratic.reach + 1; i + quadratic.reach + 1 < n; ++i) {
-    smooth[i] = quadratic.of(teeth, i, quadratic.value);
-    if (std::fabs(smooth[i]) < clear) continue;
-    flank[i] = smooth[i] > 0 ? 1 : -1;
-    pressed.push_back(std::fabs(smooth[i]));
+  /// At the place of this stage: which are pressed.
+  DIAGNOSIS_LANES LaneBits<Lanes> touch() {
+    touch_ = machines_.touch(motor_, trial_);
+    return touch_.depth > 0;
   }
-  d.clear = clear + unsure;
-  if (!pressed.empty()) d.level = signal::median(pressed);
-  const auto before = static_cast<std::size_t>(std::lround(kBefore * cycle / d.interval));
-  d.samples = before + static_cast<std::size_t>(std::lround(kAfter * cycle / d.interval));
-  std::size_t last = 0, free_from = 3;  // last sample on a flank; where the next window may begin
-  for (std::size_t i = 3; i < n; ++i) {
-    if (flank[i] == 0) continue;
-    const std::size_t left = last;
-    last = i;
-    if (left == 0 || flank[left] == flank[i]) continue;
-    ++d.crossings;
-    std::size_t first = left > before ? left - before : 0;
-    const auto sure = [&](std::size_t k) {
-      return k > 2 + quadratic.reach && flank[left] * smooth[k] > d.clear;
-    };
-    while (first < left && !sure(first)) ++first;
-    if (first < free_from || !sure(first) || first + d.samples + quadratic.reach + 1 >= n ||
-        i + d.samples / 8 > first + d.samples)
-      continue;
-    const auto from = d.counts.begin() + std::ptrdiff_t(first), to = from + std::ptrdiff_t(d.samples);
-    if (double(std::count(from, to, 1)) < kCounted * double(d.samples)) continue;
-    d.windows.push_back({first, double(flank[first]), smooth[first],
-                         quadratic.of(teeth, first, quadratic.slope) / d.interval});
-    free_from = first + d.samples / 2;
+  DIAGNOSIS_LANES void press() { teeth_ = machines_.torque(touch_); }
+  DIAGNOSIS_LANES void leave() { teeth_ = Lanes{}; }
+
+  /// `before`, `after`: how the torque here counts in the means about sample k and the next.
+  DIAGNOSIS_LANES void first_stage(double half, double before, double after) {
+    mean_ += before * teeth_, mean_of_next_ += after * teeth_;
+    sum_ = Place<Lanes>{};
+    stage(1, half);
   }
-}
 
-/// Motor between two samples: a cubic through positions and rates.
-struct Motor {
-  double position, rate;
-};
-
-class Cubic {
- public:
-  Cubic(const TraverseData& d, std::size_t i)
-      : q0_(d.position[i]),
-        q1_(d.position[i + 1]),
-        v0_(d.rate[i] * d.interval),
-        v1_(d.rate[i + 1] * d.interval),
-        interval_(d.interval) {}
-
-  Motor at(double u) const {
-    const double u2 = u * u, u3 = u2 * u;
-    return {
-        (2 * u3 - 3 * u2 + 1) * q0_ + (u3 - 2 * u2 + u) * v0_ + (3 * u2 - 2 * u3) * q1_ + (u3 - u2) * v1_,
-        ((6 * u2 - 6 * u) * (q0_ - q1_) + (3 * u2 - 4 * u + 1) * v0_ + (3 * u2 - 2 * u) * v1_) / interval_};
+  /// Counts `weight` times; the next is `on` later than the first.
+  DIAGNOSIS_LANES void stage(double weight, double on) {
+    const Lanes rate = trial_.rate, acceleration = machines_.acceleration(teeth_, rate);
+    sum_.position += weight * rate, sum_.rate += weight * acceleration;
+    trial_ = {load_.position + on * rate, load_.rate + on * acceleration};
   }
+
+  DIAGNOSIS_LANES void last_stage(double sixth) {
+    sum_.position += trial_.rate, sum_.rate += machines_.acceleration(teeth_, trial_.rate);
+    load_.position += sixth * sum_.position, load_.rate += sixth * sum_.rate;
+    trial_ = load_;
+  }
+
+  /// About sample k.
+  DIAGNOSIS_LANES double mean(int lane) const { return mean_[lane]; }
 
  private:
-  double q0_, q1_, v0_, v1_, interval_;
+  Machines<Lanes> machines_;
+  Place<Lanes> here_, next_, motor_, load_, trial_, sum_;
+  Touch<Lanes> touch_;
+  Lanes teeth_, step_, mean_, mean_of_next_ = {};
+  const double *positions_[kLanesOf<Lanes>], *rates_[kLanesOf<Lanes>];  // of the motor
 };
 
-struct Load {
-  double position, rate;
-};
+/// The torque of a stage. Half of the time no teeth are pressed, and powers take most of the time.
+template <typename Lanes, int Parts>
+DIAGNOSIS_LANES void press(Loads<Lanes> (&parts)[Parts]) {
+  LaneBits<Lanes> pressed = {};
+  for (Loads<Lanes>& part : parts) pressed |= part.touch();
+  bool any = false;
+  for (int i = 0; i < kLanesOf<Lanes>; ++i) any |= pressed[i] != 0;
+  if (any)
+    for (Loads<Lanes>& part : parts) part.press();
+  else
+    for (Loads<Lanes>& part : parts) part.leave();
+}
 
-/// The teeth yield as a spring does at the usual torque `level`, and by a power of it elsewhere. Damping
-/// follows: constant for a spring and as the torque after Hertz (Hunt and Crossley 1975), between them by 3
-/// (power - 1).
-class Teeth {
- public:
-  Teeth(const TraverseMachine& m, double level)
-      : half_gap_(0.5 * m[kTraverseGap]),
-        stiffness_(m[kTraverseStiffness]),
-        damping_(m[kTraverseDamping]),
-        power_(m[kTraversePower]),
-        level_(level) {}
-
-  /// Never tensile.
-  double torque(const Motor& motor, const Load& load) const {
-    const double x = motor.position - load.position, in = std::fabs(x) - half_gap_;
-    if (in <= 0) return 0;
-    const double side = x > 0 ? 1 : -1;
-    const double harder = std::exp((power_ - 1) * std::log(stiffness_ * in / level_));
-    const double damping = power_ > 1 ? damping_ * harder * harder * harder : damping_;
-    const double force = stiffness_ * in * harder + damping * side * (motor.rate - load.rate);
-    return force > 0 ? side * force : 0;
+/// Moves kTraverseRuns, of which the first `count` are wanted. `weights`: of each half step of the
+/// integration.
+template <typename Lanes>
+DIAGNOSIS_LANES void move_all(const TraverseData& data, const CubicWeights* weights,
+                              const TraverseRun* const* runs, Eigen::Index count, double* to) {
+  constexpr int kLanes = kLanesOf<Lanes>, kParts = kTraverseRuns / kLanes;
+  Loads<Lanes> parts[kParts];
+  for (int p = 0; p < kParts; ++p) parts[p].start(data, runs + p * kLanes);
+  const double step = data.interval / data.steps, share = 1.0 / data.steps;
+  for (std::size_t k = 0; k + 1 < data.samples; ++k) {
+    for (Loads<Lanes>& part : parts) part.begin(k);
+    for (int s = 0; s < data.steps; ++s) {
+      const double after = s * share * share;
+      press(parts);
+      for (Loads<Lanes>& part : parts) part.first_stage(step / 2, share - after, after);
+      for (Loads<Lanes>& part : parts) part.move_motor(weights[2 * s]);
+      press(parts);
+      for (Loads<Lanes>& part : parts) part.stage(2, step / 2);
+      press(parts);
+      for (Loads<Lanes>& part : parts) part.stage(2, step);
+      for (Loads<Lanes>& part : parts) part.move_motor(weights[2 * s + 1]);
+      press(parts);
+      for (Loads<Lanes>& part : parts) part.last_stage(step / 6);
+    }
+    for (int i = 0; i < count; ++i)
+      to[static_cast<std::size_t>(i) * data.samples + k] = parts[i / kLanes].mean(i % kLanes);
   }
+}
 
-  /// The load as far behind the motor as a torque through the teeth says that changes at this rate.
-  Load under(double torque, double torque_rate, double side, const Motor& motor) const {
-    const double in = level_ / stiffness_ * std::pow(std::fabs(torque) / level_, 1 / power_);
-    return {motor.position - side * (half_gap_ + in),
-            motor.rate - in * torque_rate / (power_ * std::fabs(torque))};
-  }
+using Lanes2 = double __attribute__((vector_size(16)));
 
- private:
-  double half_gap_, stiffness_, damping_, power_, level_;
-};
+#if defined(__x86_64__)
+using Lanes4 = double __attribute__((vector_size(32)));
+using Lanes8 = double __attribute__((vector_size(64)));
+
+__attribute__((target("avx512f,prefer-vector-width=512"))) void move_avx512(const TraverseData& data,
+                                                                            const CubicWeights* weights,
+                                                                            const TraverseRun* const* runs,
+                                                                            Eigen::Index count, double* to) {
+  move_all<Lanes8>(data, weights, runs, count, to);
+}
+
+__attribute__((target("avx2"))) void move_avx2(const TraverseData& data, const CubicWeights* weights,
+                                               const TraverseRun* const* runs, Eigen::Index count,
+                                               double* to) {
+  move_all<Lanes4>(data, weights, runs, count, to);
+}
+#endif
+
+void move(const TraverseData& data, const CubicWeights* weights, const TraverseRun* const* runs,
+          Eigen::Index count, double* to) {
+#if defined(__x86_64__)
+  static const bool has_avx512 = __builtin_cpu_supports("avx512f");
+  static const bool has_avx2 = __builtin_cpu_supports("avx2");
+  if (has_avx512) return move_avx512(data, weights, runs, count, to);
+  if (has_avx2) return move_avx2(data, weights, runs, count, to);
+#endif
+  move_all<Lanes2>(data, weights, runs, count, to);
+}
 
 }  // namespace
 
-TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings,
-                           const TraverseMotor& motor) {
-  TraverseData d;
-  d.interval = record.sampling_interval();
-  const double cycle = cycle_of(settings);
-  check_samples(record, d.interval, cycle);
-  d.steps = std::max(1, static_cast<int>(std::ceil(2 * M_PI * d.interval / (cycle * kStep))));
-  d.torque = record.column(record::Channel::motor_torque);
-  d.position = record.column(record::Channel::motor_position);
-  const std::size_t n = d.position.size();
-  d.rate.assign(n, 0), d.acceleration.assign(n, 0), d.counts.assign(n, 0);
-  double squares = 0;
-  for (std::size_t i = 1; i + 1 < n; ++i) {
-    d.rate[i] = (d.position[i + 1] - d.position[i - 1]) / (2 * d.interval);
-    d.acceleration[i] =
-        (d.position[i + 1] - 2 * d.position[i] + d.position[i - 1]) / (d.interval * d.interval);
-    squares += d.rate[i] * d.rate[i] / static_cast<double>(n);
+bool moves_load(int value) {
+  switch (value) {
+    case kTraverseMotorInertia:
+    case kTraverseMotorDamping:
+    case kTraverseMotorFriction:
+    case kTraverseEarlier:
+    case kTraverseValues + kOwnMotorTorque:
+      return false;
+    default:
+      return true;
   }
-  if (!(squares > 0)) throw Refusal{Status::insufficient_data, "the motor does not move"};
-  d.slow = kFade * std::sqrt(squares);
-  for (std::size_t i = 0; i < n; ++i) d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares);
-  const std::vector<double> teeth = torque_of_teeth(d, motor);
-  d.torque_noise = signal::noise_from_differences(d.torque, 2);
-  d.position_noise = std::max(signal::noise_from_differences(d.position, 4),
-                              signal::smallest_step(d.position) / std::sqrt(12.0));
-  const Quadratic quadratic(reach_of(d, cycle));
-  const double differences = motor.inertia * d.position_noise / (d.interval * d.interval);
-  d.noise = noise_of(quadratic.value, d.torque_noise, differences);
-  d.slope_noise = noise_of(quadratic.slope, d.torque_noise, differences) / d.interval;
-  find_windows(d, teeth, cycle, motor.unsure);
-  return d;
 }
 
-void traverse_residual(const TraverseData& d, const TraverseWindow& window, const TraverseMachine& m,
-                       const TraverseOwn& own, double* to) {
-  const double dt = d.interval / d.steps, inertia = m[kTraverseLoadInertia];
-  const Teeth teeth(m, d.level);
-  Load load = teeth.under(window.torque, window.torque_rate, window.side,
-                          {d.position[window.first], d.rate[window.first]});
-  load.position += own[0];
-  load.rate += own[1];
-  const auto acceleration = [&](double torque, double rate) {
-    return (torque - own[3] - m[kTraverseLoadFriction] * std::clamp(rate / d.slow, -1.0, 1.0)) / inertia;
-  };
-  // Weighted 1 - |t| / interval about each sample, which is what a second difference of the position sees.
-  double mean = 0, next = 0;
-  for (std::size_t k = 0; k + 1 < d.samples; ++k) {
-    const std::size_t i = window.first + k;
-    const Cubic motor(d, i);
-    mean = next, next = 0;
-    for (int s = 0; s < d.steps; ++s) {
-      const double u = double(s) / d.steps, half = u + 0.5 / d.steps, end = u + 1.0 / d.steps;
-      const double f = teeth.torque(motor.at(u), load);
-      mean += (1 - u) * f / d.steps, next += u * f / d.steps;
-      const double a1 = acceleration(f, load.rate);
-      const Load l2{load.position + 0.5 * dt * load.rate, load.rate + 0.5 * dt * a1};
-      const double a2 = acceleration(teeth.torque(motor.at(half), l2), l2.rate);
-      const Load l3{load.position + 0.5 * dt * l2.rate, load.rate + 0.5 * dt * a2};
-      const double a3 = acceleration(teeth.torque(motor.at(half), l3), l3.rate);
-      const Load l4{load.position + dt * l3.rate, load.rate + dt * a3};
-      const double a4 = acceleration(teeth.torque(motor.at(end), l4), l4.rate);
-      load.position += dt * (load.rate + 2 * l2.rate + 2 * l3.rate + l4.rate) / 6;
-      load.rate += dt * (a1 + 2 * a2 + 2 * a3 + a4) / 6;
-    }
-    const double drive = (1 - m[kTraverseEarlier]) * d.torque[i] + m[kTraverseEarlier] * d.torque[i - 1];
-    const double need = mean + own[2] + m[kTraverseMotorInertia] * d.acceleration[i] +
-                        m[kTraverseMotorDamping] * d.rate[i] +
-                        std::copysign(m[kTraverseMotorFriction], d.rate[i]);
-    to[k] = k > 0 && d.counts[i] ? drive - need : 0;
+Eigen::MatrixXd traverse_teeth(const TraverseData& data, const std::vector<TraverseRun>& runs) {
+  std::vector<CubicWeights> weights;
+  for (int half = 1; half <= 2 * data.steps; ++half)
+    weights.emplace_back(half / (2.0 * data.steps), data.interval);
+  const auto all = static_cast<Eigen::Index>(runs.size());
+  Eigen::MatrixXd teeth = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data.samples), all);
+  for (Eigen::Index first = 0; first < all; first += kTraverseRuns) {
+    const Eigen::Index count = std::min<Eigen::Index>(kTraverseRuns, all - first);
+    const TraverseRun* group[kTraverseRuns];
+    for (Eigen::Index i = 0; i < kTraverseRuns; ++i)
+      group[i] = &runs[static_cast<std::size_t>(first + std::min(i, count - 1))];
+    move(data, weights.data(), group, count, teeth.col(first).data());
   }
-  to[d.samples - 1] = 0;
+  return teeth;
+}
+
+Eigen::VectorXd traverse_residual(const TraverseData& data, const TraverseRun& run,
+                                  const Eigen::Ref<const Eigen::VectorXd>& teeth) {
+  const TraverseMachine& m = run.machine;
+  Eigen::VectorXd left = Eigen::VectorXd::Zero(teeth.size());
+  for (Eigen::Index k = 1; k + 1 < left.size(); ++k) {
+    const std::size_t i = run.window->first + static_cast<std::size_t>(k);
+    if (!data.counts[i]) continue;
+    const double drive =
+        (1 - m[kTraverseEarlier]) * data.torque[i] + m[kTraverseEarlier] * data.torque[i - 1];
+    left[k] = drive - (teeth[k] + run.own[kOwnMotorTorque] + m[kTraverseMotorInertia] * data.acceleration[i] +
+                       m[kTraverseMotorDamping] * data.rate[i] +
+                       std::copysign(m[kTraverseMotorFriction], data.rate[i]));
+  }
+  return left;
 }
 
 }  // namespace backlash::diagnosis

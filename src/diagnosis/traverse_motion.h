@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Crossings of the gap in a record of the motor's side, and the torque that a machine needs for the recorded
-// motion about one of them. Equations: gap_traverse.h.
+// The load about crossings of the gap, moved by the recorded motor, and the torque that a machine needs for
+// that. Equations: gap_traverse.h.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
-#include <cstddef>
-#include <vector>
 
-#include "backlash_diagnosis/diagnosis/gap_traverse.h"
+#include "traverse_data.h"
 
 namespace backlash::diagnosis {
 
@@ -29,47 +27,30 @@ using TraverseMachine = std::array<double, kTraverseValues>;
 /// Of one crossing: position and rate of the load at the first sample beyond what the torque there tells,
 /// rad, rad/s, and torques on motor and load that nothing else tells (gravity, cogging, friction that
 /// drifts), N m.
-constexpr int kTraverseOwn = 4;
+enum TraverseOwnValue { kOwnPosition, kOwnRate, kOwnMotorTorque, kOwnLoadTorque, kTraverseOwn };
 using TraverseOwn = Eigen::Matrix<double, kTraverseOwn, 1>;
 
-/// Stretch of the record that begins in contact and holds one change of flank or more.
-struct TraverseWindow {
-  std::size_t first = 0;
-  double side = 1;                     // flank at the first sample
-  double torque = 0, torque_rate = 0;  // N m, N m/s through the teeth there
+/// A machine in one window.
+struct TraverseRun {
+  const TraverseWindow* window = nullptr;
+  TraverseMachine machine{};
+  TraverseOwn own = TraverseOwn::Zero();
 };
 
-/// The motor's side of a record.
-struct TraverseData {
-  double interval = 0;                 // s
-  int steps = 1;                       // of the integration per sample
-  std::size_t samples = 0;             // of a window
-  std::vector<double> torque;          // N m, of the motor
-  std::vector<double> position, rate;  // rad, rad/s
-  std::vector<double> acceleration;    // rad/s^2, second difference
-  std::vector<char> counts;            // whether dry friction is told: not about a standstill
-  double noise = 0, slope_noise = 0;   // N m, N m/s, of the averaged torque through the teeth
-  double torque_noise = 0;             // N m, of a sample of the torque, white
-  double position_noise = 0;           // rad, the same of the position, at least that of its steps
-  double clear = 0;                    // N m, of it, that presses a flank for sure
-  double level = 0;                    // N m, of it, median where it presses a flank
-  double slow = 0;                     // rad/s, below which dry friction fades
-  std::size_t crossings = 0;           // changes of flank, of which windows may hold several
-  std::vector<TraverseWindow> windows;
-};
+/// Whether the motion of the load depends on a value of the machine or, from kTraverseValues on, of the
+/// crossing. The others count in traverse_residual() alone.
+bool moves_load(int value);
 
-/// What is known of the motor, by which a record is cut into windows.
-struct TraverseMotor {
-  double inertia = 0, damping = 0, friction = 0;  // kg m^2, N m s/rad, N m
-  double unsure = 0;  // N m, by which the torque that it leaves for the teeth may be off
-};
+constexpr int kTraverseRuns = 8;  // moved at once: two registers of AVX2, so that their waits overlap
 
-/// Throws Refusal.
-TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings,
-                           const TraverseMotor& motor);
+/// Torque through the teeth about each sample of the window, N m, a column for each run; weighted 1 - |t| /
+/// interval, which is what a second difference of the position sees. A run's does not depend on the others,
+/// nor on the processor as far as its pow() does not. Fastest for multiples of kTraverseRuns.
+Eigen::MatrixXd traverse_teeth(const TraverseData& data, const std::vector<TraverseRun>& runs);
 
-/// Recorded torque less what the machine needs, N m, at each sample of the window; 0 where it does not count.
-void traverse_residual(const TraverseData& data, const TraverseWindow& window, const TraverseMachine& machine,
-                       const TraverseOwn& own, double* to);
+/// Recorded torque less what the machine needs with this torque through the teeth, N m, at each sample of the
+/// window; 0 where it does not count.
+Eigen::VectorXd traverse_residual(const TraverseData& data, const TraverseRun& run,
+                                  const Eigen::Ref<const Eigen::VectorXd>& teeth);
 
 }  // namespace backlash::diagnosis

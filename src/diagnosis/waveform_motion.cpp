@@ -6,20 +6,20 @@
 #include <cstring>
 #include <utility>
 
-#include "waveform_lanes.h"
+#include "lanes_power.h"
 
 namespace backlash::diagnosis {
 namespace {
 
-using Lanes = WaveformLanes;
+using Lanes = double __attribute__((vector_size(8 * kWaveformSets)));
 
-WAVEFORM_INLINE Lanes positive(const Lanes& a) {
+DIAGNOSIS_LANES Lanes positive(const Lanes& a) {
   return a > 0 ? a : Lanes{};
 }
-WAVEFORM_INLINE Lanes magnitude(const Lanes& a) {
+DIAGNOSIS_LANES Lanes magnitude(const Lanes& a) {
   return a < 0 ? -a : a;
 }
-WAVEFORM_INLINE Lanes root(const Lanes& a) {
+DIAGNOSIS_LANES Lanes root(const Lanes& a) {
   double each[kWaveformSets];  // a loop over these becomes one instruction for all of them
   std::memcpy(each, &a, sizeof each);
   for (double& value : each) value = std::sqrt(value);
@@ -69,7 +69,7 @@ struct Train {
         exponent(grid.exponent) {}
 
   /// At penetration `depth` [m], approaching at `rate` [m/s]: N, no tension.
-  WAVEFORM_INLINE Lanes push(const Lanes& depth, const Lanes& rate) const {
+  DIAGNOSIS_LANES Lanes push(const Lanes& depth, const Lanes& rate) const {
     if constexpr (Law == Teeth::hertz) return contact * depth * root(depth) * positive(1 + loss * rate);
     const Lanes spring = Law == Teeth::line ? contact * depth : contact * lanes_power(depth, exponent);
     const Lanes force = positive(spring * (1 + loss * rate) + contact_damping * rate);
@@ -88,7 +88,7 @@ struct Train {
   }
 
   /// Of the gear and of the link, rad/s^2.
-  WAVEFORM_INLINE void output(const State& s, const Lanes& teeth, State& rate) const {
+  DIAGNOSIS_LANES void output(const State& s, const Lanes& teeth, State& rate) const {
     if constexpr (Output == WaveformOutput::locked) {
       rate.wg = (teeth - ko * s.qg - co * s.wg) * per_jg;
     } else if constexpr (Output == WaveformOutput::link) {
@@ -101,7 +101,7 @@ struct Train {
     }
   }
 
-  WAVEFORM_INLINE State rate(const State& s, const Lanes& drive) const {
+  DIAGNOSIS_LANES State rate(const State& s, const Lanes& drive) const {
     const Lanes x = lever * (s.qp - s.qg), v = lever * (s.wp - s.wg);
     const Lanes depth = positive(magnitude(x) - half_gap);
     const Lanes pushed = lever * push(depth, x < 0 ? -v : v);
@@ -115,7 +115,7 @@ struct Train {
     return rate;
   }
 
-  WAVEFORM_INLINE static State along(const State& s, const State& r, double h) {
+  DIAGNOSIS_LANES static State along(const State& s, const State& r, double h) {
     State next;
     next.qm = s.qm + h * r.qm, next.wm = s.wm + h * r.wm;
     next.qp = s.qp + h * r.qp, next.wp = s.wp + h * r.wp;
@@ -125,7 +125,7 @@ struct Train {
     return next;
   }
 
-  WAVEFORM_INLINE void step(const Lanes& drive, double h, State& s) const {
+  DIAGNOSIS_LANES void step(const Lanes& drive, double h, State& s) const {
     const State a = rate(s, drive), b = rate(along(s, a, h / 2), drive);
     const State c = rate(along(s, b, h / 2), drive), d = rate(along(s, c, h), drive);
     s = along(along(along(along(s, a, h / 6), b, h / 3), c, h / 3), d, h / 6);
@@ -136,7 +136,7 @@ struct Train {
 
   /// Dry friction of one step, implicitly, so that what sticks stays: `most` is the speed that it takes at
   /// most.
-  WAVEFORM_INLINE void brake(const Lanes& most, double h, Lanes& angle, Lanes& speed) const {
+  DIAGNOSIS_LANES void brake(const Lanes& most, double h, Lanes& angle, Lanes& speed) const {
     const Lanes slips = speed < 0 ? speed + most : speed - most;
     const Lanes next = magnitude(speed) > slow + most ? slips : speed * slow / (slow + most);
     angle -= 0.5 * h * (speed - next);
@@ -173,7 +173,7 @@ State start(const Train<Output, Law>& train, const WaveformWindow& window, const
   return s;
 }
 
-WAVEFORM_INLINE void put(const Lanes& from, std::array<double, kWaveformSets>& to) {
+DIAGNOSIS_LANES void put(const Lanes& from, std::array<double, kWaveformSets>& to) {
   std::memcpy(to.data(), &from, sizeof from);
 }
 
@@ -198,7 +198,7 @@ class Drive {
   Drive(const WaveformWindow& window, const WaveformGrid& grid, const Lanes& delay)
       : window_(window), grid_(grid), delay_(delay), change_(window.reversal + delay) {}
 
-  WAVEFORM_INLINE Lanes at(std::size_t sample, int j) const {
+  DIAGNOSIS_LANES Lanes at(std::size_t sample, int j) const {
     const double h = grid_.interval / grid_.steps;
     if (window_.drive.empty()) {
       const Lanes part = (change_ - (static_cast<double>(sample) * grid_.interval + j * h)) / h;
@@ -216,7 +216,7 @@ class Drive {
 };
 
 template <WaveformOutput Output, Teeth Law>
-WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+DIAGNOSIS_LANES void move_all(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   Lanes v[kAllValues];
   for (std::size_t k = 0; k < kAllValues; ++k)
@@ -251,7 +251,7 @@ WAVEFORM_INLINE void move_all(const WaveformWindow& window, const WaveformGrid& 
 }
 
 template <WaveformOutput Output>
-WAVEFORM_INLINE void move_by_teeth(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+DIAGNOSIS_LANES void move_by_teeth(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                                    const WaveformSets& sets, WaveformMotion& motion) {
   if (grid.exponent == kHertzExponent)
     return move_all<Output, Teeth::hertz>(window, grid, samples, sets, motion);
@@ -259,7 +259,7 @@ WAVEFORM_INLINE void move_by_teeth(const WaveformWindow& window, const WaveformG
   move_all<Output, Teeth::power>(window, grid, samples, sets, motion);
 }
 
-WAVEFORM_INLINE void move_any(const WaveformWindow& window, const WaveformGrid& grid, int samples,
+DIAGNOSIS_LANES void move_any(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   switch (grid.output) {
     case WaveformOutput::locked:

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "traverse_data.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "backlash_diagnosis/signal/noise.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "refusal.h"
+
+namespace backlash::diagnosis {
+namespace {
+
+// All choices, tried on simulated machines, but where another origin is given.
+constexpr double kCycleSamples = 8;  // fewest samples in a cycle of the motor against the load
+constexpr double kStep = 0.06;       // of the integration times the fastest frequency, rad
+constexpr double kBefore = 0.8;      // cycles of a window before a crossing: tell the start
+constexpr double kAfter = 2.6;       // and from its begin on: the first touches
+constexpr double kCounted = 0.5;     // share of a window in which the motor moves
+constexpr double kUneven = 0.25;     // of an interval, from one sample to the next
+constexpr double kClear = 4.4;       // noises of the averaged torque, above which it presses a flank
+constexpr double kAveraged = 0.16;   // cycles, half width of the average
+constexpr double kSlow = 0.02;       // of the rms speed: there dry friction takes any value
+constexpr double kFade = 0.01;       // of it: the load's friction turns its sign within
+constexpr std::size_t kFewestSamples = 256;
+
+/// Value and slope per sample of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
+struct Quadratic {
+  std::vector<double> value, slope;
+  std::size_t reach;
+
+  explicit Quadratic(std::size_t to_each_side) : reach(to_each_side) {
+    const auto m = static_cast<double>(reach);
+    for (double k = -m; k <= m; ++k) {
+      value.push_back((3 * (3 * m * m + 3 * m - 1) - 15 * k * k) / ((2 * m - 1) * (2 * m + 1) * (2 * m + 3)));
+      slope.push_back(3 * k / (m * (m + 1) * (2 * m + 1)));
+    }
+  }
+
+  double of(const std::vector<double>& x, std::size_t i, const std::vector<double>& weights) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < weights.size(); ++k) sum += weights[k] * x[i + k - reach];
+    return sum;
+  }
+};
+
+/// What the weights leave of the noise of a torque of which two samples are averaged, and of second
+/// differences of positions [N m].
+double noise_of(const std::vector<double>& weights, double torque, double differences) {
+  double squares = 0;
+  const auto at = [&](std::ptrdiff_t i) {
+    return i < 0 || i >= std::ptrdiff_t(weights.size()) ? 0 : weights[std::size_t(i)];
+  };
+  for (std::ptrdiff_t i = -1; i <= std::ptrdiff_t(weights.size()); ++i)
+    squares += std::pow(0.5 * torque * (at(i) + at(i - 1)), 2) +
+               std::pow(differences * (at(i - 1) - 2 * at(i) + at(i + 1)), 2);
+  return std::sqrt(squares);
+}
+
+double cycle_of(const GapTraverseSettings& s) {
+  return 2 * M_PI / std::sqrt(s.stiffness * (1 / s.motor_inertia + 1 / s.load_inertia));
+}
+
+void check_samples(const record::Record& record, double interval, double cycle) {
+  if (record.size() < kFewestSamples) throw Refusal{Status::insufficient_data, "fewer than 256 samples"};
+  if (!(interval * kCycleSamples < cycle))
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("a sample each {:.3g} s does not resolve the cycle of {:.3g} s of the motor "
+                              "against the load",
+                              interval, cycle)};
+  for (std::size_t i = 1; i < record.size(); ++i) {
+    const double step = record.time[i] - record.time[i - 1];
+    if (std::fabs(step - interval) > kUneven * interval)
+      throw Refusal{Status::out_of_domain,
+                    fmt::format("the samples are not evenly spaced in time at {:.6g} s", record.time[i])};
+  }
+}
+
+/// What the motor leaves for the teeth.
+std::vector<double> torque_of_teeth(const TraverseData& d, const TraverseMotor& motor) {
+  std::vector<double> teeth(d.torque.size(), 0.0);
+  for (std::size_t i = 1; i + 1 < teeth.size(); ++i)
+    teeth[i] = 0.5 * (d.torque[i] + d.torque[i - 1]) - motor.inertia * d.acceleration[i] -
+               motor.damping * d.rate[i] - std::copysign(motor.friction, d.rate[i]);
+  return teeth;
+}
+
+std::size_t reach_of(const TraverseData& d, double cycle) {
+  return std::max<std::size_t>(2, std::size_t(std::lround(kAveraged * cycle / d.interval)));
+}
+
+void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle, double unsure) {
+  const std::size_t n = teeth.size();
+  const Quadratic quadratic(reach_of(d, cycle));
+  std::vector<double> smooth(n, 0.0), pressed;
+  std::vector<int> flank(n, 0);
+  const double clear = kClear * d.noise;
+  for (std::size_t i = quadratic.reach + 1; i + quadratic.reach + 1 < n; ++i) {
+    smooth[i] = quadratic.of(teeth, i, quadratic.value);
+    if (std::fabs(smooth[i]) < clear) continue;
+    flank[i] = smooth[i] > 0 ? 1 : -1;
+    pressed.push_back(std::fabs(smooth[i]));
+  }
+  d.clear = clear + unsure;
+  if (!pressed.empty()) d.level = signal::median(pressed);
+  const auto before = static_cast<std::size_t>(std::lround(kBefore * cycle / d.interval));
+  d.samples = before + static_cast<std::size_t>(std::lround(kAfter * cycle / d.interval));
+  std::size_t last = 0, free_from = 3;  // last sample on a flank; where the next window may begin
+  for (std::size_t i = 3; i < n; ++i) {
+    if (flank[i] == 0) continue;
+    const std::size_t left = last;
+    last = i;
+    if (left == 0 || flank[left] == flank[i]) continue;
+    ++d.crossings;
+    std::size_t first = left > before ? left - before : 0;
+    const auto sure = [&](std::size_t k) {
+      return k > 2 + quadratic.reach && flank[left] * smooth[k] > d.clear;
+    };
+    while (first < left && !sure(first)) ++first;
+    if (first < free_from || !sure(first) || first + d.samples + quadratic.reach + 1 >= n ||
+        i + d.samples / 8 > first + d.samples)
+      continue;
+    const auto from = d.counts.begin() + std::ptrdiff_t(first), to = from + std::ptrdiff_t(d.samples);
+    if (double(std::count(from, to, 1)) < kCounted * double(d.samples)) continue;
+    d.windows.push_back({first, double(flank[first]), smooth[first],
+                         quadratic.of(teeth, first, quadratic.slope) / d.interval});
+    free_from = first + d.samples / 2;
+  }
+}
+
+}  // namespace
+
+TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings,
+                           const TraverseMotor& motor) {
+  TraverseData d;
+  d.interval = record.sampling_interval();
+  const double cycle = cycle_of(settings);
+  check_samples(record, d.interval, cycle);
+  d.steps = std::max(1, static_cast<int>(std::ceil(2 * M_PI * d.interval / (cycle * kStep))));
+  d.torque = record.column(record::Channel::motor_torque);
+  d.position = record.column(record::Channel::motor_position);
+  const std::size_t n = d.position.size();
+  d.rate.assign(n, 0), d.acceleration.assign(n, 0), d.counts.assign(n, 0);
+  double squares = 0;
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    d.rate[i] = (d.position[i + 1] - d.position[i - 1]) / (2 * d.interval);
+    d.acceleration[i] =
+        (d.position[i + 1] - 2 * d.position[i] + d.position[i - 1]) / (d.interval * d.interval);
+    squares += d.rate[i] * d.rate[i] / static_cast<double>(n);
+  }
+  if (!(squares > 0)) throw Refusal{Status::insufficient_data, "the motor does not move"};
+  d.slow = kFade * std::sqrt(squares);
+  for (std::size_t i = 0; i < n; ++i) d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares);
+  const std::vector<double> teeth = torque_of_teeth(d, motor);
+  d.torque_noise = signal::noise_from_differences(d.torque, 2);
+  d.position_noise = std::max(signal::noise_from_differences(d.position, 4),
+                              signal::smallest_step(d.position) / std::sqrt(12.0));
+  const Quadratic quadratic(reach_of(d, cycle));
+  const double differences = motor.inertia * d.position_noise / (d.interval * d.interval);
+  d.noise = noise_of(quadratic.value, d.torque_noise, differences);
+  d.slope_noise = noise_of(quadratic.slope, d.torque_noise, differences) / d.interval;
+  find_windows(d, teeth, cycle, motor.unsure);
+  return d;
+}
+
+}  // namespace backlash::diagnosis

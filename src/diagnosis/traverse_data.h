@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Crossings of the gap in a record of the motor's side. Equations: gap_traverse.h.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "backlash_diagnosis/diagnosis/gap_traverse.h"
+
+namespace backlash::diagnosis {
+
+/// Stretch of the record that begins in contact and holds one change of flank or more.
+struct TraverseWindow {
+  std::size_t first = 0;
+  double side = 1;                     // flank at the first sample
+  double torque = 0, torque_rate = 0;  // N m, N m/s through the teeth there
+};
+
+/// The motor's side of a record.
+struct TraverseData {
+  double interval = 0;                 // s
+  int steps = 1;                       // of the integration per sample
+  std::size_t samples = 0;             // of a window
+  std::vector<double> torque;          // N m, of the motor
+  std::vector<double> position, rate;  // rad, rad/s
+  std::vector<double> acceleration;    // rad/s^2, second difference
+  std::vector<char> counts;            // whether dry friction is told: not about a standstill
+  double noise = 0, slope_noise = 0;   // N m, N m/s, of the averaged torque through the teeth
+  double torque_noise = 0;             // N m, of a sample of the torque, white
+  double position_noise = 0;           // rad, the same of the position, at least that of its steps
+  double clear = 0;                    // N m, of it, that presses a flank for sure
+  double level = 0;                    // N m, of it, median where it presses a flank
+  double slow = 0;                     // rad/s, below which dry friction fades
+  std::size_t crossings = 0;           // changes of flank, of which windows may hold several
+  std::vector<TraverseWindow> windows;
+};
+
+/// What is known of the motor, by which a record is cut into windows.
+struct TraverseMotor {
+  double inertia = 0, damping = 0, friction = 0;  // kg m^2, N m s/rad, N m
+  double unsure = 0;  // N m, by which the torque that it leaves for the teeth may be off
+};
+
+/// Throws Refusal.
+TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings,
+                           const TraverseMotor& motor);
+
+}  // namespace backlash::diagnosis
