@@ -24,15 +24,19 @@ constexpr double kUnsureTorque = 2;            // theory: 95 % of what nothing t
 constexpr int kFewest = 20, kFewestFirst = 8;  // crossings, for the answer and to know the motor
 constexpr int kMost = 60;                      // beyond them the errors do not shrink: the equations limit
 constexpr int kSearched = 24;                  // for the first guesses
-constexpr double kGuesses[] = {-0.5, 0, 0.5};  // spreads of the gap: 0.2, 1, 4.5 times the declared one
-constexpr int kSearch = 20, kFit = 40;         // steps
-constexpr double kMisfit = 2;                  // noises, of the median crossing
-constexpr double kFar = 4;                     // spreads of a declared value
-constexpr double kMostLeftOut = 0.2;           // of the crossings
-constexpr double kVague = 0.7;                 // half width of the interval of the logarithm: a factor of two
-constexpr double kRivalCost = 9;               // theory: three standard errors
-constexpr double kHidden = 1;                  // deflections under the noise, that a play must exceed
-constexpr double kLaw = 0.05;                  // of the deflection: teeth that yield by no power of it, 95 %
+constexpr double kGuesses[] = {-0.5, -0.3, -0.15, 0, 0.15, 0.3, 0.5};
+constexpr double kBeside[] = {0.6, 1, 1.6};  // times the gap of a fit, from which others begin
+constexpr int kRounds = 3;
+constexpr double kCheaper = 1;          // of the cost, to go on
+constexpr int kSearch = 20, kFit = 40;  // steps
+constexpr double kMisfit = 2;           // noises, of the median crossing
+constexpr double kFewOf = 0.4;          // of all crossings: simulation, see require_most()
+constexpr double kFar = 4;              // spreads of a declared value
+constexpr double kMostLeftOut = 0.2;    // of the crossings
+constexpr double kVague = 0.7;          // half width of the interval of the logarithm: a factor of two
+constexpr double kRivalCost = 9;        // theory: three standard errors
+constexpr double kHidden = 1;           // deflections under the noise, that a play must exceed
+constexpr double kLaw = 0.05;           // of the deflection: teeth that yield by no power of it, 95 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid || !std::isfinite(value)) throw InvalidParameter(name, value, limit);
@@ -97,13 +101,30 @@ const TraverseFit& cheapest(const std::vector<TraverseFit>& fits) {
                            [](const auto& a, const auto& b) { return cost_of(a) < cost_of(b); });
 }
 
+/// A fit stops where it is cheapest nearby: others begin with what is declared and gaps about the cheapest
+/// one's, as long as that finds a cheaper one.
+void look_beside(std::vector<TraverseFit>& fits, const TraverseData& data, const TraversePriors& priors) {
+  for (int round = 0; round < kRounds; ++round) {
+    const TraverseFit best = cheapest(fits);
+    for (const double factor : kBeside) {
+      const TraversePrior& gap = priors[kTraverseGap];
+      fits.emplace_back(data, priors, some(data.windows, kMost),
+                        std::log(factor * best.value(kTraverseGap) / gap.value) / gap.spread);
+      fits.back().run(kFit);
+    }
+    if (!(cost_of(cheapest(fits)) < cost_of(best) - kCheaper)) return;
+  }
+}
+
 /// Each leaves out other crossings: all are compared on all.
-Solution solve(const TraverseData& data, const std::vector<TraverseFit>& guesses) {
+Solution solve(const TraverseData& data, const TraversePriors& priors,
+               const std::vector<TraverseFit>& guesses) {
   std::vector<TraverseFit> fits;
   for (const TraverseFit& guess : guesses) {
     fits.emplace_back(guess, data, some(data.windows, kMost));
     fits.back().run(kFit);
   }
+  look_beside(fits, data, priors);
   const TraverseFit& best = cheapest(fits);
   const double gap = best.value(kTraverseGap);
   Solution solution{best, gap, std::numeric_limits<double>::infinity()};
@@ -180,6 +201,17 @@ void require_crossings(const TraverseData& data, int fewest) {
                             data.crossings, data.windows.size(), fewest, data.clear)};
 }
 
+/// Those that are left out take long, or follow each other closely, as of a large play they do: where they
+/// are many, what is left has been told of a play of half the size, with nothing but noise left.
+void require_most(const TraverseData& data) {
+  if (double(data.windows.size()) >= kFewOf * double(data.crossings)) return;
+  throw Refusal{
+      Status::insufficient_data,
+      fmt::format("{} of {} crossings of the gap can be looked at, the others are too slow or too close "
+                  "to each other, as those of a larger play: {:.0f} % are needed",
+                  data.windows.size(), data.crossings, 100 * kFewOf)};
+}
+
 /// Crossings that begin in a clear press whatever is wrong with the declared friction of the motor.
 TraverseData first_data(const record::Record& record, const GapTraverseSettings& s) {
   return traverse_data(
@@ -201,10 +233,12 @@ Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSe
     check_channels(record);
     const TraverseData first = first_data(record, settings);
     require_crossings(first, kFewestFirst);
-    const std::vector<TraverseFit> guesses = guesses_of(first, traverse_priors(first, settings));
+    const TraversePriors priors = traverse_priors(first, settings);
+    const std::vector<TraverseFit> guesses = guesses_of(first, priors);
     const TraverseData data = second_data(record, settings, cheapest(guesses));
     require_crossings(data, kFewest);
-    fill(estimate, solve(data, guesses), data, settings);
+    require_most(data);
+    fill(estimate, solve(data, priors, guesses), data, settings);
   });
 }
 

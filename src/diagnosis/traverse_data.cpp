@@ -17,7 +17,10 @@ namespace {
 constexpr double kCycleSamples = 8;  // fewest samples in a cycle of the motor against the load
 constexpr double kStep = 0.06;       // of the integration times the fastest frequency, rad
 constexpr double kBefore = 0.8;      // cycles of a window before a crossing: tell the start
-constexpr double kAfter = 2.6;       // and from its begin on: the first touches
+constexpr double kAfter = 2.6;       // and from its begin on: the first touches, at least
+constexpr double kTouches = 1.6;     // the same, from the end of a crossing on
+constexpr double kMostTurns = 0.8;   // share of the crossings that fit into a window so long
+constexpr double kLongest = 12;      // cycles, after the begin of a crossing
 constexpr double kCounted = 0.5;     // share of a window in which the motor moves
 constexpr double kUneven = 0.25;     // of an interval, from one sample to the next
 constexpr double kClear = 4.4;       // noises of the averaged torque, above which it presses a flank
@@ -91,6 +94,31 @@ std::size_t reach_of(const TraverseData& d, double cycle) {
   return std::max<std::size_t>(2, std::size_t(std::lround(kAveraged * cycle / d.interval)));
 }
 
+/// Last sample on a flank, and the first on the other one.
+struct Turn {
+  std::size_t left, touched;
+};
+
+std::vector<Turn> turns_of(const std::vector<int>& flank) {
+  std::vector<Turn> turns;
+  std::size_t last = 0;
+  for (std::size_t i = 3; i < flank.size(); ++i) {
+    if (flank[i] == 0) continue;
+    if (last > 0 && flank[last] != flank[i]) turns.push_back({last, i});
+    last = i;
+  }
+  return turns;
+}
+
+/// Of a window from the begin of a crossing on: the first touches, of most crossings. Those that are left out
+/// because they take longer would be those of the larger play.
+std::size_t samples_after(const std::vector<Turn>& turns, double cycle) {
+  std::vector<double> took;
+  for (const Turn& turn : turns) took.push_back(double(turn.touched - turn.left));
+  const double most = took.empty() ? 0 : signal::quantile(took, kMostTurns);
+  return std::size_t(std::lround(std::clamp(most + kTouches * cycle, kAfter * cycle, kLongest * cycle)));
+}
+
 void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle, double unsure) {
   const std::size_t n = teeth.size();
   const Quadratic quadratic(reach_of(d, cycle));
@@ -105,22 +133,19 @@ void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycl
   }
   d.clear = clear + unsure;
   if (!pressed.empty()) d.level = signal::median(pressed);
+  const std::vector<Turn> turns = turns_of(flank);
+  d.crossings = turns.size();
   const auto before = static_cast<std::size_t>(std::lround(kBefore * cycle / d.interval));
-  d.samples = before + static_cast<std::size_t>(std::lround(kAfter * cycle / d.interval));
-  std::size_t last = 0, free_from = 3;  // last sample on a flank; where the next window may begin
-  for (std::size_t i = 3; i < n; ++i) {
-    if (flank[i] == 0) continue;
-    const std::size_t left = last;
-    last = i;
-    if (left == 0 || flank[left] == flank[i]) continue;
-    ++d.crossings;
-    std::size_t first = left > before ? left - before : 0;
+  d.samples = before + samples_after(turns, cycle / d.interval);
+  std::size_t free_from = 3;  // where the next window may begin
+  for (const Turn& turn : turns) {
+    std::size_t first = turn.left > before ? turn.left - before : 0;
     const auto sure = [&](std::size_t k) {
-      return k > 2 + quadratic.reach && flank[left] * smooth[k] > d.clear;
+      return k > 2 + quadratic.reach && flank[turn.left] * smooth[k] > d.clear;
     };
-    while (first < left && !sure(first)) ++first;
+    while (first < turn.left && !sure(first)) ++first;
     if (first < free_from || !sure(first) || first + d.samples + quadratic.reach + 1 >= n ||
-        i + d.samples / 8 > first + d.samples)
+        turn.touched + d.samples / 8 > first + d.samples)
       continue;
     const auto from = d.counts.begin() + std::ptrdiff_t(first), to = from + std::ptrdiff_t(d.samples);
     if (double(std::count(from, to, 1)) < kCounted * double(d.samples)) continue;
