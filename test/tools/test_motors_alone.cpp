@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Plays of a robot's joint from the motor's side alone, whose truth is the simulator's, up to six times the
+// declared one (5.4e-4 rad).
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "support/data.h"
+#include "tools/command_runner.h"
+
+namespace backlash::test {
+namespace {
+
+class MotorsAlone : public CommandTest {
+ protected:
+  nlohmann::json estimate(double play, int seed) const {
+    const std::string rig = package_file("config/simulated_robot/shoulder.yaml");
+    done(fmt::format("simulate {} --duration 25 --backlash {} --seed {} --out run.csv", rig, play, seed));
+    run("diagnose_record run.csv --rig " + rig + " --method gap_traverse --json out.json");
+    return nlohmann::json::parse(read("out.json")).at("estimates").at(0);
+  }
+  static bool holds(const nlohmann::json& e, double play) {
+    return e.at("interval_angle").at(0).get<double>() <= play &&
+           play <= e.at("interval_angle").at(1).get<double>();
+  }
+};
+
+// Records that were told 0.2 to 0.75 of the play, with nothing but noise left.
+TEST_F(MotorsAlone, ALargePlayIsNotToldAsASmallOne) {
+  for (const auto& [play, seed] : {std::pair{2e-3, 3}, {2e-3, 7}, {2e-3, 8}, {3e-3, 5}, {1e-3, 35}}) {
+    const nlohmann::json e = estimate(play, seed);
+    EXPECT_TRUE(e.at("status") != "ok" || holds(e, play)) << play << " " << seed << " " << e;
+  }
+}
+
+// And some that found no answer, as the fit stood still on its way.
+TEST_F(MotorsAlone, APlayThatIsNotTheDeclaredOneIsTold) {
+  for (const auto& [play, seed] : {std::pair{7e-4, 1}, {7e-4, 2}, {1e-3, 1}, {2.2e-4, 20}}) {
+    const nlohmann::json e = estimate(play, seed);
+    ASSERT_EQ(e.at("status"), "ok") << play << " " << seed << " " << e;
+    EXPECT_TRUE(holds(e, play)) << play << " " << seed << " " << e;
+  }
+}
+
+}  // namespace
+}  // namespace backlash::test
