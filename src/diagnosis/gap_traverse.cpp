@@ -30,7 +30,7 @@ constexpr int kRounds = 3;
 constexpr double kCheaper = 1;          // of the cost, to go on
 constexpr int kSearch = 20, kFit = 40;  // steps
 constexpr double kMisfit = 1.6;         // noises, of the median crossing
-constexpr double kFewOf = 0.4;          // of all crossings: simulation, see require_most()
+constexpr double kFewOf = 0.5;          // of all crossings: simulation, see require_most()
 constexpr double kFar = 4;              // spreads of a declared value
 constexpr double kMostLeftOut = 0.2;    // of the crossings
 constexpr double kVague = 0.7;          // half width of the interval of the logarithm: a factor of two

@@ -12,6 +12,11 @@
 // spring at the usual torque T, and may yield by a power p of the deflection, 1 within a factor of 1.5 (1.5:
 // Hertz), as far as the record tells.
 //
+// The stretch about a crossing is as long as four of five crossings take to the first touches, so that a play
+// many times the declared one fits in, and half of the crossings must be looked at: the quick ones alone tell
+// a smaller play, with nothing but noise left. The cost has many minima: fits begin with seven gaps, and with
+// others about the cheapest one's until none is cheaper.
+//
 // Where a crossing begins the teeth must press one flank for sure: by more than noise and half of the
 // declared dry friction of the motor. The motor that such crossings tell finds more of them.
 //
