@@ -31,8 +31,8 @@ struct ArmTraceSettings {
                          // friction of another day has given 3.3
   double explained = 2;  // the same, of a joint of which a factor is told, of all its friction or of its
                          // motor's torque: what is no factor leaves more; choice, see doc/arm.md
-  int most_effects = 3;         // of single joints; choice
-  int most_tried = 3;           // guesses for each; choice (time)
+  int most_effects = 3;  // of single joints; choice
+  int most_tried = 3;    // guesses for each; choice (time)
   double least_at_joint = 0.5;  // share of its joint's squared error that such an effect must take away, and
   double least_of_signal = 0.025;  // rms of what it explains, of the signal's deviation; choice: bristles of
                                    // a UR5's joints take up to 0.4 and 0.03, see doc/measured/ur5_arm.md
