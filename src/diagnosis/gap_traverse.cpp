@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/distributions.h"
@@ -26,6 +28,7 @@ constexpr int kMost = 60;                      // beyond them the errors do not 
 constexpr int kSearched = 24;                  // for the first guesses
 constexpr double kGuesses[] = {-0.5, -0.3, -0.15, 0, 0.15, 0.3, 0.5};
 constexpr double kBeside[] = {0.6, 1, 1.6};  // times the gap of a fit, from which others begin
+constexpr std::size_t kGoneOn = 3;           // of the guesses, the cheapest: choice (time)
 constexpr int kRounds = 3;
 constexpr double kCheaper = 1;          // of the cost, to go on
 constexpr int kSearch = 20, kFit = 40;  // steps
@@ -119,9 +122,13 @@ void look_beside(std::vector<TraverseFit>& fits, const TraverseData& data, const
 /// Each leaves out other crossings: all are compared on all.
 Solution solve(const TraverseData& data, const TraversePriors& priors,
                const std::vector<TraverseFit>& guesses) {
+  std::vector<std::pair<double, const TraverseFit*>> cheap;
+  for (const TraverseFit& guess : guesses) cheap.emplace_back(cost_of(guess), &guess);
+  std::sort(cheap.begin(), cheap.end());
+  if (cheap.size() > kGoneOn) cheap.resize(kGoneOn);
   std::vector<TraverseFit> fits;
-  for (const TraverseFit& guess : guesses) {
-    fits.emplace_back(guess, data, some(data.windows, kMost));
+  for (const auto& [cost, guess] : cheap) {
+    fits.emplace_back(*guess, data, some(data.windows, kMost));
     fits.back().run(kFit);
   }
   look_beside(fits, data, priors);

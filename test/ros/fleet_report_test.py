@@ -296,7 +296,7 @@ class FleetReportTest(unittest.TestCase):
     def test_commands_that_crash_or_hang_are_rows_until_asked_again(self):
         count = self.records(2)
         before = "case $1 in */worn/*) kill -SEGV $$ ;; */ageing/*) exec sleep 600 ;; esac"
-        self.run_fleet(*self.stand_in(before), "--time-limit", "2", code=3)
+        self.run_fleet(*self.stand_in(before), "--time-limit", "6", code=3)
         rows = self.rows()
         self.assertEqual(len(rows), count)
         for row in rows:
