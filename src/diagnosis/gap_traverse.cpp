@@ -26,6 +26,7 @@ constexpr double kUnsureTorque = 2;            // theory: 95 % of what nothing t
 constexpr int kFewest = 20, kFewestFirst = 8;  // crossings, for the answer and to know the motor
 constexpr int kMost = 60;                      // beyond them the errors do not shrink: the equations limit
 constexpr int kSearched = 24;                  // for the first guesses
+// Spreads of the gap: 0.2 to 4.5 times the declared one.
 constexpr double kGuesses[] = {-0.5, -0.3, -0.15, 0, 0.15, 0.3, 0.5};
 constexpr double kBeside[] = {0.6, 1, 1.6};  // times the gap of a fit, from which others begin
 constexpr std::size_t kGoneOn = 3;           // of the guesses, the cheapest: choice (time)

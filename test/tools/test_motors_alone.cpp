@@ -25,7 +25,7 @@ class MotorsAlone : public CommandTest {
   }
 };
 
-// Records that were told 0.2 to 0.75 of the play, with nothing but noise left.
+// Records of which versions told 0.2 to 0.75 of the play, with nothing but noise left.
 TEST_F(MotorsAlone, ALargePlayIsNotToldAsASmallOne) {
   for (const auto& [play, seed] : {std::pair{2e-3, 3}, {2e-3, 7}, {2e-3, 8}, {3e-3, 5}, {1e-3, 35}}) {
     const nlohmann::json e = estimate(play, seed);
