@@ -123,6 +123,12 @@ void read_payload(const YamlReader& yaml, ArmRig& rig) {
   rig.payloads.push_back(payload);
 }
 
+HeldJoints read_held(const YamlReader& yaml) {
+  HeldJoints held;
+  for (const std::string& joint : yaml.keys()) held[joint] = yaml.number(joint, Range::any());
+  return held;
+}
+
 std::string path_in(const std::string& folder, const std::string& path) {
   const std::filesystem::path p(path);
   return p.is_absolute() ? path : (std::filesystem::path(folder) / p).string();
@@ -179,17 +185,18 @@ bool is_urdf(const std::string& path) {
   return first != std::string::npos && start[first] == '<';
 }
 
-ArmRig arm_rig_of_urdf(const std::string& path) {
+ArmRig arm_rig_of_urdf(const std::string& path, const HeldJoints& held) {
   ArmRig rig;
   rig.source = rig.urdf = path;
   rig.name = std::filesystem::path(path).stem().string();
   rig.channel = record::Channel::motor_torque;
   rig.terms = {DriveTerm::rotor_inertia, DriveTerm::coulomb, DriveTerm::viscous, DriveTerm::offset};
-  for (const std::string& name : moving_joints(path)) {
+  rig.held = held;
+  for (const std::string& name : moving_joints(path, held)) {
     rig.joints.emplace_back();
     rig.joints.back().name = name;
   }
-  rig.chain = read_chain(path, rig.joint_names());
+  rig.chain = read_chain(path, rig.joint_names(), held);
   rig.text = arm_rig_text(
       rig,
       {"All joints of " + std::filesystem::path(path).filename().string() +
@@ -223,7 +230,8 @@ ArmRig arm_rig_from_text(const std::string& text, const std::string& source, con
   rig.urdf = path_in(folder, yaml.text("urdf"));
   read_drives(yaml, rig);
   rig.identification = read_identification(yaml.map("identification"));
-  rig.chain = read_chain(rig.urdf, rig.joint_names());
+  if (const auto held = yaml.optional_map("held_joints")) rig.held = read_held(*held);
+  rig.chain = read_chain(rig.urdf, rig.joint_names(), rig.held);
   rig.chain.gravity = vector(yaml, "gravity");
   if (yaml.has("links")) {
     read_links(yaml, rig);
@@ -289,6 +297,12 @@ std::string arm_rig_text(const ArmRig& rig, const std::vector<std::string>& comm
       "base\n\n",
       kSchema, rig.name, std::filesystem::absolute(rig.urdf).lexically_normal().string(),
       rig.chain.gravity.x(), rig.chain.gravity.y(), rig.chain.gravity.z());
+  if (!rig.held.empty()) {
+    text += "held_joints:  # that stand still: rad; m of a prismatic one\n";
+    for (const auto& [joint, position] : rig.held)
+      text += fmt::format("  \"{}\": {}\n", joint, to_text(position));
+    text += "\n";
+  }
   text += fmt::format("drives:\n  channel: {}\n  terms: [{}]\n", record::channel_name(rig.channel), terms);
   if (rig.common_error > 0)
     text += fmt::format("  common_uncertainty: {:.4g}  # relative, of all torque constants together\n",

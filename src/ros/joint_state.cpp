@@ -190,6 +190,10 @@ void add_robot_joint(const model::Observation& o, const std::string& joint, sens
   add(m, joint, o.load_position, o.load_velocity, o.motor_torque);
 }
 
+void add_held_joint(const std::string& joint, double position, sensor_msgs::JointState& m) {
+  add(m, joint, position, 0, kAbsent);
+}
+
 JointStateWriter::JointStateWriter(const record::ChannelMap& sources) {
   for (const record::ChannelSource& source : sources.sources) {
     auto name =

@@ -26,6 +26,7 @@ SimulatedArm::SimulatedArm(const ArmSettings& settings, const ros::NodeHandle& h
                            const ros::NodeHandle& private_handle)
     : title_("simulating " + settings.arm.rig.name + " (" + settings.arm.rig.source + ")"),
       folder_(std::filesystem::path(settings.arm.rig.source).parent_path().string()),
+      held_(settings.arm.rig.held),
       simulation_(settings.arm),
       rig_description_(publish_rig_description(handle, settings.description)) {
   for (std::size_t j = 0; j < settings.arm.joints.size(); ++j) {
@@ -53,6 +54,7 @@ void SimulatedArm::step(std::map<std::string, sensor_msgs::JointState>& messages
   const std::vector<model::Observation> samples = simulation_.step();
   sensor_msgs::JointState& message = messages[kJointStates];
   for (std::size_t j = 0; j < samples.size(); ++j) add_robot_joint(samples[j], names_[j].robot, message);
+  for (const auto& [joint, position] : held_) add_held_joint(joint, position, message);
   for (std::size_t j = 0; j < samples.size(); ++j) add_joint_state(samples[j], names_[j], message);
 }
 
@@ -66,6 +68,7 @@ bool SimulatedArm::set_rig(backlash_diagnosis::SetRig::Request& request,
   try {
     const geared_arm::GearedArm arm = geared_arm::geared_arm_from_text(request.rig, "set_rig", folder_);
     simulation_.plant().set_machine(arm);
+    held_ = arm.rig.held;
     for (JointControls& joint : controls_) joint.tell();
     response.success = true;
     response.message = "the arm is " + arm.rig.name + ", " + std::to_string(arm.rig.payloads.size()) +

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/findings/motion_plan_report.h"
 #include "backlash_diagnosis/geared_arm/motion_file.h"
 #include "tools/common/command_line.h"
@@ -31,6 +32,9 @@ Command command() {
       {"out", "MOTION.yaml", "the motion: a Fourier series per joint, for simulate --motion", true},
       {"json", "OUT.json", "the same with all figures"},
       {"write-rig", "RIG.yaml", "of a URDF: the rig file that it is taken for, to complete and for identify"},
+      {"hold", "JOINT[=POSITION]...",
+       "of a URDF: joints that stand still, a gripper's for instance, and where [rad; m of a prismatic one]; "
+       "without a position at 0"},
       {"csv", "TRAJECTORY.csv", "approach and one period as samples, for any controller; needs --rate"},
       {"rate", "HZ", "of --csv"},
       {"acceleration", "RAD/S^2", "limit of the joints whose motion_limits in the rig file have none"},
@@ -43,9 +47,12 @@ Command command() {
       "are all "
       "that is known of the place: no walls, no collisions of the arm with itself. Watch the motion in a "
       "simulation of the cell, or slowly, before it is run. Of a URDF all joints that move are planned, from "
-      "0 rad; of its drives nothing is known, so that how much load their friction hides is not told.";
-  c.examples = {"plan_motion config/two_link_arm/two_link_arm.yaml --out motion.yaml",
-                "plan_motion robot.urdf --acceleration 5 --out motion.yaml --write-rig robot.yaml"};
+      "0 rad, but those that --hold names; of its drives nothing is known, so that how much load their "
+      "friction hides is not told.";
+  c.examples = {
+      "plan_motion config/two_link_arm/two_link_arm.yaml --out motion.yaml",
+      "plan_motion robot.urdf --acceleration 5 --out motion.yaml --write-rig robot.yaml",
+      "plan_motion robot_with_gripper.urdf --hold finger_joint=0.02 --acceleration 5 --out motion.yaml"};
   c.exit_codes =
       "  0   done\n  3   the gap of a joint cannot be shown within the limits; the motion for all others is "
       "written\n";
@@ -75,15 +82,35 @@ void check_outputs(const Arguments& arguments, const std::vector<std::string>& i
   if (arguments.has("csv") != arguments.has("rate")) throw UsageError("--csv and --rate go together");
 }
 
+/// JOINT or JOINT=POSITION; no joint's name holds a '='.
+arm::HeldJoints held_of(const Arguments& arguments) {
+  arm::HeldJoints held;
+  if (!arguments.has("hold")) return held;
+  for (const std::string& text : arguments.texts("hold")) {
+    const auto sign = text.find('=');
+    double position = 0;
+    if (sign != std::string::npos) {
+      const ParsedNumber number = parse_number(std::string_view(text).substr(sign + 1));
+      if (!number) throw UsageError("--hold '" + printable(text) + "': the position is " + number.problem);
+      position = number.value;
+    }
+    if (!held.emplace(text.substr(0, sign), position).second)
+      throw UsageError("--hold names '" + printable(text.substr(0, sign)) + "' twice");
+  }
+  return held;
+}
+
 geared_arm::GearedArm arm_of(const Arguments& arguments) {
   const std::string& path = arguments.positional(0);
   if (arm::is_urdf(path)) {
-    const arm::ArmRig rig = arm::arm_rig_of_urdf(path);
+    const arm::ArmRig rig = arm::arm_rig_of_urdf(path, held_of(arguments));
     check_outputs(arguments, {path});
     if (arguments.has("write-rig")) write_text(arguments.text("write-rig"), rig.text);
     return geared_arm::geared_arm_from_text(rig.text, "the rig of " + path, "");
   }
-  if (arguments.has("write-rig")) throw UsageError("--write-rig is for a URDF; " + path + " is a rig file");
+  for (const char* option : {"write-rig", "hold"})
+    if (arguments.has(option))
+      throw UsageError(std::string("--") + option + " is for a URDF; " + path + " is a rig file");
   if (!arm::is_arm_rig(path))
     throw BadData(
         path,

@@ -161,6 +161,56 @@ TEST_F(ArmRigFile, AUrdfByItselfIsAllItsJointsThatMove) {
   }
 }
 
+// A point of 2 kg and a gripper whose fingers mimic each other: where they stand their masses are points, so
+// that the body is known in closed form. Left moves along y and by mimicry right against it; the wrist
+// between arm and gripper turns by 90 degrees about z, so that y of the gripper is -x of the arm.
+TEST_F(ArmRigFile, JointsThatAreHeldBelongToTheLinkThatCarriesThem) {
+  const std::string point = R"(<inertial><mass value="M"/><inertia ixx="1e-9" ixy="0" ixz="0" iyy="1e-9"
+    iyz="0" izz="1e-9"/></inertial></link>)";
+  const auto link = [&](const std::string& name, const std::string& mass) {
+    return "<link name=\"" + name + "\">" + with(point, "M", mass);
+  };
+  const std::string urdf = R"(<robot name="gripper"><link name="base"/>)" + link("arm", "2") +
+                           link("palm", "1") + link("a", "0.5") + link("b", "0.25") +
+                           R"(<joint name="hinge" type="continuous"><parent link="base"/>
+    <child link="arm"/><axis xyz="0 -1 0"/></joint><joint name="wrist" type="revolute"><parent link="arm"/>
+    <child link="palm"/><origin xyz="1 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1"
+    velocity="1"/></joint><joint name="left" type="prismatic"><parent link="palm"/><child link="a"/>
+    <origin xyz="0 0.1 0"/><axis xyz="0 1 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+    <joint name="right" type="prismatic"><parent link="palm"/><child link="b"/><origin xyz="0 -0.1 0"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+    <mimic joint="left" multiplier="-1" offset="-0.01"/></joint></robot>)";
+  write_file(path("gripper.urdf"), urdf);
+  const HeldJoints held = {{"wrist", M_PI / 2}, {"left", 0.03}};
+  const ArmRig rig = arm_rig_of_urdf(path("gripper.urdf"), held);
+  ASSERT_EQ(rig.joint_names(), std::vector<std::string>{"hinge"});
+  const Body body = body_of(rig.chain.links[0]);
+  EXPECT_NEAR(body.mass, 3.75, 1e-12);
+  EXPECT_NEAR(body.centre.x(), (1.0 + 0.5 * (1 - 0.13) + 0.25 * (1 + 0.14)) / 3.75, 1e-12);
+  EXPECT_NEAR(body.centre.y(), 0, 1e-12);
+  // about the origin, m x^2 of each point about y; 1e-9 are those of the bodies
+  EXPECT_NEAR(rig.chain.links[0][7], 1 + 0.5 * 0.87 * 0.87 + 0.25 * 1.14 * 1.14, 1e-8);
+  write_file(path("gripper.yaml"), rig.text);
+  EXPECT_EQ(load_arm_rig(path("gripper.yaml")).chain.links, rig.chain.links);
+
+  // A held joint before the first one turns that one's frame.
+  const Chain wrist = read_chain(path("gripper.urdf"), {"wrist"}, {{"hinge", M_PI / 2}, {"left", 0}});
+  EXPECT_LT((wrist.joints[0].position - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
+
+  const auto told = [&](const std::vector<std::string>& names, const HeldJoints& still) {
+    try {
+      chain_of_urdf(urdf, "x.urdf", names, still);
+    } catch (const BadData& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_NE(told({"hinge", "wrist"}, {{"right", 0}}).find("'left' moves and is not"), std::string::npos);
+  EXPECT_NE(told({"hinge", "wrist"}, {{"finger", 0}}).find("no joint 'finger'"), std::string::npos);
+  EXPECT_NE(told({"hinge", "wrist"}, {{"wrist", 0}, {"left", 0}}).find("held and one"), std::string::npos);
+  EXPECT_EQ(told({"hinge", "wrist"}, {{"left", 0}, {"right", 0.01}}), "accepted");
+}
+
 // Theory: a cloud of masses has a positive definite pseudo inertia, a body whose inertia breaks the triangle
 // rule has not.
 TEST(Body, PseudoInertiaTellsWhatIsPhysical) {

@@ -207,6 +207,20 @@ class ArmTest(unittest.TestCase):
                 self.assertFalse(answer.success)
                 self.assertIn("'%s' has no gap" % joint, answer.message)
 
+    def test_joints_that_are_held_are_published_where_they_stand(self):
+        robot = os.path.join(self.folder, "gripper.urdf")
+        with open(robot, "w") as file:
+            file.write(urdf().replace("</robot>", """<link name="finger"/><joint name="grip" type="prismatic">
+              <parent link="forearm"/><child link="finger"/><axis xyz="0 1 0"/>
+              <limit lower="0" upper="0.1" effort="1" velocity="1"/></joint></robot>"""))
+
+        def with_gripper(rig):
+            rig.update(urdf=robot, held_joints={"grip": 0.02})
+        with Simulator({"rig": self.rig(with_gripper), "set_robot_description": False}) as simulator:
+            state = Inbox(simulator.topic("joint_states"), JointState).wait_for_count(1)[0]
+        self.assertEqual(state.name, JOINTS + ["grip"] + NAMES[2:])
+        self.assertEqual((column([state], "grip"), column([state], "grip", "velocity")), ([0.02], [0]))
+
     def test_what_cannot_be_is_refused(self):
         def assert_refused(parameters, code, *shown):
             with Simulator(dict({"rig": RIG}, **parameters)) as simulator:

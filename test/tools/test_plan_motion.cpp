@@ -100,6 +100,25 @@ TEST_F(PlanMotion, AUrdfIsPlannedAndGivesARigFile) {
   refused("identify r.csv --rig link.urdf --out f.yaml --json f.json", 65, "is a URDF");
 }
 
+TEST_F(PlanMotion, JointsOfAUrdfCanBeHeld) {
+  std::string text = read("link.urdf");
+  text.insert(text.find("</robot>"), R"(<link name="finger"><inertial><mass value="0.1"/>
+      <inertia ixx="1e-5" ixy="0" ixz="0" iyy="1e-5" iyz="0" izz="1e-5"/></inertial></link>
+      <link name="wheel"/><joint name="roll" type="continuous"><parent link="base"/><child link="wheel"/></joint>
+      <joint name="slide" type="prismatic"><parent link="arm"/><child link="finger"/><axis xyz="1 0 0"/>
+      <limit lower="0" upper="1" effort="1" velocity="1"/></joint>)");
+  write("gripper.urdf", text);
+  const std::string line = "plan_motion gripper.urdf --acceleration 5 --out m.yaml";
+  refused(line, 65, "begin at the same body");
+  refused(line + " --hold roll=x", 64, "--hold 'roll=x'");
+  refused(line + " --hold roll roll=1", 64, "'roll' twice");
+  refused(line + " --hold rol slide=0.2", 65, "no joint 'rol'");
+  refused("plan_motion hinge.yaml --out m.yaml --hold slide", 64, "--hold is for a URDF");
+  done(line + " --hold roll slide=0.2 --write-rig rig.yaml");
+  expect_contains(read("rig.yaml"), "\"slide\": 0.2");
+  done("plan_motion rig.yaml --acceleration 5 --out of_rig.yaml");
+}
+
 TEST_F(PlanMotion, WhatDoesNotServeIsRefused) {
   const std::string joint = package_file("config/two_inertia_servo.yaml");
   refused("plan_motion hinge.yaml", 64, "--out");

@@ -67,6 +67,7 @@ struct ArmRig {
   std::vector<JointDrive> joints;
   double common_error = 0;  // of all constants together, relative; known of a fitted rig
   ArmIdentification identification;
+  HeldJoints held;      // of the URDF, that stand still
   Chain chain;          // of the URDF, with the fitted links in its place where there are some
   bool fitted = false;  // the file has links of its own
   std::vector<Payload> payloads;
@@ -84,9 +85,9 @@ std::optional<std::size_t> index_of(const ArmRig& rig, const std::string& joint)
 /// Whether a file is a URDF, as it begins like XML. Throws MissingInput.
 bool is_urdf(const std::string& path);
 
-/// What a URDF by itself says as a rig: all its joints that move, with drives whose values nobody knows (all
-/// 0) and torques at the joint as channel, the base level. Throws MissingInput, BadData.
-ArmRig arm_rig_of_urdf(const std::string& path);
+/// What a URDF by itself says as a rig: all its joints that move but the held ones, with drives whose values
+/// nobody knows (all 0) and torques at the joint as channel, the base level. Throws MissingInput, BadData.
+ArmRig arm_rig_of_urdf(const std::string& path, const HeldJoints& held = {});
 
 /// Whether a rig file is that of an arm: it has `urdf`. Throws MissingInput, BadData; for a URDF, too.
 bool is_arm_rig(const std::string& path);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -57,15 +58,23 @@ Body moved(const Body& b, const Eigen::Matrix3d& rotation, const Eigen::Vector3d
 /// The text of a URDF. Throws MissingInput.
 std::string read_urdf(const std::string& path);
 
-/// The chain through the joints of these names in a URDF. Links behind fixed joints belong to the link that
-/// carries them. Throws MissingInput, BadData where the file is no URDF, a joint is not there or not revolute
-/// or continuous, the joints are not one chain in this order, or another moving joint branches off from it.
-Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints);
-Chain chain_of_urdf(const std::string& text, const std::string& name, const std::vector<std::string>& joints);
+/// Joints of a URDF that stand still, fingers of a gripper for instance, and where [rad; m of a prismatic
+/// one]. Joints that mimic one of them stand still with it, unless they are named themselves.
+using HeldJoints = std::map<std::string, double>;
 
-/// All joints that are not fixed, from the root to the tip. Throws MissingInput; BadData where the file is no
-/// URDF, has no such joint, or where two of them begin at one link: that is no chain.
-std::vector<std::string> moving_joints(const std::string& urdf_path);
+/// The chain through the joints of these names in a URDF. Links behind fixed and held joints belong to the
+/// link that carries them. Throws MissingInput, BadData where the file is no URDF, a joint is not there, one
+/// of the chain is held or not revolute or continuous, a held one is not revolute, continuous or prismatic,
+/// the joints are not one chain in this order, or another moving joint branches off from it.
+Chain read_chain(const std::string& urdf_path, const std::vector<std::string>& joints,
+                 const HeldJoints& held = {});
+Chain chain_of_urdf(const std::string& text, const std::string& name, const std::vector<std::string>& joints,
+                    const HeldJoints& held = {});
+
+/// All joints that are neither fixed nor held, from the root to the tip. Throws MissingInput; BadData where
+/// the file is no URDF, has no such joint, a held one is not there, or where two begin at one link: that is
+/// no chain.
+std::vector<std::string> moving_joints(const std::string& urdf_path, const HeldJoints& held = {});
 
 /// What the limit element of a joint says; NaN where it does not: a revolute joint without lower < upper, a
 /// continuous one (which has no such limits), velocity or effort that are not > 0.

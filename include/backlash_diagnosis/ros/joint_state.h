@@ -91,6 +91,9 @@ void add_joint_state(const record::Record& record, std::size_t i, const JointNam
 void add_robot_joint(const model::Observation& observation, const std::string& joint,
                      sensor_msgs::JointState& message);
 
+/// A joint of its URDF that stands still at a position [rad; m of a prismatic one].
+void add_held_joint(const std::string& joint, double position, sensor_msgs::JointState& message);
+
 /// Empties the arrays of a message in which no name has that quantity.
 void empty_if_absent(sensor_msgs::JointState& message);
 

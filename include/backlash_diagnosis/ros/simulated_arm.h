@@ -47,6 +47,7 @@ class SimulatedArm : public SimulatedMachine {
 
   std::string title_, folder_;  // folder_: of the rig file, where the URDF of another is looked for
   std::vector<JointNames> names_;
+  arm::HeldJoints held_;  // published too: robot_state_publisher shows what stands on them
   geared_arm::ArmSimulation simulation_;
   std::deque<JointControls> controls_;  // cannot be moved
   ros::Publisher rig_description_;
