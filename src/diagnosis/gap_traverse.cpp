@@ -20,21 +20,20 @@ namespace {
 // All choices, tried on simulated machines, but where another origin is given.
 constexpr double kModel = 0.2;                 // of the play, see gap_traverse.h: simulation
 constexpr double kAlike = 0.2;                 // of the play, between fits that tell the same: choice
-constexpr double kSame = 0.05;                 // of the play, between guesses that came to the same: choice
 constexpr double kUnsureFriction = 0.5;        // of the declared dry friction of the motor, as the fit has it
 constexpr double kUnsureTorque = 2;            // theory: 95 % of what nothing tells
 constexpr int kFewest = 20, kFewestFirst = 8;  // crossings, for the answer and to know the motor
 constexpr int kMost = 60;                      // beyond them the errors do not shrink: the equations limit
 constexpr int kSearched = 24;                  // for the first guesses
-// Spreads of the gap: 0.2 to 4.5 times the declared one.
-constexpr double kGuesses[] = {-0.5, -0.3, -0.15, 0, 0.15, 0.3, 0.5};
-constexpr double kBeside[] = {0.6, 1, 1.6};  // times the gap of a fit, from which others begin
-constexpr std::size_t kGoneOn = 3;           // of the guesses, the cheapest: choice (time)
+// Spreads of the gap: 0.3 to 3.3 times the declared one.
+constexpr double kGuesses[] = {-0.4, -0.2, 0, 0.2, 0.4};
+constexpr double kBeside[] = {0.6, 1.6};  // times the gap of a fit, from which others begin
+constexpr std::size_t kGoneOn = 2;        // of the guesses, the cheapest that differ: choice (time)
 constexpr int kRounds = 3;
 constexpr double kCheaper = 1;          // of the cost, to go on
 constexpr int kSearch = 20, kFit = 40;  // steps
 constexpr double kMisfit = 1.6;         // noises, of the median crossing
-constexpr double kFewOf = 0.5;          // of all crossings: simulation, see require_most()
+constexpr double kFewOf = 0.54;         // of all crossings: simulation, see require_most()
 constexpr double kFar = 4;              // spreads of a declared value
 constexpr double kMostLeftOut = 0.2;    // of the crossings
 constexpr double kVague = 0.7;          // half width of the interval of the logarithm: a factor of two
@@ -81,21 +80,6 @@ struct Solution {
   double rival_gap, rival_cost;  // rad; more than the best's
 };
 
-/// What fits begin with: guesses that some of the crossings have improved, without those that came to the
-/// same.
-std::vector<TraverseFit> guesses_of(const TraverseData& data, const TraversePriors& priors) {
-  std::vector<TraverseFit> guesses;
-  for (const double guess : kGuesses) {
-    guesses.emplace_back(data, priors, some(data.windows, kSearched), guess);
-    guesses.back().run(kSearch);
-    const auto same = [&](const TraverseFit& other) {
-      return std::fabs(std::log(other.value(kTraverseGap) / guesses.back().value(kTraverseGap))) < kSame;
-    };
-    if (std::any_of(guesses.begin(), guesses.end() - 1, same)) guesses.pop_back();
-  }
-  return guesses;
-}
-
 double cost_of(const TraverseFit& fit) {
   return fit.cost() + fit.left_out() * kFar * kFar * 64;  // left out is no way to be better
 }
@@ -105,16 +89,52 @@ const TraverseFit& cheapest(const std::vector<TraverseFit>& fits) {
                            [](const auto& a, const auto& b) { return cost_of(a) < cost_of(b); });
 }
 
+bool alike(const TraverseFit& a, const TraverseFit& b) {
+  return std::fabs(std::log(a.value(kTraverseGap) / b.value(kTraverseGap))) < kAlike;
+}
+
+/// What fits begin with: guesses that some of the crossings have improved, cheapest first, without those that
+/// came to the same.
+std::vector<TraverseFit> guesses_of(const TraverseData& data, const TraversePriors& priors) {
+  std::vector<TraverseFit> guesses;
+  for (const double guess : kGuesses) {
+    guesses.emplace_back(data, priors, some(data.windows, kSearched), guess);
+    guesses.back().run(kSearch);
+  }
+  std::vector<const TraverseFit*> by_cost;
+  for (const TraverseFit& guess : guesses) by_cost.push_back(&guess);
+  std::sort(by_cost.begin(), by_cost.end(),
+            [](const auto* a, const auto* b) { return cost_of(*a) < cost_of(*b); });
+  std::vector<TraverseFit> kept;
+  for (const TraverseFit* guess : by_cost)
+    if (std::none_of(kept.begin(), kept.end(), [&](const auto& other) { return alike(*guess, other); }))
+      kept.push_back(*guess);
+  return kept;
+}
+
+/// Another fit's machine on all windows.
+TraverseFit gone_on(const TraverseFit& from, const TraverseData& data) {
+  TraverseFit fit(from, data, some(data.windows, kMost));
+  fit.run(kFit);
+  return fit;
+}
+
 /// A fit stops where it is cheapest nearby: others begin with what is declared and gaps about the cheapest
-/// one's, as long as that finds a cheaper one.
+/// one's, on some of the crossings, and go on where they are not dearer there, as long as that finds a
+/// cheaper one.
 void look_beside(std::vector<TraverseFit>& fits, const TraverseData& data, const TraversePriors& priors) {
+  const std::vector<TraverseWindow> few = some(data.windows, kSearched);
   for (int round = 0; round < kRounds; ++round) {
     const TraverseFit best = cheapest(fits);
+    TraverseFit here(best, data, few);
+    here.run(kSearch);
     for (const double factor : kBeside) {
       const TraversePrior& gap = priors[kTraverseGap];
-      fits.emplace_back(data, priors, some(data.windows, kMost),
-                        std::log(factor * best.value(kTraverseGap) / gap.value) / gap.spread);
-      fits.back().run(kFit);
+      TraverseFit beside(data, priors, few,
+                         std::log(factor * best.value(kTraverseGap) / gap.value) / gap.spread);
+      beside.run(kSearch);
+      const bool rival = !alike(beside, here) && cost_of(beside) < cost_of(here) + kRivalCost;
+      if (rival || cost_of(beside) < cost_of(here) - kCheaper) fits.push_back(gone_on(beside, data));
     }
     if (!(cost_of(cheapest(fits)) < cost_of(best) - kCheaper)) return;
   }
@@ -123,22 +143,14 @@ void look_beside(std::vector<TraverseFit>& fits, const TraverseData& data, const
 /// Each leaves out other crossings: all are compared on all.
 Solution solve(const TraverseData& data, const TraversePriors& priors,
                const std::vector<TraverseFit>& guesses) {
-  std::vector<std::pair<double, const TraverseFit*>> cheap;
-  for (const TraverseFit& guess : guesses) cheap.emplace_back(cost_of(guess), &guess);
-  std::sort(cheap.begin(), cheap.end());
-  if (cheap.size() > kGoneOn) cheap.resize(kGoneOn);
   std::vector<TraverseFit> fits;
-  for (const auto& [cost, guess] : cheap) {
-    fits.emplace_back(*guess, data, some(data.windows, kMost));
-    fits.back().run(kFit);
-  }
+  for (std::size_t i = 0; i < std::min(kGoneOn, guesses.size()); ++i)
+    fits.push_back(gone_on(guesses[i], data));
   look_beside(fits, data, priors);
   const TraverseFit& best = cheapest(fits);
-  const double gap = best.value(kTraverseGap);
-  Solution solution{best, gap, std::numeric_limits<double>::infinity()};
+  Solution solution{best, best.value(kTraverseGap), std::numeric_limits<double>::infinity()};
   for (const TraverseFit& other : fits)
-    if (std::fabs(std::log(other.value(kTraverseGap) / gap)) > kAlike &&
-        cost_of(other) - cost_of(best) < solution.rival_cost)
+    if (!alike(other, best) && cost_of(other) - cost_of(best) < solution.rival_cost)
       solution.rival_gap = other.value(kTraverseGap), solution.rival_cost = cost_of(other) - cost_of(best);
   return solution;
 }
@@ -209,15 +221,15 @@ void require_crossings(const TraverseData& data, int fewest) {
                             data.crossings, data.windows.size(), fewest, data.clear)};
 }
 
-/// Those that are left out take long, or follow each other closely, as of a large play they do: where they
-/// are many, what is left has been told of a play of half the size, with nothing but noise left.
+/// Those that are left out take long, or begin in no clear press, as of a large play they do: where they are
+/// many, what is left has been told of a play of half the size, with nothing but noise left.
 void require_most(const TraverseData& data) {
-  if (double(data.windows.size()) >= kFewOf * double(data.crossings)) return;
+  if (double(data.within) >= kFewOf * double(data.crossings)) return;
   throw Refusal{
       Status::insufficient_data,
-      fmt::format("{} of {} crossings of the gap can be looked at, the others are too slow or too close "
-                  "to each other, as those of a larger play: {:.0f} % are needed",
-                  data.windows.size(), data.crossings, 100 * kFewOf)};
+      fmt::format("{} of {} crossings of the gap can be looked at, the others are too slow or begin "
+                  "in no clear press on a flank, as those of a larger play: {:.0f} % are needed",
+                  data.within, data.crossings, 100 * kFewOf)};
 }
 
 /// Crossings that begin in a clear press whatever is wrong with the declared friction of the motor.
@@ -243,7 +255,7 @@ Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSe
     require_crossings(first, kFewestFirst);
     const TraversePriors priors = traverse_priors(first, settings);
     const std::vector<TraverseFit> guesses = guesses_of(first, priors);
-    const TraverseData data = second_data(record, settings, cheapest(guesses));
+    const TraverseData data = second_data(record, settings, guesses.front());
     require_crossings(data, kFewest);
     require_most(data);
     fill(estimate, solve(data, priors, guesses), data, settings);

@@ -14,20 +14,22 @@ namespace backlash::diagnosis {
 namespace {
 
 // All choices, tried on simulated machines, but where another origin is given.
-constexpr double kCycleSamples = 8;  // fewest samples in a cycle of the motor against the load
-constexpr double kStep = 0.06;       // of the integration times the fastest frequency, rad
-constexpr double kBefore = 0.8;      // cycles of a window before a crossing: tell the start
-constexpr double kAfter = 2.6;       // and from its begin on: the first touches, at least
-constexpr double kTouches = 1.6;     // the same, from the end of a crossing on
-constexpr double kMostTurns = 0.8;   // share of the crossings that fit into a window so long
-constexpr double kLongest = 12;      // cycles, after the begin of a crossing
-constexpr double kCounted = 0.5;     // share of a window in which the motor moves
-constexpr double kUneven = 0.25;     // of an interval, from one sample to the next
-constexpr double kClear = 4.4;       // noises of the averaged torque, above which it presses a flank
-constexpr double kAveraged = 0.16;   // cycles, half width of the average
-constexpr double kSlow = 0.02;       // of the rms speed: there dry friction takes any value
-constexpr double kFade = 0.01;       // of it: the load's friction turns its sign within
+constexpr double kCycleSamples = 8;   // fewest samples in a cycle of the motor against the load
+constexpr double kStep = 0.2;         // of the integration times the fastest frequency, rad
+constexpr double kBefore = 0.8;       // cycles of a window before a crossing, at least: tell the start
+constexpr double kLongestBefore = 3;  // the same at most
+constexpr double kAfter = 2.6;        // and from its begin on: the first touches, at least
+constexpr double kTouches = 1.6;      // the same, from the end of a crossing on
+constexpr double kMostTurns = 0.8;    // share of the crossings that fit into a window so long
+constexpr double kLongest = 12;       // cycles, after the begin of a crossing
+constexpr double kCounted = 0.5;      // share of a window in which the motor moves
+constexpr double kUneven = 0.25;      // of an interval, from one sample to the next
+constexpr double kClear = 4.4;        // noises of the averaged torque, above which it presses a flank
+constexpr double kAveraged = 0.16;    // cycles, half width of the average
+constexpr double kSlow = 0.02;        // of the rms speed: there dry friction takes any value
+constexpr double kFade = 0.01;        // of it: the load's friction turns its sign within
 constexpr std::size_t kFewestSamples = 256;
+constexpr std::size_t kFirst = 3;  // samples, that differences and delays need
 
 /// Value and slope per sample of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
 struct Quadratic {
@@ -94,6 +96,34 @@ std::size_t reach_of(const TraverseData& d, double cycle) {
   return std::max<std::size_t>(2, std::size_t(std::lround(kAveraged * cycle / d.interval)));
 }
 
+/// Of each sample: the averaged torque through the teeth, the flank that it presses (0: not clear which), and
+/// for sure: whatever is wrong with the motor, while it moves, as far as the average reaches.
+struct Presses {
+  std::vector<double> torque;
+  std::vector<int> flank, sure;
+};
+
+Presses presses_of(TraverseData& d, const std::vector<double>& teeth, const Quadratic& quadratic,
+                   double unsure) {
+  const std::size_t n = teeth.size(), reach = quadratic.reach;
+  Presses p{std::vector<double>(n, 0.0), std::vector<int>(n, 0), std::vector<int>(n, 0)};
+  const double clear = kClear * d.noise;
+  std::vector<double> pressed;
+  for (std::size_t i = reach + 1; i + reach + 1 < n; ++i) {
+    p.torque[i] = quadratic.of(teeth, i, quadratic.value);
+    if (std::fabs(p.torque[i]) < clear) continue;
+    p.flank[i] = p.torque[i] > 0 ? 1 : -1;
+    pressed.push_back(std::fabs(p.torque[i]));
+  }
+  d.clear = clear + unsure;
+  if (!pressed.empty()) d.level = signal::median(pressed);
+  for (std::size_t i = kFirst + 2 * reach; i + 2 * reach < n; ++i)
+    if (d.counts[i] && std::fabs(p.torque[i]) > d.clear && p.flank[i - reach] == p.flank[i] &&
+        p.flank[i + reach] == p.flank[i])
+      p.sure[i] = p.flank[i];
+  return p;
+}
+
 /// Last sample on a flank, and the first on the other one.
 struct Turn {
   std::size_t left, touched;
@@ -102,12 +132,27 @@ struct Turn {
 std::vector<Turn> turns_of(const std::vector<int>& flank) {
   std::vector<Turn> turns;
   std::size_t last = 0;
-  for (std::size_t i = 3; i < flank.size(); ++i) {
+  for (std::size_t i = kFirst; i < flank.size(); ++i) {
     if (flank[i] == 0) continue;
     if (last > 0 && flank[last] != flank[i]) turns.push_back({last, i});
     last = i;
   }
   return turns;
+}
+
+/// Of a window before the begin of a crossing: since its flank was last pressed for sure, of most crossings.
+std::size_t samples_before(const std::vector<Turn>& turns, const Presses& presses, double cycle) {
+  const auto longest = std::size_t(std::lround(kLongestBefore * cycle));
+  std::vector<double> since;
+  for (const Turn& turn : turns)
+    for (std::size_t i = 0; i <= std::min(longest, turn.left); ++i) {
+      if (presses.flank[turn.left - i] == -presses.flank[turn.left]) break;
+      if (presses.sure[turn.left - i] == 0) continue;
+      since.push_back(double(i));
+      break;
+    }
+  const double most = since.empty() ? 0 : signal::quantile(since, kMostTurns);
+  return std::size_t(std::lround(std::max(most, kBefore * cycle)));
 }
 
 /// Of a window from the begin of a crossing on: the first touches, of most crossings. Those that are left out
@@ -119,40 +164,46 @@ std::size_t samples_after(const std::vector<Turn>& turns, double cycle) {
   return std::size_t(std::lround(std::clamp(most + kTouches * cycle, kAfter * cycle, kLongest * cycle)));
 }
 
+/// The earliest sample at most `before` before a crossing that presses its flank for sure; its begin where
+/// there is none.
+std::size_t first_of_window(const Turn& turn, const Presses& presses, std::size_t before) {
+  const int flank = presses.flank[turn.left];
+  std::size_t first = turn.left;
+  while (first > 0 && turn.left - first < before && presses.flank[first - 1] != -flank) --first;
+  while (first < turn.left && presses.sure[first] != flank) ++first;
+  return first;
+}
+
+/// How many crossings lie in a window from flank to flank.
+std::size_t count_within(const std::vector<Turn>& turns, const TraverseData& d) {
+  return std::size_t(std::count_if(turns.begin(), turns.end(), [&](const Turn& turn) {
+    return std::any_of(d.windows.begin(), d.windows.end(), [&](const TraverseWindow& w) {
+      return w.first <= turn.left && turn.touched < w.first + d.samples;
+    });
+  }));
+}
+
 void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycle, double unsure) {
-  const std::size_t n = teeth.size();
   const Quadratic quadratic(reach_of(d, cycle));
-  std::vector<double> smooth(n, 0.0), pressed;
-  std::vector<int> flank(n, 0);
-  const double clear = kClear * d.noise;
-  for (std::size_t i = quadratic.reach + 1; i + quadratic.reach + 1 < n; ++i) {
-    smooth[i] = quadratic.of(teeth, i, quadratic.value);
-    if (std::fabs(smooth[i]) < clear) continue;
-    flank[i] = smooth[i] > 0 ? 1 : -1;
-    pressed.push_back(std::fabs(smooth[i]));
-  }
-  d.clear = clear + unsure;
-  if (!pressed.empty()) d.level = signal::median(pressed);
-  const std::vector<Turn> turns = turns_of(flank);
+  const Presses presses = presses_of(d, teeth, quadratic, unsure);
+  const std::vector<Turn> turns = turns_of(presses.flank);
   d.crossings = turns.size();
-  const auto before = static_cast<std::size_t>(std::lround(kBefore * cycle / d.interval));
+  const std::size_t before = samples_before(turns, presses, cycle / d.interval);
   d.samples = before + samples_after(turns, cycle / d.interval);
-  std::size_t free_from = 3;  // where the next window may begin
+  std::size_t free_from = kFirst;  // where the next window may begin
   for (const Turn& turn : turns) {
-    std::size_t first = turn.left > before ? turn.left - before : 0;
-    const auto sure = [&](std::size_t k) {
-      return k > 2 + quadratic.reach && flank[turn.left] * smooth[k] > d.clear;
-    };
-    while (first < turn.left && !sure(first)) ++first;
-    if (first < free_from || !sure(first) || first + d.samples + quadratic.reach + 1 >= n ||
+    const std::size_t first = first_of_window(turn, presses, before);
+    if (first < free_from || presses.sure[first] == 0 ||
+        first + d.samples + quadratic.reach + 1 >= teeth.size() ||
         turn.touched + d.samples / 8 > first + d.samples)
       continue;
     const auto from = d.counts.begin() + std::ptrdiff_t(first), to = from + std::ptrdiff_t(d.samples);
     if (double(std::count(from, to, 1)) < kCounted * double(d.samples)) continue;
-    d.windows.push_back({first, double(flank[first]), smooth[first],
+    d.windows.push_back({first, double(presses.flank[first]), presses.torque[first],
                          quadratic.of(teeth, first, quadratic.slope) / d.interval});
     free_from = first + d.samples / 2;
   }
+  d.within = count_within(turns, d);
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ struct TraverseData {
   double level = 0;                    // N m, of it, median where it presses a flank
   double slow = 0;                     // rad/s, below which dry friction fades
   std::size_t crossings = 0;           // changes of flank, of which windows may hold several
+  std::size_t within = 0;              // of them, from flank to flank in a window
   std::vector<TraverseWindow> windows;
 };
 

@@ -38,6 +38,9 @@ constexpr double kEnough = 1e-5;      // gain of the cost below which it ends, r
 constexpr double kFarOff = 3;         // times the median rms: a crossing is left out
 constexpr int kLook = 6;              // steps between two looks for such crossings
 constexpr int kTries = 8;
+constexpr int kSettleSteps = 12;      // of one crossing alone
+constexpr double kLongestOwn = 1;     // spreads, of its value in one of them
+constexpr double kSettled = 1e-3;     // gain of its cost below which they end, relative
 constexpr std::size_t kTogether = 4;  // windows of a linearisation, which fill whole groups of runs
 constexpr int kUnmoved = kTraverseValues + kTraverseOwn;  // beside the values of machine and crossing
 
@@ -142,6 +145,7 @@ TraverseFit::TraverseFit(const TraverseFit& other, const TraverseData& data,
                          std::vector<TraverseWindow> windows)
     : TraverseFit(data, other.priors_, std::move(windows), 0) {
   z_ = other.z_;
+  settle(used_);
 }
 
 double TraverseFit::value(int which, double z) const {
@@ -286,10 +290,63 @@ bool TraverseFit::iterate() {
   return false;
 }
 
+/// One after the other: steps of all crossings together lead some of them astray.
+void TraverseFit::settle(const std::vector<char>& which) {
+  for_each_in_parallel(windows(), [&](int w) {
+    const auto window = static_cast<std::size_t>(w);
+    if (which[window]) own_[window] = settled(window);
+  });
+}
+
+TraverseOwn TraverseFit::settled(std::size_t window) const {
+  const TraverseMachine here = machine(z_);
+  const auto left = [&](const TraverseRun& run, const auto& teeth) {
+    const VectorXd all = traverse_residual(data_, run, teeth), counted = all(weights_[window].counted);
+    return VectorXd(weights_[window].deviation.triangularView<Eigen::Lower>().solve(counted));
+  };
+  const auto cost = [&](const TraverseOwn& at) {
+    const TraverseRun run = run_of(window, here, at);
+    return left(run, traverse_teeth(data_, {run}).col(0)).squaredNorm() + at.squaredNorm();
+  };
+  TraverseOwn own = TraverseOwn::Zero();
+  double damping = kFirstDamping, now = cost(own);
+  for (int step = 0; step < kSettleSteps; ++step) {
+    std::vector<TraverseRun> runs = {run_of(window, here, own)};
+    for (int k = 0; k < kTraverseOwn; ++k)
+      runs.push_back(run_of(window, here, own + kStartDifference * TraverseOwn::Unit(k)));
+    const MatrixXd teeth = traverse_teeth(data_, runs);
+    const VectorXd r = left(runs[0], teeth.col(0));
+    MatrixXd slopes(r.size(), int(kTraverseOwn));
+    for (int k = 0; k < kTraverseOwn; ++k)
+      slopes.col(k) = (left(runs[std::size_t(k) + 1], teeth.col(k + 1)) - r) / kStartDifference;
+    const TraverseMatrix normal = signal::gram(slopes) + TraverseMatrix::Identity();
+    const TraverseOwn toward = -signal::transposed_product(slopes, r) - own;
+    double gain = 0;
+    for (int attempt = 0; attempt < kTries && !(gain > 0); ++attempt) {
+      TraverseMatrix damped = normal;
+      damped.diagonal() *= 1 + damping;
+      const TraverseOwn move = damped.inverse() * toward,
+                        moved = (own + move.cwiseMax(-kLongestOwn).cwiseMin(kLongestOwn))
+                                    .cwiseMax(-kFarthestOwn)
+                                    .cwiseMin(kFarthestOwn);
+      const double then = cost(moved);
+      gain = now - then;
+      damping = gain > 0 ? std::max(kLeastDamping, damping / kEasier) : damping * kHarder;
+      if (gain > 0) own = moved, now = then;
+    }
+    if (!(gain > kSettled * now)) break;
+  }
+  return own;
+}
+
 void TraverseFit::leave_out() {
   std::vector<double> rms(windows_.size());
   cost_of(z_, own_, &rms);
   const double most = kFarOff * std::max(1.0, signal::median(rms));
+  std::vector<char> far(windows_.size());
+  for (std::size_t w = 0; w < windows_.size(); ++w) far[w] = !(rms[w] <= most);
+  settle(far);
+  cost_of(z_, own_, &rms);
   for (std::size_t w = 0; w < windows_.size(); ++w) {
     used_[w] = rms[w] <= most;
     if (!used_[w]) own_[w].setZero();

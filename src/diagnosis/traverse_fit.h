@@ -25,7 +25,7 @@ class TraverseFit {
   /// Uses `windows` of the data's, and begins with a gap of `first_gap` spreads.
   TraverseFit(const TraverseData& data, const TraversePriors& priors, std::vector<TraverseWindow> windows,
               double first_gap);
-  /// Another fit's machine on these windows, of its data or of others.
+  /// Another fit's machine on these windows, of its data or of others, whose own values are fitted to it.
   TraverseFit(const TraverseFit& other, const TraverseData& data, std::vector<TraverseWindow> windows);
 
   /// At most so many steps; crossings that the machine does not follow are left out on the way.
@@ -77,6 +77,9 @@ class TraverseFit {
   double cost_of(const Eigen::VectorXd& z, const std::vector<TraverseOwn>& own,
                  std::vector<double>* rms) const;
   bool iterate();
+  /// Own values of crossings anew, with the machine as it is.
+  void settle(const std::vector<char>& which);
+  TraverseOwn settled(std::size_t window) const;
   void leave_out();
 
   const TraverseData& data_;

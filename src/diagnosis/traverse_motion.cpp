@@ -11,18 +11,21 @@ namespace {
 
 // Deflections, in those under the usual torque, and powers beyond which no fit comes: they keep lanes_exp()
 // within its range.
+constexpr int kChangeSteps = 4;  // of Newton's method: choice, two would do
+constexpr double kFlat = 0.1;    // slope over that of the chord, below which the chord's is taken: choice
 constexpr double kLeastDeflection = 1e-30, kMostDeflection = 1e30, kMostPower = 10;
 
 template <typename Lanes>
 constexpr int kLanesOf = static_cast<int>(sizeof(Lanes) / sizeof(double));
 
-/// Motor between two samples at share u of the interval, a cubic through positions and rates: what their
-/// differences, and the rates at either end, count there.
+/// Of a cubic through two places, `interval` apart, with rates there, at share u of the way: what their
+/// difference and the rates at either end count. A number for all lanes, or one for each.
+template <typename T>
 struct CubicWeights {
-  double position_step, position_begin, position_end;  // -, s, s
-  double rate_step, rate_begin, rate_end;              // 1/s, -, -
+  T position_step, position_begin, position_end;  // -, s, s
+  T rate_step, rate_begin, rate_end;              // 1/s, -, -
 
-  CubicWeights(double u, double interval)
+  DIAGNOSIS_LANES CubicWeights(const T& u, double interval)
       : position_step(u * u * (3 - 2 * u)),
         position_begin(u * (1 - u) * (1 - u) * interval),
         position_end(u * u * (u - 1) * interval),
@@ -63,16 +66,15 @@ struct Machines {
     return {turned(x, side) - half_gap, turned(Lanes(motor.rate - load.rate), side), side};
   }
 
-  /// Through the teeth, never tensile.
+  /// Through teeth that are pressed; where they would pull they have come apart. On the other side of no
+  /// deflection it goes on smoothly, for the steps that come there.
   DIAGNOSIS_LANES Lanes torque(const Touch<Lanes>& touch) const {
-    const Lanes deflection = touch.depth * per_deflection;
+    const Lanes deflection = (touch.depth > 0 ? touch.depth : -touch.depth) * per_deflection;
     const Lanes not_less = deflection > kLeastDeflection ? deflection : Lanes{} + kLeastDeflection;
     const Lanes within = not_less < kMostDeflection ? not_less : Lanes{} + kMostDeflection;
     const Lanes harder = lanes_exp(Lanes(beyond_spring * lanes_log(within)));
     const Lanes damper = beyond_spring > 0 ? damping * harder * harder * harder : damping;
-    const Lanes force = stiffness * touch.depth * harder + damper * touch.rate;
-    const Lanes pushed = force > 0 ? force : Lanes{};
-    return turned(touch.depth > 0 ? pushed : Lanes{}, touch.side);
+    return stiffness * touch.depth * harder + damper * touch.rate;
   }
 
   /// Of the load, rad/s^2.
@@ -111,11 +113,49 @@ Place<double> start_of(const TraverseData& data, const TraverseRun& run) {
           data.rate[w.first] - in * w.torque_rate / (power * torque) + run.own[kOwnRate]};
 }
 
+template <typename Flags>
+DIAGNOSIS_LANES bool any(const Flags& flags) {
+  bool found = false;
+  for (std::size_t i = 0; i < sizeof(Flags) / sizeof(double); ++i) found |= flags[i] != 0;
+  return found;
+}
+
+template <typename Lanes>
+DIAGNOSIS_LANES Lanes clamped(const Lanes& share) {
+  const Lanes not_less = share > 0 ? share : Lanes{};
+  return not_less < 1 ? not_less : Lanes{} + 1;
+}
+
+/// A step of an interval from share `from` to `to` of it. What the torque of its stages counts in the means
+/// about the samples at both ends: 1 - u and u at share u, by Simpson's rule, which is that of the stages. A
+/// number for all lanes, or one for each.
+template <typename T>
+struct Step {
+  CubicWeights<T> half, end;
+  T length;               // s
+  T before[3], after[3];  // at its begin, at each of both stages in the middle, and at its end
+
+  DIAGNOSIS_LANES Step(const T& from, const T& to, double interval)
+      : half(T(0.5 * (from + to)), interval), end(to, interval), length((to - from) * interval) {
+    const T sixth = (to - from) / 6, middle = 0.5 * (from + to);
+    before[0] = sixth * (1 - from), after[0] = sixth * from;
+    before[1] = 2 * sixth * (1 - middle), after[1] = 2 * sixth * middle;
+    before[2] = sixth * (1 - to), after[2] = sixth * to;
+  }
+};
+
 /// Loads of some runs, moved by the classical Runge-Kutta method, its stages one by one: the compiler mixes
 /// those of several of these, so that the processor need not wait.
+///
+/// Teeth are pressed, or not, from the begin of a step to its end. Where that ends within the step, as those
+/// that are apart touch or those that are pressed would pull, the step is taken again up to there, and on
+/// from there in the other way. Damped teeth push at once when they touch: a step across that would be wrong
+/// by as much as it is long, and differently for each value of the machine, which no fit can follow.
 template <typename Lanes>
 class alignas(sizeof(Lanes)) Loads {
  public:
+  using Flags = LaneBits<Lanes>;
+
   DIAGNOSIS_LANES void start(const TraverseData& data, const TraverseRun* const* runs) {
     machines_ = machines_of<Lanes>(data, runs);
     for (int i = 0; i < kLanesOf<Lanes>; ++i) {
@@ -125,100 +165,198 @@ class alignas(sizeof(Lanes)) Loads {
       next_.position[i] = data.position[first], next_.rate[i] = data.rate[first];
       positions_[i] = data.position.data() + first, rates_[i] = data.rate.data() + first;
     }
-    trial_ = load_;
+    motor_ = next_, trial_ = load_;
+    touch_ = machines_.touch(motor_, trial_);
+    force_ = machines_.torque(touch_);
+    pressed_ = (touch_.depth > 0) & (force_ > 0);
+    teeth_ = pressed_ ? turned(force_, touch_.side) : Lanes{};
   }
 
   /// To the interval from sample k to the next.
   DIAGNOSIS_LANES void begin(std::size_t k) {
-    here_ = motor_ = next_;
+    here_ = next_;
     for (int i = 0; i < kLanesOf<Lanes>; ++i)
       next_.position[i] = positions_[i][k + 1], next_.rate[i] = rates_[i][k + 1];
     step_ = next_.position - here_.position;
     mean_ = mean_of_next_, mean_of_next_ = Lanes{};
   }
 
-  DIAGNOSIS_LANES void move_motor(const CubicWeights& w) {
+  template <typename T>
+  DIAGNOSIS_LANES void move_motor(const CubicWeights<T>& w) {
     motor_.position = here_.position + w.position_step * step_ + w.position_begin * here_.rate +
                       w.position_end * next_.rate;
     motor_.rate = w.rate_step * step_ + w.rate_begin * here_.rate + w.rate_end * next_.rate;
   }
 
-  /// At the place of this stage: which are pressed.
-  DIAGNOSIS_LANES LaneBits<Lanes> touch() {
+  DIAGNOSIS_LANES Flags pressed() const { return pressed_; }
+  /// The torque at the place of this stage; where none is pressed none is asked for.
+  DIAGNOSIS_LANES void press() {
     touch_ = machines_.touch(motor_, trial_);
-    return touch_.depth > 0;
+    force_ = machines_.torque(touch_);
+    teeth_ = pressed_ ? turned(force_, touch_.side) : Lanes{};
   }
-  DIAGNOSIS_LANES void press() { teeth_ = machines_.torque(touch_); }
   DIAGNOSIS_LANES void leave() { teeth_ = Lanes{}; }
 
-  /// `before`, `after`: how the torque here counts in the means about sample k and the next.
-  DIAGNOSIS_LANES void first_stage(double half, double before, double after) {
-    mean_ += before * teeth_, mean_of_next_ += after * teeth_;
-    sum_ = Place<Lanes>{};
-    stage(1, half);
+  template <typename T>
+  DIAGNOSIS_LANES void first_stage(const Step<T>& s) {
+    sum_ = Place<Lanes>{}, sum_before_ = sum_after_ = Lanes{};
+    stage<T>(1, s.length / 2, s.before[0], s.after[0]);
   }
-
-  /// Counts `weight` times; the next is `on` later than the first.
-  DIAGNOSIS_LANES void stage(double weight, double on) {
+  /// The rates count `weight` times, and the next stage is `on` later than the first.
+  template <typename T>
+  DIAGNOSIS_LANES void stage(double weight, const T& on, const T& before, const T& after) {
     const Lanes rate = trial_.rate, acceleration = machines_.acceleration(teeth_, rate);
     sum_.position += weight * rate, sum_.rate += weight * acceleration;
+    sum_before_ += before * teeth_, sum_after_ += after * teeth_;
+    middle_ = force_;  // after the third
     trial_ = {load_.position + on * rate, load_.rate + on * acceleration};
   }
-
-  DIAGNOSIS_LANES void last_stage(double sixth) {
-    sum_.position += trial_.rate, sum_.rate += machines_.acceleration(teeth_, trial_.rate);
-    load_.position += sixth * sum_.position, load_.rate += sixth * sum_.rate;
+  template <typename T>
+  DIAGNOSIS_LANES void last_stage(const Step<T>& s) {
+    const Lanes middle = middle_;
+    stage<T>(1, s.length, s.before[2], s.after[2]);
+    middle_ = middle;
+    load_.position += s.length / 6 * sum_.position, load_.rate += s.length / 6 * sum_.rate;
     trial_ = load_;
+    touch_ = machines_.touch(motor_, load_);
+  }
+
+  /// Which may be pressed where the step has come to.
+  DIAGNOSIS_LANES Flags may_press() const { return pressed_ | (touch_.depth > 0); }
+  /// Which have come to touch or to leave in the step.
+  DIAGNOSIS_LANES Flags changed() {
+    force_ = machines_.torque(touch_);
+    return changed_ = pressed_ ^ ((touch_.depth > 0) & (force_ > 0));
+  }
+  DIAGNOSIS_LANES void keep_begin() { begin_ = {load_, motor_, touch_, force_, teeth_, Lanes{}, Lanes{}}; }
+  DIAGNOSIS_LANES void end_step() {
+    mean_ += sum_before_, mean_of_next_ += sum_after_;
+    teeth_ = pressed_ ? turned(force_, touch_.side) : Lanes{};
+  }
+
+  /// Back to the begin of the step. Returns the share of it, `step` long, after which they touch or leave.
+  DIAGNOSIS_LANES Lanes go_back(double step) {
+    const Lanes share = share_of_change(step);
+    end_ = {load_, motor_, touch_, force_, teeth_, sum_before_, sum_after_};
+    load_ = trial_ = begin_.load, touch_ = begin_.touch, force_ = begin_.force, teeth_ = begin_.teeth;
+    return share;
+  }
+  /// At the place where they touch or leave.
+  DIAGNOSIS_LANES void change() {
+    first_before_ = sum_before_, first_after_ = sum_after_;
+    pressed_ ^= changed_;
+    press();
+  }
+  /// At the end of the step; those that did not change are as they were there.
+  DIAGNOSIS_LANES void end_change() {
+    load_.position = changed_ ? load_.position : end_.load.position;
+    load_.rate = changed_ ? load_.rate : end_.load.rate;
+    sum_before_ = changed_ ? first_before_ + sum_before_ : end_.sum_before;
+    sum_after_ = changed_ ? first_after_ + sum_after_ : end_.sum_after;
+    trial_ = load_, motor_ = end_.motor;
+    touch_ = machines_.touch(motor_, load_);
+    force_ = machines_.torque(touch_);
   }
 
   /// About sample k.
   DIAGNOSIS_LANES double mean(int lane) const { return mean_[lane]; }
 
  private:
+  /// Of those that are apart the depth, a cubic through both ends of the step and its slopes there, comes to
+  /// 0; of those that are pressed the torque, a square through both ends and the middle. Newton's method from
+  /// the chord, which both all but follow.
+  DIAGNOSIS_LANES Lanes share_of_change(double step) const {
+    const Flags other = begin_.touch.side ^ touch_.side;  // they come from beyond the middle of the gap
+    const Lanes depth = other ? -2 * machines_.half_gap - begin_.touch.depth : begin_.touch.depth,
+                grows = step * turned(begin_.touch.rate, other), grows_last = step * touch_.rate,
+                deeper = touch_.depth - depth, pulls = begin_.force - force_;
+    const Lanes from = pressed_ ? -begin_.force : depth, chord = pressed_ ? pulls : deeper,
+                first = pressed_ ? 3 * begin_.force - 4 * middle_ + force_ : grows,
+                second = pressed_ ? chord - first : 3 * deeper - 2 * grows - grows_last,
+                third = pressed_ ? Lanes{} : grows + grows_last - 2 * deeper;
+    Lanes u = clamped<Lanes>(-from / chord);
+    for (int i = 0; i < kChangeSteps; ++i) {
+      const Lanes there = from + u * (first + u * (second + u * third)),
+                  slope = first + u * (2 * second + 3 * u * third);
+      u = clamped<Lanes>(u - there / (slope > kFlat * chord ? slope : chord));
+    }
+    return u;
+  }
+
+  struct State {
+    Place<Lanes> load, motor;
+    Touch<Lanes> touch;
+    Lanes force, teeth, sum_before, sum_after;
+  };
+
   Machines<Lanes> machines_;
   Place<Lanes> here_, next_, motor_, load_, trial_, sum_;
   Touch<Lanes> touch_;
-  Lanes teeth_, step_, mean_, mean_of_next_ = {};
+  Lanes force_, teeth_, middle_;  // of the teeth if they are pressed, through them, in the middle of the step
+  Flags pressed_, changed_;
+  Lanes step_, sum_before_, sum_after_, first_before_, first_after_, mean_, mean_of_next_ = {};
+  State begin_, end_;
   const double *positions_[kLanesOf<Lanes>], *rates_[kLanesOf<Lanes>];  // of the motor
 };
 
 /// The torque of a stage. Half of the time no teeth are pressed, and powers take most of the time.
-template <typename Lanes, int Parts>
-DIAGNOSIS_LANES void press(Loads<Lanes> (&parts)[Parts]) {
+template <int Parts, typename Lanes>
+DIAGNOSIS_LANES void press(Loads<Lanes>* parts) {
   LaneBits<Lanes> pressed = {};
-  for (Loads<Lanes>& part : parts) pressed |= part.touch();
-  bool any = false;
-  for (int i = 0; i < kLanesOf<Lanes>; ++i) any |= pressed[i] != 0;
-  if (any)
-    for (Loads<Lanes>& part : parts) part.press();
+  for (int p = 0; p < Parts; ++p) pressed |= parts[p].pressed();
+  if (any(pressed))
+    for (int p = 0; p < Parts; ++p) parts[p].press();
   else
-    for (Loads<Lanes>& part : parts) part.leave();
+    for (int p = 0; p < Parts; ++p) parts[p].leave();
 }
 
-/// Moves kTraverseRuns, of which the first `count` are wanted. `weights`: of each half step of the
-/// integration.
+template <int Parts, typename Lanes, typename T>
+DIAGNOSIS_LANES void move_part(Loads<Lanes>* parts, const Step<T>& s) {
+  for (int p = 0; p < Parts; ++p) parts[p].first_stage(s);
+  for (int p = 0; p < Parts; ++p) parts[p].move_motor(s.half);
+  press<Parts>(parts);
+  for (int p = 0; p < Parts; ++p) parts[p].template stage<T>(2, s.length / 2, s.before[1], s.after[1]);
+  press<Parts>(parts);
+  for (int p = 0; p < Parts; ++p) parts[p].template stage<T>(2, s.length, s.before[1], s.after[1]);
+  for (int p = 0; p < Parts; ++p) parts[p].move_motor(s.end);
+  press<Parts>(parts);
+  for (int p = 0; p < Parts; ++p) parts[p].last_stage(s);
+}
+
+/// Takes the step from `from` of an interval, `share` of it long, again.
 template <typename Lanes>
-DIAGNOSIS_LANES void move_all(const TraverseData& data, const CubicWeights* weights,
-                              const TraverseRun* const* runs, Eigen::Index count, double* to) {
+DIAGNOSIS_LANES void move_with_change(Loads<Lanes>& part, double from, double share, double interval) {
+  const Lanes change = from + share * part.go_back(share * interval);
+  move_part<1>(&part, Step<Lanes>(Lanes{} + from, change, interval));
+  part.change();
+  move_part<1>(&part, Step<Lanes>(change, Lanes{} + (from + share), interval));
+  part.end_change();
+}
+
+template <int Parts, typename Lanes>
+DIAGNOSIS_LANES void move_step(Loads<Lanes>* parts, double from, double share, double interval) {
+  for (int p = 0; p < Parts; ++p) parts[p].keep_begin();
+  move_part<Parts>(parts, Step<double>(from, from + share, interval));
+  LaneBits<Lanes> may_press = {}, changed = {};
+  for (int p = 0; p < Parts; ++p) may_press |= parts[p].may_press();
+  if (any(may_press))
+    for (int p = 0; p < Parts; ++p) changed |= parts[p].changed();
+  if (any(changed))
+    for (int p = 0; p < Parts; ++p) move_with_change(parts[p], from, share, interval);
+  for (int p = 0; p < Parts; ++p) parts[p].end_step();
+}
+
+/// Moves kTraverseRuns, of which the first `count` are wanted.
+template <typename Lanes>
+DIAGNOSIS_LANES void move_all(const TraverseData& data, const TraverseRun* const* runs, Eigen::Index count,
+                              double* to) {
   constexpr int kLanes = kLanesOf<Lanes>, kParts = kTraverseRuns / kLanes;
   Loads<Lanes> parts[kParts];
   for (int p = 0; p < kParts; ++p) parts[p].start(data, runs + p * kLanes);
-  const double step = data.interval / data.steps, share = 1.0 / data.steps;
+  const double share = 1.0 / data.steps;
   for (std::size_t k = 0; k + 1 < data.samples; ++k) {
-    for (Loads<Lanes>& part : parts) part.begin(k);
-    for (int s = 0; s < data.steps; ++s) {
-      const double after = s * share * share;
-      press(parts);
-      for (Loads<Lanes>& part : parts) part.first_stage(step / 2, share - after, after);
-      for (Loads<Lanes>& part : parts) part.move_motor(weights[2 * s]);
-      press(parts);
-      for (Loads<Lanes>& part : parts) part.stage(2, step / 2);
-      press(parts);
-      for (Loads<Lanes>& part : parts) part.stage(2, step);
-      for (Loads<Lanes>& part : parts) part.move_motor(weights[2 * s + 1]);
-      press(parts);
-      for (Loads<Lanes>& part : parts) part.last_stage(step / 6);
-    }
+    for (int p = 0; p < kParts; ++p) parts[p].begin(k);
+    for (int s = 0; s < data.steps; ++s) move_step<kParts>(parts, s * share, share, data.interval);
     for (int i = 0; i < count; ++i)
       to[static_cast<std::size_t>(i) * data.samples + k] = parts[i / kLanes].mean(i % kLanes);
   }
@@ -231,28 +369,25 @@ using Lanes4 = double __attribute__((vector_size(32)));
 using Lanes8 = double __attribute__((vector_size(64)));
 
 __attribute__((target("avx512f,prefer-vector-width=512"))) void move_avx512(const TraverseData& data,
-                                                                            const CubicWeights* weights,
                                                                             const TraverseRun* const* runs,
                                                                             Eigen::Index count, double* to) {
-  move_all<Lanes8>(data, weights, runs, count, to);
+  move_all<Lanes8>(data, runs, count, to);
 }
 
-__attribute__((target("avx2"))) void move_avx2(const TraverseData& data, const CubicWeights* weights,
-                                               const TraverseRun* const* runs, Eigen::Index count,
-                                               double* to) {
-  move_all<Lanes4>(data, weights, runs, count, to);
+__attribute__((target("avx2"))) void move_avx2(const TraverseData& data, const TraverseRun* const* runs,
+                                               Eigen::Index count, double* to) {
+  move_all<Lanes4>(data, runs, count, to);
 }
 #endif
 
-void move(const TraverseData& data, const CubicWeights* weights, const TraverseRun* const* runs,
-          Eigen::Index count, double* to) {
+void move(const TraverseData& data, const TraverseRun* const* runs, Eigen::Index count, double* to) {
 #if defined(__x86_64__)
   static const bool has_avx512 = __builtin_cpu_supports("avx512f");
   static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  if (has_avx512) return move_avx512(data, weights, runs, count, to);
-  if (has_avx2) return move_avx2(data, weights, runs, count, to);
+  if (has_avx512) return move_avx512(data, runs, count, to);
+  if (has_avx2) return move_avx2(data, runs, count, to);
 #endif
-  move_all<Lanes2>(data, weights, runs, count, to);
+  move_all<Lanes2>(data, runs, count, to);
 }
 
 }  // namespace
@@ -271,9 +406,6 @@ bool moves_load(int value) {
 }
 
 Eigen::MatrixXd traverse_teeth(const TraverseData& data, const std::vector<TraverseRun>& runs) {
-  std::vector<CubicWeights> weights;
-  for (int half = 1; half <= 2 * data.steps; ++half)
-    weights.emplace_back(half / (2.0 * data.steps), data.interval);
   const auto all = static_cast<Eigen::Index>(runs.size());
   Eigen::MatrixXd teeth = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data.samples), all);
   for (Eigen::Index first = 0; first < all; first += kTraverseRuns) {
@@ -281,7 +413,7 @@ Eigen::MatrixXd traverse_teeth(const TraverseData& data, const std::vector<Trave
     const TraverseRun* group[kTraverseRuns];
     for (Eigen::Index i = 0; i < kTraverseRuns; ++i)
       group[i] = &runs[static_cast<std::size_t>(first + std::min(i, count - 1))];
-    move(data, weights.data(), group, count, teeth.col(first).data());
+    move(data, group, count, teeth.col(first).data());
   }
   return teeth;
 }

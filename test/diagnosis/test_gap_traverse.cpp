@@ -68,19 +68,19 @@ GapTraverseSettings declared() {
   return s;
 }
 
-void expect_gap(const Servo& servo, const Estimate& e) {
+void expect_gap(const Servo& servo, const Estimate& e, double within = 0.1) {
   ASSERT_EQ(e.status, Status::ok) << e.message;
   EXPECT_LT(e.angle_lower, servo.gap) << e.message;
   EXPECT_GT(e.angle_upper, servo.gap) << e.message;
-  // kModel of the estimator: its interval holds every machine of the header within 10 %.
-  EXPECT_NEAR(e.backlash_angle, servo.gap, 0.1 * servo.gap) << e.message;
+  // By default: the estimator's interval (kModel) is for every machine of the header within 10 %.
+  EXPECT_NEAR(e.backlash_angle, servo.gap, within * servo.gap) << e.message;
 }
 
 TEST(GapTraverse, TellsThePlayOfOrdinaryMotionFromTheMotorsSide) {
   for (const double gap : {1.5e-4, 5e-4, 1.5e-3}) {
     Servo servo;
     servo.gap = gap;
-    expect_gap(servo, estimate_gap_traverse(servo.record(), declared()));
+    expect_gap(servo, estimate_gap_traverse(servo.record(), declared()), 0.02);  // of a machine as it is told
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Loads moved side by side against one moved alone by the library's pow().
+// Loads moved side by side against one moved alone in small steps by the library's pow().
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 /// A motor to and fro over a gap, and two windows.
 TraverseData some_data() {
   TraverseData d;
-  d.interval = 2e-3, d.steps = 7, d.samples = 60;
+  d.interval = 2e-3, d.steps = 4, d.samples = 60;
   d.level = 300, d.slow = 2e-4;
   for (int i = 0; i < 400; ++i) {
     const double t = i * d.interval;
@@ -46,7 +46,10 @@ TraverseRun some_run(const TraverseData& data, int which) {
   return run;
 }
 
-/// The equations of gap_traverse.h, run by run, by the library's pow().
+constexpr int kSmallSteps = 1000;  // per sample
+
+/// The equations of gap_traverse.h, run by run, by the library's pow(), in steps across touches: they are
+/// told to half a small step.
 class Reference {
  public:
   Reference(const TraverseData& data, const TraverseRun& run)
@@ -60,12 +63,12 @@ class Reference {
   /// Through the teeth about each sample but the last, N m.
   std::vector<double> teeth() {
     std::vector<double> mean(d_.samples, 0.0);
-    const double h = d_.interval / d_.steps;
+    const double h = d_.interval / kSmallSteps;
     for (std::size_t k = 0; k + 1 < d_.samples; ++k)
-      for (int s = 0; s < d_.steps; ++s) {
-        const double u = double(s) / d_.steps, half = u + 0.5 / d_.steps, end = u + 1.0 / d_.steps;
+      for (int s = 0; s < kSmallSteps; ++s) {
+        const double u = double(s) / kSmallSteps, half = u + 0.5 / kSmallSteps, end = u + 1.0 / kSmallSteps;
         const double here = torque(k, u, q_, w_);
-        mean[k] += (1 - u) * here / d_.steps, mean[k + 1] += u * here / d_.steps;
+        mean[k] += (1 - u) * here / kSmallSteps, mean[k + 1] += u * here / kSmallSteps;
         const double w1 = w_, a1 = acceleration(here, w1);
         const double w2 = w_ + h / 2 * a1, a2 = acceleration(torque(k, half, q_ + h / 2 * w1, w2), w2);
         const double w3 = w_ + h / 2 * a2, a3 = acceleration(torque(k, half, q_ + h / 2 * w2, w3), w3);
@@ -102,23 +105,34 @@ class Reference {
   double q_ = 0, w_ = 0;
 };
 
+/// Largest difference of the torque from the reference's over the usual torque, of all runs.
+double error_of(int steps, const std::vector<std::vector<double>>& expected) {
+  TraverseData data = some_data();
+  data.steps = steps;
+  std::vector<TraverseRun> runs;
+  for (std::size_t i = 0; i < expected.size(); ++i) runs.push_back(some_run(data, int(i)));
+  const Eigen::MatrixXd teeth = traverse_teeth(data, runs);
+  double worst = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    for (Eigen::Index k = 0; k + 1 < teeth.rows(); ++k)
+      worst = std::max(worst, std::fabs(teeth(k, Eigen::Index(i)) - expected[i][std::size_t(k)]));
+  return worst / data.level;
+}
+
+// The reference is off by half a small step at each touch of damped teeth: 4e-4 of the level here. A stage
+// across the end of friction's ramp, 2e-4 rad/s, is off by more.
 TEST(TraverseMotion, IsThatOfTheEquations) {
   const TraverseData data = some_data();
-  std::vector<TraverseRun> runs;
-  for (int i = 0; i < 11; ++i) runs.push_back(some_run(data, i));
-  const Eigen::MatrixXd teeth = traverse_teeth(data, runs);
-  ASSERT_EQ(teeth.cols(), 11);
+  std::vector<std::vector<double>> expected;
   for (int i = 0; i < 11; ++i) {
-    const std::vector<double> expected = Reference(data, runs[static_cast<std::size_t>(i)]).teeth();
-    int pressed = 0, free = 0;
-    for (Eigen::Index k = 0; k + 1 < teeth.rows(); ++k) {
-      const double there = expected[static_cast<std::size_t>(k)];
-      EXPECT_NEAR(teeth(k, i), there, 1e-9 * data.level) << "run " << i << ", sample " << k;
-      (std::fabs(there) > 0.1 * data.level ? pressed : free) += 1;
-    }
-    EXPECT_GT(pressed, 10) << i;
-    EXPECT_GE(free, 1) << i;
+    expected.push_back(Reference(data, some_run(data, i)).teeth());
+    const auto pressed = [&](double torque) { return std::fabs(torque) > 0.1 * data.level; };
+    EXPECT_GT(std::count_if(expected[i].begin(), expected[i].end(), pressed), 10) << i;
+    EXPECT_FALSE(std::all_of(expected[i].begin(), expected[i].end() - 1, pressed)) << i;
   }
+  EXPECT_LT(error_of(1, expected), 0.03);
+  EXPECT_LT(error_of(2, expected), 0.01);
+  EXPECT_LT(error_of(4, expected), 0.003);
 }
 
 TEST(TraverseMotion, OneAloneIsTheSameAsBesideOthers) {
