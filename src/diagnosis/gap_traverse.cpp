@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/distributions.h"
 #include "refusal.h"
 #include "traverse_fit.h"
@@ -93,14 +94,19 @@ bool alike(const TraverseFit& a, const TraverseFit& b) {
   return std::fabs(std::log(a.value(kTraverseGap) / b.value(kTraverseGap))) < kAlike;
 }
 
+/// Steps of each on its crossings, side by side.
+void search(std::vector<TraverseFit>& fits) {
+  for_each_in_parallel(static_cast<int>(fits.size()),
+                       [&](int i) { fits[static_cast<std::size_t>(i)].run(kSearch); });
+}
+
 /// What fits begin with: guesses that some of the crossings have improved, cheapest first, without those that
 /// came to the same.
 std::vector<TraverseFit> guesses_of(const TraverseData& data, const TraversePriors& priors) {
   std::vector<TraverseFit> guesses;
-  for (const double guess : kGuesses) {
+  for (const double guess : kGuesses)
     guesses.emplace_back(data, priors, some(data.windows, kSearched), guess);
-    guesses.back().run(kSearch);
-  }
+  search(guesses);
   std::vector<const TraverseFit*> by_cost;
   for (const TraverseFit& guess : guesses) by_cost.push_back(&guess);
   std::sort(by_cost.begin(), by_cost.end(),
@@ -126,15 +132,17 @@ void look_beside(std::vector<TraverseFit>& fits, const TraverseData& data, const
   const std::vector<TraverseWindow> few = some(data.windows, kSearched);
   for (int round = 0; round < kRounds; ++round) {
     const TraverseFit best = cheapest(fits);
-    TraverseFit here(best, data, few);
-    here.run(kSearch);
+    std::vector<TraverseFit> tried = {TraverseFit(best, data, few)};
     for (const double factor : kBeside) {
       const TraversePrior& gap = priors[kTraverseGap];
-      TraverseFit beside(data, priors, few,
+      tried.emplace_back(data, priors, few,
                          std::log(factor * best.value(kTraverseGap) / gap.value) / gap.spread);
-      beside.run(kSearch);
-      const bool rival = !alike(beside, here) && cost_of(beside) < cost_of(here) + kRivalCost;
-      if (rival || cost_of(beside) < cost_of(here) - kCheaper) fits.push_back(gone_on(beside, data));
+    }
+    search(tried);
+    for (std::size_t i = 1; i < tried.size(); ++i) {
+      const double dearer = cost_of(tried[i]) - cost_of(tried[0]);
+      if (dearer < -kCheaper || (dearer < kRivalCost && !alike(tried[i], tried[0])))
+        fits.push_back(gone_on(tried[i], data));
     }
     if (!(cost_of(cheapest(fits)) < cost_of(best) - kCheaper)) return;
   }

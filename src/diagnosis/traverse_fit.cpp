@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 
@@ -65,11 +64,6 @@ struct Columns {
     return i < group ? window * group + i : windows * group + window * others + i - group;
   }
 };
-
-/// Of so many each.
-int groups(std::size_t count, std::size_t each) {
-  return static_cast<int>((count + each - 1) / each);
-}
 
 }  // namespace
 
@@ -230,10 +224,8 @@ double TraverseFit::cost_of(const VectorXd& z, const std::vector<TraverseOwn>& o
   for (std::size_t w = 0; w < windows_.size(); ++w)
     if (used_[w] || rms != nullptr) wanted.push_back(w);
   std::vector<double> of(windows_.size(), 0.0);
-  const std::size_t count = wanted.size();
-  for_each_in_parallel(groups(count, kTraverseRuns), [&](int group) {
-    const std::size_t first = static_cast<std::size_t>(group) * kTraverseRuns,
-                      last = std::min<std::size_t>(first + kTraverseRuns, count);
+  for (std::size_t first = 0; first < wanted.size(); first += kTraverseRuns) {
+    const std::size_t last = std::min<std::size_t>(first + kTraverseRuns, wanted.size());
     std::vector<TraverseRun> runs;
     for (std::size_t i = first; i < last; ++i) runs.push_back(run_of(wanted[i], here, own[wanted[i]]));
     const MatrixXd teeth = traverse_teeth(data_, runs);
@@ -244,7 +236,7 @@ double TraverseFit::cost_of(const VectorXd& z, const std::vector<TraverseOwn>& o
       if (rms != nullptr) (*rms)[w] = std::sqrt(squares / weights_[w].of_noise);
       of[w] = used_[w] ? squares + own[w].squaredNorm() : 0;
     }
-  });
+  }
   double sum = z.squaredNorm();
   for (const double each : of) sum += each;
   return std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
@@ -254,10 +246,8 @@ double TraverseFit::cost_of(const VectorXd& z, const std::vector<TraverseOwn>& o
 bool TraverseFit::iterate() {
   parts_.resize(windows_.size());
   const std::vector<TraverseMachine> machines = moved_machines();
-  for_each_in_parallel(groups(windows_.size(), kTogether), [&](int group) {
-    const std::size_t first = static_cast<std::size_t>(group) * kTogether;
+  for (std::size_t first = 0; first < windows_.size(); first += kTogether)
     linearise(first, std::min(first + kTogether, windows_.size()), machines);
-  });
   for (int attempt = 0; attempt < kTries; ++attempt, damping_ *= kHarder) {
     MatrixXd normal = MatrixXd::Identity(kTraverseValues, kTraverseValues);
     VectorXd toward = -z_;
@@ -292,10 +282,8 @@ bool TraverseFit::iterate() {
 
 /// One after the other: steps of all crossings together lead some of them astray.
 void TraverseFit::settle(const std::vector<char>& which) {
-  for_each_in_parallel(windows(), [&](int w) {
-    const auto window = static_cast<std::size_t>(w);
-    if (which[window]) own_[window] = settled(window);
-  });
+  for (std::size_t w = 0; w < windows_.size(); ++w)
+    if (which[w]) own_[w] = settled(w);
 }
 
 TraverseOwn TraverseFit::settled(std::size_t window) const {
