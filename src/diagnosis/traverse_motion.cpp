@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/signal/root_in_step.h"
 #include "lanes_power.h"
 
 namespace backlash::diagnosis {
@@ -11,8 +12,6 @@ namespace {
 
 // Deflections, in those under the usual torque, and powers beyond which no fit comes: they keep lanes_exp()
 // within its range.
-constexpr int kChangeSteps = 4;  // of Newton's method: choice, two would do
-constexpr double kFlat = 0.1;    // slope over that of the chord, below which the chord's is taken: choice
 constexpr double kLeastDeflection = 1e-30, kMostDeflection = 1e30, kMostPower = 10;
 
 template <typename Lanes>
@@ -118,12 +117,6 @@ DIAGNOSIS_LANES bool any(const Flags& flags) {
   bool found = false;
   for (std::size_t i = 0; i < sizeof(Flags) / sizeof(double); ++i) found |= flags[i] != 0;
   return found;
-}
-
-template <typename Lanes>
-DIAGNOSIS_LANES Lanes clamped(const Lanes& share) {
-  const Lanes not_less = share > 0 ? share : Lanes{};
-  return not_less < 1 ? not_less : Lanes{} + 1;
 }
 
 /// A step of an interval from share `from` to `to` of it. What the torque of its stages counts in the means
@@ -262,25 +255,14 @@ class alignas(sizeof(Lanes)) Loads {
   DIAGNOSIS_LANES double mean(int lane) const { return mean_[lane]; }
 
  private:
-  /// Of those that are apart the depth, a cubic through both ends of the step and its slopes there, comes to
-  /// 0; of those that are pressed the torque, a square through both ends and the middle. Newton's method from
-  /// the chord, which both all but follow.
+  /// Of those that are apart the depth comes to 0, of those that are pressed the torque.
   DIAGNOSIS_LANES Lanes share_of_change(double step) const {
     const Flags other = begin_.touch.side ^ touch_.side;  // they come from beyond the middle of the gap
     const Lanes depth = other ? -2 * machines_.half_gap - begin_.touch.depth : begin_.touch.depth,
                 grows = step * turned(begin_.touch.rate, other), grows_last = step * touch_.rate,
-                deeper = touch_.depth - depth, pulls = begin_.force - force_;
-    const Lanes from = pressed_ ? -begin_.force : depth, chord = pressed_ ? pulls : deeper,
-                first = pressed_ ? 3 * begin_.force - 4 * middle_ + force_ : grows,
-                second = pressed_ ? chord - first : 3 * deeper - 2 * grows - grows_last,
-                third = pressed_ ? Lanes{} : grows + grows_last - 2 * deeper;
-    Lanes u = clamped<Lanes>(-from / chord);
-    for (int i = 0; i < kChangeSteps; ++i) {
-      const Lanes there = from + u * (first + u * (second + u * third)),
-                  slope = first + u * (2 * second + 3 * u * third);
-      u = clamped<Lanes>(u - there / (slope > kFlat * chord ? slope : chord));
-    }
-    return u;
+                touches = signal::root_by_slopes<Lanes>(depth, touch_.depth, grows, grows_last),
+                leaves = signal::root_by_middle<Lanes>(-begin_.force, -middle_, -force_);
+    return pressed_ ? leaves : touches;
   }
 
   struct State {

@@ -291,7 +291,7 @@ CrossingFit::Told CrossingFit::told_by(const Part& p, const MatrixXd& known, con
   return told;
 }
 
-void CrossingFit::run(int steps) {
+void CrossingFit::run(int steps, double wanted) {
   for (int s = 0; s < steps; ++s) {
     const std::vector<Part> all = parts();
     const Index n = Index(machine_.size()) * kCrossingValues;
@@ -324,7 +324,8 @@ void CrossingFit::run(int steps) {
       damping_ = std::clamp(better ? damping_ / 5 : damping_ * 5, 1e-6, 1e6);
       if (better) machine_ = machine, own_ = owns, cost_ = cost;
     }
-    if (!better || before - cost_ < 1e-3) return;  // a thirtieth of a standard error
+    if (!better || before - cost_ < 1e-3) return;           // a thirtieth of a standard error
+    if ((before - cost_) * steps < cost_ - wanted) return;  // so it would not come there
   }
 }
 

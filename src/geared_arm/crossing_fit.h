@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 #include "crossing_motion.h"
@@ -19,7 +20,9 @@ class CrossingFit {
   /// The gap of this joint stays as it is.
   void hold_gap(std::size_t joint, bool held) { held_[joint] = held; }
   void set_gap(std::size_t joint, double gap);
-  void run(int steps);
+  /// At most so many steps; ends where at the pace of a step all of them would not bring the cost down to
+  /// what is wanted.
+  void run(int steps, double wanted = std::numeric_limits<double>::infinity());
   /// Takes, joint by joint, the gap of `grid` that explains most, all else as it is.
   void scan(const std::vector<double>& grid);
 

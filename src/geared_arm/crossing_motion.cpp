@@ -4,9 +4,13 @@
 #include <cmath>
 
 #include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/root_in_step.h"
 
 namespace backlash::geared_arm {
 namespace {
+
+constexpr double kLeastTorque = 1e-30;  // of the usual one, that has a logarithm
+constexpr int kMostChanges = 8;         // of flanks in a step: choice
 
 /// Teeth that are a spring at the usual torque `level` and yield by a power elsewhere; damping is constant
 /// for a spring and as the torque after Hertz, as in diagnosis/traverse_motion.cpp.
@@ -19,22 +23,25 @@ class Teeth {
         power_(values[kCrossingPower]),
         level_(joint.level) {}
 
-  double torque(double twist, double rate) const {
-    const double depth = std::fabs(twist) - half_gap_;
-    if (depth <= 0) return 0;
-    const double side = twist > 0 ? 1 : -1;
+  /// Beyond the gap, towards the flank of `side`.
+  double depth(double twist, double side) const { return side * twist - half_gap_; }
+
+  /// Towards the flank, of teeth that are pressed; where they would pull they have come apart. On the other
+  /// side of no deflection it goes on smoothly, for the steps that come there.
+  double torque(double depth, double rate) const {
     double force = stiffness_ * depth, damping = damping_;
     if (power_ != 1) {
-      const double harder = std::exp((power_ - 1) * std::log(force / level_));
+      const double elastic = std::fmax(std::fabs(force) / level_, kLeastTorque);
+      const double harder = std::exp((power_ - 1) * std::log(elastic));
       force *= harder, damping *= harder * harder * harder;
     }
-    force += damping * side * rate;
-    return force > 0 ? side * force : 0;
+    return force + damping * rate;
   }
   double twist_under(double torque) const {
     const double depth = level_ / stiffness_ * std::pow(std::fabs(torque) / level_, 1 / power_);
     return std::copysign(half_gap_ + depth, torque);
   }
+  double gap() const { return 2 * half_gap_; }
   /// 1, -1: the flank that is touched; 0: none.
   int flank(double twist) const { return std::fabs(twist) <= half_gap_ ? 0 : twist > 0 ? 1 : -1; }
 
@@ -72,6 +79,15 @@ class Interval {
   const Eigen::MatrixXd &m0_, &m1_;
 };
 
+/// What the teeth of a joint do at a place: torque as if they were pressed.
+struct Touch {
+  double side, depth, rate, torque;  // -, rad, rad/s, N m, towards the flank of `side`
+};
+using Touches = std::array<Touch, kMostGaps>;
+
+/// Teeth are pressed, or not, from the begin of a step to its end. Where that changes in it, as those that
+/// are apart touch or those that are pressed would pull, the step ends there and another goes on from there:
+/// damped teeth push at once when they touch, and a step across that would be wrong by as much as it is long.
 class Links {
  public:
   Links(const CrossingData& data, const CrossingMachine& machine, const Eigen::VectorXd& own)
@@ -82,26 +98,28 @@ class Links {
 
   void begin(const CrossingWindow& window) {
     for (Eigen::Index j = 0; j < n_; ++j) {
-      q_[std::size_t(j)] = window.position(0, j) - teeth_[std::size_t(j)].twist_under(window.load[j]);
-      v_[std::size_t(j)] = window.rate(0, j);
+      const auto k = std::size_t(j);
+      const double twist = teeth_[k].twist_under(window.load[j]);
+      q_[k] = window.position(0, j) - twist, v_[k] = window.rate(0, j);
+      pressed_[k] = teeth_[k].flank(twist) != 0;
     }
   }
 
-  /// Runge and Kutta's step from u0 to u1 [samples]; adds the mean torque times the step to `sum`.
+  /// From u0 to u1 [samples]; adds the mean torque times the step to `sum`.
   void step(const Interval& at, double u0, double u1, Small& sum) {
-    const double dt = (u1 - u0) * data_.interval, half = (u0 + u1) / 2;
-    Small a1, a2, a3, a4, t1, t2, t3, t4;
-    rates(at, u0, q_, v_, a1, t1);
-    Small q2 = moved(q_, v_, dt / 2), v2 = moved(v_, a1, dt / 2);
-    rates(at, half, q2, v2, a2, t2);
-    Small q3 = moved(q_, v2, dt / 2), v3 = moved(v_, a2, dt / 2);
-    rates(at, half, q3, v3, a3, t3);
-    Small q4 = moved(q_, v3, dt), v4 = moved(v_, a3, dt);
-    rates(at, u1, q4, v4, a4, t4);
-    for (std::size_t j = 0; j < std::size_t(n_); ++j) {
-      q_[j] += dt * (v_[j] + 2 * v2[j] + 2 * v3[j] + v4[j]) / 6;
-      v_[j] += dt * (a1[j] + 2 * a2[j] + 2 * a3[j] + a4[j]) / 6;
-      sum[j] += (u1 - u0) * (t1[j] + 2 * t2[j] + 2 * t3[j] + t4[j]) / 6;
+    for (int changes = 0; u0 < u1; ++changes) {
+      const Small q = q_, v = v_;
+      Small mean{};
+      advance(at, u0, u1, mean);
+      const double share = until_change((u1 - u0) * data_.interval);
+      double end = u1;
+      if (share < 1 && changes < kMostChanges) {
+        q_ = q, v_ = v, mean = {}, end = u0 + share * (u1 - u0);
+        advance(at, u0, end, mean);
+      }
+      for (std::size_t j = 0; j < std::size_t(n_); ++j) sum[j] += mean[j];
+      for (const std::size_t j : changing_) pressed_[j] = !pressed_[j];
+      u0 = end;
     }
   }
 
@@ -110,19 +128,68 @@ class Links {
   }
 
  private:
+  /// Runge and Kutta's step.
+  void advance(const Interval& at, double u0, double u1, Small& sum) {
+    const double dt = (u1 - u0) * data_.interval, half = (u0 + u1) / 2;
+    Small a1, a2, a3, a4, t1, t2, t3, t4;
+    Touches unused;
+    rates(at, u0, q_, v_, a1, t1, begin_);
+    Small q2 = moved(q_, v_, dt / 2), v2 = moved(v_, a1, dt / 2);
+    rates(at, half, q2, v2, a2, t2, unused);
+    Small q3 = moved(q_, v2, dt / 2), v3 = moved(v_, a2, dt / 2);
+    rates(at, half, q3, v3, a3, t3, middle_);
+    Small q4 = moved(q_, v3, dt), v4 = moved(v_, a3, dt);
+    rates(at, u1, q4, v4, a4, t4, unused);
+    for (std::size_t j = 0; j < std::size_t(n_); ++j) {
+      q_[j] += dt * (v_[j] + 2 * v2[j] + 2 * v3[j] + v4[j]) / 6;
+      v_[j] += dt * (a1[j] + 2 * a2[j] + 2 * a3[j] + a4[j]) / 6;
+      sum[j] += (u1 - u0) * (t1[j] + 2 * t2[j] + 2 * t3[j] + t4[j]) / 6;
+    }
+    for (std::size_t j = 0; j < std::size_t(n_); ++j) end_[j] = touch(at, u1, j, q_[j], v_[j]);
+  }
+
   Small moved(const Small& from, const Small& rate, double dt) const {
     Small to;
     for (std::size_t j = 0; j < std::size_t(n_); ++j) to[j] = from[j] + dt * rate[j];
     return to;
   }
 
-  void rates(const Interval& at, double u, const Small& q, const Small& v, Small& a, Small& torque) const {
+  Touch touch(const Interval& at, double u, std::size_t j, double q, double v) const {
+    double motor, rate;
+    at.motor(u, Eigen::Index(j), motor, rate);
+    const double side = motor > q ? 1 : -1, depth = teeth_[j].depth(motor - q, side);
+    return {side, depth, side * (rate - v),
+            pressed_[j] || depth > 0 ? teeth_[j].torque(depth, side * (rate - v)) : 0};
+  }
+
+  /// Share of the last step, `dt` long, at which the first joints come to touch or leave, and which these
+  /// are; 1 and none: none does.
+  double until_change(double dt) {
+    changing_.clear();
+    double first = 1;
+    for (std::size_t j = 0; j < std::size_t(n_); ++j) {
+      const Touch &begin = begin_[j], &end = end_[j];
+      if (pressed_[j] == (end.depth > 0 && end.torque > 0)) continue;
+      const double turn = begin.side * end.side, gap = begin.depth + teeth_[j].gap();
+      const double share = pressed_[j]
+                               ? signal::root_by_middle(-begin.torque, -middle_[j].torque, -end.torque)
+                               : signal::root_by_slopes(turn > 0 ? begin.depth : -gap, end.depth,
+                                                        dt * turn * begin.rate, dt * end.rate);
+      if (share > first) continue;
+      if (share < first) changing_.clear();
+      first = share;
+      changing_.push_back(j);
+    }
+    return first;
+  }
+
+  void rates(const Interval& at, double u, const Small& q, const Small& v, Small& a, Small& torque,
+             Touches& touches) const {
     Small net;
     for (Eigen::Index j = 0; j < n_; ++j) {
       const auto k = std::size_t(j);
-      double motor, rate;
-      at.motor(u, j, motor, rate);
-      torque[k] = teeth_[k].torque(motor - q[k], rate - v[k]);
+      touches[k] = touch(at, u, k, q[k], v[k]);
+      torque[k] = pressed_[k] ? touches[k].side * touches[k].torque : 0;
       net[k] = torque[k] - at.bias(u, j) - beta_[j] - data_.joints[k].link_viscous * v[k] -
                machine_[k][kCrossingCoulomb] * std::tanh(v[k] / data_.friction_speed);
     }
@@ -139,6 +206,9 @@ class Links {
   Eigen::Index n_;
   std::vector<Teeth> teeth_;
   Small q_, v_;
+  std::array<bool, kMostGaps> pressed_{};
+  Touches begin_, middle_, end_;       // of the last step
+  std::vector<std::size_t> changing_;  // joints, at its end
 };
 
 /// Of the links alone: what the fit moves to the rotor is taken from them.

@@ -180,12 +180,12 @@ std::size_t turns_of(const CrossingData& data, std::size_t k) {
   return turns;
 }
 
-/// How much worse the record is explained without the gap.
-double evidence_of(const CrossingFit& best, std::size_t k) {
+/// How much worse the record is explained without the gap; looked for until that is less than `wanted`.
+double evidence_of(const CrossingFit& best, std::size_t k, double wanted) {
   CrossingFit sound = best;
   sound.set_gap(k, 0);
   sound.hold_gap(k, true);
-  sound.run(kSteps);
+  sound.run(kSteps, best.cost() + wanted);
   return sound.cost() - best.cost();
 }
 
@@ -202,7 +202,7 @@ double rival_of(const CrossingFit& best, std::size_t k, const TraverseSettings& 
     if (costs[i] > costs[i - 1] || costs[i] > costs[i + 1] || !apart(gaps[i])) continue;
     CrossingFit other = best;
     other.set_gap(k, gaps[i]);
-    other.run(kSteps);
+    other.run(kSteps, best.cost() + settings.rival);
     if (apart(other.gap(k)) && other.cost() - best.cost() < settings.rival) return other.gap(k);
   }
   return std::nan("");
@@ -275,7 +275,7 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
   require_explained(judged);
   e.from_record = true;
   const double gap = fit.gap(k), half = half_width(fit, k, errors, judged);
-  if (!(gap > half) || evidence_of(fit, k) < s.evidence) {
+  if (!(gap > half) || evidence_of(fit, k, s.evidence) < s.evidence) {
     const double most = largest_of(fit, k, gap + half, s);
     e.status = Status::below_range;
     e.angle_lower = 0, e.angle_upper = most;

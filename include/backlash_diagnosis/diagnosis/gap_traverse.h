@@ -12,13 +12,17 @@
 // spring at the usual torque T, and may yield by a power p of the deflection, 1 within a factor of 1.5 (1.5:
 // Hertz), as far as the record tells.
 //
-// The stretch about a crossing is as long as four of five crossings take to the first touches, so that a play
-// many times the declared one fits in, and half of the crossings must be looked at: the quick ones alone tell
-// a smaller play, with nothing but noise left. The cost has many minima: fits begin with seven gaps, and with
-// others about the cheapest one's until none is cheaper.
+// The stretch about a crossing is as long as four of five crossings take, from a sure press on their flank to
+// the first touches, so that a play many times the declared one fits in, and more than half of the crossings
+// must lie in such a stretch: the quick ones alone tell a smaller play, with nothing but noise left. Fits
+// begin with five gaps, and with others about the cheapest one's until none is cheaper.
 //
-// Where a crossing begins the teeth must press one flank for sure: by more than noise and half of the
-// declared dry friction of the motor. The motor that such crossings tell finds more of them.
+// A stretch begins while the motor moves and the teeth press one flank for sure: by more than noise and half
+// of the declared dry friction of the motor, for as long as the torque is averaged. The motor that such
+// crossings tell finds more of them.
+//
+// Teeth touch and leave within a step of the integration, at the moment that it finds: damped teeth push at
+// once, and steps across that make a cost with as many minima as there are touches.
 //
 // What is left is weighted by its covariance: noise of the torque, a slow torque that nothing tells (5 % of
 // T), and noise of the position, which second differences make large and fast. The inertia of the motor
