@@ -23,7 +23,7 @@ constexpr double kLead = 3;              // cycles of the teeth that count befor
 constexpr double kSettling = 2;          // cycles of the teeth after the begin that do not count
 constexpr double kTail = 0.15;           // s, after the load is certain again
 constexpr double kLongest = 1.5;         // s
-constexpr double kUnsureFriction = 0.3;  // of the motor's dry friction, about a standstill
+constexpr double kUnsureFriction = 0.7;  // of the motor's dry friction, about a standstill
 constexpr double kStandstill = 3;        // friction speeds
 
 /// Value and slope of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).

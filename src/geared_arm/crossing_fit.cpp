@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
@@ -21,18 +22,27 @@ constexpr double kKnownStiffness = 0.5, kKnownDamping = 0.8, kKnownPower = 0.15,
 constexpr double kKnownCoulomb = 0.5;                   // of the declared friction behind the gap, and
 constexpr double kUndeclaredCoulomb = 0.005;            // of the largest load
 constexpr double kHeldTorque = 0.25, kKnownHeld = 0.3;  // samples: held or averaged; theory, choice
-constexpr double kUntold = 0.01;      // of the largest load: torque on a link that nothing tells; choice
-constexpr double kVaries = 0.1;       // of the gap, and
-constexpr double kTeethVary = 0.03;   // of the deflection: what a turn says of the gap otherwise; choices
-constexpr double kSlow = 0.3;         // s, memory of a torque that nothing tells; choice
-constexpr double kRough = 0.03;       // s, the same of friction about a standstill; choice
-constexpr double kDifference = 0.1;   // of a standard deviation, for derivatives; choice
-constexpr double kMostWindows = 0.7;  // that must be explained; choice
-constexpr double kBounds[kCrossingValues][2] = {{0, 0.1},    {-3, 3},    {-4, 4},  {0.8, 1.6},
-                                                {-0.6, 0.6}, {0, 1e300}, {-0.5, 1}};
+constexpr double kUntold = 0.01;        // of the largest load: torque on a link that nothing tells; choice
+constexpr double kVaries = 0.1;         // of the gap, and
+constexpr double kTeethVary = 0.03;     // of the deflection: what a turn says of the gap otherwise; choices
+constexpr double kSlow = 0.3;           // s, memory of a torque that nothing tells; choice
+constexpr double kRough = 0.03;         // s, the same of friction about a standstill; choice
+constexpr double kRings = 0.5;          // of the deflection: what a link swings on its teeth; choice
+constexpr double kShares[] = {1, 0.3};  // of a step of what is a window's own; choice
+constexpr int kAttempts = 10;           // of a step, each five times shorter; choice
+constexpr double kLittle = 1;           // of the cost: a standard error
+constexpr double kDifference = 0.01;    // of a standard deviation, for derivatives; choice: more leaves
+                                        // out touches, and fits end before they are at their best
+constexpr double kMostWindows = 0.7;    // that must be explained; choice
+constexpr double kBounds[kCrossingValues][2] = {{0, 0.1},    {-3, 3},    {-4, 4}, {0.8, 1.6},
+                                                {-0.6, 0.6}, {0, 1e300}, {-3, 3}};
 
 int place(std::size_t joint, int value) {
   return int(joint) * kCrossingValues + value;
+}
+
+bool same_rotor(const CrossingMachine::value_type& a, const CrossingMachine::value_type& b) {
+  return a[kCrossingRotor] == b[kCrossingRotor];
 }
 
 }  // namespace
@@ -48,20 +58,31 @@ void CrossingFit::begin(const std::vector<double>& gaps) {
     for (int v = 0; v < kCrossingValues; ++v) machine_[j][std::size_t(v)] = centre(j, v);
     machine_[j][kCrossingGap] = gaps[j];
   }
-  own_.assign(data_.windows.size(), VectorXd::Zero(2 * Index(machine_.size())));
+  take_rotors();
+  own_.assign(data_.windows.size(), VectorXd::Zero(kCrossingOwn * Index(machine_.size())));
   cost_ = cost_of(machine_, own_);
+}
+
+void CrossingFit::take_rotors() {
+  std::vector<LinkMobilities> all(data_.windows.size());
+  for_each_in_parallel(int(all.size()), [&](int w) {
+    all[std::size_t(w)] = link_mobilities(data_, data_.windows[std::size_t(w)], machine_);
+  });
+  mobilities_ = std::make_shared<const std::vector<LinkMobilities>>(std::move(all));
 }
 
 /// Standard deviations of what is a window's own. What the equations do not hold makes each turn say another
 /// gap: without that, the one turn with the hardest touch would tell it alone.
 VectorXd CrossingFit::own_spread(const CrossingMachine& machine) const {
   const Index n = Index(machine.size());
-  VectorXd spread(2 * n);
+  VectorXd spread(kCrossingOwn * n);
   for (Index j = 0; j < n; ++j) {
     const TraverseJoint& joint = data_.joints[std::size_t(j)];
     spread[j] = std::hypot(kUntold * joint.most, joint.slow_torque);
     spread[n + j] = std::hypot(kVaries * machine[std::size_t(j)][kCrossingGap],
                                kTeethVary * joint.level / joint.stiffness);
+    spread[2 * n + j] = kRings * joint.level / joint.stiffness;
+    spread[3 * n + j] = spread[2 * n + j] * 2 * M_PI / teeth_cycle(joint);
   }
   return spread;
 }
@@ -133,7 +154,13 @@ void CrossingFit::whiten() {
 VectorXd CrossingFit::residual(std::size_t window, const CrossingMachine& machine,
                                const VectorXd& own) const {
   const CrossingWindow& w = data_.windows[window];
-  const MatrixXd mesh = mesh_torques(data_, w, machine, own);
+  LinkMobilities other;
+  const LinkMobilities* mobilities = &(*mobilities_)[window];
+  if (!std::equal(machine.begin(), machine.end(), machine_.begin(), same_rotor)) {
+    other = link_mobilities(data_, w, machine);
+    mobilities = &other;
+  }
+  const MatrixXd mesh = mesh_torques(data_, w, *mobilities, machine, own);
   const Index m = data_.block, n = (w.samples() - 1 - data_.skipped) / m;
   VectorXd all(n * Index(machine.size()));
   for (std::size_t j = 0; j < machine.size(); ++j) {
@@ -224,25 +251,26 @@ std::vector<CrossingFit::Part> CrossingFit::parts() const {
   return all;
 }
 
-double CrossingFit::prior_cost(const CrossingMachine& machine, const std::vector<VectorXd>& own) const {
+double CrossingFit::prior_cost(const CrossingMachine& machine) const {
   double sum = 0;
-  for (std::size_t j = 0; j < machine.size(); ++j)
+  for (std::size_t j = 0; j < machine_.size(); ++j)
     for (int v = kCrossingStiffness; v < kCrossingValues; ++v)
       sum += std::pow((machine[j][std::size_t(v)] - centre(j, v)) / spread(j, v), 2);
-  const VectorXd spread = own_spread(machine);
-  for (const VectorXd& each : own) sum += each.cwiseQuotient(spread).squaredNorm();
   return sum;
+}
+
+/// Of a window, with what is known of its own values.
+double CrossingFit::cost_of(std::size_t window, const CrossingMachine& machine, const VectorXd& own) const {
+  return cost_of(window, residual(window, machine, own), machine) +
+         own.cwiseQuotient(own_spread(machine)).squaredNorm();
 }
 
 double CrossingFit::cost_of(const CrossingMachine& machine, const std::vector<VectorXd>& own) const {
   std::vector<double> costs(data_.windows.size(), 0.0);
   for_each_in_parallel(int(costs.size()), [&](int w) {
-    costs[std::size_t(w)] =
-        cost_of(std::size_t(w), residual(std::size_t(w), machine, own[std::size_t(w)]), machine);
+    costs[std::size_t(w)] = cost_of(std::size_t(w), machine, own[std::size_t(w)]);
   });
-  double sum = prior_cost(machine, own);
-  for (const double cost : costs) sum += cost;
-  return sum;
+  return std::accumulate(costs.begin(), costs.end(), prior_cost(machine));
 }
 
 double CrossingFit::cost_with(std::size_t joint, double gap) const {
@@ -262,6 +290,18 @@ void CrossingFit::add_priors(MatrixXd& h, VectorXd& g) const {
       } else if (held_[j]) {
         h(p, p) += 1;
       }
+    }
+}
+
+/// Values that would leave their bounds stay there, and the others do not count on them.
+void CrossingFit::hold_at_bounds(MatrixXd& h, VectorXd& g) const {
+  for (std::size_t j = 0; j < machine_.size(); ++j)
+    for (int v = 0; v < kCrossingValues; ++v) {
+      const int p = place(j, v);
+      const double value = machine_[j][std::size_t(v)];
+      if ((value > kBounds[v][0] || g[p] < 0) && (value < kBounds[v][1] || g[p] > 0)) continue;
+      h.row(p).setZero(), h.col(p).setZero();
+      h(p, p) = 1, g[p] = 0;
     }
 }
 
@@ -291,6 +331,37 @@ CrossingFit::Told CrossingFit::told_by(const Part& p, const MatrixXd& known, con
   return told;
 }
 
+/// Takes a machine, with what is of each window alone moved to suit it where that helps, if it is better.
+bool CrossingFit::take(const CrossingMachine& machine, const std::vector<Part>& parts,
+                       const std::vector<Told>& told) {
+  VectorXd taken(Index(machine.size()) * kCrossingValues);
+  for (std::size_t j = 0; j < machine.size(); ++j)
+    for (int v = 0; v < kCrossingValues; ++v)
+      taken[place(j, v)] = machine[j][std::size_t(v)] - machine_[j][std::size_t(v)];
+  const VectorXd known = own_spread(machine_).array().pow(-2);
+  std::vector<VectorXd> owns = own_;
+  std::vector<double> costs(parts.size(), 0.0);
+  for_each_in_parallel(int(parts.size()), [&](int i) {
+    const auto w = std::size_t(i);
+    const Part& p = parts[w];
+    const VectorXd step = -told[w].inverse *
+                          (p.own.transpose() * (p.residual + p.global * taken) + known.cwiseProduct(own_[w]));
+    costs[w] = cost_of(w, machine, own_[w]);
+    for (const double share : kShares) {
+      const VectorXd other = own_[w] + share * step;
+      const double cost = cost_of(w, machine, other);
+      if (!(cost < costs[w])) continue;
+      owns[w] = other, costs[w] = cost;
+      return;
+    }
+  });
+  const double cost = std::accumulate(costs.begin(), costs.end(), prior_cost(machine));
+  if (!(cost < cost_)) return false;
+  machine_ = machine, own_ = owns, cost_ = cost;
+  take_rotors();
+  return true;
+}
+
 void CrossingFit::run(int steps, double wanted) {
   for (int s = 0; s < steps; ++s) {
     const std::vector<Part> all = parts();
@@ -305,26 +376,16 @@ void CrossingFit::run(int steps, double wanted) {
       h += told.back().information;
       g += told.back().score;
     }
+    hold_at_bounds(h, g);
     const double before = cost_;
     bool better = false;
-    for (int attempt = 0; attempt < 6 && !better; ++attempt) {
+    for (int attempt = 0; attempt < kAttempts && !better; ++attempt) {
       MatrixXd damped = h;
       damped.diagonal() *= 1 + damping_;
-      const CrossingMachine machine = moved(-signal::solve_symmetric(damped, g));
-      VectorXd taken(n);
-      for (std::size_t j = 0; j < machine.size(); ++j)
-        for (int v = 0; v < kCrossingValues; ++v)
-          taken[place(j, v)] = machine[j][std::size_t(v)] - machine_[j][std::size_t(v)];
-      std::vector<VectorXd> owns = own_;
-      for (std::size_t w = 0; w < all.size(); ++w)
-        owns[w] -= told[w].inverse *
-                   (all[w].own.transpose() * (all[w].residual + all[w].global * taken) + known * own_[w]);
-      const double cost = cost_of(machine, owns);
-      better = cost < cost_;
+      better = take(moved(-signal::solve_symmetric(damped, g)), all, told);
       damping_ = std::clamp(better ? damping_ / 5 : damping_ * 5, 1e-6, 1e6);
-      if (better) machine_ = machine, own_ = owns, cost_ = cost;
     }
-    if (!better || before - cost_ < 1e-3) return;           // a thirtieth of a standard error
+    if (!better || before - cost_ < kLittle) return;
     if ((before - cost_) * steps < cost_ - wanted) return;  // so it would not come there
   }
 }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "crossing_motion.h"
@@ -61,12 +62,16 @@ class CrossingFit {
   double shaken(std::size_t window, std::size_t joint, const CrossingMachine& machine) const;
   double cost_of(std::size_t window, const Eigen::VectorXd& residual, const CrossingMachine& machine) const;
   double cost_of(const CrossingMachine& machine, const std::vector<Eigen::VectorXd>& own) const;
-  double prior_cost(const CrossingMachine& machine, const std::vector<Eigen::VectorXd>& own) const;
+  double cost_of(std::size_t window, const CrossingMachine& machine, const Eigen::VectorXd& own) const;
+  double prior_cost(const CrossingMachine& machine) const;
   void add_priors(Eigen::MatrixXd& h, Eigen::VectorXd& g) const;
+  void hold_at_bounds(Eigen::MatrixXd& h, Eigen::VectorXd& g) const;
   double centre(std::size_t joint, int value) const;
   double spread(std::size_t joint, int value) const;
   Eigen::VectorXd own_spread(const CrossingMachine& machine) const;
   CrossingMachine moved(const Eigen::VectorXd& step) const;
+  bool take(const CrossingMachine& machine, const std::vector<Part>& parts, const std::vector<Told>& told);
+  void take_rotors();
   void whiten();
 
   const CrossingData& data_;
@@ -75,6 +80,7 @@ class CrossingFit {
   std::vector<Eigen::VectorXd> own_;                   // per window: as mesh_torques() has it
   std::vector<std::vector<Eigen::MatrixXd>> factors_;  // of covariances, lower: per window, per joint
   std::vector<std::vector<double>> shaken_;            // the same: squares that noise of the position leaves
+  std::shared_ptr<const std::vector<LinkMobilities>> mobilities_;  // per window, with the machine's rotors
   double cost_ = 0, damping_ = 1e-3;
 };
 

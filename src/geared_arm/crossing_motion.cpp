@@ -49,6 +49,12 @@ class Teeth {
   double half_gap_, stiffness_, damping_, power_, level_;
 };
 
+/// The hyperbolic tangent, in half the time of the library's.
+double saturated(double x) {
+  const double size = std::fabs(x);
+  return std::copysign(size < 18 ? 1 - 2 / (std::exp(2 * size) + 1) : 1, x);
+}
+
 using Small = std::array<double, kMostGaps>;
 
 /// Links and motors between two samples.
@@ -100,7 +106,8 @@ class Links {
     for (Eigen::Index j = 0; j < n_; ++j) {
       const auto k = std::size_t(j);
       const double twist = teeth_[k].twist_under(window.load[j]);
-      q_[k] = window.position(0, j) - twist, v_[k] = window.rate(0, j);
+      q_[k] = window.position(0, j) - twist - beta_[2 * n_ + j];
+      v_[k] = window.rate(0, j) - beta_[3 * n_ + j];
       pressed_[k] = teeth_[k].flank(twist) != 0;
     }
   }
@@ -191,7 +198,7 @@ class Links {
       touches[k] = touch(at, u, k, q[k], v[k]);
       torque[k] = pressed_[k] ? touches[k].side * touches[k].torque : 0;
       net[k] = torque[k] - at.bias(u, j) - beta_[j] - data_.joints[k].link_viscous * v[k] -
-               machine_[k][kCrossingCoulomb] * std::tanh(v[k] / data_.friction_speed);
+               machine_[k][kCrossingCoulomb] * saturated(v[k] / data_.friction_speed);
     }
     for (Eigen::Index j = 0; j < n_; ++j) {
       double sum = 0;
@@ -211,16 +218,6 @@ class Links {
   std::vector<std::size_t> changing_;  // joints, at its end
 };
 
-/// Of the links alone: what the fit moves to the rotor is taken from them.
-Eigen::MatrixXd mobility(const CrossingData& data, const Eigen::MatrixXd& inertia,
-                         const CrossingMachine& machine) {
-  Eigen::MatrixXd links = inertia;
-  for (std::size_t j = 0; j < machine.size(); ++j)
-    links(Eigen::Index(j), Eigen::Index(j)) -=
-        data.joints[j].rotor * (std::exp(machine[j][kCrossingRotor]) - 1);
-  return signal::symmetric_inverse(links);
-}
-
 /// Adds the flights that have ended at a sample.
 class Flights {
  public:
@@ -239,25 +236,34 @@ class Flights {
 
 }  // namespace
 
+LinkMobilities link_mobilities(const CrossingData& data, const CrossingWindow& window,
+                               const CrossingMachine& machine) {
+  LinkMobilities all;
+  for (Eigen::MatrixXd links : window.inertia) {
+    for (std::size_t j = 0; j < machine.size(); ++j)
+      links(Eigen::Index(j), Eigen::Index(j)) -=
+          data.joints[j].rotor * (std::exp(machine[j][kCrossingRotor]) - 1);
+    all.push_back(signal::symmetric_inverse(links));
+  }
+  return all;
+}
+
 Eigen::MatrixXd mesh_torques(const CrossingData& data, const CrossingWindow& window,
-                             const CrossingMachine& machine, const Eigen::VectorXd& own,
-                             std::vector<Flight>* flights) {
+                             const LinkMobilities& mobilities, const CrossingMachine& machine,
+                             const Eigen::VectorXd& own, std::vector<Flight>* flights) {
   const auto n = Eigen::Index(machine.size());
   Eigen::MatrixXd mean(window.samples() - 1, n);
   Links links(data, machine, own);
   links.begin(window);
   Flights seen(machine.size());
-  Eigen::MatrixXd before = mobility(data, window.inertia.front(), machine);
   for (Eigen::Index i = 0; i + 1 < window.samples(); ++i) {
-    const Eigen::MatrixXd after = mobility(data, window.inertia[std::size_t(i + 1)], machine);
-    const Interval at(data, window, i, before, after);
+    const Interval at(data, window, i, mobilities[std::size_t(i)], mobilities[std::size_t(i + 1)]);
     if (flights)
       for (Eigen::Index j = 0; j < n; ++j) seen.see(std::size_t(j), i, links.flank(window, i, j), *flights);
     Small sum{};
     for (int s = 0; s < data.steps; ++s)
       links.step(at, double(s) / data.steps, double(s + 1) / data.steps, sum);
     for (Eigen::Index j = 0; j < n; ++j) mean(i, j) = sum[std::size_t(j)];
-    before = after;
   }
   return mean;
 }

@@ -23,6 +23,11 @@ enum CrossingValue {
 };
 using CrossingMachine = std::vector<std::array<double, kCrossingValues>>;  // one per joint of CrossingData
 
+/// Of a window alone, each per joint: beta [N m]; how much wider than the machine's its gap is [rad]; what
+/// the link is at its first sample beside a link that rests on its flank: deflection of the teeth [rad], its
+/// rate.
+constexpr int kCrossingOwn = 4;
+
 /// How long a joint's teeth touched nothing, between flanks of either sign.
 struct Flight {
   std::size_t joint;      // of CrossingData
@@ -32,11 +37,16 @@ struct Flight {
 
 constexpr std::size_t kMostGaps = 16;  // joints that are looked at together; choice (time)
 
-/// Torque through the teeth, mean between a sample and the next: samples - 1 rows [N m]. `own`: of this
-/// window, beta [N m] per joint, then per joint how much wider than the machine's its gap is [rad].
-/// `flights`, where asked for, takes those that end on the other flank.
+/// Inverse of the mass matrix of the links at each sample [1 / (kg m^2)]: what a machine moves to the rotors
+/// is taken from the links.
+using LinkMobilities = std::vector<Eigen::MatrixXd>;
+LinkMobilities link_mobilities(const CrossingData& data, const CrossingWindow& window,
+                               const CrossingMachine& machine);
+
+/// Torque through the teeth, mean between a sample and the next: samples - 1 rows [N m]. `own`: see
+/// kCrossingOwn. `flights`, where asked for, takes those that end on the other flank.
 Eigen::MatrixXd mesh_torques(const CrossingData& data, const CrossingWindow& window,
-                             const CrossingMachine& machine, const Eigen::VectorXd& own,
-                             std::vector<Flight>* flights = nullptr);
+                             const LinkMobilities& mobilities, const CrossingMachine& machine,
+                             const Eigen::VectorXd& own, std::vector<Flight>* flights = nullptr);
 
 }  // namespace backlash::geared_arm

@@ -30,6 +30,7 @@ constexpr int kProfileSteps = 6;                     // of its fits; choice
 constexpr double kRivalApart = 1.25;                 // ratio of gaps that are different answers; choice
 constexpr double kLeastSlow = 0.005;                 // of the largest load; choice
 constexpr double kCycleSamples = 8;                  // in a cycle of the teeth, at least; choice
+constexpr double kFelt = 4;                          // the same, of joints that move others; choice
 constexpr double kTypical = 0.5;                     // of the largest load: where teeth are known; choice
 
 std::vector<double> grid() {
@@ -132,8 +133,7 @@ std::string obstacle(const GearedArm& arm, const arm::ArmFit& fit, std::size_t j
   return {};
 }
 
-/// Why samples are too far apart for a joint; empty: they are not. Such a link is light: the other joints
-/// hardly feel whether it turns with its motor or a tooth beside it.
+/// Why samples are too far apart for a joint; empty: they are not.
 std::string too_fast(const TraverseJoint& joint, double interval) {
   if (interval * kCycleSamples < teeth_cycle(joint)) return {};
   return fmt::format(
@@ -148,7 +148,8 @@ std::vector<std::vector<Crossing>> crossings_of(const CrossingData& data, const 
   for (std::size_t w = 0; w < data.windows.size(); ++w) {
     std::vector<Flight> flights;
     const CrossingWindow& window = data.windows[w];
-    mesh_torques(data, window, fit.machine(), fit.own(w), &flights);
+    mesh_torques(data, window, link_mobilities(data, window, fit.machine()), fit.machine(), fit.own(w),
+                 &flights);
     for (const Flight& flight : flights) {
       Crossing c;
       c.time = window.begin + double(flight.from) * data.interval;
@@ -310,6 +311,7 @@ void tell(const CrossingData& data, std::vector<JointTraverse>& out, const Trave
   for (std::size_t k = 0; k < data.joints.size(); ++k) {
     const TraverseJoint& joint = data.joints[k];
     JointTraverse& one = out[joint.joint];
+    if (!one.estimate.message.empty()) continue;  // only felt by the others
     one.turns = joint.crosses;
     one.misfit = fit.misfit(k);
     one.estimate = diagnosis::estimate_or_refusal("gap_traverse", [&](diagnosis::Estimate& e) {
@@ -358,9 +360,13 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
       const TraverseJoint joint =
           joint_of(arm, fit, record, loads[j], least_inertia(chain, motions, j), j, settings);
       out[j].estimate.message = too_fast(joint, motions.front().interval);
-      if (out[j].estimate.message.empty()) joints.push_back(joint);
+      // What its teeth throw on the other joints must be known, be it roughly.
+      if (motions.front().interval * kFelt < teeth_cycle(joint)) joints.push_back(joint);
     }
-    if (joints.empty()) return out;
+    const auto looked_at = [&](const TraverseJoint& joint) {
+      return out[joint.joint].estimate.message.empty();
+    };
+    if (std::none_of(joints.begin(), joints.end(), looked_at)) return out;
     if (joints.size() > kMostGaps)
       throw Refusal{Status::out_of_domain,
                     fmt::format("needs load_position: more than {} joints have a gap", kMostGaps)};

@@ -80,7 +80,9 @@ Eigen::MatrixXd by_small_steps(const CrossingData& d, const CrossingMachine& m) 
 double error_of(int steps, const Eigen::MatrixXd& expected) {
   CrossingData data = some_data();
   data.steps = steps;
-  const Eigen::MatrixXd mean = mesh_torques(data, data.windows[0], some_machine(), Eigen::VectorXd::Zero(4));
+  const CrossingWindow& window = data.windows[0];
+  const Eigen::MatrixXd mean = mesh_torques(data, window, link_mobilities(data, window, some_machine()),
+                                            some_machine(), Eigen::VectorXd::Zero(2 * kCrossingOwn));
   return (mean - expected).cwiseAbs().maxCoeff() / data.joints[0].level;
 }
 

@@ -13,11 +13,11 @@
 // q_M: of the record. Links, drives and friction are those of the rig file after a fit to the whole record
 // (arm/fit.h), so that friction and payload may be wrong in the file. Free within what is known: b, k, c, p,
 // the rotor's share of what the motor moves, friction behind the gap, the time at which a torque was
-// recorded; and of each turn alone beta, a torque [N m] on each link that nothing tells, and how much wider
-// the gap seems there (10 % of it and 3 % of the deflection of the teeth): what these equations do not hold
-// makes each turn say another gap, and the one with the hardest touch would tell it alone otherwise. All
-// joints and all turns are fitted together: what the play of one joint throws on the teeth of another is in
-// M.
+// recorded; and of each turn alone beta, a torque [N m] on each link that nothing tells, how the link swings
+// on its teeth as the turn begins, and how much wider the gap seems there (10 % of it and 3 % of the
+// deflection of the teeth): what these equations do not hold makes each turn say another gap, and the one
+// with the hardest touch would tell it alone otherwise. All joints and all turns are fitted together: what
+// the play of one joint throws on the teeth of another is in M.
 //
 // The residual [N m], averaged over some samples, is weighted by its covariance: noise of the torque and of
 // the position, a slow torque that nothing tells (as large as the fit to the whole record leaves), and
@@ -26,7 +26,8 @@
 // better.
 //
 // A joint whose link is too light for the sampling interval (fewer than eight samples in a cycle of its
-// teeth) is not looked at and turns with its motor.
+// teeth) is not told; it is fitted as all others for what it throws on their teeth, and below four samples
+// turns with its motor.
 //
 // Interval, 95 %: Student's t with the larger of two standard errors (turns as clusters; the fit's own), and
 // `model` of the play and `law` of the deflection of the teeth for teeth that yield by no power: a soft start
@@ -56,7 +57,7 @@ struct TraverseSettings {
                          // the likelihood); choice: five standard errors and a half
   double far = 3.5;      // times stiffer or softer than declared: other teeth; choice: 2.5 spreads of the fit
   double rival = 9;      // theory: three standard errors
-  double vague = 0.25;   // half width of the interval, of the play, beyond which nothing is told; choice
+  double vague = 0.2;    // half width of the interval, of the play, beyond which nothing is told; choice
   std::size_t least_turns = 4;  // that tell the play; choice, for a standard error that means something
 };
 
