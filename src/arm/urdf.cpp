@@ -69,9 +69,10 @@ class Reader {
     add_moving(*model_.getRoot(), next);
     while (!next.empty()) {
       if (next.size() > 1)
-        throw BadData(name_, "joints '" + next[0]->name + "' and '" + next[1]->name +
-                                 "' begin at the same body: only a serial chain is known; which of them "
-                                 "stands still is to be said (held_joints of a rig file)");
+        throw BadData(name_,
+                      "joints '" + next[0]->name + "' and '" + next[1]->name +
+                          "' begin at the same body: only a serial chain is known; which of them "
+                          "stands still is to be said (held_joints of a rig file, --hold of plan_motion)");
       names.push_back(next.front()->name);
       const urdf::LinkConstSharedPtr link = model_.getLink(next.front()->child_link_name);
       next.clear();
