@@ -169,6 +169,7 @@ struct Judged {
   const TraverseSettings& settings;
   double misfit;
   std::size_t crossings, turns;
+  std::string strange;  // other joints
 };
 
 /// Windows in which the load of a joint turns.
@@ -232,6 +233,24 @@ double half_width(const CrossingFit& fit, std::size_t k, const CrossingFit::Erro
                     judged.settings.law * joint.level / stiffness);
 }
 
+/// Times stiffer or softer than declared.
+double off_stiffness(const CrossingFit& fit, std::size_t k) {
+  return std::exp(std::fabs(fit.machine()[k][kCrossingStiffness]));
+}
+
+/// A joint that the fit does not describe: what its teeth throw on the others is not known.
+bool is_strange(const CrossingFit& fit, std::size_t k, const TraverseSettings& settings) {
+  return fit.misfit(k) > settings.misfit || off_stiffness(fit, k) > settings.far;
+}
+
+void require_others(const std::string& strange) {
+  if (strange.empty()) return;
+  throw Refusal{Status::out_of_domain,
+                fmt::format("cannot tell: what the teeth of {} do, which throw this joint as well, is not "
+                            "explained",
+                            strange)};
+}
+
 void require_explained(const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   if (judged.misfit > s.misfit)
@@ -249,12 +268,18 @@ void require_explained(const Judged& judged) {
 void require_known(const CrossingFit& fit, std::size_t k, double half, double turns, const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   const double gap = fit.gap(k), stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
-  if (std::fmax(stiffer, 1 / stiffer) > s.far)
+  if (off_stiffness(fit, k) > s.far)
     throw Refusal{
         Status::out_of_domain,
         fmt::format("cannot tell: the record fits only teeth of {:.2g} N m/rad at {:.2g} N m, {:.2g} "
                     "times the declared stiffness: is gear.contact that of this joint?",
                     stiffer * judged.data.joints[k].stiffness, judged.data.joints[k].level, stiffer)};
+  if (const double power = fit.machine()[k][kCrossingPower]; power > s.steepest || power < s.flattest)
+    throw Refusal{
+        Status::out_of_domain,
+        fmt::format("cannot tell: the record fits only teeth whose torque goes with the power {:.2g} of "
+                    "their deflection, which says that it goes with none",
+                    power)};
   if (turns < double(s.least_turns))
     throw Refusal{Status::insufficient_data,
                   fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
@@ -274,6 +299,7 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
            const Judged& judged) {
   const TraverseSettings& s = judged.settings;
   require_explained(judged);
+  require_others(judged.strange);
   e.from_record = true;
   const double gap = fit.gap(k), half = half_width(fit, k, errors, judged);
   if (!(gap > half) || evidence_of(fit, k, s.evidence) < s.evidence) {
@@ -304,10 +330,15 @@ CrossingFit solved(const CrossingData& data) {
   return fit;
 }
 
-void tell(const CrossingData& data, std::vector<JointTraverse>& out, const TraverseSettings& settings) {
+void tell(const GearedArm& arm, const CrossingData& data, std::vector<JointTraverse>& out,
+          const TraverseSettings& settings) {
   const CrossingFit fit = solved(data);
   const std::vector<CrossingFit::Errors> errors = fit.errors();
   std::vector<std::vector<Crossing>> crossings = crossings_of(data, fit);
+  std::vector<std::size_t> strange;
+  for (std::size_t k = 0; k < data.joints.size(); ++k)
+    if (out[data.joints[k].joint].estimate.message.empty() && is_strange(fit, k, settings))
+      strange.push_back(k);
   for (std::size_t k = 0; k < data.joints.size(); ++k) {
     const TraverseJoint& joint = data.joints[k];
     JointTraverse& one = out[joint.joint];
@@ -328,7 +359,11 @@ void tell(const CrossingData& data, std::vector<JointTraverse>& out, const Trave
                       fmt::format("cannot tell: links and drives, fitted to the record, leave {:.2g} N m of "
                                   "the torque of the motor",
                                   joint.slow_torque)};
-      judge(e, fit, k, errors[k], {data, settings, one.misfit, crossings[k].size(), turns_of(data, k)});
+      std::string others;
+      for (const std::size_t i : strange)
+        if (i != k) others += (others.empty() ? "" : ", ") + arm.rig.joints[data.joints[i].joint].name;
+      judge(e, fit, k, errors[k],
+            {data, settings, one.misfit, crossings[k].size(), turns_of(data, k), others});
     });
     if (one.estimate.status == Status::ok) one.crossings = std::move(crossings[k]);
   }
@@ -375,7 +410,7 @@ std::vector<JointTraverse> traverses_of(const GearedArm& arm, const arm::ArmReco
       throw Refusal{
           Status::out_of_domain,
           "cannot tell: at no time that begins with all teeth on a flank for certain does a load turn"};
-    tell(data, out, settings);
+    tell(arm, data, out, settings);
   } catch (const Refusal& refusal) {
     refuse_all(refusal);
   }

@@ -33,6 +33,7 @@
 // `model` of the play and `law` of the deflection of the teeth for teeth that yield by no power: a soft start
 // of the teeth and a small play move the motor alike. Of a joint without a play that is larger than its
 // interval: at most the gap with which the record, all else fitted again, is explained worse by `rival`.
+// Nothing is told of a joint while another one of those fitted with it is not explained.
 #pragma once
 
 #include <string>
@@ -48,7 +49,7 @@ struct TraverseSettings {
   double least_load = 0.1;    // of the largest |T|, beyond friction: below it the flank is not certain; as
                               // geared_arm/play.h
   double model = 0.05;        // of the play; choice, see the study in doc/arm.md
-  double law = 0.1;           // of the deflection under the usual load; choice: teeth by no power
+  double law = 0.13;          // of the deflection under the usual load; choice: teeth by no power
   double disagreement = 0.1;  // of the torque of the joint (rms) that the fitted chain may leave; choice
   double friction = 2;   // Coulomb's of the motor, that the load must reach on both flanks: what a bristle
                          // does about a standstill looks like a gap; choice, tried on other simulators
@@ -56,8 +57,10 @@ struct TraverseSettings {
   double evidence = 30;  // by how much less a sound joint explains the record (minus twice the logarithm of
                          // the likelihood); choice: five standard errors and a half
   double far = 3.5;      // times stiffer or softer than declared: other teeth; choice: 2.5 spreads of the fit
-  double rival = 9;      // theory: three standard errors
-  double vague = 0.2;    // half width of the interval, of the play, beyond which nothing is told; choice
+  double flattest = 0.82, steepest = 1.58;  // powers at the ends of what the fit looks at; choice: such
+                                            // teeth, a soft start for instance, yield by no power
+  double rival = 9;                         // theory: three standard errors
+  double vague = 0.2;  // half width of the interval, of the play, beyond which nothing is told; choice
   std::size_t least_turns = 4;  // that tell the play; choice, for a standard error that means something
 };
 
