@@ -39,6 +39,7 @@ constexpr double kFar = 4;              // spreads of a declared value
 constexpr double kMostLeftOut = 0.2;    // of the crossings
 constexpr double kVague = 0.7;          // half width of the interval of the logarithm: a factor of two
 constexpr double kRivalCost = 9;        // theory: three standard errors
+constexpr double kSteepest = 1.55;      // power of the deflection: Hertz's 1.5 and what is told wrong of it
 constexpr double kHidden = 1;           // deflections under the noise, that a play must exceed
 constexpr double kLaw = 0.05;           // of the deflection: teeth that yield by no power of it, 95 %
 
@@ -189,6 +190,12 @@ void refuse(const TraverseFit& fit, const TraverseData& data) {
       throw Refusal{Status::out_of_domain,
                     fmt::format("the record fits only a machine far from that of the rig file: {} {:.3g}",
                                 names[k], fit.value(k))};
+  if (const double power = fit.value(kTraversePower); power > kSteepest)
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("the record fits only teeth whose torque goes with the power {:.3g} of their "
+                              "deflection, steeper than any contact: they yield otherwise, or there are more "
+                              "gaps than one",
+                              power)};
   const double hidden =
       std::max(kHidden * data.noise / fit.value(kTraverseStiffness), 2 * kLaw * deflection(fit, data));
   if (fit.value(kTraverseGap) < hidden)

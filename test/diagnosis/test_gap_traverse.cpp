@@ -17,7 +17,8 @@ struct Servo {
   double gap = 5e-4, stiffness = 4e5, damping = 450;  // rad, N m/rad, N m s/rad
   double motor_inertia = 7, load_inertia = 90;        // kg m^2
   double motor_viscous = 12, motor_coulomb = 50, load_coulomb = 15;
-  double hertz = 0;                 // N m; > 0: K in^1.5 (1 + chi in'), as stiff and damped at this torque
+  double hertz = 0;                 // N m; > 0: K in^p (1 + chi in'), as stiff and damped at this torque
+  double exponent = 1.5;            // p
   double gravity = 0, cogging = 0;  // N m: on the load, constant; on the motor, order 36
   double amplitude = 500;           // N m
   double noise = 2, step = 8.7e-7;  // N m, rad
@@ -26,8 +27,8 @@ struct Servo {
 
   double pressed(double in, double rate) const {
     if (hertz == 0) return stiffness * in + damping * rate;
-    const double there = 1.5 * hertz / stiffness;  // slope 1.5 T / in
-    return hertz * std::pow(in / there, 1.5) * (1 + damping / hertz * rate);
+    const double there = exponent * hertz / stiffness;  // slope p T / in
+    return hertz * std::pow(in / there, exponent) * (1 + damping / hertz * rate);
   }
 
   record::Record record(int rate = 1000) const {
@@ -119,6 +120,19 @@ TEST(GapTraverse, HoldsForTeethAfterHertz) {
     EXPECT_GT(e.angle_upper, servo.gap) << e.message;
     EXPECT_LT(e.angle_upper, 2 * e.angle_lower) << e.message;  // and says something
   }
+}
+
+// Teeth that begin more softly than Hertz's, as those that harden, are no machine of the header: where noise
+// hides that, the fit takes a power steeper than any contact's, and a play that is anything.
+TEST(GapTraverse, TeethSofterAtFirstThanAnyContactAreRefused) {
+  for (const double noise : {2.0, 20.0, 60.0})
+    for (const double exponent : {1.75, 2.0}) {
+      Servo servo;
+      servo.noise = noise, servo.hertz = 300, servo.exponent = exponent;
+      const Estimate e = estimate_gap_traverse(servo.record(), declared());
+      EXPECT_EQ(e.status, Status::out_of_domain) << exponent << " " << noise << " " << e.backlash_angle;
+      if (noise > 2) EXPECT_NE(e.message.find("power"), std::string::npos) << e.message;
+    }
 }
 
 TEST(GapTraverse, AngleIsPlayOverBaseRadius) {

@@ -10,7 +10,8 @@
 // with gap, k, p, c, Jl, Jm, bm, cm and cl of all crossings together, free within what is known of them, and
 // of each two start values and a torque on motor and load. All at the motor_position axis. The teeth are a
 // spring at the usual torque T, and may yield by a power p of the deflection, 1 within a factor of 1.5 (1.5:
-// Hertz), as far as the record tells.
+// Hertz), as far as the record tells. Beyond 1.55 nothing is told: no contact is so steep, and teeth that are
+// softer at first than a power, or two gaps in a row, look like that and like another play.
 //
 // The stretch about a crossing is as long as four of five crossings take, from a sure press on their flank to
 // the first touches, so that a play many times the declared one fits in, and more than half of the crossings
