@@ -3,6 +3,8 @@
 // never the wrong joint. How often is counted by tools/arm_traverse.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "backlash_diagnosis/geared_arm/simulation.h"
 #include "backlash_diagnosis/geared_arm/traverse.h"
 #include "support/data.h"
@@ -98,6 +100,21 @@ TEST(ArmTraverse, AMachineWithoutPlayThatTheFileDoesNotKnowHasNone) {
     machine.rig.joints[j].terms[std::size_t(arm::DriveTerm::coulomb)] *= 1.3;
   }
   for (const JointTraverse& joint : diagnosed(machine, declared)) expect_no_play_told(joint.estimate);
+}
+
+/// The shoulder's encoder is wrong along the turn: what its teeth throw on the elbow is not known either.
+TEST(ArmTraverse, NothingIsToldBesideAJointThatIsNotExplained) {
+  const GearedArm arm = arm_of("two_link_arm");
+  std::vector<record::JointRecord> joints = simulate_arm(arm, kDuration);
+  for (record::JointRecord& joint : joints) joint.record.column(Channel::load_position).clear();
+  for (double& q : joints[0].record.column(Channel::motor_position)) q += 5e-5 * std::sin(50 * q);
+  std::vector<std::string> warnings;
+  const std::vector<JointTraverse> found =
+      traverses_of(arm, arm::arm_record(joints, arm.rig, "simulated"), warnings);
+  EXPECT_NE(found[0].estimate.message.find("times the noise are left"), std::string::npos)
+      << found[0].estimate.message;
+  EXPECT_EQ(found[1].estimate.status, Status::out_of_domain) << found[1].estimate.backlash_angle;
+  EXPECT_NE(found[1].estimate.message.find("shoulder"), std::string::npos) << found[1].estimate.message;
 }
 
 TEST(ArmTraverse, ALoadThatNeverTurnsTellsNothing) {
