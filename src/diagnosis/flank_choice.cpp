@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
+#include "backlash_diagnosis/signal/robust.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -15,13 +17,19 @@ namespace {
 constexpr std::size_t kHalves[] = {4, 8, 16, 32};  // samples, half a window
 // Laws by which a deflection may follow the torque: powers (Hertz's contact 2/3, a spring 1, teeth between
 // them), and springs that harden with the third power of the deflection, by this much at a large torque.
-constexpr double kPowers[] = {2.0 / 3, 0.8, 1};
-constexpr double kHardening[] = {0.05, 0.1, 0.2, 0.4, 0.8};
+constexpr double kPowers[] = {0.55, 2.0 / 3, 0.73, 0.8, 0.9, 1};
+constexpr double kHardening[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6};
 constexpr double kOtherPower = 0.05;  // from the declared one, beyond which it is another: choice
 constexpr double kLawErrors = 3;      // standard errors by which the record tells two laws apart: choice
-// Square of the residual over that of the best law, up to which another is not ruled out once the declared
-// one is: none of those tried is the true one exactly.
-constexpr double kAnyLaw = 2.5;
+// Mean square left over that of the best law, up to which another is not ruled out once the declared one is:
+// none of those tried is the true one exactly. Larger where the best one tells the play to a tenth only, be
+// it the declared one, and where the recorded torque is too noisy to tell. Simulated machines.
+constexpr double kAnyLaw = 1.5, kAnyUnsureLaw = 2.5, kAnyNoisyLaw = 3, kSure = 0.1;
+constexpr double kSurelyWorse = 3;  // likewise, of one cut: not looked at any further
+constexpr double kTooNoisy = 4;  // what is typical over that of the sharpest cut: not read by any other law
+constexpr double kSharp = 3;     // the same: where laws are told apart
+constexpr double kNotFound = 4;  // mean square over that of the best law, of one that finds no flanks: choice
+constexpr double kOutlying = 5;  // standard deviations, beyond which a window is left by any law: choice
 
 /// One way to cut the record: all windows of one length, by one torque.
 struct Cut {
@@ -64,9 +72,11 @@ double windows_change(const std::vector<Cut>& cuts, const std::vector<FlankFit>&
   return INFINITY;
 }
 
-Readings read(const std::vector<Cut>& cuts, const FlankModel& model) {
+/// Of the cuts that are `worth` reading.
+Readings read(const std::vector<Cut>& cuts, const std::vector<char>& worth, const FlankModel& model) {
   Readings out;
-  for (const Cut& cut : cuts) out.fits.push_back(fit_flanks(cut.windows, model));
+  for (std::size_t k = 0; k < cuts.size(); ++k)
+    out.fits.push_back(worth[k] ? fit_flanks(cuts[k].windows, model) : FlankFit{});
   for (std::size_t k = 0; k < cuts.size(); ++k) {
     if (!out.fits[k].found) continue;
     const double change = windows_change(cuts, out.fits, k),
@@ -107,33 +117,103 @@ struct Law {
   Readings readings;
 };
 
-std::size_t used(const FlankFit& fit) {
-  return fit.used[0] + fit.used[1];
+/// Median size of what a fit leaves of all windows, as a standard deviation.
+double typical_of(const FlankFit& fit) {
+  std::vector<double> away;
+  for (const double a : fit.away)
+    if (!std::isnan(a)) away.push_back(a);
+  return away.empty() || !fit.found ? INFINITY : signal::kNormalPerMedianDeviation * signal::median(away);
 }
 
-/// Squares of the residuals over one cut.
-double left(const FlankFit& fit) {
-  return fit.found ? fit.residual * fit.residual : INFINITY;
-}
-
-/// Ratio of squares beyond which the record tells two laws apart: each stay tells once.
-double told(const FlankFit& fit) {
-  return 1 + kLawErrors * kLawErrors / double(std::max<std::size_t>(1, fit.stays));
-}
-
-/// The declared law first, then those that the record does not rule out where that is surest.
-std::vector<Law> read_laws(const std::vector<Cut>& cuts, const FlankModel& model, double large_torque) {
-  std::vector<Law> laws = {{model, read(cuts, model)}};
-  const Readings declared = laws[0].readings;
-  if (!declared.surest().found) return laws;
-  for (FlankModel& law : other_laws(model, large_torque)) {
-    const FlankFit first = fit_flanks(cuts[declared.best].windows, law);
-    if (left(first) > told(declared.surest()) * left(declared.surest())) continue;
-    Readings readings = read(cuts, law);
-    if (readings.surest().found && readings.surest().gap > 0)
-      laws.push_back({std::move(law), std::move(readings)});
+/// Mean square of what a law leaves of all windows of a cut, over the square of `typical`.
+double left(const FlankFit& fit, double typical) {
+  if (!fit.found) return INFINITY;
+  double sum = 0, count = 0;
+  for (const double away : fit.away) {
+    if (std::isnan(away)) continue;
+    const double deviations = std::min(away / std::max(typical, 1e-300), kOutlying);
+    sum += deviations * deviations, ++count;
   }
-  return laws;
+  return count > 0 ? sum / count : INFINITY;
+}
+
+/// The cut of which some law leaves least: there laws are told apart.
+std::size_t sharpest_cut(const std::vector<Law>& laws, const std::vector<Cut>& cuts,
+                         const std::vector<bool>& balanced = {false, true}) {
+  std::size_t sharpest = 0;
+  double least = INFINITY;
+  for (const Law& law : laws)
+    for (std::size_t c = 0; c < cuts.size(); ++c) {
+      if (std::count(balanced.begin(), balanced.end(), cuts[c].balanced) == 0) continue;
+      if (const double t = typical_of(law.readings.fits[c]); t < least) least = t, sharpest = c;
+    }
+  return sharpest;
+}
+
+/// What each of the fits of one cut leaves of it, over what the best one does, at least 1.
+std::vector<double> squares_over_least(const std::vector<FlankFit>& fits) {
+  double typical = INFINITY, least = INFINITY;
+  for (const FlankFit& fit : fits) typical = std::min(typical, typical_of(fit));
+  std::vector<double> squares;
+  for (const FlankFit& fit : fits) squares.push_back(left(fit, typical));
+  for (const double s : squares) least = std::min(least, s);
+  for (double& s : squares) s = s > least ? s / least : 1;
+  return squares;
+}
+
+/// The declared law first, then those that are not surely worse where it leaves least, by either torque.
+std::vector<Law> read_laws(const std::vector<Cut>& cuts, const FlankModel& model, double large_torque) {
+  std::vector<Law> laws = {{model, read(cuts, std::vector<char>(cuts.size(), true), model)}};
+  const std::vector<FlankFit>& declared = laws[0].readings.fits;
+  if (!laws[0].readings.surest().found) return laws;
+  const double least = typical_of(declared[sharpest_cut(laws, cuts)]);
+  std::vector<char> worth;
+  for (const FlankFit& fit : declared) worth.push_back(typical_of(fit) <= kTooNoisy * least);
+  std::vector<FlankModel> others = other_laws(model, large_torque);
+  std::vector<double> squares(others.size(), INFINITY);
+  for (const bool balanced : {false, true}) {
+    const std::size_t at = sharpest_cut(laws, cuts, {balanced});
+    std::vector<FlankFit> there = {declared[at]};
+    for (const FlankModel& law : others) there.push_back(fit_flanks(cuts[at].windows, law));
+    const std::vector<double> here = squares_over_least(there);
+    for (std::size_t k = 0; k < others.size(); ++k) squares[k] = std::min(squares[k], here[k + 1]);
+  }
+  std::vector<Law> all = std::move(laws);
+  for (std::size_t k = 0; k < others.size(); ++k) {
+    if (squares[k] > kSurelyWorse) continue;
+    Readings readings = read(cuts, worth, others[k]);
+    if (readings.surest().found && readings.surest().gap > 0)
+      all.push_back({std::move(others[k]), std::move(readings)});
+  }
+  return all;
+}
+
+/// What all laws make of one cut.
+std::vector<FlankFit> fits_of(const std::vector<Law>& laws, std::size_t cut) {
+  std::vector<FlankFit> fits;
+  for (const Law& law : laws) fits.push_back(law.readings.fits[cut]);
+  return fits;
+}
+
+/// What each law leaves over what the best one does, geometric mean over the cuts that tell laws apart.
+std::vector<double> squares_of_laws(const std::vector<Law>& laws, const std::vector<Cut>& cuts) {
+  const auto typical_at = [&](std::size_t c) {
+    double typical = INFINITY;
+    for (const FlankFit& fit : fits_of(laws, c)) typical = std::min(typical, typical_of(fit));
+    return typical;
+  };
+  const double sharpest = typical_at(sharpest_cut(laws, cuts));
+  std::vector<double> sums(laws.size(), 0.0);
+  double count = 0;
+  for (std::size_t c = 0; c < cuts.size(); ++c) {
+    if (!(typical_at(c) <= kSharp * sharpest)) continue;
+    const std::vector<double> squares = squares_over_least(fits_of(laws, c));
+    for (std::size_t k = 0; k < laws.size(); ++k) sums[k] += std::log(std::min(squares[k], kNotFound));
+    ++count;
+  }
+  const double least = *std::min_element(sums.begin(), sums.end());
+  for (double& s : sums) s = std::exp((s - least) / count);
+  return sums;
 }
 
 }  // namespace
@@ -165,23 +245,22 @@ FlankReading read_flanks(const TwoEncoders& motion, const FlankModel& model, dou
   const std::vector<Law> laws = read_laws(cuts, model, large_torque);
   FlankReading reading;
   if (!laws[0].readings.surest().found) return reading;
-  // Laws are compared over the same windows, of those that are surest by one law the most.
-  const auto fewer = [](const Law& a, const Law& b) {
-    return used(a.readings.surest()) < used(b.readings.surest());
-  };
-  const std::size_t common = std::max_element(laws.begin(), laws.end(), fewer)->readings.best;
-  const auto left_by = [&](std::size_t k) { return left(laws[k].readings.fits[common]); };
-  const double apart = told(laws[0].readings.surest());
-  std::size_t best = 0;
-  for (std::size_t k = 1; k < laws.size(); ++k)
-    if (apart * left_by(k) < left_by(0) && left_by(k) < left_by(best)) best = k;
+  const std::vector<double> squares = squares_of_laws(laws, cuts);
+  const auto least = std::size_t(std::min_element(squares.begin(), squares.end()) - squares.begin());
+  // Each stay on a flank tells once.
+  const double apart =
+      1 + kLawErrors * kLawErrors / double(std::max<std::size_t>(1, laws[least].readings.surest().stays));
+  const std::size_t best = squares[0] <= apart ? 0 : least;
   const Readings& chosen = laws[best].readings;
   reading.fit = chosen.surest();
   reading.windows_change = chosen.change;
   reading.declared_law = best == 0;
+  const bool unsure = chosen.error > kSure * chosen.surest().gap;
+  const bool noisy = best != 0 && cuts[chosen.best].balanced;
+  const double any = noisy ? kAnyNoisyLaw : unsure ? kAnyUnsureLaw : best != 0 ? kAnyLaw : apart;
   reading.least = reading.largest = reading.fit.gap;
   for (std::size_t k = 0; k < laws.size(); ++k) {
-    if (left_by(k) > (best == 0 ? apart : kAnyLaw) * left_by(best)) continue;
+    if (squares[k] > std::max(apart, any)) continue;
     const double gap = laws[k].readings.surest().gap;
     reading.least = std::min(reading.least, gap), reading.largest = std::max(reading.largest, gap);
   }

@@ -109,6 +109,7 @@ class Fitter {
   bool choose_loaded();
   bool holds_compliance();
   FlankFit result(const MatrixXd& gap) const;
+  std::vector<double> away() const;
   double sum_of_stays(const VectorXd& score, std::size_t& stays) const;
 
   const FlankWindows& w_;
@@ -283,6 +284,22 @@ double Fitter::sum_of_stays(const VectorXd& score, std::size_t& stays) const {
   return squares + sum * sum;
 }
 
+std::vector<double> Fitter::away() const {
+  const Eigen::Index knots = elastic_at_ - gap_at_;
+  const VectorXd deflection = phi_ - a_.leftCols(gap_at_) * p_.head(gap_at_);
+  const VectorXd half = side_.asDiagonal() * (a_.middleCols(gap_at_, knots) * p_.segment(gap_at_, knots));
+  const VectorXd elastic = a_.rightCols(a_.cols() - elastic_at_) * p_.tail(p_.size() - elastic_at_);
+  std::vector<double> least(n_, NAN);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    if (std::abs(w_.speed[i]) <= slow_) continue;
+    const double side = elastic[i] > 0 ? 1 : -1;
+    const double pressed = std::abs(deflection[i] - side * half[i] - elastic[i]);
+    const double beyond = std::max(0.0, std::abs(deflection[i]) - half[i]);
+    least[i] = std::min(pressed, std::hypot(beyond, elastic[i]));
+  }
+  return least;
+}
+
 FlankFit Fitter::result(const MatrixXd& gap) const {
   FlankFit fit;
   VectorXd mean = VectorXd::Zero(p_.size());
@@ -343,6 +360,7 @@ FlankFit Fitter::fit() {
     }
   }
   fit.compliance_from_record = held;
+  fit.away = away();
   if (model_.moving && common_.cols() > 1) {
     fit.scale_error = (p_[common_.cols() - 1] - p_[0]) / signal::peak_to_peak(w_.load);
   }

@@ -28,7 +28,8 @@ constexpr double kTiming = 0.5;          // samples, when the impact began
 constexpr double kNoisyTiming = 0.8;
 constexpr double kLeastOverFriction = 0.7;  // simulation: servos with up to twice the declared friction
 constexpr int kSettle = 2;                  // choice: looks at what is left in flight
-constexpr double kToldElasticShare = 0.2;   // simulation: the level is told to some 10 %
+constexpr double kTangent = 1.5;  // theory: Hertz, deflection at a tangent stiffness over that at the secant
+constexpr double kToldElasticShare = 0.2;  // simulation: the level is told to some 10 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid) throw InvalidParameter(std::string("momentum_transfer.") + name, value, limit);
@@ -109,11 +110,11 @@ double large_torque(const Flank& flank) {
   return signal::quantile(std::move(sizes), 0.95);
 }
 
-/// By how much more the flank yields under a small torque where it does by Hertz and is declared at the
-/// torque `most` of the record.
+/// By how much more the flank yields under a small torque where it does by Hertz and is as stiff as declared
+/// at the torque `most` of the record.
 double more_after_hertz(double torque, double most, const MomentumTransferSettings& s) {
   if (s.output_locked || !s.flank_deflection || !(torque > 0 && torque < most)) return 0;
-  return s.flank_deflection(most) * std::pow(torque / most, 2.0 / 3) - s.flank_deflection(torque);
+  return kTangent * s.flank_deflection(most) * std::pow(torque / most, 2.0 / 3) - s.flank_deflection(torque);
 }
 
 Travels travels_of(const Motor& motor, const Flank& flank, const std::vector<Crossing>& crossings,
@@ -155,7 +156,10 @@ double half_width(const Travels& travels, const signal::RobustScale& scale, cons
                     static_cast<double>(flank.half) * motor.interval, smear)};
   const double noisy = kNoisyTiming * smear * std::min(1.0, 2 * kNoiseFree * flank.noise / flank.level);
   const double share = std::max(s.elastic_uncertainty, motor.torque_measured ? 0 : kToldElasticShare);
-  return std::sqrt(scatter * scatter + std::pow(signal::median(travels.timing), 2) + noisy * noisy +
+  // What makes crossings of a free load differ may shift all of them.
+  const double unlike = s.output_locked ? 0 : scale.deviation;
+  return std::sqrt(scatter * scatter + unlike * unlike + std::pow(signal::median(travels.timing), 2) +
+                   noisy * noisy +
                    std::pow(share * signal::median(travels.elastic) + signal::median(travels.law), 2));
 }
 

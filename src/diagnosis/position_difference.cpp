@@ -32,9 +32,9 @@ constexpr double kLockedTravel = 0.05;  // of the motor's travel
 constexpr double kLockedResidual = 2;   // share of the rms residual in the interval, of a locked rig
 // Of the play, of a moving load: what windows over touches and coarse encoders shift. Simulation.
 constexpr double kMovingModel = 0.01;
-// The same where the deflection bends otherwise than declared: its law is none of those that are tried
-// exactly. Simulation.
-constexpr double kBentModel = 0.02;
+// The same where the deflection bends otherwise than declared, and of the deflection under a large torque:
+// its law is none of those that are tried exactly, and half a step between them shifts the play by that much.
+constexpr double kBentModel = 0.03, kBentElastic = 0.05;
 constexpr double kLargeTorque = 0.95;  // quantile, where laws of the deflection are the same: choice
 constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
@@ -363,7 +363,9 @@ Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
   require_sound(fit);
   require_told(reading);
   require_constant(reading);
-  const double model_error = (reading.declared_law ? kMovingModel : kBentModel) * fit.gap;
+  const double elastic = fit.compliance_factor * reading.model.elastic(large_torque);
+  const double model_error = reading.declared_law ? kMovingModel * fit.gap
+                                                  : std::hypot(kBentModel * fit.gap, kBentElastic * elastic);
   const double half = std::hypot(
       std::hypot(scatter_of(fit), reading.windows_change),
       std::hypot(std::hypot(kResidualShare * fit.residual, model_error), skew_change(motion, reading, skew)));

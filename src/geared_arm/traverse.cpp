@@ -264,10 +264,10 @@ void require_explained(const Judged& judged) {
                               judged.turns, s.least_turns)};
 }
 
-/// That a play, which there is, is known well enough.
-void require_known(const CrossingFit& fit, std::size_t k, double half, double turns, const Judged& judged) {
+/// That the teeth are some that are known: else what they take for a play, or for none, means nothing.
+void require_teeth(const CrossingFit& fit, std::size_t k, const Judged& judged) {
   const TraverseSettings& s = judged.settings;
-  const double gap = fit.gap(k), stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
+  const double stiffer = std::exp(fit.machine()[k][kCrossingStiffness]);
   if (off_stiffness(fit, k) > s.far)
     throw Refusal{
         Status::out_of_domain,
@@ -280,6 +280,12 @@ void require_known(const CrossingFit& fit, std::size_t k, double half, double tu
         fmt::format("cannot tell: the record fits only teeth whose torque goes with the power {:.2g} of "
                     "their deflection, which says that it goes with none",
                     power)};
+}
+
+/// That a play, which there is, is known well enough.
+void require_known(const CrossingFit& fit, std::size_t k, double half, double turns, const Judged& judged) {
+  const TraverseSettings& s = judged.settings;
+  const double gap = fit.gap(k);
   if (turns < double(s.least_turns))
     throw Refusal{Status::insufficient_data,
                   fmt::format("cannot tell: {:.2g} turns of the load tell the play, {} are needed: a longer "
@@ -300,6 +306,7 @@ void judge(diagnosis::Estimate& e, const CrossingFit& fit, std::size_t k, const 
   const TraverseSettings& s = judged.settings;
   require_explained(judged);
   require_others(judged.strange);
+  require_teeth(fit, k, judged);
   e.from_record = true;
   const double gap = fit.gap(k), half = half_width(fit, k, errors, judged);
   if (!(gap > half) || evidence_of(fit, k, s.evidence) < s.evidence) {

@@ -15,13 +15,15 @@ constexpr double kTorque = 1;      // N m
 constexpr double kRate = 10000;    // Hz
 
 /// A rigid body between two walls that swallow its momentum, under a square wave of 10 Hz: at rest on a wall,
-/// it crosses the gap with constant acceleration and hits with w^2 = 2 kTorque gap / kInertia.
-record::Record crossing(double gap, double noise = 0, double torque_bias = 0) {
+/// it crosses the gap with constant acceleration and hits with w^2 = 2 kTorque gap / kInertia. `unlike`: by
+/// which share crossings differ, by the tachometer.
+record::Record crossing(double mean_gap, double noise = 0, double torque_bias = 0, double unlike = 0) {
   record::Record r;
   Random random(5);
   for (int i = 0; i < kRate; ++i) {
     const double t = i / kRate, half = std::floor(20 * t + 1e-9), since = t - half / 20;
     const double sign = std::fmod(half, 2) == 0 ? 1 : -1;
+    const double gap = mean_gap * (1 + unlike * std::sin(half));
     const double acceleration = kTorque / kInertia, flight = std::sqrt(2 * gap / acceleration);
     const bool flies = since < flight && torque_bias == 0;
     r.time.push_back(t);
@@ -114,6 +116,39 @@ TEST(MomentumTransfer, OfAFreeLoadNoPlayIsNotTold) {
   s.elastic_uncertainty = 1;
   const Estimate e = estimate_momentum_transfer(record, s);
   EXPECT_EQ(e.status, Status::insufficient_data) << e.message;
+}
+
+// Teeth after Hertz that are as stiff as declared (tangent) under the torque of the record yield by 1.5 times
+// the declared deflection there, and by 1.5 * 0.5^(2/3) of it under half of that, where contact ends.
+TEST(MomentumTransfer, OfAFreeLoadTheIntervalHoldsTeethAfterHertz) {
+  constexpr double kTravel = 1e-2;
+  record::Record record = crossing(kTravel);
+  record.column(record::Channel::load_position).assign(record.size(), 0.0);
+  for (const double declared : {1e-4, 1e-3, 2e-3}) {  // rad at kTorque
+    MomentumTransferSettings s = settings();
+    s.output_locked = false;
+    s.elastic_uncertainty = 0.1;
+    s.flank_deflection = [declared](double torque) { return declared * torque / kTorque; };
+    const Estimate e = estimate_momentum_transfer(record, s);
+    ASSERT_EQ(e.status, Status::ok) << e.message;
+    const double hertz = 1.5 * declared * std::pow(0.5, 2.0 / 3);
+    EXPECT_LE(e.angle_lower, kTravel - hertz) << declared;
+    EXPECT_GE(e.angle_upper, kTravel - 0.5 * declared) << declared;  // a spring
+  }
+}
+
+// Crossings of 0.8 to 1.2 of the mean have a standard deviation of 0.14 of it.
+TEST(MomentumTransfer, OfAFreeLoadTheIntervalHoldsMostOfTheCrossings) {
+  record::Record record = crossing(1e-2, 0, 0, 0.2);
+  record.column(record::Channel::load_position).assign(record.size(), 0.0);
+  MomentumTransferSettings s = settings();
+  const Estimate locked = estimate_momentum_transfer(record, s);
+  s.output_locked = false;
+  const Estimate free = estimate_momentum_transfer(record, s);
+  ASSERT_EQ(locked.status, Status::ok) << locked.message;
+  ASSERT_EQ(free.status, Status::ok) << free.message;
+  EXPECT_LT(locked.angle_upper - locked.angle_lower, 0.28e-2);
+  EXPECT_GT(free.angle_upper - free.angle_lower, 0.28e-2);
 }
 
 // The same from the motion alone, of which the level of the torque is no part: the inertia scales it.

@@ -62,6 +62,9 @@ struct FlankFit {
   double residual = 0;           // rad, rms
   std::size_t used[2] = {0, 0};  // windows on the negative and the positive flank
   std::size_t stays = 0;         // uninterrupted stays on a flank
+  /// rad, every window: how far it lies from where the fit has the flanks, or from a free flight between them
+  /// without torque. NaN where friction has no certain sign.
+  std::vector<double> away;
 };
 
 /// Windows count in which the flank is loaded for certain: deflection and predicted elastic deflection both

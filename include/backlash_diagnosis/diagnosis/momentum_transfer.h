@@ -44,8 +44,10 @@
 // of the elastic deflections. Travel within the averages beyond the gap is out of the domain. About 94 %
 // coverage in simulations, see test_rig_estimators.cpp. Of a free load the dry friction is not the declared
 // one but that which leaves nothing in flight, and the flanks may yield by any law between the declared one
-// and Hertz's, which agree at the torque that the flanks exceed for a twentieth of the time: the middle is
-// taken, both ends are in the interval.
+// and Hertz's, as stiff as declared (tangent) at the torque that the flanks exceed for a twentieth of the
+// time: the middle is taken, both ends are in the interval. Where crossings of a free load scatter, what
+// makes them differ may shift all of them: their whole scatter is in the interval, not that of the median
+// alone.
 #pragma once
 
 #include <functional>

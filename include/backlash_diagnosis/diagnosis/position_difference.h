@@ -18,8 +18,11 @@
 // recorded torque (with_balanced_torque), is free of its noise, which as a regressor would draw compliance
 // and play towards others (Fuller 1987). The record is read by either torque and over windows of 7 to 63
 // samples; that reading counts which is surest. Read also with a deflection that follows the torque by other
-// laws (powers between Hertz's 2/3 and a spring's 1, springs that harden): where the declared one fits worse
-// than another, the better counts, and the interval holds the play by all that are not clearly worse.
+// laws (powers from 0.55 to a spring's 1, Hertz's 2/3 among them, springs that harden). Laws are compared by
+// what they leave of all windows, those in flight too, where no torque may be left, of the cut that is told
+// best. Where the declared one is clearly worse than another, the better counts, and the interval holds the
+// play by all that leave up to one and a half times the mean square of the best (two and a half times, where
+// that one tells the play to a tenth only).
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t times the standard error, stays on a flank counted as independent,
@@ -31,7 +34,7 @@
 //   moves,
 // - the skew of the encoders, where it was taken out: the change of the play over its interval,
 // - with a locked output 3 % of the play, for the bouncing that the residual does not show; where the load
-//   moves 1 %, and 2 % where the deflection bends otherwise than declared;
+//   moves 1 %, and 3 % where the deflection bends otherwise than declared;
 // and on one side what the play would change if all of the residual were noise of the torque.
 // The shares are set by simulation, see test_rig_estimators.cpp, and for loads that move by the machines of
 // scripts/trace_machines.sh (doc/reference/estimators.md).
