@@ -221,7 +221,7 @@ class alignas(sizeof(Lanes)) Loads {
     force_ = machines_.torque(touch_);
     return changed_ = pressed_ ^ ((touch_.depth > 0) & (force_ > 0));
   }
-  DIAGNOSIS_LANES void keep_begin() { begin_ = {load_, motor_, touch_, force_, teeth_, Lanes{}, Lanes{}}; }
+  DIAGNOSIS_LANES void keep_begin() { begin_ = {load_, touch_, force_, teeth_}; }
   DIAGNOSIS_LANES void end_step() {
     mean_ += sum_before_, mean_of_next_ += sum_after_;
     teeth_ = pressed_ ? turned(force_, touch_.side) : Lanes{};
@@ -230,7 +230,7 @@ class alignas(sizeof(Lanes)) Loads {
   /// Back to the begin of the step. Returns the share of it, `step` long, after which they touch or leave.
   DIAGNOSIS_LANES Lanes go_back(double step) {
     const Lanes share = share_of_change(step);
-    end_ = {load_, motor_, touch_, force_, teeth_, sum_before_, sum_after_};
+    end_ = {load_, motor_, sum_before_, sum_after_};
     load_ = trial_ = begin_.load, touch_ = begin_.touch, force_ = begin_.force, teeth_ = begin_.teeth;
     return share;
   }
@@ -265,10 +265,14 @@ class alignas(sizeof(Lanes)) Loads {
     return pressed_ ? leaves : touches;
   }
 
-  struct State {
-    Place<Lanes> load, motor;
+  struct Begin {  // of a step
+    Place<Lanes> load;
     Touch<Lanes> touch;
-    Lanes force, teeth, sum_before, sum_after;
+    Lanes force, teeth;
+  };
+  struct End {
+    Place<Lanes> load, motor;
+    Lanes sum_before, sum_after;
   };
 
   Machines<Lanes> machines_;
@@ -277,7 +281,8 @@ class alignas(sizeof(Lanes)) Loads {
   Lanes force_, teeth_, middle_;  // of the teeth if they are pressed, through them, in the middle of the step
   Flags pressed_, changed_;
   Lanes step_, sum_before_, sum_after_, first_before_, first_after_, mean_, mean_of_next_ = {};
-  State begin_, end_;
+  Begin begin_;
+  End end_;
   const double *positions_[kLanesOf<Lanes>], *rates_[kLanesOf<Lanes>];  // of the motor
 };
 

@@ -118,25 +118,6 @@ TEST(MomentumTransfer, OfAFreeLoadNoPlayIsNotTold) {
   EXPECT_EQ(e.status, Status::insufficient_data) << e.message;
 }
 
-// Teeth after Hertz that are as stiff as declared (tangent) under the torque of the record yield by 1.5 times
-// the declared deflection there, and by 1.5 * 0.5^(2/3) of it under half of that, where contact ends.
-TEST(MomentumTransfer, OfAFreeLoadTheIntervalHoldsTeethAfterHertz) {
-  constexpr double kTravel = 1e-2;
-  record::Record record = crossing(kTravel);
-  record.column(record::Channel::load_position).assign(record.size(), 0.0);
-  for (const double declared : {1e-4, 1e-3, 2e-3}) {  // rad at kTorque
-    MomentumTransferSettings s = settings();
-    s.output_locked = false;
-    s.elastic_uncertainty = 0.1;
-    s.flank_deflection = [declared](double torque) { return declared * torque / kTorque; };
-    const Estimate e = estimate_momentum_transfer(record, s);
-    ASSERT_EQ(e.status, Status::ok) << e.message;
-    const double hertz = 1.5 * declared * std::pow(0.5, 2.0 / 3);
-    EXPECT_LE(e.angle_lower, kTravel - hertz) << declared;
-    EXPECT_GE(e.angle_upper, kTravel - 0.5 * declared) << declared;  // a spring
-  }
-}
-
 // Crossings of 0.8 to 1.2 of the mean have a standard deviation of 0.14 of it.
 TEST(MomentumTransfer, OfAFreeLoadTheIntervalHoldsMostOfTheCrossings) {
   record::Record record = crossing(1e-2, 0, 0, 0.2);
