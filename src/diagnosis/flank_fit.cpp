@@ -53,6 +53,16 @@ MatrixXd hats(const std::vector<double>& q, int knots) {
   return h;
 }
 
+/// Of each row the first of the two neighbouring columns outside of which all are zero; 0 of less than two.
+std::vector<Eigen::Index> first_knots(const MatrixXd& h) {
+  const Eigen::Index last = std::max<Eigen::Index>(0, h.cols() - 2);
+  std::vector<Eigen::Index> first(static_cast<std::size_t>(h.rows()), last);
+  for (Eigen::Index k = last; k >= 0; --k)
+    for (Eigen::Index i = 0; i < h.rows(); ++i)
+      if (h(i, k) != 0) first[static_cast<std::size_t>(i)] = k;
+  return first;
+}
+
 double rms(const std::vector<double>& x) {
   return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0) / static_cast<double>(x.size()));
 }
@@ -90,6 +100,7 @@ class Fitter {
         model.moving ? static_cast<int>(std::min<double>(kGapKnots, scaled(double(n_), 200))) : 1;
     common_ = hats(w_.load, common);
     gap_ = hats(w_.load, gaps);
+    common_first_ = first_knots(common_), gap_first_ = first_knots(gap_);
     phi_ = Eigen::Map<const VectorXd>(w_.deflection.data(), n_);
     inertia_ = model.inertia;
     slow_ = model.moving ? kSlow * rms(w_.speed) : -1;
@@ -104,6 +115,7 @@ class Fitter {
   void choose_outermost();
   void iterate(bool by_position, int iterations);
   void design(const MatrixXd& gap);
+  void add_windows(MatrixXd* normal, VectorXd* right) const;
   void solve(const MatrixXd& gap, double elastic_deviation);
   void take_over();
   bool choose_loaded();
@@ -116,13 +128,14 @@ class Fitter {
   const FlankModel& model_;
   Eigen::Index n_;
   MatrixXd common_, gap_, f_basis_;
+  std::vector<Eigen::Index> common_first_, gap_first_;
   VectorXd phi_, side_;
   std::vector<char> use_;
   double slow_;
   std::optional<Slope> slope_;
   double factor_ = 1, inertia_, viscous_ = 0, coulomb_ = 0;  // g, J, d, C
   // of the last solution
-  MatrixXd a_, used_, inverse_;  // used_: a_ with zeros for windows not in use
+  MatrixXd a_, inverse_;
   VectorXd p_, residual_;
   double sigma_ = 0, prior_g_ = 0;
   Eigen::Index gap_at_ = 0, elastic_at_ = 0;
@@ -173,18 +186,42 @@ void Fitter::design(const MatrixXd& gap) {
   }
 }
 
+/// Normal equations of the windows in use. Of f and of b each row has two columns, between whose knots it
+/// lies.
+void Fitter::add_windows(MatrixXd* normal, VectorXd* right) const {
+  constexpr Eigen::Index kMost = 16;
+  Eigen::Index column[kMost];
+  double value[kMost];
+  const auto add_pair = [&](Eigen::Index from, Eigen::Index columns, Eigen::Index first,
+                            Eigen::Index* count) {
+    for (Eigen::Index k = 0; k < std::min<Eigen::Index>(2, columns); ++k)
+      column[(*count)++] = from + (columns > 2 ? first : 0) + k;
+  };
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    if (!use_[i]) continue;
+    Eigen::Index count = 0;
+    add_pair(0, gap_at_, common_first_[i], &count);
+    add_pair(gap_at_, elastic_at_ - gap_at_, gap_first_[i], &count);
+    for (Eigen::Index k = elastic_at_; k < a_.cols(); ++k) column[count++] = k;
+    for (Eigen::Index p = 0; p < count; ++p) {
+      value[p] = a_(i, column[p]);
+      (*right)[column[p]] += value[p] * phi_[i];
+      for (Eigen::Index q = 0; q <= p; ++q) (*normal)(column[p], column[q]) += value[p] * value[q];
+    }
+  }
+  normal->triangularView<Eigen::StrictlyUpper>() = normal->transpose();
+}
+
 /// Least squares on the windows in use. elastic_deviation > 0: with g = 1 +- elastic_deviation as one more
 /// observation. Parameters are J, d, C minus their present values.
 void Fitter::solve(const MatrixXd& gap, double elastic_deviation) {
   gap_at_ = f_basis_.cols();
   elastic_at_ = gap_at_ + gap.cols();
   design(gap);
-  const VectorXd used =
-      Eigen::Map<const Eigen::Array<char, Eigen::Dynamic, 1>>(use_.data(), n_).cast<double>();
-  const double count = used.sum();
-  used_.noalias() = used.asDiagonal() * a_;
-  MatrixXd normal = signal::transposed_product(used_, a_);
-  VectorXd right = used_.transpose() * phi_;
+  const auto count = static_cast<double>(std::count(use_.begin(), use_.end(), 1));
+  MatrixXd normal = MatrixXd::Zero(a_.cols(), a_.cols());
+  VectorXd right = VectorXd::Zero(a_.cols());
+  add_windows(&normal, &right);
   const double noise = sigma_ > 0 ? sigma_ : 0.1 * std::sqrt(phi_.squaredNorm() / static_cast<double>(n_));
   // A declaration is worth one window per its own variance times what a correlated record repeats itself.
   const double weight = noise * noise * std::max(1.0, count / 50);
