@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -137,25 +138,26 @@ double left(const FlankFit& fit, double typical) {
   return count > 0 ? sum / count : INFINITY;
 }
 
-/// The cut of which some law leaves least: there laws are told apart.
+/// The cut, of those by one torque if that is given, of which some law leaves least: there laws are told
+/// apart.
 std::size_t sharpest_cut(const std::vector<Law>& laws, const std::vector<Cut>& cuts,
-                         const std::vector<bool>& balanced = {false, true}) {
+                         std::optional<bool> balanced = {}) {
   std::size_t sharpest = 0;
   double least = INFINITY;
   for (const Law& law : laws)
     for (std::size_t c = 0; c < cuts.size(); ++c) {
-      if (std::count(balanced.begin(), balanced.end(), cuts[c].balanced) == 0) continue;
+      if (cuts[c].balanced != balanced.value_or(cuts[c].balanced)) continue;
       if (const double t = typical_of(law.readings.fits[c]); t < least) least = t, sharpest = c;
     }
   return sharpest;
 }
 
 /// What each of the fits of one cut leaves of it, over what the best one does, at least 1.
-std::vector<double> squares_over_least(const std::vector<FlankFit>& fits) {
+std::vector<double> squares_over_least(const std::vector<const FlankFit*>& fits) {
   double typical = INFINITY, least = INFINITY;
-  for (const FlankFit& fit : fits) typical = std::min(typical, typical_of(fit));
+  for (const FlankFit* fit : fits) typical = std::min(typical, typical_of(*fit));
   std::vector<double> squares;
-  for (const FlankFit& fit : fits) squares.push_back(left(fit, typical));
+  for (const FlankFit* fit : fits) squares.push_back(left(*fit, typical));
   for (const double s : squares) least = std::min(least, s);
   for (double& s : squares) s = s > least ? s / least : 1;
   return squares;
@@ -172,26 +174,27 @@ std::vector<Law> read_laws(const std::vector<Cut>& cuts, const FlankModel& model
   std::vector<FlankModel> others = other_laws(model, large_torque);
   std::vector<double> squares(others.size(), INFINITY);
   for (const bool balanced : {false, true}) {
-    const std::size_t at = sharpest_cut(laws, cuts, {balanced});
-    std::vector<FlankFit> there = {declared[at]};
-    for (const FlankModel& law : others) there.push_back(fit_flanks(cuts[at].windows, law));
+    const std::size_t at = sharpest_cut(laws, cuts, balanced);
+    std::vector<FlankFit> fits;
+    for (const FlankModel& law : others) fits.push_back(fit_flanks(cuts[at].windows, law));
+    std::vector<const FlankFit*> there = {&declared[at]};
+    for (const FlankFit& fit : fits) there.push_back(&fit);
     const std::vector<double> here = squares_over_least(there);
     for (std::size_t k = 0; k < others.size(); ++k) squares[k] = std::min(squares[k], here[k + 1]);
   }
-  std::vector<Law> all = std::move(laws);
   for (std::size_t k = 0; k < others.size(); ++k) {
     if (squares[k] > kSurelyWorse) continue;
     Readings readings = read(cuts, worth, others[k]);
     if (readings.surest().found && readings.surest().gap > 0)
-      all.push_back({std::move(others[k]), std::move(readings)});
+      laws.push_back({std::move(others[k]), std::move(readings)});
   }
-  return all;
+  return laws;
 }
 
 /// What all laws make of one cut.
-std::vector<FlankFit> fits_of(const std::vector<Law>& laws, std::size_t cut) {
-  std::vector<FlankFit> fits;
-  for (const Law& law : laws) fits.push_back(law.readings.fits[cut]);
+std::vector<const FlankFit*> fits_of(const std::vector<Law>& laws, std::size_t cut) {
+  std::vector<const FlankFit*> fits;
+  for (const Law& law : laws) fits.push_back(&law.readings.fits[cut]);
   return fits;
 }
 
@@ -199,7 +202,7 @@ std::vector<FlankFit> fits_of(const std::vector<Law>& laws, std::size_t cut) {
 std::vector<double> squares_of_laws(const std::vector<Law>& laws, const std::vector<Cut>& cuts) {
   const auto typical_at = [&](std::size_t c) {
     double typical = INFINITY;
-    for (const FlankFit& fit : fits_of(laws, c)) typical = std::min(typical, typical_of(fit));
+    for (const FlankFit* fit : fits_of(laws, c)) typical = std::min(typical, typical_of(*fit));
     return typical;
   };
   const double sharpest = typical_at(sharpest_cut(laws, cuts));
