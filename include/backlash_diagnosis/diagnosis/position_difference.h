@@ -19,10 +19,12 @@
 // and play towards others (Fuller 1987). The record is read by either torque and over windows of 7 to 63
 // samples; that reading counts which is surest. Read also with a deflection that follows the torque by other
 // laws (powers from 0.55 to a spring's 1, Hertz's 2/3 among them, springs that harden). Laws are compared by
-// what they leave of all windows, those in flight too, where no torque may be left, of the cut that is told
-// best. Where the declared one is clearly worse than another, the better counts, and the interval holds the
-// play by all that leave up to one and a half times the mean square of the best (two and a half times, where
-// that one tells the play to a tenth only).
+// what they leave of all windows, those in flight too, where no torque may be left: mean squares over those
+// of the best law, geometric mean over the cuts that tell laws apart. Where the declared one is clearly worse
+// than another, the better counts, and the interval holds the play by all that leave up to 1.5 times what the
+// best does (2.5 where that tells the play to a tenth only, be it the declared one; 3 where the recorded
+// torque is too noisy). Where the declared one counts it holds those that stays on the flanks do not tell
+// from it.
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t times the standard error, stays on a flank counted as independent,
@@ -34,7 +36,8 @@
 //   moves,
 // - the skew of the encoders, where it was taken out: the change of the play over its interval,
 // - with a locked output 3 % of the play, for the bouncing that the residual does not show; where the load
-//   moves 1 %, and 3 % where the deflection bends otherwise than declared;
+//   moves 1 %, and 3 % where the deflection bends otherwise than declared, besides 5 % of the
+//   deflection under a large torque;
 // and on one side what the play would change if all of the residual were noise of the torque.
 // The shares are set by simulation, see test_rig_estimators.cpp, and for loads that move by the machines of
 // scripts/trace_machines.sh (doc/reference/estimators.md).
