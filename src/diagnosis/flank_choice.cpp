@@ -222,7 +222,7 @@ std::vector<double> squares_of_laws(const std::vector<Law>& laws, const std::vec
 }  // namespace
 
 double scatter_of(const FlankFit& fit) {
-  const double pairs = std::max(1.0, std::floor(0.5 * static_cast<double>(fit.stays)) - 1);
+  const double pairs = std::max(1.0, std::floor(std::min(0.5 * double(fit.stays), double(fit.against))) - 1);
   return signal::student_t_quantile(0.975, pairs) * fit.standard_error;
 }
 
@@ -239,8 +239,9 @@ FlankWindows part_of(const FlankWindows& windows, std::size_t begin, std::size_t
     return std::decay_t<decltype(column)>(column.begin() + long(begin), column.begin() + long(end));
   };
   return {
-      cut(windows.centre), cut(windows.torque), cut(windows.deflection),   cut(windows.load),
-      cut(windows.speed),  cut(windows.slip),   cut(windows.acceleration), cut(windows.load_acceleration)};
+      cut(windows.centre), cut(windows.torque),  cut(windows.deflection),   cut(windows.load),
+      cut(windows.speed),  cut(windows.slip),    cut(windows.acceleration), cut(windows.load_acceleration),
+      cut(windows.least),  cut(windows.largest), cut(windows.rough)};
 }
 
 FlankReading read_flanks(const TwoEncoders& motion, const FlankModel& model, double large_torque) {

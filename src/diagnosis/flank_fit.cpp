@@ -29,8 +29,10 @@ constexpr double kHeld =
 constexpr double kVaries = 1.25;           // ratio of residuals, constant over varying gap
 constexpr double kInertiaDeviation = 0.5;  // relative, of the declared inertia
 constexpr double kTorqueStep = 0.05;       // of the rms torque, for slopes
+constexpr double kSwings = 0.05;           // of the windows, that change flanks within them: choice
 constexpr int kIterations = 40;
-constexpr std::size_t kFewest = 12;  // windows per flank
+constexpr std::size_t kFewest = 12;        // windows per flank
+constexpr std::size_t kFewestAgainst = 3;  // stays against the motion, choice: two may be one mistake
 
 double scaled(double n, double count) {
   return std::max(1.0, std::floor(n / count));
@@ -118,10 +120,13 @@ class Fitter {
   void add_windows(MatrixXd* normal, VectorXd* right) const;
   void solve(const MatrixXd& gap, double elastic_deviation);
   void take_over();
+  VectorXd half_play() const;
   bool choose_loaded();
   bool holds_compliance();
   FlankFit result(const MatrixXd& gap) const;
   std::vector<double> away() const;
+  std::size_t stays_against() const;
+  double share_that_swings() const;
   double sum_of_stays(const VectorXd& score, std::size_t& stays) const;
 
   const FlankWindows& w_;
@@ -257,12 +262,16 @@ void Fitter::take_over() {
   coulomb_ += p_[elastic_at_ + 3];
 }
 
+/// Of the last solution, without its sign, wherever side_ pointed.
+VectorXd Fitter::half_play() const {
+  const Eigen::Index knots = elastic_at_ - gap_at_;
+  return side_.asDiagonal() * (a_.middleCols(gap_at_, knots) * p_.segment(gap_at_, knots));
+}
+
 /// Windows that surely lie on a flank by the present solution; false when nothing changes any more.
 bool Fitter::choose_loaded() {
   const VectorXd common = a_.leftCols(gap_at_) * p_.head(gap_at_);
-  const Eigen::Index knots = elastic_at_ - gap_at_;
-  // The free play without its sign, wherever side_ pointed.
-  const VectorXd half = side_.asDiagonal() * (a_.middleCols(gap_at_, knots) * p_.segment(gap_at_, knots));
+  const VectorXd half = half_play();
   const VectorXd elastic = a_.rightCols(a_.cols() - elastic_at_) * p_.tail(p_.size() - elastic_at_);
   const double clear = kClear * sigma_;
   std::vector<double> loaded(n_ + 2, 0.0);  // side, 0 where not for certain; shifted by one
@@ -321,10 +330,39 @@ double Fitter::sum_of_stays(const VectorXd& score, std::size_t& stays) const {
   return squares + sum * sum;
 }
 
+std::size_t Fitter::stays_against() const {
+  std::size_t stays = 0;
+  bool before = false;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    if (!use_[i]) continue;
+    const bool against = side_[i] * w_.speed[i] < 0;
+    stays += against && !before;
+    before = against;
+  }
+  return stays;
+}
+
+/// Of the windows in use, in which samples lie on both sides of the middle, or go back and forth by more than
+/// half the play: flanks change within them, and what they average shows less play than there is (none, of a
+/// drive that chatters).
+double Fitter::share_that_swings() const {
+  const VectorXd common = a_.leftCols(gap_at_) * p_.head(gap_at_);
+  const VectorXd half = half_play();
+  const double clear = kClear * sigma_;
+  double swings = 0, count = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    if (!use_[i]) continue;
+    const bool both = w_.least[i] - common[i] < -clear && w_.largest[i] - common[i] > clear;
+    const bool rough = w_.rough[i] > std::max(0.5 * half[i], clear);
+    swings += both || rough;
+    ++count;
+  }
+  return swings / count;
+}
+
 std::vector<double> Fitter::away() const {
-  const Eigen::Index knots = elastic_at_ - gap_at_;
   const VectorXd deflection = phi_ - a_.leftCols(gap_at_) * p_.head(gap_at_);
-  const VectorXd half = side_.asDiagonal() * (a_.middleCols(gap_at_, knots) * p_.segment(gap_at_, knots));
+  const VectorXd half = half_play();
   const VectorXd elastic = a_.rightCols(a_.cols() - elastic_at_) * p_.tail(p_.size() - elastic_at_);
   std::vector<double> least(n_, NAN);
   for (Eigen::Index i = 0; i < n_; ++i) {
@@ -353,6 +391,7 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   fit.residual = std::sqrt(squares / count);
   const VectorXd row = inverse_ * mean;
   double variance = sum_of_stays(a_ * row, fit.stays);
+  fit.against = model_.moving ? stays_against() : fit.stays;
   const double stays = static_cast<double>(fit.stays);
   variance *=
       stays / std::max(1.0, stays - 1) * count / std::max(1.0, count - static_cast<double>(p_.size()));
@@ -362,7 +401,8 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   const double noise = squares / (p_[elastic_at_] * p_[elastic_at_]);
   const double left = 1 - noise * inverse_(elastic_at_, elastic_at_);
   fit.attenuation = left > 0 ? noise * p_[elastic_at_] * row[elastic_at_] / left : INFINITY;
-  fit.found = std::min(fit.used[0], fit.used[1]) >= kFewest;
+  fit.found = std::min(fit.used[0], fit.used[1]) >= kFewest && fit.against >= kFewestAgainst &&
+              !(model_.moving && share_that_swings() > kSwings);
   return fit;
 }
 
@@ -412,12 +452,18 @@ FlankWindows average_windows(const TwoEncoders& motion, std::size_t half) {
   const double h = static_cast<double>(half), span = h * motion.interval;
   for (std::size_t c = half; c + half < n; c += half) {
     bool whole = true;
-    double torque = 0, motor = 0, load = 0;
+    double torque = 0, motor = 0, load = 0, least = INFINITY, largest = -INFINITY, rough = 0;
+    const auto deflection = [&](std::size_t i) { return motion.motor[i] - motion.load[i]; };
     for (std::size_t i = c - half; i <= c + half; ++i) {
       const double weight = (h - std::abs(static_cast<double>(i) - static_cast<double>(c))) / (h * h);
       torque += weight * motion.torque[i];
       motor += weight * motion.motor[i];
       load += weight * motion.load[i];
+      if (weight > 0) {
+        least = std::min(least, deflection(i));
+        largest = std::max(largest, deflection(i));
+        rough += 0.25 * std::abs(deflection(i - 1) - 2 * deflection(i) + deflection(i + 1)) / (2 * h - 1);
+      }
       whole = whole && (i == c - half || motion.unbroken[i]);
     }
     if (!whole) continue;
@@ -439,6 +485,9 @@ FlankWindows average_windows(const TwoEncoders& motion, std::size_t half) {
     };
     out.acceleration.push_back(acceleration(motion.motor));
     out.load_acceleration.push_back(acceleration(motion.load));
+    out.least.push_back(least);
+    out.largest.push_back(largest);
+    out.rough.push_back(rough);
   }
   return out;
 }

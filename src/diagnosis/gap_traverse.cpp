@@ -41,7 +41,7 @@ constexpr double kVague = 0.7;          // half width of the interval of the log
 constexpr double kRivalCost = 9;        // theory: three standard errors
 constexpr double kSteepest = 1.55;      // power of the deflection: Hertz's 1.5 and what is told wrong of it
 constexpr double kHidden = 1;           // deflections under the noise, that a play must exceed
-constexpr double kLaw = 0.05;           // of the deflection: teeth that yield by no power of it, 95 %
+constexpr double kLaw = 0.1;            // of the deflection: teeth that yield by no power of it, 95 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid || !std::isfinite(value)) throw InvalidParameter(name, value, limit);

@@ -32,10 +32,14 @@ constexpr double kLockedTravel = 0.05;  // of the motor's travel
 constexpr double kLockedResidual = 2;   // share of the rms residual in the interval, of a locked rig
 // Of the play, of a moving load: what windows over touches and coarse encoders shift. Simulation.
 constexpr double kMovingModel = 0.01;
+// Of the deflection under a large torque: what friction that is not as modelled shifts. Simulation.
+constexpr double kMovingElastic = 0.005;
 // The same where the deflection bends otherwise than declared, and of the deflection under a large torque:
 // its law is none of those that are tried exactly, and half a step between them shifts the play by that much.
 constexpr double kBentModel = 0.03, kBentElastic = 0.05;
 constexpr double kLargeTorque = 0.95;  // quantile, where laws of the deflection are the same: choice
+constexpr double kWorthSaying = 0.25;  // of the deflection, that an interval wider than
+// twice the play may have: choice
 constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
 // wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
@@ -192,8 +196,10 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
 
 void require_sound(const FlankFit& fit) {
   if (!fit.found)
-    throw Refusal{Status::out_of_domain,
-                  "torque does not press both flanks: no two groups of deflections that follow the torque"};
+    throw Refusal{
+        Status::out_of_domain,
+        "torque does not press both flanks, or each in one direction of motion only, where play is "
+        "not told from the dry friction of the motor; loads that drive, or that are braked, would do"};
   if (fit.stays < kFewestStays)
     throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
                                                  " times, needed are " + std::to_string(kFewestStays)};
@@ -247,10 +253,11 @@ void require_told(const FlankReading& reading) {
                     reading.windows_change)};
 }
 
-/// An interval as wide as the elastic deflection says that play is not told from that.
+/// An interval as wide as the elastic deflection, or one twice as wide as the play and as a good part of the
+/// deflection, says that play is not told from that.
 void require_worth_saying(const FlankReading& reading, double width, double large_torque) {
   const double elastic = std::abs(reading.fit.compliance_factor * reading.model.elastic(large_torque));
-  if (width > elastic)
+  if (width > std::min(elastic, std::max(2 * reading.fit.gap, kWorthSaying * elastic)))
     throw Refusal{
         Status::out_of_domain,
         fmt::format("the play is told to {:.4g} rad only, where the teeth yield by {:.4g} rad: too few "
@@ -364,8 +371,9 @@ Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
   require_told(reading);
   require_constant(reading);
   const double elastic = fit.compliance_factor * reading.model.elastic(large_torque);
-  const double model_error = reading.declared_law ? kMovingModel * fit.gap
-                                                  : std::hypot(kBentModel * fit.gap, kBentElastic * elastic);
+  const double model_error = reading.declared_law
+                                 ? std::hypot(kMovingModel * fit.gap, kMovingElastic * elastic)
+                                 : std::hypot(kBentModel * fit.gap, kBentElastic * elastic);
   const double half = std::hypot(
       std::hypot(scatter_of(fit), reading.windows_change),
       std::hypot(std::hypot(kResidualShare * fit.residual, model_error), skew_change(motion, reading, skew)));

@@ -30,11 +30,12 @@ struct Servo {
   double stiffness = kStiffness;
   double hardening = 0;  // 1/rad^2, torque = stiffness x (1 + hardening x^2)
   double power = 1;      // of the torque, that the deflection goes with; as `stiffness` at kWorking
-  double motor_inertia = kMotorInertia;
+  double motor_inertia = kMotorInertia, load_inertia = kLoadInertia;
   double motor_coulomb = 50, load_coulomb = 10;  // N m
   double offset = 0, scale = 1;                  // of the load encoder
   double eccentricity = 0;                       // rad, once per 0.5 rad of the load
   double skew = 0;                               // s, of the load encoder
+  double chatter = 0;  // N m, of a drive that throws the motor over with each sample
   double torque_noise = 1, motor_step = 8.7e-7, load_step = 7e-6;
   double duration = 20;
 
@@ -44,7 +45,7 @@ struct Servo {
   double transmitted(double t) const {
     const double h = 1e-4, speed = (load(t + h) - load(t - h)) / (2 * h);
     const double acceleration = (load(t + h) - 2 * load(t) + load(t - h)) / (h * h);
-    return kLoadInertia * acceleration + load_coulomb * std::tanh(speed / 1e-3);
+    return load_inertia * acceleration + load_coulomb * std::tanh(speed / 1e-3);
   }
   double elastic(double torque) const {
     if (power != 1)
@@ -67,11 +68,13 @@ struct Servo {
       const double t = i / rate, h = 1e-4;
       const double acceleration = (motor(t + h) - 2 * motor(t) + motor(t - h)) / (h * h);
       const double speed = (motor(t + h) - motor(t - h)) / (2 * h);
+      const double side = i % 2 == 0 ? 1 : -1;
+      const double motor_now = chatter > 0 ? load(t) + elastic(transmitted(t)) + side * 0.55 * gap : motor(t);
       r.time.push_back(t);
       r.column(record::Channel::motor_torque)
           .push_back(transmitted(t) + motor_inertia * acceleration + motor_coulomb * std::tanh(speed / 1e-3) +
-                     torque_noise * random.normal());
-      r.column(record::Channel::motor_position).push_back(rounded(motor(t), motor_step));
+                     chatter * side + torque_noise * random.normal());
+      r.column(record::Channel::motor_position).push_back(rounded(motor_now, motor_step));
       r.column(record::Channel::load_position).push_back(offset + rounded(scale * load(t - skew), load_step));
     }
     return r;
@@ -131,6 +134,35 @@ TEST(PositionDifference, NoiseOfTheTorqueIsNoPlay) {
     }
 }
 
+// A light load is dragged: each flank is pressed in one direction of motion only, and a larger play looks as
+// more dry friction of the motor does. With a load of 100 kg m^2, which drives where it is braked, the same
+// play is told.
+TEST(PositionDifference, PlayOfALoadThatIsDraggedIsNotToldFromFriction) {
+  for (const double gap : {1e-4, 5e-4})
+    for (const double inertia : {0.5, 3.0})
+      for (const double friction : {10.0, 40.0}) {
+        Servo servo;
+        servo.gap = gap;
+        servo.load_inertia = inertia;
+        servo.load_coulomb = friction;
+        const Estimate e = estimate_position_difference(servo.record(), settings());
+        EXPECT_EQ(e.status, Status::out_of_domain) << e.backlash_angle << " of " << gap;
+        EXPECT_NE(e.message.find("dry friction of the motor"), std::string::npos) << e.message;
+      }
+}
+
+// A drive that chatters throws the motor from flank to flank within a few samples. What windows of them
+// average follows the torque as if there were no play (describing function of dead zone with dither).
+TEST(PositionDifference, ChatterOfTheDriveIsNoAbsenceOfPlay) {
+  for (const double gap : {1e-4, 5e-4}) {
+    Servo servo;
+    servo.gap = gap;
+    servo.chatter = 2000;
+    const Estimate e = estimate_position_difference(servo.record(), settings());
+    EXPECT_NE(e.status, Status::ok) << e.backlash_angle << " of " << gap;
+  }
+}
+
 // Teeth that press harder the deeper they go: at 200 N m, 0.5 mrad, these are stiffer by a quarter, and by
 // all.
 TEST(PositionDifference, TeethThatHardenAreToldOrTheIntervalHoldsThem) {
@@ -162,7 +194,7 @@ TEST(PositionDifference, TeethThatYieldByAPowerOfTheTorqueAreToldOrTheIntervalHo
         EXPECT_LE(e.angle_lower, gap) << where();
         EXPECT_GE(e.angle_upper, gap) << where();
       }
-  EXPECT_EQ(answered, 8);  // all that have hardly any noise
+  EXPECT_EQ(answered, 7);  // of 8 with hardly any noise; of one the interval is more than twice the play
 }
 
 /// The record of a torque sensor behind the gear instead of the motor's torque: the torque that the servo's

@@ -31,6 +31,8 @@ struct FlankWindows {
   std::vector<std::size_t> centre;                                          // sample
   std::vector<double> torque, deflection, load, speed, slip, acceleration;  // slip: motor minus load speed
   std::vector<double> load_acceleration;
+  std::vector<double> least, largest;  // rad, deflection of its samples
+  std::vector<double> rough;           // rad, amplitude by which it alternates from sample to sample, mean
   std::size_t size() const { return centre.size(); }
 };
 FlankWindows average_windows(const TwoEncoders& motion, std::size_t half);
@@ -62,6 +64,10 @@ struct FlankFit {
   double residual = 0;           // rad, rms
   std::size_t used[2] = {0, 0};  // windows on the negative and the positive flank
   std::size_t stays = 0;         // uninterrupted stays on a flank
+  /// Of them, how often the motor moves away from the flank that is pressed, as where it brakes or the load
+  /// drives. Without, side and sign(w_M) are one, and so are b / 2 and the deflection that C causes. Of a
+  /// locked output, which shows no friction, all.
+  std::size_t against = 0;
   /// rad, every window: how far it lies from where the fit has the flanks, or from a free flight between them
   /// without torque. NaN where friction has no certain sign.
   std::vector<double> away;

@@ -76,6 +76,7 @@ struct SecondStage {
 };
 
 struct Drive {
+  double gain = 1;        // -, times the usual gain of the speed loop
   double saturation = 0;  // N m, the torque that the motor cannot exceed; 0: none
   Wave cogging;           // N m
   Wave speed_ripple;      // N m s^2/rad^2, times the speed squared

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <sstream>
 
 #include "effects.h"
@@ -24,22 +25,37 @@ struct Options {
          rate = 0;
   int encoder_bits = 0;
   bool dither = true;
+  std::map<std::string, double> times;  // what is declared, by name as in truth.json
 };
 
-/// The declared values, each up to 40 % off, as config/two_inertia_servo.yaml has them.
+constexpr double kMotorInertia = 6.3,
+                 kLoadInertia = 108;  // kg m^2, as config/two_inertia_servo.yaml has them
+
+double times(const Options& options, const std::string& name) {
+  const auto found = options.times.find(name);
+  return found == options.times.end() ? 1 : found->second;
+}
+
+/// The declared values, those of config/two_inertia_servo.yaml times --times, each up to 40 % off.
 Machine draw_machine(const Options& options) {
   Random random(options.seed, "machine");
-  const auto near = [&random](double declared) { return declared * random.uniform(0.6, 1.4); };
+  const auto near = [&](const char* name, double declared) {
+    return times(options, name) * declared * random.uniform(0.6, 1.4);
+  };
   Machine machine;
-  machine.motor.inertia = near(6.3);
-  machine.load.inertia = near(108);
-  machine.mesh.stiffness = near(460e3);
-  machine.mesh.damping = near(483);
-  machine.mesh.backlash = near(5.4e-4);
-  machine.motor.friction.coulomb = near(63);
-  machine.motor.friction.viscous = near(13);
-  machine.load.friction.coulomb = near(15);
-  machine.load.friction.viscous = near(9);
+  machine.motor.inertia = near("motor_inertia", kMotorInertia);
+  machine.load.inertia = near("load_inertia", kLoadInertia);
+  machine.mesh.stiffness = near("mesh_stiffness", 460e3);
+  machine.mesh.damping = near("mesh_damping", 483);
+  machine.mesh.backlash = near("backlash_angle", 5.4e-4);
+  machine.motor.friction.coulomb = near("motor_coulomb", 63);
+  machine.motor.friction.viscous = near("motor_viscous", 13);
+  machine.load.friction.coulomb = near("load_coulomb", 15);
+  machine.load.friction.viscous = near("load_viscous", 9);
+  machine.drive.gain =
+      times(options, "loop_gain") *
+      (times(options, "motor_inertia") * kMotorInertia + times(options, "load_inertia") * kLoadInertia) /
+      (kMotorInertia + kLoadInertia);
   machine.sensors.torque_noise = options.noise * random.uniform(1, 3);
   machine.mesh.hertz = options.contact == "hertz";
   if (options.friction == "lugre") {
@@ -215,6 +231,23 @@ void make_servo(const Options& options) {
   write_truth(options, truth);
 }
 
+/// NAME=FACTOR,NAME=FACTOR
+std::map<std::string, double> read_times(const std::string& list) {
+  const std::vector<std::string> known{"motor_inertia",  "load_inertia",  "mesh_stiffness", "mesh_damping",
+                                       "backlash_angle", "motor_coulomb", "motor_viscous",  "load_coulomb",
+                                       "load_viscous",   "loop_gain"};
+  std::map<std::string, double> times;
+  for (const std::string& item : split(list)) {
+    const std::size_t middle = item.find('=');
+    const std::string name = item.substr(0, middle);
+    if (middle == std::string::npos || std::find(known.begin(), known.end(), name) == known.end())
+      throw po::error("--times " + item + ": no NAME=FACTOR of a declared value");
+    times[name] = std::stod(item.substr(middle + 1));
+    if (!(times[name] > 0)) throw po::error("--times " + item + ": not above 0");
+  }
+  return times;
+}
+
 void one_of(const std::string& name, const std::string& value, const std::vector<std::string>& known) {
   if (std::find(known.begin(), known.end(), value) == known.end()) {
     throw po::error("--" + name + " " + value + ": not known");
@@ -242,12 +275,16 @@ bool read_options(int argc, char** argv, Options& options) {
   add("duration", po::value(&options.duration), "of a record [s]; 30, of a joint 80");
   add("strength", po::value(&options.strength)->default_value(1),
       "times the size of every effect: where does it stop to be seen?");
-  add("rate", po::value(&options.rate), "Hz, of the loop and the record; 1000, of a joint drawn");
+  add("rate", po::value(&options.rate),
+      "Hz, of the record (the loop of a servo has 1000 at least); 1000, of a joint drawn");
   add("order", po::value(&options.order)->default_value(0),
       "of every effect that is a wave over a position, per turn of the load, any number; 0: drawn");
   add("encoder-bits", po::value(&options.encoder_bits)->default_value(0),
       "per turn of the load encoder, motor 3 more; 0: as declared");
   add("no-dither", "slow motions only");
+  add("times", po::value<std::string>(),
+      "NAME=FACTOR,...: a servo of another build, declared with so many times the usual value (names as in "
+      "truth.json)");
   add("list", "all effects, those outside the dictionary marked with *");
   po::variables_map given;
   po::store(po::parse_command_line(argc, argv, all), given);
@@ -279,6 +316,7 @@ bool read_options(int argc, char** argv, Options& options) {
   if (!(options.skew >= 0 && options.skew < 0.1)) throw po::error("--skew: 0 to 0.1 s");
   if (!(options.order >= 0)) throw po::error("--order is not negative");
   options.dither = given.count("no-dither") == 0;
+  if (given.count("times") != 0) options.times = read_times(given["times"].as<std::string>());
   return true;
 }
 

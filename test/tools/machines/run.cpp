@@ -11,18 +11,19 @@
 namespace machines {
 namespace {
 
-constexpr double kStep = 2e-5;        // s: a period of the mesh has a thousand
-constexpr double kTravelStep = 1e-3;  // s
+constexpr double kStep = 2e-5;         // s: a period of the mesh has a thousand
+constexpr double kTravelStep = 1e-3;   // s
+constexpr double kSlowestLoop = 1e-3;  // s; records may be slower
 
 /// PI control of the motor's speed; gain and limit as the records in undeclared/ show them.
 class SpeedControl {
  public:
-  explicit SpeedControl(double interval) : interval_(interval) {}
+  SpeedControl(double interval, double gain) : interval_(interval), gain_(gain * kGain) {}
 
   double torque(double wanted, double speed, double extra) {
     const double error = wanted - speed;
-    const double torque = kGain * error + integral_ + extra;
-    if (std::abs(torque) < kLimit) integral_ += kGain / kIntegralTime * error * interval_;
+    const double torque = gain_ * error + integral_ + extra;
+    if (std::abs(torque) < kLimit) integral_ += gain_ / kIntegralTime * error * interval_;
     return std::clamp(torque, -kLimit, kLimit);
   }
 
@@ -30,7 +31,7 @@ class SpeedControl {
   static constexpr double kGain = 4800;         // N m s/rad
   static constexpr double kIntegralTime = 0.3;  // s
   static constexpr double kLimit = 2440;        // N m
-  double interval_, integral_ = 0;
+  double interval_, gain_, integral_ = 0;
 };
 
 double sum(const std::vector<Tone>& tones, double time) {
@@ -85,7 +86,10 @@ Travel travel_of(const Reference& reference, double duration) {
 
 std::vector<Row> run(const Machine& machine, const Reference& reference, double duration, double interval) {
   const auto samples = static_cast<std::size_t>(std::lround(duration / interval));
-  const auto per_sample = static_cast<std::size_t>(std::lround(interval / kStep));
+  const auto loops = static_cast<std::size_t>(std::ceil(interval / kSlowestLoop - 1e-9));  // per sample
+  const double loop = interval / static_cast<double>(loops);
+  const auto per_loop = static_cast<std::size_t>(std::lround(loop / kStep));
+  const std::size_t per_sample = loops * per_loop;
   const auto steps = [](double time) { return static_cast<std::size_t>(std::lround(time / kStep)); };
   const std::size_t late = steps(machine.sensors.latency),
                     load_late = late + steps(machine.sensors.load_skew);
@@ -94,13 +98,13 @@ std::vector<Row> run(const Machine& machine, const Reference& reference, double 
     return step % per_sample == 0 && step / per_sample < samples ? &rows[step / per_sample] : nullptr;
   };
   Plant plant(machine);
-  SpeedControl control(interval);
-  for (std::size_t k = 0; k < samples; ++k) {
-    const double time = static_cast<double>(k) * interval;
+  SpeedControl control(loop, machine.drive.gain);
+  for (std::size_t k = 0; k < samples * loops; ++k) {
+    const double time = static_cast<double>(k) * loop;
     const double torque =
         control.torque(sum(reference.speed, time), plant.motor_speed(), sum(reference.torque, time));
-    rows[k].torque = torque;
-    for (std::size_t step = k * per_sample; step < (k + 1) * per_sample; ++step) {
+    if (k % loops == 0) rows[k / loops].torque = torque;
+    for (std::size_t step = k * per_loop; step < (k + 1) * per_loop; ++step) {
       if (Row* row = shown(step + late)) row->motor_position = plant.motor_position();
       if (Row* row = shown(step + load_late))
         row->load_position = plant.load_position() * machine.sensors.load_gain;
