@@ -338,6 +338,27 @@ TEST_F(MakeMachine, StrengthIsTimesWhatIsDrawn) {
     EXPECT_DOUBLE_EQ(of(id, "A"), 0.25 * whole[id]["A"].get<double>()) << id;
 }
 
+TEST_F(MakeMachine, AServoOfAnotherBuildHasSoManyTimesTheValues) {
+  make("--seed 6 --duration 1");
+  const nlohmann::json usual = truth_["rig"];
+  make("--seed 6 --duration 1 --times backlash_angle=8,load_inertia=0.03");
+  for (const auto& [name, value] : usual.items()) {
+    const double times = name == "backlash_angle" ? 8 : name == "load_inertia" ? 0.03 : 1;
+    EXPECT_NEAR(truth_["rig"][name]["value"].get<double>() / value["value"].get<double>(), times, 1e-12)
+        << name;
+  }
+}
+
+// The loop keeps its rate: a record of each fifth sample is of the same motion.
+TEST_F(MakeMachine, ASlowRecorderLeavesSamplesOut) {
+  make("--seed 6 --duration 2");
+  const Values whole = column("machine/train.csv", 2);
+  done("make_machine --seed 6 --duration 2 --rate 200 --out slow");
+  const Values part = column("slow/train.csv", 2);
+  ASSERT_EQ(part.size(), 400u);
+  for (std::size_t k = 0; k < part.size(); ++k) ASSERT_EQ(part[k], whole[5 * k]) << k;
+}
+
 // The current against Newton's law, written down here anew, where the joint slides: what is left is noise.
 TEST_F(MakeMachine, AJointKeepsNewtonsLaw) {
   done(
@@ -376,6 +397,9 @@ TEST_F(MakeMachine, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(run("make_machine --seed 1 --out x --machine crane").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --machine joint --effects transmission_error").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --rate 1").code, 64);
+  for (const char* times :
+       {"colour=2", "backlash_angle", "backlash_angle=", "backlash_angle=0", "backlash_angle=2x"})
+    EXPECT_EQ(run(std::string("make_machine --seed 1 --out x --times ") + times).code, 64) << times;
   EXPECT_EQ(run("make_machine --seed 1 --out x --strength -1").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --effects rust").code, 64);
   EXPECT_EQ(run("make_machine --seed 1 --out x --friction oil").code, 64);

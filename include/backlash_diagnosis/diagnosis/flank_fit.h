@@ -65,8 +65,8 @@ struct FlankFit {
   std::size_t used[2] = {0, 0};  // windows on the negative and the positive flank
   std::size_t stays = 0;         // uninterrupted stays on a flank
   /// Of them, how often the motor moves away from the flank that is pressed, as where it brakes or the load
-  /// drives. Without, side and sign(w_M) are one, and so are b / 2 and the deflection that C causes. Of a
-  /// locked output, which shows no friction, all.
+  /// drives. Without, side and sign(w_M) are one, and so are b / 2 and the deflection that C causes: 0
+  /// where less than 4 % of the windows are of such. Of a locked output, which shows no friction, all.
   std::size_t against = 0;
   /// rad, every window: how far it lies from where the fit has the flanks, or from a free flight between them
   /// without torque. NaN where friction has no certain sign.

@@ -34,9 +34,10 @@
 // against the load, and 20 crossings that begin in contact. No period.
 //
 // Interval, 95 %: Student's t with the larger of two standard errors of the logarithm (crossings as clusters;
-// the fit's own), 20 % for what these equations do not hold, and 5 % of the deflection of the teeth under T:
+// the fit's own), 20 % for what these equations do not hold, and 10 % of the deflection of the teeth under T:
 // checked on simulated machines with cogging, gravity, Stribeck friction, varying play, transmission errors
-// and teeth after Hertz that are not told to the fit.
+// and teeth after Hertz that are not told to the fit, and on such whose play is a thirtieth of the
+// deflection.
 #pragma once
 
 #include "backlash_diagnosis/diagnosis/estimate.h"
@@ -60,7 +61,7 @@ struct GapTraverseSettings {
 ///   out_of_domain      uneven or too coarse samples; the equations do not fit the record, or only with
 ///                      values far from the declared ones
 ///   ambiguous          two plays fit alike
-///   below_range        the play is less than the noise of the torque hides, or a tenth of the deflection
+///   below_range        the play is less than the noise of the torque hides, or a fifth of the deflection
 Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSettings& settings);
 
 }  // namespace backlash::diagnosis

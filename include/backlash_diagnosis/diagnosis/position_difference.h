@@ -14,6 +14,12 @@
 // Elastic deflection: where the load moves, the record itself tells how deflection follows torque; where it
 // is locked, or the record does not hold it to 10 %, the declared function counts.
 //
+// Where each flank is pressed in one direction of motion only, as those of a light load that is dragged, a
+// play looks as more dry friction of the motor does: windows in which the motor moves away from the pressed
+// flank tell them apart, and a reading with fewer than three stays of such, or 4 % of its windows, is none.
+// Nor is one whose flanks change within its windows, as under a drive that chatters: such averages show no
+// play (describing function of a dead zone under dither).
+//
 // A load that moves tells the torque on the flanks as well: what the motion of both takes, fitted to the
 // recorded torque (with_balanced_torque), is free of its noise, which as a regressor would draw compliance
 // and play towards others (Fuller 1987). The record is read by either torque and over windows of 7 to 63
@@ -36,8 +42,8 @@
 //   moves,
 // - the skew of the encoders, where it was taken out: the change of the play over its interval,
 // - with a locked output 3 % of the play, for the bouncing that the residual does not show; where the load
-//   moves 1 %, and 3 % where the deflection bends otherwise than declared, besides 5 % of the
-//   deflection under a large torque;
+//   moves 1 %, and 3 % where the deflection bends otherwise than declared, besides 0.5 % of the deflection
+//   under a large torque for friction that is not as modelled, or 5 % where it bends otherwise;
 // and on one side what the play would change if all of the residual were noise of the torque.
 // The shares are set by simulation, see test_rig_estimators.cpp, and for loads that move by the machines of
 // scripts/trace_machines.sh (doc/reference/estimators.md).
@@ -89,10 +95,12 @@ struct PositionDifferenceSettings {
 /// Estimates play as above, in time linear in the samples. Throws InvalidParameter for settings outside the
 /// ranges above. Everything that lies in the record is answered by the status:
 ///   insufficient_data  no motor_position, no load_position, no torque, too few samples or changes of flank
-///   out_of_domain      the output moves although it is locked; torque does not press both flanks; the
-///   deflection does not follow the torque; the
-///                      encoders differ by more than 1 % in scale; the play is negative beyond the interval,
-///                      another in other parts of the record, or another with windows of another length
+///   out_of_domain      the output moves although it is locked; torque does not press both flanks, or each
+///                      in one direction of motion only; the deflection does not follow the torque; the
+///                      interval would be as wide as the deflection, or more than a quarter of that and twice
+///                      the play; the encoders differ by more than 1 % in scale; the play is negative beyond
+///                      the interval, another in other parts of the record, or another with windows of
+///                      another length
 /// Torque is motor_torque where present, else sensor_torque, else output_torque, which the motor's inertia
 /// and friction do not reach: the friction in the fit is then that between the teeth and the sensor.
 Estimate estimate_position_difference(const record::Record& record,

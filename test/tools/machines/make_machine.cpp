@@ -242,8 +242,9 @@ std::map<std::string, double> read_times(const std::string& list) {
     const std::string name = item.substr(0, middle);
     if (middle == std::string::npos || std::find(known.begin(), known.end(), name) == known.end())
       throw po::error("--times " + item + ": no NAME=FACTOR of a declared value");
-    times[name] = std::stod(item.substr(middle + 1));
-    if (!(times[name] > 0)) throw po::error("--times " + item + ": not above 0");
+    std::istringstream number(item.substr(middle + 1));
+    if (!(number >> times[name] && number.eof() && times[name] > 0))
+      throw po::error("--times " + item + ": no factor above 0");
   }
   return times;
 }
