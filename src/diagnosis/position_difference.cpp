@@ -38,8 +38,8 @@ constexpr double kMovingElastic = 0.005;
 // its law is none of those that are tried exactly, and half a step between them shifts the play by that much.
 constexpr double kBentModel = 0.03, kBentElastic = 0.05;
 constexpr double kLargeTorque = 0.95;  // quantile, where laws of the deflection are the same: choice
-constexpr double kWorthSaying = 0.25;  // of the deflection, that an interval wider than
-// twice the play may have: choice
+// Of the deflection, that an interval of more than twice the play may be wide. Choice.
+constexpr double kWorthSaying = 0.25;
 constexpr double kLargestScaleError = 0.01;
 // Of the compliance against the declared one. Where the torque has two values only, as with a slow square
 // wave, nothing but the noise of the acceleration tells compliance from play, and draws the former towards 0.
@@ -196,10 +196,10 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
 
 void require_sound(const FlankFit& fit) {
   if (!fit.found)
-    throw Refusal{
-        Status::out_of_domain,
-        "torque does not press both flanks, or each in one direction of motion only, where play is "
-        "not told from the dry friction of the motor; loads that drive, or that are braked, would do"};
+    throw Refusal{Status::out_of_domain,
+                  "torque does not press both flanks, or each in one direction of motion only, where play is "
+                  "not told from the dry friction of the motor, or flanks change within a few samples; loads "
+                  "that drive, or that are braked, would do"};
   if (fit.stays < kFewestStays)
     throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
                                                  " times, needed are " + std::to_string(kFewestStays)};
