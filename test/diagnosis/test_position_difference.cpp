@@ -136,19 +136,22 @@ TEST(PositionDifference, NoiseOfTheTorqueIsNoPlay) {
 
 // A light load is dragged: each flank is pressed in one direction of motion only, and a larger play looks as
 // more dry friction of the motor does. With a load of 100 kg m^2, which drives where it is braked, the same
-// play is told.
+// play is told. The reason is asked for: without that rule these records are refused as well, by one accident
+// or another; machines that were told a wrong play are those of diagnose_machines.sh --build light_load.
 TEST(PositionDifference, PlayOfALoadThatIsDraggedIsNotToldFromFriction) {
+  struct Load {
+    double inertia, friction;  // kg m^2, N m: of the acceleration, 3.6 rad/s^2, less than of the friction
+  };
   for (const double gap : {1e-4, 5e-4})
-    for (const double inertia : {0.5, 3.0})
-      for (const double friction : {10.0, 40.0}) {
-        Servo servo;
-        servo.gap = gap;
-        servo.load_inertia = inertia;
-        servo.load_coulomb = friction;
-        const Estimate e = estimate_position_difference(servo.record(), settings());
-        EXPECT_EQ(e.status, Status::out_of_domain) << e.backlash_angle << " of " << gap;
-        EXPECT_NE(e.message.find("dry friction of the motor"), std::string::npos) << e.message;
-      }
+    for (const Load load : {Load{0.5, 10}, {3, 40}, {10, 50}, {20, 80}}) {
+      Servo servo;
+      servo.gap = gap;
+      servo.load_inertia = load.inertia;
+      servo.load_coulomb = load.friction;
+      const Estimate e = estimate_position_difference(servo.record(), settings());
+      EXPECT_EQ(e.status, Status::out_of_domain) << e.backlash_angle << " of " << gap;
+      EXPECT_NE(e.message.find("dry friction of the motor"), std::string::npos) << e.message;
+    }
 }
 
 // A drive that chatters throws the motor from flank to flank within a few samples. What windows of them
