@@ -50,6 +50,7 @@ constexpr std::size_t kMostParts = 16, kFewestWindows = 32;  // of a part, at le
 constexpr double kPartChange = 0.1, kPartErrors = 4, kPartResiduals = 2;
 constexpr double kSkewErrors = 2;        // theory: standard errors to either side, 95 %
 constexpr std::size_t kFewestStays = 6;  // on a flank
+constexpr double kThrown = 0.1;          // of the rms speed, thrown within a sample: choice
 constexpr double kBroken = 1.5;          // intervals between samples, beyond which they are no neighbours
 
 void require(bool valid, const char* name, double value, const char* limit) {
@@ -174,6 +175,25 @@ void require_possible(const TwoEncoders& motion, double inertia) {
                   fmt::format("motor_position jumps faster than a torque of {:.4g} N m can drive the motor: "
                               "columns are exchanged, or a unit is not as declared",
                               torque)};
+}
+
+/// A torque that alternates throws the motor to and fro within each sample: teeth that push but never pull,
+/// damping and dry friction then do not see the means that are recorded.
+void require_steady(const TwoEncoders& motion, double inertia) {
+  if (!(inertia > 0)) return;
+  const std::size_t n = motion.motor.size(), lag = kShortestWindow;
+  double alternates = 0, squares = 0;
+  for (std::size_t i = 1; i + 1 < n; ++i)
+    alternates += 0.25 * std::abs(motion.torque[i - 1] - 2 * motion.torque[i] + motion.torque[i + 1]);
+  for (std::size_t i = lag; i < n; ++i) squares += std::pow(motion.motor[i] - motion.motor[i - lag], 2);
+  const double speed = std::sqrt(squares / double(n - lag)) / (double(lag) * motion.interval);
+  const double thrown = alternates / double(n - 2) * motion.interval / inertia;
+  if (thrown > kThrown * speed)
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("the torque alternates from sample to sample, which throws the motor by {:.3g} "
+                              "rad/s within them, where it moves at {:.3g} rad/s: a drive that chatters, or "
+                              "a torque that is mostly noise",
+                              thrown, speed)};
 }
 
 struct Fits {
@@ -364,6 +384,7 @@ double skew_change(const TwoEncoders& motion, const FlankReading& reading, const
 }
 
 Answer read_moving(const TwoEncoders& motion, const FlankModel& model) {
+  require_steady(motion, model.inertia);
   const double large_torque = torque_size(motion, kLargeTorque);
   const auto [reading, skew] = read_unskewed(motion, model, large_torque);
   const FlankFit& fit = reading.fit;

@@ -23,10 +23,10 @@ constexpr double kStands = 0.02;        // choice: of the rms speed, below which
 constexpr int kIterations = 20;         // choice: of the weights of least absolute deviations
 constexpr double kSmallest = 0.01;      // choice: of the mean deviation: what is smaller counts alike
 constexpr std::size_t kBlocks = 12;     // choice
-constexpr double kLeftWrong = 5e-5;     // s, simulation: what the model leaves wrong on servos with play
-constexpr double kClear = 4;            // choice: standard errors
-constexpr std::size_t kFewest = 64;     // samples, choice
-constexpr Eigen::Index kSkew = 2;       // its column
+constexpr double kFriction = 0.06;  // of the torque, that yields teeth in proportion to the speed: simulation
+constexpr double kClear = 4;        // choice: standard errors
+constexpr std::size_t kFewest = 64;                 // samples, choice
+constexpr Eigen::Index kSkew = 2, kCompliance = 3;  // their columns
 constexpr Eigen::Index kColumns = 7;
 
 double rms(const std::vector<double>& x) {
@@ -38,6 +38,7 @@ double rms(const std::vector<double>& x) {
 struct Rows {
   Eigen::MatrixXd a;
   Eigen::VectorXd b;
+  double torque_per_speed = 0;  // N m s/rad, of rms values
 };
 
 Rows rows_of(const DrivenPositions& p, double cutoff) {
@@ -54,7 +55,8 @@ Rows rows_of(const DrivenPositions& p, double cutoff) {
   const std::size_t n = motor.size();
   const std::size_t count = n > 2 * ends ? (n - 2 * ends + stride - 1) / stride : 0;
   if (count < 4 * std::size_t(kColumns)) throw CannotIdentify("too short to tell the skew of the encoders");
-  Rows rows{Eigen::MatrixXd(Eigen::Index(count), kColumns), Eigen::VectorXd(Eigen::Index(count))};
+  Rows rows{Eigen::MatrixXd(Eigen::Index(count), kColumns), Eigen::VectorXd(Eigen::Index(count)),
+            rms(torque) / std::max(rms(speed), 1e-300)};
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t k = ends + i * stride;
     const double sign = std::fabs(speed[k]) <= stands ? 0 : speed[k] > 0 ? 1 : -1;
@@ -82,7 +84,9 @@ signal::Measured skew_in_band(const DrivenPositions& p, double cutoff) {
   for (std::size_t i = 0; i < block.size(); ++i) block[i] = kBlocks * i / block.size();
   const Eigen::MatrixXd covariance = signal::jackknife_covariance(
       root.asDiagonal() * rows.a, root.asDiagonal() * (rows.b - rows.a * x), block);
-  return {x[kSkew], std::sqrt(covariance(kSkew, kSkew))};
+  // Friction of the motor that is not as modelled is a torque that never reaches the teeth.
+  const double friction = kFriction * std::fabs(x[kCompliance]) * rows.torque_per_speed;
+  return {x[kSkew], std::hypot(std::sqrt(covariance(kSkew, kSkew)), friction)};
 }
 
 }  // namespace
@@ -94,7 +98,7 @@ signal::Measured encoder_skew(const DrivenPositions& positions) {
   const double cutoff = std::min(kBand, kWidestBand / positions.interval);
   signal::Measured skew = skew_in_band(positions, cutoff);
   const double slow = skew_in_band(positions, 0.5 * cutoff).value;
-  skew.standard_error = std::hypot(skew.standard_error, std::hypot(skew.value - slow, kLeftWrong));
+  skew.standard_error = std::hypot(skew.standard_error, skew.value - slow);
   return skew;
 }
 

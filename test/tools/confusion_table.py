@@ -20,6 +20,8 @@ import tempfile
 import time
 from pathlib import Path
 
+import builds
+
 PACKAGE = "backlash_diagnosis"
 REPOSITORY = Path(__file__).resolve().parents[2]
 NOTHING = "(nothing)"
@@ -181,8 +183,7 @@ def judge(case, truth, outcome, report):
 def run_case(case, args):
     folder = args.folder / case.name
     make(case, folder, args.make)
-    rig = REPOSITORY / RIGS["joint" if case.group == "joint" else "servo"]
-    outcome = trace(folder, args.trace, str(rig), args.timeout)
+    outcome = trace(folder, args.trace, str(args.rigs["joint" if case.group == "joint" else "servo"]), args.timeout)
     report = None
     if outcome["code"] in RESULT_CODES:
         report = json.loads((folder / "report" / "report.json").read_text())
@@ -270,6 +271,9 @@ def read_arguments():
     parser.add_argument("--trace", help="path of trace_residual (default: PATH, then the workspace)")
     parser.add_argument("--make", help="path of make_machine (default: PATH, then the workspace)")
     parser.add_argument("--only", default="", metavar="PATTERN", help="machines whose name contains it")
+    parser.add_argument("--build", choices=builds.BUILDS, default="servo",
+                        help="of the servos (default: %(default)s, as in the rig file)")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th machine only")
     parser.add_argument("--quick", action="store_true", help="12 machines")
     parser.add_argument("--seed", type=int, help="of the first machine (default: drawn, and printed)")
     parser.add_argument("--jobs", type=int, default=2, help="at the same time (default: %(default)s)")
@@ -298,7 +302,8 @@ def run_all(cases, args):
 
 def main():
     args = read_arguments()
-    cases = [case for case in suite(args.seed) if args.only in case.name]
+    build = builds.BUILDS[args.build]
+    cases = builds.of_build(build, [case for case in suite(args.seed) if args.only in case.name])[::args.every]
     if args.quick:
         cases = quick(cases)
     if args.list:
@@ -317,6 +322,8 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         args.folder = Path(args.keep or scratch).resolve()
         args.folder.mkdir(parents=True, exist_ok=True)
+        args.rigs = {name: REPOSITORY / path for name, path in RIGS.items()}
+        args.rigs["servo"] = builds.declared(build, args.rigs["servo"], args.folder)
         results = run_all(cases, args)
     summary = {}
     for group in GROUPS:

@@ -20,73 +20,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import yaml
-
+import builds
 import confusion_table
 
 MOTIONS = ("train", "test")
 MOTOR = ("time", "motor_torque", "motor_position")
 VERDICT = "verdict"
-
-# Servos that are not as that of config/two_inertia_servo.yaml: what is declared, times so much (names as make_machine
-# has them), and how they are recorded.
-Build = collections.namedtuple("Build", "times options", defaults=({}, ()))
-BUILDS = {
-    "servo": Build(),
-    "light_load": Build({"load_inertia": 0.03, "load_coulomb": 0.3, "load_viscous": 0.3}),
-    "light_motor": Build({"motor_inertia": 0.1, "motor_coulomb": 0.3, "motor_viscous": 0.3,
-                          "loop_gain": 0.1}),
-    "wide_gap": Build({"backlash_angle": 8}),
-    "narrow_gap": Build({"backlash_angle": 0.15}),
-    "soft_teeth": Build({"mesh_stiffness": 0.05, "mesh_damping": 0.2}),
-    "stiff_teeth": Build({"mesh_stiffness": 5, "mesh_damping": 2.2}),
-    "damped_teeth": Build({"mesh_damping": 6}),
-    "sticky_load": Build({"load_coulomb": 10}),
-    "free_load": Build({"load_coulomb": 0.03, "load_viscous": 0.1}),
-    "coarse": Build({}, ("--encoder-bits", "15")),
-    "slow_recorder": Build({}, ("--rate", "200")),
-    "chattering": Build({"loop_gain": 4.5}),
-    "short": Build({}, ("--duration", "4")),
-}
-PLACES = {"motor_inertia": ("motor", "inertia"), "motor_coulomb": ("motor", "coulomb_friction"),
-          "motor_viscous": ("motor", "viscous_damping"), "load_inertia": ("link", "inertia"),
-          "load_coulomb": ("link", "coulomb_friction"), "load_viscous": ("link", "viscous_damping"),
-          "backlash_angle": ("mesh", "backlash_angle"), "mesh_stiffness": ("mesh", "contact", "stiffness"),
-          "mesh_damping": ("mesh", "contact", "damping")}
-
-
-def declared(build, source, folder):
-    """The rig file of a build."""
-    with open(source, encoding="utf-8") as file:
-        rig = yaml.safe_load(file)
-    for name, factor in build.times.items():
-        if name not in PLACES:  # the drive's, which no rig file knows
-            continue
-        *path, last = PLACES[name]
-        place = rig["gear_train"]
-        for step in path:
-            place = place[step]
-        place[last] = float(place[last]) * factor
-    options = dict(zip(build.options[::2], build.options[1::2]))
-    if "--rate" in options:
-        rig["sensors"]["sampling_rate"] = float(options["--rate"])
-    if "--encoder-bits" in options:
-        resolution = 2 * math.pi / 2 ** int(options["--encoder-bits"])
-        rig["sensors"]["load_position"]["resolution"] = resolution
-        rig["sensors"]["motor_position"]["resolution"] = resolution / 8
-    path = folder / "rig.yaml"
-    path.write_text(yaml.safe_dump(rig, sort_keys=False), encoding="utf-8")
-    return str(path)
-
-
-def cases_of(args):
-    """The servos of confusion_table.py, as the build is made and recorded."""
-    build = BUILDS[args.build]
-    times = ",".join(f"{name}={factor}" for name, factor in build.times.items())
-    more = list(build.options) + (["--times", times] if times else [])
-    cases = [c for c in confusion_table.suite(args.seed) if c.group != "joint" and args.only in c.name]
-    cases = [c for c in cases if not set(c.options) & set(build.options[::2])]
-    return [c._replace(options=c.options + more) for c in cases[::args.every]]
 
 
 def plays(truth, duration):
@@ -155,7 +94,7 @@ def read_arguments():
     parser.add_argument("--make", help="path of make_machine (default: PATH, then the workspace)")
     parser.add_argument("--rig", default=str(confusion_table.REPOSITORY / confusion_table.RIGS["servo"]))
     parser.add_argument("--seed", type=int, help="of the first machine (default: drawn, and printed)")
-    parser.add_argument("--build", choices=BUILDS, default="servo", help="of the servos (default: %(default)s)")
+    parser.add_argument("--build", choices=builds.BUILDS, default="servo", help="of the servos (default: %(default)s)")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th machine only")
     parser.add_argument("--only", default="", metavar="PATTERN", help="machines whose name contains it")
     parser.add_argument("--motor-alone", action="store_true", help="without the load encoder")
@@ -173,13 +112,14 @@ def read_arguments():
         setattr(args, name, path)
     args.folder = Path(args.keep).resolve()
     args.folder.mkdir(parents=True, exist_ok=True)
-    args.rig = declared(BUILDS[args.build], args.rig, args.folder)
+    args.rig = builds.declared(builds.BUILDS[args.build], args.rig, args.folder)
     return args
 
 
 def main():
     args = read_arguments()
-    cases = cases_of(args)
+    cases = [c for c in confusion_table.suite(args.seed) if c.group != "joint" and args.only in c.name]
+    cases = builds.of_build(builds.BUILDS[args.build], cases)[::args.every]
     counts = collections.defaultdict(collections.Counter)
     with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
         list(pool.map(lambda case: confusion_table.make(case, args.folder / case.name, args.make), cases))

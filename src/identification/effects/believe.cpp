@@ -21,9 +21,10 @@ std::string interval(const TestGain& g) {
   return fmt::format("{:.2g} % (95 %: {:.2g} to {:.2g} %)", 100 * g.value, 100 * g.lower, 100 * g.upper);
 }
 
-/// Why the record does not bear out the effect that makes the difference of both; empty: it does.
+/// Why the record does not bear out the effect that makes the difference of both; empty: it does. A map,
+/// which can take any shape, has no credit with the other channel.
 std::string contradicted(const ServoPrediction& before, const ServoPrediction& after, bool deflection,
-                         const BeliefSettings& settings) {
+                         bool map, const BeliefSettings& settings) {
   const char* const names[] = {"torque", "deflection"};
   const Left was = left(before, deflection, settings), is = left(after, deflection, settings);
   const TestGain gain = test_gain(was, is, settings);
@@ -44,7 +45,7 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
   const TestGain other = test_gain(other_was, other_is, settings);
   const double price = (other_is.total() - other_was.total()) / other_was.noise;
   const bool at_noise = other_is.total() < settings.at_noise * settings.at_noise * other_is.noise;
-  const bool dear = !at_noise || price > settings.price * decrease / was.noise;
+  const bool dear = map || !at_noise || price > settings.price * decrease / was.noise;
   if (other.upper < 0 && (other.value < -settings.much_worse || (other.value < -settings.worse && dear)))
     return fmt::format("on the unseen record it makes the error of {} worse, by {}", names[!deflection],
                        interval({-other.value, -other.upper, -other.lower}));
@@ -110,7 +111,9 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
       return std::pair{i, std::move(why)};
   const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
-    std::string why = contradicted(on_unseen[i], on_unseen[i + 1], h.effects[i].gain.deflection, settings);
+    const Effect& effect = h.effects[i];
+    std::string why = contradicted(on_unseen[i], on_unseen[i + 1], effect.gain.deflection,
+                                   model::term_type(effect.candidate.id).map.has_value(), settings);
     if (!why.empty()) return std::pair{i, std::move(why)};
   }
   return std::nullopt;

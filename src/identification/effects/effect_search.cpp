@@ -12,6 +12,7 @@
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "effect_roles.h"
 #include "found_effects.h"
+#include "impossible_friction.h"
 #include "search.h"
 #include "signature.h"
 #include "traced_records.h"
@@ -145,9 +146,10 @@ std::vector<ChannelRemainder> remainders(const SearchResult& result, const Servo
   return all;
 }
 
-/// Whether what is left is noise.
-void judge_remainder(const std::vector<ChannelRemainder>& all, const ExplainableSettings& settings,
-                     Trace& trace) {
+/// Whether what is left is noise, and the machine without effects a possible one.
+void judge_remainder(const std::vector<ChannelRemainder>& all, const ServoData& test,
+                     const SearchSettings& search, Trace& trace) {
+  const ExplainableSettings& settings = search.explainable;
   std::map<std::string, double> most;
   for (const ChannelRemainder& c : all) {
     const auto [at, first] = most.emplace(c.channel, 0.0);
@@ -158,6 +160,9 @@ void judge_remainder(const std::vector<ChannelRemainder>& all, const Explainable
                                                 c.left.explainable.upper};
   }
   trace.unexplained = signature(all, trace.augmented.linear, settings);
+  if (!trace.unexplained && trace.steps.empty() && !trace.augmented.coupled)
+    trace.unexplained =
+        impossible_friction(trace.base_parameters, trace.units, motion_size(test), search.belief, settings);
   if (!trace.unexplained)
     for (std::string& note : noise_notes(all, settings)) trace.notes.push_back(std::move(note));
   if (!trace.steps.empty())
@@ -190,7 +195,8 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
       found,
       simulation::load_moves_freely(declared) ? settings.shape_of_friction : settings.shape_of_all_torque,
       trace);
-  judge_remainder(remainders(result, on_test.back(), records, settings, trace), settings.explainable, trace);
+  judge_remainder(remainders(result, on_test.back(), records, settings, trace), records.test, settings,
+                  trace);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
 }

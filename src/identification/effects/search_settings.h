@@ -99,10 +99,11 @@ struct ExplainableSettings {
   std::size_t least_samples = 200;  // choice: fewer tell nothing
   double near_zero = 0.1;           // choice: share of a residual: less is nothing that matters
   double worth_saying = 0.01;  // choice: of the signal: what is smaller lies within what any model neglects
-  double part_of_explained = 0.3;  // choice: of what effects explain: they must not leave as much
-  double worth_naming = 0.05;      // choice: share of a residual, of a single state
-  double clear = 2;                // choice: times the floor of the sensors, beyond which noise needs a word
-  double uneven = 4;               // theory: coloured noise with ten values in a part stays below
+  double far = 10, worth_saying_far = 0.001;  // simulation: the same, of what is so many times the floor
+  double part_of_explained = 0.3;             // choice: of what effects explain: they must not leave as much
+  double worth_naming = 0.05;                 // choice: share of a residual, of a single state
+  double clear = 2;   // choice: times the floor of the sensors, beyond which noise needs a word
+  double uneven = 4;  // theory: coloured noise with ten values in a part stays below
 };
 
 struct SearchSettings {

@@ -15,7 +15,8 @@ constexpr std::size_t kMostNames = 3;  // choice
 
 /// Of the signal; beside an effect that is smaller itself, of that.
 bool worth_saying(const Remainder& r, double part, const ExplainableSettings& settings) {
-  const double of_signal = settings.worth_saying * r.signal;
+  const bool far = r.rms > settings.far * r.floor;
+  const double of_signal = (far ? settings.worth_saying_far : settings.worth_saying) * r.signal;
   const double least =
       r.explained > 0 ? std::min(of_signal, settings.part_of_explained * r.explained) : of_signal;
   return r.signal > 0 && part * r.rms >= least;
