@@ -12,12 +12,11 @@
 #include "backlash_diagnosis/record/time_base.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
+#include "fit/joint_fit.h"
 #include "procedures/procedures.h"
 
 namespace backlash::identification {
 namespace {
-
-constexpr double kMisfit = 1.5;  // times the noise floor, beyond which the model lacks something
 
 void require_finite(const record::Record& record) {
   for (const record::Channel channel : record::kChannels)

@@ -15,6 +15,7 @@ constexpr double kInertia = 6, kStiffness = 4e5;  // kg m^2, N m/rad
 /// A load led along sines, its motor in closed form: compliance, and half a gap on the side of the torque.
 struct Servo {
   double gap = 5e-4, friction = 30, noise = 1e-6;  // rad, N m, rad
+  double stiffness = kStiffness, damping = 0;      // N m/rad; N m s/rad, of the motor, which no model knows
 
   static double load(double t) {
     return 0.6 * std::sin(2 * M_PI * 0.11 * t) + 0.05 * std::sin(2 * M_PI * 1.3 * t + 1);
@@ -25,7 +26,7 @@ struct Servo {
     return 100 * (load(t + h) - 2 * load(t) + load(t - h)) / (h * h) + friction * std::tanh(rate(t) / 1e-3);
   }
   double motor(double t) const {
-    return load(t) + transmitted(t) / kStiffness + 0.5 * gap * std::tanh(transmitted(t));
+    return load(t) + transmitted(t) / stiffness + 0.5 * gap * std::tanh(transmitted(t));
   }
   signal::Measured skew(double late, double interval) const {
     std::mt19937 random(7);
@@ -35,7 +36,7 @@ struct Servo {
       motors.push_back(motor(t) + normal(random));
       loads.push_back(load(t - late) + normal(random));
       const double h = 1e-3, acceleration = (load(t + h) - 2 * load(t) + load(t - h)) / (h * h);
-      torque.push_back(transmitted(t) + kInertia * acceleration);
+      torque.push_back(transmitted(t) + kInertia * acceleration + damping * rate(t));
     }
     return encoder_skew({interval, torque, motors, loads, kInertia});
   }
@@ -52,6 +53,18 @@ TEST(EncoderSkew, IsToldBesidePlayComplianceAndFriction) {
         EXPECT_NEAR(skew.value, late, 2 * skew.standard_error) << gap << " " << interval;
         EXPECT_EQ(is_clear(skew), late != 0) << skew.value << " +- " << skew.standard_error;
       }
+}
+
+// Drag of the motor is torque that never reaches the teeth: where these are soft it looks like a skew of
+// damping / stiffness, here 0.3 ms.
+TEST(EncoderSkew, DragOfTheMotorIsNone) {
+  Servo servo;
+  servo.stiffness = 2e4;
+  servo.damping = 6;
+  const signal::Measured skew = servo.skew(0, 1e-3);
+  EXPECT_NEAR(skew.value, -servo.damping / servo.stiffness, 1e-4);
+  EXPECT_FALSE(is_clear(skew)) << skew.value << " +- " << skew.standard_error;
+  EXPECT_TRUE(is_clear(servo.skew(2e-2, 1e-3)));
 }
 
 TEST(EncoderSkew, IsNotToldOfALoadThatStands) {

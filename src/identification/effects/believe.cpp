@@ -33,7 +33,7 @@ std::string contradicted(const ServoPrediction& before, const ServoPrediction& a
     return fmt::format("on the unseen record it lessens the error of {} by {}: not told from nothing", name,
                        interval(gain));
   const double above = was.total() - was.noise, decrease = was.total() - is.total();
-  if (decrease < settings.least_part * above)
+  if (decrease < (map ? settings.least_part_of_map : settings.least_part) * above)
     return fmt::format("on the unseen record it explains {:.2g} % of what {} has above the noise: too little",
                        100 * decrease / above, name);
   if (is.total() < settings.below_noise * is.noise)

@@ -70,11 +70,12 @@ struct MapSettings {
 
 /// What the unseen record must bear out.
 struct BeliefSettings {
-  int blocks = 20;          // choice: of the record, drawn with replacement: several reversals each
-  int draws = 400;          // choice (time)
-  std::uint64_t seed = 1;   // choice
-  double risk = 0.05;       // choice: beyond both ends of an interval
-  double least_part = 0.1;  // choice: of what lies above the noise, that an effect must explain
+  int blocks = 20;                 // choice: of the record, drawn with replacement: several reversals each
+  int draws = 400;                 // choice (time)
+  std::uint64_t seed = 1;          // choice
+  double risk = 0.05;              // choice: beyond both ends of an interval
+  double least_part = 0.1;         // choice: of what lies above the noise, that an effect must explain
+  double least_part_of_map = 0.5;  // choice: the same, of a map, which can take any shape
   double below_noise =
       0.64;             // theory: of the noise's square, its deviation known to a fifth: nothing leaves less
   double worse = 0.05;  // choice: of the other channel's error

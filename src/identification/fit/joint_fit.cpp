@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/model/term.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "contact_edge.h"
 #include "sampling.h"
@@ -19,6 +20,7 @@ namespace {
 
 constexpr double kFarthest = 30;  // choice: factor by which a positive parameter may differ from its start; a
                                   // bound that is approached and never reached
+constexpr double kDrawn = 0.3;    // simulation: share of what is left that follows what a value changes
 constexpr double kWideStep = 1e-2;  // simulation: relative, of the differences that the errors are taken from
 constexpr double kNegligible = 2e-3;  // choice: of a signal: no floor is lower, no model need be better
 constexpr double kVague = 30;  // choice: times the scale: standard deviation of the prior of a parameter
@@ -121,11 +123,14 @@ void add_equations(MachineFit& fit, const Machine& start) {
       fit.fit.covariance(Eigen::Index(i), Eigen::Index(i)) += std::pow(kEquations, 2);
 }
 
-/// What is left beyond noise may follow what a value changes, wholly where the machine is not to be modelled:
-/// it must not be told better than |left| / |change per unit|, or than it is known beside the records.
-void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double in_floors) {
-  const double left =
-      fit.residuals.head(rows).norm() * std::sqrt(std::max(0.0, 1 - 1 / (in_floors * in_floors)));
+/// What lies beyond noise, of what is this many times as large.
+double share_beyond_noise(double in_floors) {
+  return std::sqrt(std::max(0.0, 1 - 1 / (in_floors * in_floors)));
+}
+
+/// What is left beyond noise, `left`, may follow what a value changes: it must not be told better than
+/// |left| / |change per unit|, or than it is known beside the `rows` of the records.
+void allow_for_left(signal::LeastSquaresFit& fit, Eigen::Index rows, double left) {
   Eigen::VectorXd growth = Eigen::VectorXd::Ones(fit.values.size());
   for (Eigen::Index i = 0; i < growth.size(); ++i) {
     const double change = fit.jacobian.col(i).head(rows).norm(), error = std::sqrt(fit.covariance(i, i));
@@ -358,7 +363,42 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
   fit.fit.values -= bias;
   fit.machine = unknowns.machine(fit.fit.values);
   fit.fit.covariance += std::pow(kUnsureOfSampling, 2) * bias * bias.transpose();
-  if (start.rig.coupled) allow_for_left(fit.fit, rows, records.misfit(fit.machine).deflection);
+  if (start.rig.coupled)
+    allow_for_left(
+        fit.fit, rows,
+        fit.fit.residuals.head(rows).norm() * share_beyond_noise(records.misfit(fit.machine).deflection));
+}
+
+void allow_for_misfit(MachineFit& fit, const RecordSet& records) {
+  const Misfit misfit = records.misfit(fit.machine);
+  const std::vector<RecordSet::Row>& layout = records.layout();
+  const Eigen::Index n = fit.fit.values.size(), rows = Eigen::Index(layout.size());
+  // Of the records and what keeps a value that they do not tell; what procedures found in the same records is
+  // no more certain.
+  const Eigen::MatrixXd j = fit.fit.jacobian.topRows(rows + n);
+  const Eigen::MatrixXd gain = signal::symmetric_inverse(j.transpose() * j) * j.topRows(rows).transpose();
+  Eigen::VectorXd drawn = Eigen::VectorXd::Zero(n);
+  double all_left = 0;
+  for (const bool deflection : {false, true}) {
+    const double in_floors = deflection ? misfit.deflection : misfit.torque;
+    if (in_floors <= kMisfit) continue;
+    double squares = 0;
+    Eigen::VectorXd gains = Eigen::VectorXd::Zero(n);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      if (layout[std::size_t(i)].deflection != deflection) continue;
+      squares += std::pow(fit.fit.residuals[i], 2);
+      gains += gain.col(i).cwiseAbs2();
+    }
+    const double left = share_beyond_noise(in_floors) * std::sqrt(squares);
+    drawn += kDrawn * left * gains.cwiseSqrt();
+    all_left = std::hypot(all_left, left);
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double alone = j.col(i).head(rows).norm(), vague = j.col(i).tail(n).norm();
+    if (all_left > 0) drawn[i] = std::max(drawn[i], 1 / std::hypot(alone / all_left, vague));
+  }
+  const Eigen::VectorXd growth = drawn.cwiseQuotient(fit.fit.covariance.diagonal().cwiseSqrt()).cwiseMax(1);
+  fit.fit.covariance = growth.asDiagonal() * fit.fit.covariance * growth.asDiagonal();
 }
 
 }  // namespace backlash::identification

@@ -35,6 +35,7 @@ OutputError fit_output_error(const model::Rig& start, const std::vector<ServoDat
   const FitSettings settings = with_bands(asked.fit, start, records);
   BandFit fitted = fit_to_records(records, start_machine(start, records.size(), asked), settings);
   judge_errors(fitted.fit, fitted.start, fitted.records);
+  allow_for_misfit(fitted.fit, fitted.records);
   const Machine& machine = fitted.fit.machine;
   OutputError result;
   result.rig = machine.rig;

@@ -49,6 +49,16 @@ TEST(Signature, AHundredthOfTheSignalIsWithinWhatAnyModelNeglects) {
   EXPECT_FALSE(signature({c}, false, {}));
 }
 
+// Sensors that are twenty times finer leave no room for neglect.
+TEST(Signature, ButNotWhereItIsFarBeyondTheNoise) {
+  ChannelRemainder c = left_of_torque(0.9, 0.8, 1.2);
+  c.left.signal = 2000;
+  c.left.floor = 0.5;
+  EXPECT_TRUE(signature({c}, false, {}));
+  c.left.signal = 20000;
+  EXPECT_FALSE(signature({c}, false, {}));
+}
+
 // What the states show of it is less than a hundredth of the signal, but what is left is more and is no
 // noise.
 TEST(Signature, APartThatShowsSpeaksForAllThatIsLeft) {

@@ -111,6 +111,26 @@ TEST(OutputError, StandardErrorsCoverTheScatter) {
   }
 }
 
+// What an effect that the model lacks draws from the values leaves no trace: the errors hold it. Three
+// standard errors.
+TEST(OutputError, StandardErrorsAllowForAnEffectThatTheModelLacks) {
+  const model::Rig declared = servo_file().rig;
+  ParameterValues drift{{"change", 25}, {"span", 20}, {"rate", 0}};
+  drift.set_choice("body", "motor");
+  const std::shared_ptr<const model::Term> lacking[] = {
+      model::make_term("gravity", {{"amplitude", 100}, {"phase", 0.4}}),
+      model::make_term("encoder_scale", {{"scale", 3e-4}}), model::make_term("friction_drift", drift)};
+  for (const auto& term : lacking) {
+    model::Rig truth = other_servo();
+    truth.terms.push_back(term);
+    const record::Record record = simulation::simulate_record(truth, test::servo_run(1), 20);
+    const OutputError fit = fit_output_error(declared, {servo_data(record, declared)}, all_parameters());
+    for (const auto& [name, m] : fit.parameters)
+      EXPECT_NEAR(m.value, rig_file::servo_parameter(name).get(truth), 3 * m.standard_error)
+          << name << " without " << term->id;
+  }
+}
+
 TEST(OutputError, StartOffsetOfTheEncodersIsCalibration) {
   const model::Rig truth = other_servo();
   record::Record record = simulation::simulate_record(truth, test::servo_run(1), 10);
