@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `identify` as its users run it.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -70,6 +72,25 @@ TEST_F(Identify, OneInertia) {
     EXPECT_NEAR(parameters.at(name).at("value").get<double>() / expected.first, 1, 0.05) << name;
     EXPECT_EQ(parameters.at(name).at("unit"), expected.second);
   }
+}
+
+// Gravity G sin q of a slow motion is torque against the acceleration: G / w^2 is taken off the inertia.
+TEST_F(Identify, GravityThatTheFileLacksIsNoNegativeInertia) {
+  std::string csv = "time,motor_torque,motor_position\n";
+  for (int k = 0; k < 8000; ++k) {
+    const double t = 0.01 * k, w = 0.8, q = std::sin(w * t) + 0.2 * std::sin(2.7 * w * t);
+    const double speed = w * std::cos(w * t) + 0.54 * w * std::cos(2.7 * w * t);
+    const double acceleration = -w * w * (std::sin(w * t) + 0.2 * 2.7 * 2.7 * std::sin(2.7 * w * t));
+    const double torque = 0.4 * acceleration + 1.1 * speed + (speed > 0 ? 0.6 : -0.6) + 4 * std::sin(q);
+    csv += fmt::format("{:.2f},{:.9g},{:.9g}\n", t, torque, q);
+  }
+  write("swing.csv", csv);
+  std::filesystem::create_symlink(package_file("config/ur5_joint.yaml"), path("joint.yaml"));
+  const Outcome outcome = run("identify swing.csv --rig joint.yaml --out fit.yaml --json fit.json");
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  expect_contains(outcome.err, "inertia comes out as -");
+  expect_contains(outcome.err, "trace_residual");
+  EXPECT_FALSE(exists("fit.yaml"));
 }
 
 TEST_F(Identify, PublishedValuesOfTheEmpsAxis) {

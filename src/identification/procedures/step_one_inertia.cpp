@@ -31,6 +31,19 @@ ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
   return trace;
 }
 
+/// A load that the model lacks can leave it with an inertia or a friction that no machine has.
+void require_possible(const OneInertia& found, const std::string& record) {
+  const std::pair<const char*, signal::Measured> parameters[] = {
+      {"inertia", found.inertia}, {"viscous", found.viscous}, {"coulomb", found.coulomb}};
+  for (const auto& [name, m] : parameters)
+    if (m.value < 0)
+      throw CannotIdentify(fmt::format(
+          "{}: {} comes out as {:.3g} +- {:.2g}, and {:.3g} % of the torque is left where noise alone would "
+          "leave {:.3g} %: the machine has effects that one inertia with friction lacks, as gravity; "
+          "trace_residual looks for them",
+          record, name, m.value, m.standard_error, 100 * found.relative_error, 100 * found.floor));
+}
+
 }  // namespace
 
 ProcedureReport run_one_inertia(IdentificationCase& c) {
@@ -51,6 +64,7 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   }
   if (!c.result.one_inertia) throw CannotIdentify(reasons);
   const OneInertia& found = *c.result.one_inertia;
+  require_possible(found, report.records.front());
   c.result.parameters = {{"inertia", found.inertia},
                          {"viscous", found.viscous},
                          {"coulomb", found.coulomb},
