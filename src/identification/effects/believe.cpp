@@ -113,7 +113,7 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
     const Effect& effect = h.effects[i];
     std::string why = contradicted(on_unseen[i], on_unseen[i + 1], effect.gain.deflection,
-                                   model::term_type(effect.candidate.id).map.has_value(), settings);
+                                   is_learned(effect.candidate.id), settings);
     if (!why.empty()) return std::pair{i, std::move(why)};
   }
   return std::nullopt;

@@ -165,7 +165,10 @@ void judge_remainder(const std::vector<ChannelRemainder>& all, const ServoData& 
         impossible_friction(trace.base_parameters, trace.units, motion_size(test), search.belief, settings);
   if (!trace.unexplained)
     for (std::string& note : noise_notes(all, settings)) trace.notes.push_back(std::move(note));
-  if (!trace.steps.empty())
+  // A map that leaves something is the shape of what is missing, and not what it is.
+  const bool named = std::any_of(trace.steps.begin(), trace.steps.end(),
+                                 [](const FoundEffect& step) { return !is_learned(step.id); });
+  if (named || (!trace.steps.empty() && !trace.unexplained))
     trace.verdict = TraceVerdict::effect_found;
   else if (trace.unexplained)
     trace.verdict = TraceVerdict::unexplained;

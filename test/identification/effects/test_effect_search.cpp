@@ -190,6 +190,8 @@ TEST(EffectSearch, LearnsAMapOfWhatHasNoName) {
   EXPECT_EQ(trace.steps[0].words.at("acts_on"), "motor");
   const TraceChannel& torque = trace.channels.at("torque");
   EXPECT_LT(torque.after, 0.6 * torque.before);  // the points of the map are as far apart as the bump is wide
+  // Of those points a part of the bump is left over: its shape is told, not what it is.
+  EXPECT_EQ(trace.verdict == TraceVerdict::effect_found, !trace.unexplained);
 }
 
 /// A drive that gives less than it is asked for: of a recorded torque u the machine feels T0 tanh(u / T0).

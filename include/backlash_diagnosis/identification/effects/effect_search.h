@@ -116,6 +116,7 @@ struct TraceSeries {
   std::vector<double> deflection, deflection_before, deflection_after;  // empty without load encoder
 };
 
+/// effect_found: a named effect, or a learned map that leaves nothing else to explain.
 enum class TraceVerdict { effect_found, nothing_missing, unexplained };
 
 struct Trace {
