@@ -1,7 +1,7 @@
 #!/bin/bash
 # Checks how the files are written: the licence in the first lines of each, the layout by .clang-format, names and habits
 # by .clang-tidy, that every public header compiles alone, that rooms include only what they may know, that
-# lanes do not lie where their alignment is lost, that pages lead to each other.
+# lanes do not lie where their alignment is lost and round as one alone does, that pages lead to each other.
 # Usage: bash scripts/check_style.sh [licence|format|tidy|headers|rooms|lanes|pages]... [--all|--since COMMIT]
 #   tidy and headers look at the files that differ from the main branch (on it: from the commit before), --all at all.
 #   format and tidy are those of clang 14 and are not tried with another; exit code 77 where that leaves nothing to do.
@@ -86,7 +86,17 @@ rooms() {
 # src/simulation/lanes.h; no compiler warns of it.
 lanes() {
   local holders='(vector|deque|list|unique_ptr|shared_ptr|make_unique|make_shared)<(const )?[A-Za-z_:]*Lanes[0-9]*>'
-  ! grep -rnE "${holders}|new [A-Za-z_:]*Lanes[0-9]*\b" include src test benchmark >&2
+  local file status=0
+  ! grep -rnE "${holders}|new [A-Za-z_:]*Lanes[0-9]*\b" include src test benchmark >&2 || status=1
+  # AVX-512 brings fused multiply-add, which rounds otherwise than one load alone: only some processors would show it.
+  for file in $(grep -rlE 'target\("avx' src); do
+    awk -v file="/${file}" 'index($0, file) { named = 1 }
+                            /COMPILE_OPTIONS/ { if (named && /-ffp-contract=off/) good = 1; named = 0 }
+                            END { exit !good }' CMakeLists.txt && continue
+    echo "${file}: has code for AVX, and CMakeLists.txt does not compile it with -ffp-contract=off" >&2
+    status=1
+  done
+  return "${status}"
 }
 
 pages() {

@@ -146,8 +146,8 @@ std::vector<ChannelRemainder> remainders(const SearchResult& result, const Servo
   return all;
 }
 
-/// Whether what is left is noise, and the machine without effects a possible one.
-void judge_remainder(const std::vector<ChannelRemainder>& all, const ServoData& test,
+/// Whether what is left is noise, and a machine that nothing is said to lack a possible one.
+void judge_remainder(const std::vector<ChannelRemainder>& all, const Hypothesis& found, const ServoData& test,
                      const SearchSettings& search, Trace& trace) {
   const ExplainableSettings& settings = search.explainable;
   std::map<std::string, double> most;
@@ -160,7 +160,8 @@ void judge_remainder(const std::vector<ChannelRemainder>& all, const ServoData& 
                                                 c.left.explainable.upper};
   }
   trace.unexplained = signature(all, trace.augmented.linear, settings);
-  if (!trace.unexplained && trace.steps.empty() && !trace.augmented.coupled)
+  const bool as_declared = found.effects.empty() && !found.other_teeth && !trace.augmented.coupled;
+  if (!trace.unexplained && as_declared)
     trace.unexplained =
         impossible_friction(trace.base_parameters, trace.units, motion_size(test), search.belief, settings);
   if (!trace.unexplained)
@@ -198,7 +199,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
       found,
       simulation::load_moves_freely(declared) ? settings.shape_of_friction : settings.shape_of_all_torque,
       trace);
-  judge_remainder(remainders(result, on_test.back(), records, settings, trace), records.test, settings,
+  judge_remainder(remainders(result, on_test.back(), records, settings, trace), found, records.test, settings,
                   trace);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
