@@ -96,7 +96,8 @@ struct PositionDifferenceSettings {
 /// ranges above. Everything that lies in the record is answered by the status:
 ///   insufficient_data  no motor_position, no load_position, no torque, too few samples or changes of flank
 ///   out_of_domain      the output moves although it is locked; torque does not press both flanks, or each
-///                      in one direction of motion only; the deflection does not follow the torque; the
+///                      in one direction of motion only; the torque alternates from sample to sample and
+///                      throws the motor by a tenth of its rms speed; the deflection does not follow it; the
 ///                      interval would be as wide as the deflection, or more than a quarter of that and twice
 ///                      the play; the encoders differ by more than 1 % in scale; the play is negative beyond
 ///                      the interval, another in other parts of the record, or another with windows of

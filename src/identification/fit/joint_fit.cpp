@@ -371,6 +371,7 @@ void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& record
 
 void allow_for_misfit(MachineFit& fit, const RecordSet& records) {
   const Misfit misfit = records.misfit(fit.machine);
+  if (fit.machine.rig.coupled || std::max(misfit.torque, misfit.deflection) <= kMisfit) return;
   const std::vector<RecordSet::Row>& layout = records.layout();
   const Eigen::Index n = fit.fit.values.size(), rows = Eigen::Index(layout.size());
   // Of the records and what keeps a value that they do not tell; what procedures found in the same records is

@@ -97,7 +97,7 @@ bool lacks_something(const ChannelError& channel) {
 /// was declared is no less likely.
 void allow_for_declared(const model::Rig& declared, std::map<std::string, signal::Measured>& parameters) {
   for (auto& [name, measured] : parameters)
-    if (measured.standard_error > measured.value)
+    if (measured.standard_error > std::fabs(measured.value))
       measured.standard_error =
           std::hypot(measured.standard_error, rig_file::servo_parameter(name).get(declared) - measured.value);
 }
