@@ -9,19 +9,17 @@ answer, miss, and are wrong and sure: outside by twice the interval's width, or 
 declared as that.
 Exit code: 0, 64 usage, 66 executable missing.
 """
-import argparse
 import collections
 import concurrent.futures
 import csv
 import json
 import math
-import secrets
 import subprocess
 import sys
-from pathlib import Path
 
 import builds
 import confusion_table
+import table_arguments
 
 MOTIONS = ("train", "test")
 MOTOR = ("time", "motor_torque", "motor_position")
@@ -89,31 +87,10 @@ def diagnose(case, motion, args):
 
 
 def read_arguments():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--diagnose", help="path of diagnose_record (default: PATH, then the workspace)")
-    parser.add_argument("--make", help="path of make_machine (default: PATH, then the workspace)")
-    parser.add_argument("--rig", default=str(confusion_table.REPOSITORY / confusion_table.RIGS["servo"]))
-    parser.add_argument("--seed", type=int, help="of the first machine (default: drawn, and printed)")
-    parser.add_argument("--build", choices=builds.BUILDS, default="servo", help="of the servos (default: %(default)s)")
-    parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th machine only")
+    parser = table_arguments.parser_of(__doc__.split("\n", maxsplit=1)[0], "diagnose_record")
     parser.add_argument("--only", default="", metavar="PATTERN", help="machines whose name contains it")
     parser.add_argument("--motor-alone", action="store_true", help="without the load encoder")
-    parser.add_argument("--jobs", type=int, default=2, help="at the same time (default: %(default)s)")
-    parser.add_argument("--keep", metavar="DIR", required=True, help="work here, machines that are there are kept")
-    args = parser.parse_args()
-    if args.seed is None:
-        args.seed = secrets.randbelow(2**31)
-        print(f"--seed {args.seed}", flush=True)
-    for name, tool in (("diagnose", "diagnose_record"), ("make", "make_machine")):
-        path = confusion_table.find(tool, getattr(args, name))
-        if path is None:
-            print(f"diagnosis_table: --{name}: executable not found", file=sys.stderr)
-            sys.exit(66)
-        setattr(args, name, path)
-    args.folder = Path(args.keep).resolve()
-    args.folder.mkdir(parents=True, exist_ok=True)
-    args.rig = builds.declared(builds.BUILDS[args.build], args.rig, args.folder)
-    return args
+    return table_arguments.arguments_of(parser, "diagnose_record")
 
 
 def main():

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "backlash_diagnosis/base/random.h"
 #include "support/data.h"
 #include "tools/command_runner.h"
 
@@ -74,23 +75,59 @@ TEST_F(Identify, OneInertia) {
   }
 }
 
-// Gravity G sin q of a slow motion is torque against the acceleration: G / w^2 is taken off the inertia.
-TEST_F(Identify, GravityThatTheFileLacksIsNoNegativeInertia) {
+/// A motion of two sines of an inertia of 0.4 kg m^2; the torque has noise of 0.01 N m.
+std::string swing(double viscous, double coulomb, double offset, double gravity) {
+  Random random(3);
   std::string csv = "time,motor_torque,motor_position\n";
   for (int k = 0; k < 8000; ++k) {
     const double t = 0.01 * k, w = 0.8, q = std::sin(w * t) + 0.2 * std::sin(2.7 * w * t);
     const double speed = w * std::cos(w * t) + 0.54 * w * std::cos(2.7 * w * t);
     const double acceleration = -w * w * (std::sin(w * t) + 0.2 * 2.7 * 2.7 * std::sin(2.7 * w * t));
-    const double torque = 0.4 * acceleration + 1.1 * speed + (speed > 0 ? 0.6 : -0.6) + 4 * std::sin(q);
+    const double torque = 0.4 * acceleration + viscous * speed + (speed > 0 ? coulomb : -coulomb) + offset +
+                          gravity * std::sin(q) + 0.01 * random.normal();
     csv += fmt::format("{:.2f},{:.9g},{:.9g}\n", t, torque, q);
   }
-  write("swing.csv", csv);
-  std::filesystem::create_symlink(package_file("config/ur5_joint.yaml"), path("joint.yaml"));
-  const Outcome outcome = run("identify swing.csv --rig joint.yaml --out fit.yaml --json fit.json");
+  return csv;
+}
+
+class OneJoint : public Identify {
+ protected:
+  Outcome identified(const std::string& csv) {
+    write("swing.csv", csv);
+    if (!exists("joint.yaml"))
+      std::filesystem::create_symlink(package_file("config/ur5_joint.yaml"), path("joint.yaml"));
+    return run("identify swing.csv --rig joint.yaml --out fit.yaml --json fit.json");
+  }
+};
+
+// Gravity G sin q of a slow motion is torque against the acceleration: G / w^2 is taken off the inertia.
+TEST_F(OneJoint, GravityThatTheFileLacksIsNoNegativeInertia) {
+  const Outcome outcome = identified(swing(1.1, 0.6, 0, 4));
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   expect_contains(outcome.err, "inertia comes out as -");
   expect_contains(outcome.err, "trace_residual");
   EXPECT_FALSE(exists("fit.yaml"));
+}
+
+// A file has Coulomb friction of either direction, none of which can drive the joint.
+TEST_F(OneJoint, AConstantLoadIsNoNegativeFriction) {
+  const Outcome outcome = identified(swing(1.1, 0.6, 2, 0));
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  expect_contains(outcome.err, "coulomb friction of the one direction comes out as -1.4");
+}
+
+TEST_F(OneJoint, WithoutFrictionIsFoundWhateverTheNoiseMakesOfIt) {
+  const Outcome outcome = identified(swing(0, 0, 0, 0));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json parameters = json("fit.json").at("parameters");
+  const auto near = [&](const char* name, double truth) {
+    const Json& p = parameters.at(name);
+    EXPECT_NEAR(p.at("value").get<double>(), truth, 4 * p.at("standard_error").get<double>()) << name;
+  };
+  near("inertia", 0.4);
+  near("viscous", 0);
+  near("coulomb", 0);
+  done("simulate fit.yaml --duration 1 --out again.csv");  // a file that can be used
 }
 
 TEST_F(Identify, PublishedValuesOfTheEmpsAxis) {

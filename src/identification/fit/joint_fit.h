@@ -123,12 +123,10 @@ MachineFit fit_machine(const Machine& start, const RecordSet& records, signal::N
 /// error. Of a machine that is coupled to other axes also what is left counts as if it followed each value.
 void judge_errors(MachineFit& fit, const Machine& start, const RecordSet& records);
 
-/// Times the noise floor, beyond which a channel shows that the machine has an effect that the model lacks.
-constexpr double kMisfit = 1.5;  // choice
-
-/// Such an effect may follow what a value changes, and draws it without a trace: no value is told better than
-/// by what would change the records as much as all that is left of such channels, or, with all others fitted,
-/// as three tenths of it. Nothing is done to a machine that is coupled: judge_errors() has allowed for it.
+/// An effect that the model lacks (kMisfit) may follow what a value changes, and draws it without a trace: no
+/// value is told better than by what would change the records as much as all that is left of such channels,
+/// or, with all others fitted, as three tenths of it. Nothing is done to a machine that is coupled:
+/// judge_errors() has allowed for it.
 void allow_for_misfit(MachineFit& fit, const RecordSet& records);
 
 }  // namespace backlash::identification

@@ -24,7 +24,6 @@ namespace {
 
 constexpr int kGrid = 12;               // choice (time): places that either edge is tried at first
 constexpr double kLeastOnFlank = 0.03;  // choice: of the rows, beyond either edge
-constexpr double kMisfit = 1.5;         // as identify.cpp: times the noise floor
 constexpr double kHold = 0.5;        // theory: samples, between a torque that is held and one of the moment
 constexpr double kReach = 0.5;       // theory: standard deviations of what is known within a bound, 95 %
 constexpr int kStates = 8;           // choice: places of position and of speed, each way

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/record/resampling.h"
 #include "backlash_diagnosis/signal/bandwidth.h"
 #include "backlash_diagnosis/signal/blocks.h"
@@ -17,6 +18,7 @@
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
+#include "missing_effects.h"
 
 namespace backlash::identification {
 namespace {
@@ -232,6 +234,22 @@ double floor_of(const record::Record& record, const Signals& s, double inertia, 
   return std::hypot(torque, inertia * acceleration_noise(s, s.position_noise)) / torque_size;
 }
 
+/// Where more is left than noise leaves, an effect that the equation lacks may have drawn the parameters.
+void allow_for_missing(Solution& solution, const Signals& s, const Eigen::MatrixXd& a,
+                       const record::Record& record, double noise) {
+  const std::vector<double>& position = record.column(record::Channel::motor_position);
+  std::vector<Eigen::MatrixXd> effects;
+  for (const EffectShapes& effect :
+       likely_effects(record.time, position, signal::derivative(position, s.interval), s.torque)) {
+    Eigen::MatrixXd columns(a.rows(), Eigen::Index(effect.size()));
+    for (std::size_t i = 0; i < effect.size(); ++i)
+      columns.col(Eigen::Index(i)) = picked(low_pass_sliding(s, effect[i]), s.used);
+    effects.push_back(std::move(columns));
+  }
+  const Eigen::VectorXd drawn = drawn_by_missing(a, solution.fit.residuals, effects, noise);
+  for (Eigen::Index i = 0; i < drawn.size(); ++i) solution.error[i] = std::hypot(solution.error[i], drawn[i]);
+}
+
 double spread(const Eigen::VectorXd& values) {
   return std::sqrt((values.array() - values.mean()).square().mean());
 }
@@ -264,13 +282,15 @@ OneInertia identify_one_inertia(const record::Record& recorded, const OneInertia
     }
   }
   const signal::LeastSquaresFit& fit = solution.fit;
-  signal::Measured* const parameters[] = {&out.inertia, &out.viscous, &out.coulomb, &out.offset};
-  for (int i = 0; i < 4; ++i) *parameters[i] = {fit.values[i], solution.error[i]};
   out.cutoff = s.cutoff;
   out.used = double(s.used.size()) / double(s.time.size());
   const Eigen::VectorXd predicted = a * fit.values, measured = predicted + fit.residuals;
   out.relative_error = std::sqrt(fit.residuals.squaredNorm() / double(measured.size())) / spread(measured);
-  out.floor = floor_of(record, s, out.inertia.value, spread(measured));
+  out.floor = floor_of(record, s, fit.values[0], spread(measured));
+  if (out.relative_error > kMisfit * out.floor)
+    allow_for_missing(solution, s, a, record, out.floor * spread(measured) * std::sqrt(double(a.rows())));
+  signal::Measured* const parameters[] = {&out.inertia, &out.viscous, &out.coulomb, &out.offset};
+  for (int i = 0; i < 4; ++i) *parameters[i] = {fit.values[i], solution.error[i]};
   for (const auto k : s.used) out.time.push_back(s.time[k]);
   out.measured.assign(measured.begin(), measured.end());
   out.predicted.assign(predicted.begin(), predicted.end());

@@ -2,15 +2,20 @@
 // The one procedure for a machine of one inertia.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "procedures.h"
 
 namespace backlash::identification {
 namespace {
+
+constexpr double kByNoise = 5;  // choice: standard errors below zero, that an explained torque may have
 
 /// The samples that were used, in their places.
 ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
@@ -34,9 +39,15 @@ ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
 /// A load that the model lacks can leave it with an inertia or a friction that no machine has.
 void require_possible(const OneInertia& found, const std::string& record) {
   const std::pair<const char*, signal::Measured> parameters[] = {
-      {"inertia", found.inertia}, {"viscous", found.viscous}, {"coulomb", found.coulomb}};
+      {"inertia", found.inertia},
+      {"viscous", found.viscous},
+      {"coulomb friction of the one direction",
+       {found.coulomb.value - std::fabs(found.offset.value),
+        std::hypot(found.coulomb.standard_error, found.offset.standard_error)}}};
+  // A friction that is nearly nothing may come out below zero by noise.
+  const bool explained = found.relative_error <= kMisfit * found.floor;
   for (const auto& [name, m] : parameters)
-    if (m.value < 0)
+    if (m.value < 0 && !(explained && m.value > -kByNoise * m.standard_error && &m != &parameters[0].second))
       throw CannotIdentify(fmt::format(
           "{}: {} comes out as {:.3g} +- {:.2g}, and {:.3g} % of the torque is left where noise alone would "
           "leave {:.3g} %: the machine has effects that one inertia with friction lacks, as gravity; "
@@ -77,10 +88,10 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   model::Body& body = c.result.rig.motor;
   body.inertia =
       found.inertia.value - c.declared.pinion.inertia - c.declared.gear.inertia - c.declared.link.inertia;
-  body.viscous_damping = found.viscous.value;
+  body.viscous_damping = std::max(0.0, found.viscous.value);
   body.viscous_asymmetry = 0;
-  body.coulomb_friction = found.coulomb.value;
-  body.coulomb_asymmetry = found.offset.value;
+  body.coulomb_friction = std::max(0.0, found.coulomb.value);
+  body.coulomb_asymmetry = std::clamp(found.offset.value, -body.coulomb_friction, body.coulomb_friction);
   report.message = fmt::format("torque error {:.3g} %, low-pass {:.3g} Hz, torque acts {:.3g} ms late",
                                100 * found.relative_error, found.cutoff, 1e3 * found.delay.value);
   return report;

@@ -8,6 +8,7 @@
 
 #include "../fit/joint_fit.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "procedures.h"

@@ -25,6 +25,9 @@ struct Axis {
   double position_noise = 3e-8, force_noise = 0.1;             // m, N
   double disturbance = 0;                                      // N, unknown force with 30 ms memory
   double dwell = 0;                                            // s of standing still at each end
+  double drag = 0;                                             // N s^2/m^2, times v |v|
+  double stribeck = 0;  // N, more friction at rest; falls over 0.05 m/s
+  double backward = 0;  // N s/m, more viscous friction in this direction
 };
 
 /// Three sines whose frequencies have no common period; every 3 s it rests for `dwell`.
@@ -38,10 +41,12 @@ struct Body {
   double x = 0, v = 0;
 
   void step(const Axis& axis, double force, double h) {
-    const double free = force - axis.offset - axis.viscous * v;
-    if (v == 0 && std::fabs(free) <= axis.coulomb) return;
+    const double free = force - axis.offset - axis.viscous * v - axis.drag * v * std::fabs(v) +
+                        axis.backward * std::max(0.0, -v);
+    if (v == 0 && std::fabs(free) <= axis.coulomb + axis.stribeck) return;
     const double sign = v != 0 ? (v > 0 ? 1 : -1) : (free > 0 ? 1 : -1);
-    const double next = v + h * (free - sign * axis.coulomb) / axis.mass;
+    const double friction = axis.coulomb + axis.stribeck * std::exp(-std::fabs(v) / 0.05);
+    const double next = v + h * (free - sign * friction) / axis.mass;
     const bool stops = v != 0 && next * v < 0;
     x += 0.5 * h * (v + (stops ? 0 : next));
     v = stops ? 0 : next;
@@ -133,8 +138,32 @@ TEST(OneInertia, StandardErrorsAreHonestForCorrelatedForces) {
       stated[i] += std::pow(measured[i].standard_error, 2);
     }
   }
-  // Variance from 160 seeds: sqrt(2 / 160) = 11 %, three of it; leaving out thirtieths overstates a little.
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(squares[i] / stated[i], 0.95, 0.34) << i;
+  // Variance from 160 seeds: sqrt(2 / 160) = 11 %, three of it. The force could be an effect that follows the
+  // motion, which the errors allow for: up to three times as large.
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_LT(squares[i] / stated[i], 1.3) << i;
+    EXPECT_GT(squares[i] / stated[i], 1.0 / 9) << i;
+  }
+}
+
+TEST(OneInertia, ErrorsHoldWhereAnEffectDrawsTheFrictionAndLeavesLittle) {
+  Axis drag, stribeck, backward;
+  drag.drag = 300;
+  stribeck.stribeck = 10;
+  backward.backward = 60;
+  for (const Axis& axis : {drag, stribeck, backward}) {
+    const OneInertia m = identify_one_inertia(simulate(axis));
+    const double inertia = std::fabs(m.inertia.value - 95), coulomb = std::fabs(m.coulomb.value - 20),
+                 viscous = std::fabs(m.viscous.value - 200 - axis.backward / 2);  // of both directions
+    EXPECT_LT(inertia, 3 * m.inertia.standard_error + 1e-3 * 95);                 // as expect_near()
+    EXPECT_LT(coulomb, 3 * m.coulomb.standard_error);
+    EXPECT_LT(viscous, 3 * m.viscous.standard_error);
+    EXPECT_LT(m.relative_error, 0.08);  // no reason for a refusal
+    // An error that holds, and is still of use: no more than twice as far as the effect drew the value.
+    EXPECT_LT(m.coulomb.standard_error, std::max(2 * coulomb, 1.0));
+    EXPECT_LT(m.viscous.standard_error, std::max(2 * viscous, 10.0));
+  }
+  EXPECT_GT(std::fabs(identify_one_inertia(simulate(drag)).viscous.value - 200), 30);  // that it matters
 }
 
 TEST(OneInertia, JitterOfTheStampsAt100Hz) {

@@ -42,7 +42,9 @@ struct OneInertia {
 /// the widest band in which its noise is a thousandth of it, but at least four times the cutoff). The delay
 /// is an unknown like the others; where it is vague (standard error beyond one interval, or at the edge of
 /// the search), it is taken as 0, its error is NaN and a warning tells; standard errors by leaving out
-/// thirtieths of the record (jackknife), so they hold what friction does that the model does not. Throws
+/// thirtieths of the record (jackknife). Where more is left than 1.5 times what noise leaves, they also hold
+/// how far a likely effect that the equation lacks (drag, friction that falls with speed or depends on
+/// direction, load, position or time, gravity) may have drawn each parameter. Throws
 /// CannotIdentify where motor_torque or motor_position is missing, the record is shorter than 64 samples or
 /// 40 periods of the cutoff, or one direction has less than 5 % of the samples; InvalidParameter for a cutoff
 /// beyond 0.4 of the sampling rate or a delay beyond two intervals.

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How far effects that the equation of one inertia lacks may have drawn its parameters. A drag that grows
+// with the square of the speed looks like viscous friction less Coulomb friction: it leaves little, and moves
+// both by far more than their errors (omitted variables; Greene 2012, Econometric Analysis, Section 4.3.2).
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace backlash::identification {
+
+/// One effect: torques over time [any unit], a linear combination of which is it.
+using EffectShapes = std::vector<std::vector<double>>;
+
+/// Gravity or a spring, drag, friction that differs between the directions, falls with speed, follows the
+/// load, the position or the time. All vectors equally long; position in rad or m, speed in its unit per s.
+std::vector<EffectShapes> likely_effects(const std::vector<double>& time, const std::vector<double>& position,
+                                         const std::vector<double>& speed, const std::vector<double>& torque);
+
+/// Of a fit A x = b with these residuals: how far each x may be from the machine's. Effects are added one
+/// after the other, the most telling first, as long as one explains a tenth of what is left; each that
+/// leaves at most twice the squares that the best one leaves counts with how far
+/// it moves x times the share that is explained. What none of
+/// them explains may follow A by three tenths, and no x is told better than by what would change b as much as
+/// all of it. `noise`: norm of the residuals of a machine that lacks nothing. Each effect has as many rows as
+/// A.
+Eigen::VectorXd drawn_by_missing(const Eigen::MatrixXd& a, const Eigen::VectorXd& residuals,
+                                 const std::vector<Eigen::MatrixXd>& effects, double noise);
+
+}  // namespace backlash::identification
