@@ -117,8 +117,7 @@ int detect(const Arguments& arguments) {
     found = arm::is_arm_rig(inputs.rig) ? changes_of_arm(inputs, settings, bar.progress())
                                         : changes_of_joint(inputs, settings, bar.progress());
   } catch (const CannotIdentify& error) {
-    std::cerr << "detect_changes: " << error.what() << '\n';
-    return kInconclusive;
+    found.cannot_tell = error.what();
   }
   write_text(arguments.text("json"), findings::change_json(found, inputs));
   std::cout << findings::change_summary(found);

@@ -53,7 +53,7 @@ Command command() {
   c.examples = {"identify run.csv --rig config/two_inertia_servo.yaml --out fitted.yaml --json fit.json",
                 "identify runs/*.csv --rig config/yumrukcal_2013.yaml --out fitted.yaml --json fit.json "
                 "--plot fit.png"};
-  c.exit_codes = "  0   done\n  3   the records allow no procedure\n";
+  c.exit_codes = "  0   done\n  3   the records allow no procedure; OUT.json has the reason\n";
   return c;
 }
 
@@ -69,31 +69,18 @@ void check_outputs(const Arguments& arguments) {
   check_output(plot, inputs);
 }
 
-int identify_machine(const Arguments& arguments) {
-  for (const std::string& path : arguments.positionals()) check_record_path(path);
-  check_outputs(arguments);
-  if (arm::is_arm_rig(arguments.text("rig"))) {
-    if (arguments.has("plot")) throw UsageError("--plot: there is no plot for an arm");
-    return identify_arm(arguments);
-  }
+int identify_joint(const Arguments& arguments) {
   const rig_file::RigFile file = rig_file::load_rig_file(arguments.text("rig"));
   std::vector<record::Record> records;
   for (const std::string& path : arguments.positionals()) {
     records.push_back(read_record(path, place_of(file)));
     records.back().name = std::filesystem::path(path).filename();
   }
-  identification::Identification found;
-  try {
-    ProgressBar bar;
-    found = of_file(file.source, [&] {
-      return file.diagnosis.waveform
-                 ? identification::commission(file, records)
-                 : identification::identify(file.rig, records, bar.progress(), file.drive);
-    });
-  } catch (const CannotIdentify& error) {
-    std::cerr << "identify: " << error.what() << '\n';
-    return kInconclusive;
-  }
+  ProgressBar bar;
+  identification::Identification found = of_file(file.source, [&] {
+    return file.diagnosis.waveform ? identification::commission(file, records)
+                                   : identification::identify(file.rig, records, bar.progress(), file.drive);
+  });
   for (const record::Record& record : records)
     for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);
   write_text(arguments.text("out"), identification::fitted_rig_text(file, found));
@@ -103,6 +90,23 @@ int identify_machine(const Arguments& arguments) {
   std::cout.flush();
   if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
   return kHealthy;
+}
+
+int identify_machine(const Arguments& arguments) {
+  for (const std::string& path : arguments.positionals()) check_record_path(path);
+  check_outputs(arguments);
+  const bool is_arm = arm::is_arm_rig(arguments.text("rig"));
+  if (is_arm && arguments.has("plot")) throw UsageError("--plot: there is no plot for an arm");
+  try {
+    return is_arm ? identify_arm(arguments) : identify_joint(arguments);
+  } catch (const CannotIdentify& error) {
+    std::cerr << "identify: " << error.what() << '\n';
+    identification::Identification nothing;
+    nothing.warnings.emplace_back(error.what());
+    write_text(arguments.text("json"),
+               findings::identification_json(nothing, arguments.text("rig"), arguments.positionals()));
+    return kInconclusive;
+  }
 }
 
 }  // namespace

@@ -193,7 +193,11 @@ TEST_F(DetectChanges, RefusesOtherGearTrains) {
                               " --healthy record.csv --json out.json record.csv");
   EXPECT_EQ(outcome.code, 3);
   expect_contains(outcome.err, "has no torque sensor before the gear");
-  EXPECT_FALSE(exists("out.json"));
+  const Json json = Json::parse(read("out.json"));
+  EXPECT_TRUE(json["changes"].empty());
+  EXPECT_EQ(json["windows"], 0);
+  EXPECT_TRUE(json["threshold"].is_null());
+  expect_contains(json["cannot_tell"].get<std::string>(), "has no torque sensor before the gear");
 }
 
 }  // namespace

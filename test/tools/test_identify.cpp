@@ -107,6 +107,9 @@ TEST_F(OneJoint, GravityThatTheFileLacksIsNoNegativeInertia) {
   expect_contains(outcome.err, "inertia comes out as -");
   expect_contains(outcome.err, "trace_residual");
   EXPECT_FALSE(exists("fit.yaml"));
+  const Json result = json("fit.json");
+  EXPECT_TRUE(result.at("parameters").empty());
+  expect_contains(result.at("warnings").at(0), "inertia comes out as -");
 }
 
 // A file has Coulomb friction of either direction, none of which can drive the joint.

@@ -103,13 +103,7 @@ int identify_arm(const Arguments& arguments) {
     for (arm::ArmMotion& m : arm::motions_of(record, rig, warnings)) motions.push_back(std::move(m));
   }
   ProgressBar bar;
-  arm::ArmFit fit;
-  try {
-    fit = arm::fit_arm_and_friction_speeds(rig, motions, {}, bar.progress());
-  } catch (const CannotIdentify& error) {
-    std::cerr << "identify: " << error.what() << '\n';
-    return kInconclusive;
-  }
+  arm::ArmFit fit = arm::fit_arm_and_friction_speeds(rig, motions, {}, bar.progress());
   fit.warnings.insert(fit.warnings.end(), warnings.begin(), warnings.end());
   write_text(arguments.text("out"), findings::fitted_arm_text(fit, arguments.positionals()));
   write_text(arguments.text("json"),

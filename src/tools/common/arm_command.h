@@ -14,7 +14,7 @@ namespace backlash::tools {
 /// (position, velocity, effort as the rig's channel). Throws as read_record().
 arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig);
 
-/// Both return the exit code. Outputs are checked already.
+/// Both return the exit code. Outputs are checked already. identify_arm() throws CannotIdentify.
 int identify_arm(const Arguments& arguments);
 int trace_arm_residual(const Arguments& arguments);
 
