@@ -105,6 +105,7 @@ struct ExplainableSettings {
   double worth_naming = 0.05;                 // choice: share of a residual, of a single state
   double clear = 2;   // choice: times the floor of the sensors, beyond which noise needs a word
   double uneven = 4;  // theory: coloured noise with ten values in a part stays below
+  double much = 4, much_of_signal = 0.02;  // choice: times the floor, and of the signal: no noise of sensors
 };
 
 struct SearchSettings {

@@ -34,9 +34,17 @@ bool explainable(const Remainder& r, const ExplainableSettings& settings) {
          r.explainable.value > r.explainable.chance && worth_saying(r, part, settings);
 }
 
-/// Too much for noise of any colour: it comes and goes; or two encoders differ by it, whose noise is white.
+/// So much beside the noise and the signal that nobody would call it noise of the torque.
+bool too_much(const Remainder& r, const ExplainableSettings& settings) {
+  return r.rms > settings.much * r.floor && r.rms > settings.much_of_signal * r.signal;
+}
+
+/// A hundredth of the signal, and too much for noise of any colour: it comes and goes; or two encoders differ
+/// by it, whose noise is white; or it is as large as what an effect does.
 bool no_noise(const ChannelRemainder& c, const ExplainableSettings& settings) {
-  return beyond_noise(c.left, settings) && (c.left.unevenness > settings.uneven || c.channel == "deflection");
+  const Remainder& r = c.left;
+  return beyond_noise(r, settings) && r.rms >= settings.worth_saying * r.signal &&
+         (r.unevenness > settings.uneven || c.channel == "deflection" || too_much(r, settings));
 }
 
 std::string followed_states(const Remainder& r, const ExplainableSettings& settings) {
@@ -59,8 +67,11 @@ Unexplained described(const ChannelRemainder& c, bool linear, const ExplainableS
   if (!explainable(r, settings))
     u.signature += r.unevenness > settings.uneven
                        ? "follows no state of the machine, but comes and goes, which noise does not"
-                       : "follows no state of the machine, but encoders have no such noise: what has "
-                         "happened before matters";
+                   : c.channel == "deflection"
+                       ? "follows no state of the machine, but encoders have no such noise: what has "
+                         "happened before matters"
+                       : "follows no state of the machine: a torque from outside, an effect that varies in "
+                         "time, or noise of another kind";
   else
     u.signature +=
         fmt::format("follows{}; {:.0f} % of its variance could be explained by the state of the machine",

@@ -28,13 +28,28 @@ TEST(Signature, NamesWhatTheRemainderFollows) {
 }
 
 TEST(Signature, NoiseOfAnotherColourIsNotMissing) {
-  const std::vector<ChannelRemainder> all = {left_of_torque(0.02, -0.01, 1.5)};
+  std::vector<ChannelRemainder> all = {left_of_torque(0.02, -0.01, 1.5)};
+  all.front().left.signal = 600;
   EXPECT_FALSE(signature(all, false, {}));
   EXPECT_EQ(noise_notes(all, {}).size(), 1u);  // but is told
 }
 
+// A torque from outside, or friction that swings in time, follows no state, and a tenth of the signal is no
+// noise of a sensor whose white noise is a hundredth.
+TEST(Signature, ButATenthOfTheTorqueIsNoNoise) {
+  ChannelRemainder c = left_of_torque(0.02, -0.01, 1.5);
+  const auto u = signature({c}, false, {});
+  ASSERT_TRUE(u);
+  EXPECT_NE(u->signature.find("a torque from outside"), std::string::npos) << u->signature;
+  EXPECT_TRUE(noise_notes({c}, {}).empty());
+  c.left.floor = 3;
+  EXPECT_FALSE(signature({c}, false, {}));
+}
+
 TEST(Signature, WhatIsNotToldFromNothingIsNotMissing) {
-  EXPECT_FALSE(signature({left_of_torque(0.2, -0.05, 1.5)}, false, {}));
+  ChannelRemainder c = left_of_torque(0.2, -0.05, 1.5);
+  c.left.signal = 600;
+  EXPECT_FALSE(signature({c}, false, {}));
 }
 
 TEST(Signature, WhatComesAndGoesIsNoNoise) {
@@ -57,6 +72,16 @@ TEST(Signature, ButNotWhereItIsFarBeyondTheNoise) {
   EXPECT_TRUE(signature({c}, false, {}));
   c.left.signal = 20000;
   EXPECT_FALSE(signature({c}, false, {}));
+}
+
+// How friction begins after each reversal comes and goes, and no model has all of it.
+TEST(Signature, WhatComesAndGoesCountsFromAHundredthHoweverFineTheSensors) {
+  ChannelRemainder c = left_of_torque(0.02, -0.01, 9);
+  c.left.floor = 0.5;
+  c.left.signal = 1100;
+  EXPECT_FALSE(signature({c}, false, {}));
+  c.left.signal = 900;
+  EXPECT_TRUE(signature({c}, false, {}));
 }
 
 // What the states show of it is less than a hundredth of the signal, but what is left is more and is no
