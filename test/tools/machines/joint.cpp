@@ -78,6 +78,7 @@ class Mechanism {
 
   double position = 0, speed = 0;
 
+  /// What the loop knows of.
   double gravity() const {
     return joint_.gravity.amplitude == 0
                ? 0
@@ -90,12 +91,14 @@ class Mechanism {
     bristle_ = (bristle_ + kStep * speed / length) / (1 + kStep * std::abs(speed) / length);
     double smooth = f.viscous * speed + f.quadratic * speed * std::abs(speed);
     if (speed > 0) smooth += f.asymmetric_viscous * speed;
-    double limit = f.coulomb * (1 + f.position.value(position) + f.drift * time);
+    double limit =
+        f.coulomb * (1 + f.position.value(position) + f.drift * time + joint_.friction_swing.value(time));
     if (f.stribeck != 0) limit += f.stribeck * std::exp(-std::pow(speed / f.stribeck_speed, 2));
     const double rest = current - joint_.cogging.value(position) - smooth - std::max(0.0, limit) * bristle_;
     // L + share |L| z = rest; 1 + share z > 0
     const double load = rest / (1 + f.load_dependent * bristle_ * (rest < 0 ? -1 : 1));
-    speed += kStep * (load - gravity()) / joint_.inertia;
+    const double taken_up = time >= joint_.more_at ? joint_.more_gravity * std::sin(position) : 0;
+    speed += kStep * (load - gravity() - taken_up - joint_.outside.value(time)) / joint_.inertia;
     position += kStep * speed;
   }
 
@@ -112,59 +115,99 @@ Wave draw_wave(Random& random, double amplitude, double first, double last) {
   return {amplitude, random.uniform(first, last), random.phase()};
 }
 
+Swings draw_swings(Random& random, int count, double largest, double first, double last) {
+  Swings swings;
+  for (int i = 0; i < count; ++i) {
+    const double amplitude = count == 1 ? largest : random.uniform(0.2, 1) * largest;
+    swings.sines.push_back(
+        {amplitude, 2 * Random::kPi * first * std::pow(last / first, random.uniform(0, 1)), random.phase()});
+  }
+  return swings;
+}
+
 Json describe(const char* equation, const Wave& wave) {
   return {{"equation", equation}, {"A", wave.amplitude}, {"n", wave.order}, {"p", wave.phase}};
 }
 
 }  // namespace
 
+double Swings::value(double time) const {
+  double sum = 0;
+  for (const Sine& s : sines) sum += s.amplitude * std::sin(s.frequency * time + s.phase);
+  return sum;
+}
+
 const std::vector<JointEffect>& joint_effects() {
   static const std::vector<JointEffect> effects{
-      {"gravity",
+      {"gravity", false,
        [](Random& random, double strength, double, Joint& joint) {
          joint.gravity = {strength * random.uniform(2, 8), random.uniform(-0.5, 0.5)};
          return Json{{"equation", "A*sin(q+p), opposing"},
                      {"A", joint.gravity.amplitude},
                      {"p", joint.gravity.phase}};
        }},
-      {"load_dependent_friction",
+      {"load_dependent_friction", false,
        [](Random& random, double strength, double, Joint& joint) {
          joint.friction.load_dependent = strength * random.uniform(0.08, 0.25);
          return Json{{"equation", "A*abs(L)*sign(w), L = torque that the load takes"},
                      {"A", joint.friction.load_dependent}};
        }},
-      {"stribeck",
+      {"stribeck", false,
        [](Random& random, double strength, double, Joint& joint) {
          Friction& f = joint.friction;
          f.stribeck = strength * random.uniform(0.2, 0.5) * f.coulomb;
          f.stribeck_speed = random.uniform(0.05, 0.2);
          return Json{{"equation", "A*exp(-(w/ws)^2)*sign(w)"}, {"A", f.stribeck}, {"ws", f.stribeck_speed}};
        }},
-      {"quadratic_drag",
+      {"quadratic_drag", false,
        [](Random& random, double strength, double, Joint& joint) {
          joint.friction.quadratic = strength * random.uniform(0.3, 1);
          return Json{{"equation", "A*w*abs(w)"}, {"A", joint.friction.quadratic}};
        }},
-      {"asymmetric_viscous",
+      {"asymmetric_viscous", false,
        [](Random& random, double strength, double, Joint& joint) {
          joint.friction.asymmetric_viscous = strength * random.uniform(0.3, 0.8);
          return Json{{"equation", "A*w where w > 0"}, {"A", joint.friction.asymmetric_viscous}};
        }},
-      {"position_dependent_friction",
+      {"position_dependent_friction", false,
        [](Random& random, double strength, double, Joint& joint) {
          Wave& wave = joint.friction.position;
          wave = draw_wave(random, strength * random.uniform(0.2, 0.5), 1, 12);
          return describe("Coulomb*(1 + A*sin(n*q+p))", wave);
        }},
-      {"cogging",
+      {"cogging", false,
        [](Random& random, double strength, double, Joint& joint) {
          joint.cogging = draw_wave(random, strength * random.uniform(0.1, 0.4), 4, 60);
          return describe("A*sin(n*q+p), opposing", joint.cogging);
        }},
-      {"friction_drift",
+      {"friction_drift", false,
        [](Random& random, double strength, double duration, Joint& joint) {
          joint.friction.drift = strength * random.sign() * random.uniform(0.2, 0.5) / duration;
          return Json{{"equation", "Coulomb*(1 + A*t)"}, {"A", joint.friction.drift}};
+       }},
+      {"outside_torque", true,
+       [](Random& random, double strength, double, Joint& joint) {
+         joint.outside = draw_swings(random, 1, strength * random.uniform(0.2, 0.6), 0.1, 1);
+         return Json{{"equation", "A*sin(2*pi*f*t), opposing"}, {"A", joint.outside.sines[0].amplitude}};
+       }},
+      {"wandering_torque", true,
+       [](Random& random, double strength, double, Joint& joint) {
+         const double largest = strength * random.uniform(0.1, 0.3);
+         joint.outside = draw_swings(random, 12, largest, 0.02, 3);
+         return Json{{"equation", "twelve sines of the time, opposing"}, {"A", largest}};
+       }},
+      {"friction_swing", true,
+       [](Random& random, double strength, double, Joint& joint) {
+         joint.friction_swing = draw_swings(random, 1, strength * random.uniform(0.2, 0.5), 0.03, 0.1);
+         return Json{{"equation", "Coulomb*(1 + A*sin(2*pi*f*t))"},
+                     {"A", joint.friction_swing.sines[0].amplitude}};
+       }},
+      {"payload_step", true,
+       [](Random& random, double strength, double duration, Joint& joint) {
+         joint.more_gravity = strength * random.uniform(1, 3);
+         joint.more_at = random.uniform(0.2, 0.4) * duration;
+         return Json{
+             {"equation", "A*sin(q) from t on, opposing"}, {"A", joint.more_gravity}, {"t", joint.more_at}};
        }},
   };
   return effects;
@@ -187,7 +230,10 @@ std::vector<JointRow> run_joint(const Joint& joint, bool in_moves, double durati
   const Motion wanted = in_moves ? moves(random, duration) : sines(random);
   const double own = 2 * Random::kPi * 4, damping = 0.8;  // rad/s, -: of the loop
   const double stiffness = joint.inertia * own * own, speed_gain = 2 * damping * joint.inertia * own;
-  Mechanism mechanism(joint);
+  Joint met = joint;  // what swings in time is met at another moment of it
+  for (Swings* swings : {&met.outside, &met.friction_swing})
+    for (Swings::Sine& sine : swings->sines) sine.phase += random.phase();
+  Mechanism mechanism(met);
   mechanism.position = wanted(0).position;
   std::vector<JointRow> rows;
   double current = 0, next = 0;

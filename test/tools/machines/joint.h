@@ -14,15 +14,26 @@
 
 namespace machines {
 
+/// Sines over time that nothing of the machine's state tells.
+struct Swings {
+  struct Sine {
+    double amplitude, frequency, phase;  // any unit, rad/s, rad
+  };
+  std::vector<Sine> sines;
+  double value(double time) const;
+};
+
 struct Joint {
   double inertia = 0;
   Friction friction;
   double friction_build_up = 5e-5;  // rad, over which friction turns round
   Wave cogging;
   Gravity gravity;
-  double rate = 100, jitter = 0;   // Hz; relative, of a sample's time
-  double noise = 0, step = 0.005;  // A, of the current that the loop asks for and of its steps
-  double resolution = 1e-6;        // rad
+  Swings outside, friction_swing;        // A, from outside; -, of the Coulomb friction
+  double more_gravity = 0, more_at = 0;  // -, s: a load that is taken up
+  double rate = 100, jitter = 0;         // Hz; relative, of a sample's time
+  double noise = 0, step = 0.005;        // A, of the current that the loop asks for and of its steps
+  double resolution = 1e-6;              // rad
 };
 
 struct JointRow {
@@ -31,6 +42,7 @@ struct JointRow {
 
 struct JointEffect {
   std::string id;
+  bool outside;                                                                      // of every dictionary
   nlohmann::ordered_json (*add)(Random&, double strength, double duration, Joint&);  // says what it drew
 };
 const std::vector<JointEffect>& joint_effects();

@@ -167,11 +167,12 @@ const JointEffect& joint_effect(const std::string& id) {
 void make_joint(const Options& options) {
   Random random(options.seed, "joint");
   Joint joint = draw_joint(random, options.rate);
-  Json undeclared = Json::object();
+  Json undeclared = Json::object(), outside = Json::array();
   if (options.effects != "none")
     for (const std::string& id : split(options.effects)) {
       Random own(options.seed, id);
       undeclared[id] = joint_effect(id).add(own, options.strength, options.duration, joint);
+      if (joint_effect(id).outside) outside.push_back(id);
     }
   const bool moves = random.chance(0.5);
   Random train(options.seed, "train"), test(options.seed, "test");
@@ -186,7 +187,7 @@ void make_joint(const Options& options) {
                           {"viscous", joint.friction.viscous},
                           {"coulomb", joint.friction.coulomb},
                           {"noise", joint.noise}}},
-                        {"outside_dictionary", Json::array()},
+                        {"outside_dictionary", outside},
                         {"made_with",
                          {{"seed", options.seed},
                           {"duration", options.duration},
