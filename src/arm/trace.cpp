@@ -71,6 +71,7 @@ class Tracer {
   void finish(const Motions& judged, const Candidate& taken, bool named);
   std::optional<ArmTrace::Unexplained> worst_unexplained(const std::vector<double>& errors,
                                                          const std::vector<double>& expected) const;
+  std::optional<ArmTrace::Unexplained> worst_left(const std::vector<double>& errors) const;
 
   ArmRig rig_;
   const ArmTraceSettings& settings_;
@@ -272,6 +273,21 @@ std::optional<ArmTrace::Unexplained> Tracer::worst_unexplained(const std::vector
     worst = ratio;
     out = {rig_.joints[j].name + "/torque",
            fmt::format("the error is {:.3g} times what the training records let expect", ratio)};
+  }
+  return out ? out : worst_left(errors);
+}
+
+/// The training records may lack as much, and let expect it.
+std::optional<ArmTrace::Unexplained> Tracer::worst_left(const std::vector<double>& errors) const {
+  std::optional<ArmTrace::Unexplained> out;
+  double worst = settings_.much;
+  for (std::size_t j = 0; j < rig_.joints.size(); ++j) {
+    if (!(errors[j] > worst && errors[j] > settings_.far * trace_.floor[j])) continue;
+    worst = errors[j];
+    out = {rig_.joints[j].name + "/torque",
+           fmt::format("{:.3g} % of it is left, {:.3g} times the noise of the sensors, as the training "
+                       "records let expect: an effect that has no name here, or a torque from outside",
+                       100 * errors[j], errors[j] / trace_.floor[j])};
   }
   return out;
 }

@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/arm/fit.h"
 #include "backlash_diagnosis/arm/trace.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash::arm {
 namespace {
@@ -174,6 +175,25 @@ TEST(Trace, WhatItDoesNotKnowIsUnexplained) {
   for (const ArmStep& step : trace.steps) EXPECT_NE(step.joint, trace.joints[1]) << step.effect;
   ASSERT_TRUE(trace.unexplained);
   EXPECT_EQ(trace.unexplained->channel, trace.joints[1] + "/torque") << trace.unexplained->signature;
+}
+
+// All records have it, so that none lets expect anything else.
+TEST(Trace, ATorqueFromOutsideInAllRecordsIsUnexplained) {
+  const test::Machine machine(2);
+  const auto pushed = [&](std::uint64_t seed) {
+    ArmRecord record = machine.record(seed);
+    std::vector<double>& current = record.joints[2].column(machine.declared.channel);
+    const double size = 0.2 * signal::quantile_range(current, 0.25);  // of half of what it spans
+    for (std::size_t k = 0; k < current.size(); ++k)
+      current[k] += size * std::sin(3.1 * record.joints[2].time[k] + double(seed));
+    return record;
+  };
+  const ArmTrace trace = trace_arm(machine.declared, {pushed(102), pushed(103)}, pushed(202), false);
+  EXPECT_TRUE(trace.steps.empty());
+  ASSERT_TRUE(trace.unexplained);
+  EXPECT_EQ(trace.unexplained->channel, "elbow_joint/torque");
+  EXPECT_NE(trace.unexplained->signature.find("a torque from outside"), std::string::npos)
+      << trace.unexplained->signature;
 }
 
 TEST(Trace, FindsGravityFromAnotherDirection) {

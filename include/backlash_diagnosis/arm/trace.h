@@ -27,8 +27,11 @@ struct ArmTraceSettings {
   double least_friction = 0.25;  // of a factor from one, to be told: less is a robot that warms up; choice
   double same_link =
       0.3;  // share of the squared error by which another link must do better than the last; choice
-  double foretold = 4;   // times what the fit expects of itself: a joint above it is unexplained; choice:
-                         // friction of another day has given 3.3
+  double foretold = 4;  // times what the fit expects of itself: a joint above it is unexplained; choice:
+                        // friction of another day has given 3.3
+  double much = 0.1, far = 10;  // of a joint's torque, and times its noise: that much left is unexplained
+                                // even where the training records leave it too; choice: measured healthy arms
+                                // leave up to 0.055, and up to 9.2 times their noise
   double explained = 2;  // the same, of a joint of which a factor is told, of all its friction or of its
                          // motor's torque: what is no factor leaves more; choice, see doc/arm.md
   int most_effects = 3;  // of single joints; choice

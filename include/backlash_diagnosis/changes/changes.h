@@ -46,7 +46,7 @@ struct Changes {
   std::vector<Change> changes;             // by onset
   std::size_t windows = 0;                 // of ChangeSettings::window that could be judged
   double threshold = kNaN;                 // of the gain, for an effect with one value
-  double noise = kNaN;                     // N m, rms of the residual of the healthy records
+  double noise = 0;                        // N m, rms of the residual of the healthy records
   double deflection_noise = kNaN;          // rad, the same of the deflection; NaN: not looked at
   std::vector<std::string> healthy_terms;  // what the healthy machine shows beside friction and gravity
   std::vector<std::string> different;      // effects that the record has from its beginning: no change in it

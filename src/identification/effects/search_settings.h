@@ -105,7 +105,8 @@ struct ExplainableSettings {
   double worth_naming = 0.05;                 // choice: share of a residual, of a single state
   double clear = 2;   // choice: times the floor of the sensors, beyond which noise needs a word
   double uneven = 4;  // theory: coloured noise with ten values in a part stays below
-  double much = 4, much_of_signal = 0.02;  // choice: times the floor, and of the signal: no noise of sensors
+  // Choices: of what follows nothing, times the floor, and of the signal; the same far beyond the floor.
+  double beyond = 4, much = 0.07, very_far = 20, much_very_far = 0.02;
 };
 
 struct SearchSettings {

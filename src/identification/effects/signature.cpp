@@ -34,9 +34,10 @@ bool explainable(const Remainder& r, const ExplainableSettings& settings) {
          r.explainable.value > r.explainable.chance && worth_saying(r, part, settings);
 }
 
-/// So much beside the noise and the signal that nobody would call it noise of the torque.
+/// So much of the signal, and so far beyond the noise, that nobody would call it noise of the torque.
 bool too_much(const Remainder& r, const ExplainableSettings& settings) {
-  return r.rms > settings.much * r.floor && r.rms > settings.much_of_signal * r.signal;
+  const double least = r.rms > settings.very_far * r.floor ? settings.much_very_far : settings.much;
+  return r.rms > settings.beyond * r.floor && r.rms > least * r.signal;
 }
 
 /// A hundredth of the signal, and too much for noise of any colour: it comes and goes; or two encoders differ

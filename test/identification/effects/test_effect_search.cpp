@@ -239,7 +239,7 @@ TEST(EffectSearch, NoiseOfAnotherColourIsNoEffect) {
   const Trace trace = traced(r);
   EXPECT_TRUE(trace.steps.empty());
   EXPECT_GT(trace.channels.at("torque").after, 2 * trace.channels.at("torque").floor);
-  EXPECT_FALSE(trace.unexplained);
+  EXPECT_FALSE(trace.unexplained) << trace.unexplained->signature;
   EXPECT_EQ(trace.verdict, TraceVerdict::nothing_missing);
   EXPECT_FALSE(trace.notes.empty());
 }

@@ -44,6 +44,11 @@ TEST(Signature, ButATenthOfTheTorqueIsNoNoise) {
   EXPECT_TRUE(noise_notes({c}, {}).empty());
   c.left.floor = 3;
   EXPECT_FALSE(signature({c}, false, {}));
+  c.left.signal = 400;
+  c.left.floor = 1;  // a fortieth, ten times the noise: may be noise of another colour
+  EXPECT_FALSE(signature({c}, false, {}));
+  c.left.floor = 0.4;
+  EXPECT_TRUE(signature({c}, false, {}));
 }
 
 TEST(Signature, WhatIsNotToldFromNothingIsNotMissing) {
