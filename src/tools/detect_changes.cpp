@@ -7,6 +7,7 @@
 
 #include "backlash_diagnosis/arm/arm_rig.h"
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/changes/arm_changes.h"
 #include "backlash_diagnosis/changes/changes_of_rig.h"
 #include "backlash_diagnosis/findings/change_report.h"
@@ -118,6 +119,7 @@ int detect(const Arguments& arguments) {
                                         : changes_of_joint(inputs, settings, bar.progress());
   } catch (const CannotIdentify& error) {
     found.cannot_tell = error.what();
+    found.noise = kNaN;  // nothing was learned
   }
   write_text(arguments.text("json"), findings::change_json(found, inputs));
   std::cout << findings::change_summary(found);

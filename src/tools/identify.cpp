@@ -76,8 +76,8 @@ int identify_joint(const Arguments& arguments) {
     records.push_back(read_record(path, place_of(file)));
     records.back().name = std::filesystem::path(path).filename();
   }
-  ProgressBar bar;
   identification::Identification found = of_file(file.source, [&] {
+    ProgressBar bar;  // gone before anything is printed
     return file.diagnosis.waveform ? identification::commission(file, records)
                                    : identification::identify(file.rig, records, bar.progress(), file.drive);
   });

@@ -197,6 +197,7 @@ TEST_F(DetectChanges, RefusesOtherGearTrains) {
   EXPECT_TRUE(json["changes"].empty());
   EXPECT_EQ(json["windows"], 0);
   EXPECT_TRUE(json["threshold"].is_null());
+  EXPECT_TRUE(json["healthy_residual"].is_null());
   expect_contains(json["cannot_tell"].get<std::string>(), "has no torque sensor before the gear");
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
@@ -38,21 +37,20 @@ ChannelTrace trace_of(const OneInertia& found, const record::Record& record) {
 
 /// A load that the model lacks can leave it with an inertia or a friction that no machine has.
 void require_possible(const OneInertia& found, const std::string& record) {
-  const std::pair<const char*, signal::Measured> parameters[] = {
-      {"inertia", found.inertia},
-      {"viscous", found.viscous},
-      {"coulomb friction of the one direction",
-       {found.coulomb.value - std::fabs(found.offset.value),
-        std::hypot(found.coulomb.standard_error, found.offset.standard_error)}}};
+  const auto refuse = [&](const char* name, const signal::Measured& m) {
+    throw CannotIdentify(fmt::format(
+        "{}: {} comes out as {:.3g} +- {:.2g}, and {:.3g} % of the torque is left where noise alone would "
+        "leave {:.3g} %: the machine has effects that one inertia with friction lacks, as gravity; "
+        "trace_residual looks for them",
+        record, name, m.value, m.standard_error, 100 * found.relative_error, 100 * found.floor));
+  };
+  if (found.inertia.value <= 0) refuse("inertia", found.inertia);
   // A friction that is nearly nothing may come out below zero by noise.
-  const bool explained = found.relative_error <= kMisfit * found.floor;
-  for (const auto& [name, m] : parameters)
-    if (m.value < 0 && !(explained && m.value > -kByNoise * m.standard_error && &m != &parameters[0].second))
-      throw CannotIdentify(fmt::format(
-          "{}: {} comes out as {:.3g} +- {:.2g}, and {:.3g} % of the torque is left where noise alone would "
-          "leave {:.3g} %: the machine has effects that one inertia with friction lacks, as gravity; "
-          "trace_residual looks for them",
-          record, name, m.value, m.standard_error, 100 * found.relative_error, 100 * found.floor));
+  const double by_noise = found.relative_error <= kMisfit * found.floor ? kByNoise : 0;
+  const signal::Measured least = {found.coulomb.value - std::fabs(found.offset.value),
+                                  std::hypot(found.coulomb.standard_error, found.offset.standard_error)};
+  if (found.viscous.value < -by_noise * found.viscous.standard_error) refuse("viscous", found.viscous);
+  if (least.value < -by_noise * least.standard_error) refuse("coulomb friction of the one direction", least);
 }
 
 }  // namespace
