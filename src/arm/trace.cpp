@@ -364,7 +364,14 @@ ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test,
     for (ArmMotion& m : motions_of(record, rig_, trace_.warnings)) train_.push_back(std::move(m));
   test_ = motions_of(test, rig_, trace_.warnings);
   tell(0.1, "fitting the base machine");
-  set_base();
+  try {
+    set_base();
+  } catch (const CannotIdentify& error) {
+    trace_.augmented = rig_;
+    trace_.cannot_tell = true;
+    cannot_judge("The arm cannot be fitted to the training records: " + std::string(error.what()) + ".");
+    return std::move(trace_);
+  }
   trace_.augmented = fits_.base.rig;
   if (holds_pose(test, settings_.push)) {
     look_for_pushes(test);

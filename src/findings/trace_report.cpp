@@ -48,6 +48,13 @@ std::string effect_text(const identification::FoundEffect& e, bool linear) {
   return text;
 }
 
+std::string remarks(const identification::Trace& trace) {
+  std::string text;
+  for (const std::string& note : trace.notes) text += "note: " + note + "\n";
+  for (const std::string& warning : trace.warnings) text += "warning: " + warning + "\n";
+  return text;
+}
+
 }  // namespace
 
 std::string effect_name(const identification::FoundEffect& e) {
@@ -89,6 +96,7 @@ std::string to_string(identification::TraceVerdict verdict) {
 }
 
 std::string verdict_sentence(const identification::Trace& trace) {
+  if (!trace.told) return "Cannot tell what is missing: " + trace.unexplained->signature + ".";
   std::vector<std::string> effects, errors;
   for (const identification::FoundEffect& e : trace.steps) effects.push_back(effect_name(e));
   for (const auto& [name, c] : trace.channels)
@@ -112,6 +120,7 @@ std::string verdict_sentence(const identification::Trace& trace) {
 }
 
 std::string trace_summary(const identification::Trace& trace) {
+  if (!trace.told) return verdict_sentence(trace) + "\n" + remarks(trace);
   const bool linear = trace.augmented.linear;
   std::string text = verdict_sentence(trace) + "\n\nrelative error on the test record, low-passed at " +
                      to_text(std::round(trace.cutoff * 1000) / 1000) + " Hz\n";
@@ -138,9 +147,7 @@ std::string trace_summary(const identification::Trace& trace) {
         fmt::format(machine, name, before == trace.base_parameters.end() ? "-" : with_error(before->second),
                     with_error(value), model::axis_unit(trace.units.at(name), linear));
   }
-  for (const std::string& note : trace.notes) text += "note: " + note + "\n";
-  for (const std::string& warning : trace.warnings) text += "warning: " + warning + "\n";
-  return text;
+  return text + remarks(trace);
 }
 
 }  // namespace backlash::findings

@@ -53,7 +53,8 @@ Command command() {
       "--cutoff 40"};
   c.exit_codes =
       "  0   done: nothing is missing, or the effects that are were found and added\n"
-      "  3   something is missing that no effect explains, be it beside effects that were found\n";
+      "  3   something is missing that no effect explains, be it beside effects that were found; or the "
+      "training records do not tell the declared machine (report.json says why)\n";
   return c;
 }
 
@@ -92,8 +93,8 @@ record::Record read(const std::string& path, const rig_file::RigFile& rig,
   return record;
 }
 
-/// With the readers' warnings. Throws MissingInput, BadData, CannotWrite, CannotIdentify, Cancelled; nothing
-/// is written then.
+/// With the readers' warnings. Throws MissingInput, BadData, CannotWrite, CannotIdentify (records that do not
+/// serve), Cancelled; nothing is written then.
 identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
   identification::check_traced_rig_text(job.rig);
   std::vector<std::string> inputs = job.train, warnings;

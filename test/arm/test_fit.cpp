@@ -63,6 +63,10 @@ TEST(Fit, SaysWhyItCannot) {
   }
   const auto resting = motions(machine, {still});
   EXPECT_THROW(fit_arm(machine.declared, fitted(resting)), CannotIdentify);
+  const ArmTrace trace = trace_arm(machine.declared, {still}, machine.record(2, 20), false);
+  EXPECT_TRUE(trace.cannot_tell);
+  EXPECT_TRUE(trace.steps.empty());
+  EXPECT_NE(trace.judged.find("cannot be fitted to the training records"), std::string::npos) << trace.judged;
   std::vector<std::string> warnings;
   EXPECT_THROW(motions_of(machine.record(1, 2), machine.declared, warnings), BadData);
   const std::vector<record::JointRecord> one = {{"elbow_joint", still.joints[2]}};

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `trace_residual` as its users run it, on records of machines that have an effect more than the rig
 // declares.
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
+#include <random>
 #include <regex>
 
 #include "support/data.h"
@@ -134,6 +137,29 @@ TEST_F(TraceResidual, NamesTheEffectThatAServoLacks) {
     EXPECT_LT(errors.at("after").get<double>(), 1.2 * errors.at("floor").get<double>()) << channel;
     EXPECT_GT(errors.at("before").get<double>(), 5 * errors.at("after").get<double>()) << channel;
   }
+  done("simulate out/rig.yaml --duration 0.1 --out again.csv");
+}
+
+// At one speed the inertia has no part in the torque, and the two frictions are one number.
+TEST_F(TraceResidual, RecordsAtOneSpeedEndInAReportThatSaysWhyItCannotTell) {
+  std::string csv = "time,motor_torque,motor_position\n";
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise;
+  for (int k = 0; k < 3000; ++k)
+    csv += fmt::format("{:.3f},{:.6f},{:.9f}\n", 0.004 * k, 40 + 0.1 * noise(random),
+                       0.1 * 0.004 * k + 1e-5 * noise(random));
+  write("train.csv", csv);
+  write("test.csv", csv);
+  const Outcome outcome = run(kEmps);
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  expect_contains(outcome.out, "Cannot tell what is missing: ");
+  const Json result = report();
+  EXPECT_EQ(result.at("verdict"), "unexplained");
+  EXPECT_TRUE(result.at("steps").empty());
+  for (const char* error : {"before", "after", "floor"})
+    EXPECT_TRUE(result.at("channels").at("torque").at(error).is_null()) << error;
+  EXPECT_FALSE(result.at("unexplained").at("signature").get<std::string>().empty());
+  expect_contains(read("out/report.html"), "Cannot tell what is missing");
   done("simulate out/rig.yaml --duration 0.1 --out again.csv");
 }
 

@@ -11,6 +11,7 @@
 #include "found_effects.h"
 #include "local_strength.h"
 #include "steps.h"
+#include "strength_in_parts.h"
 #include "unseen_gain.h"
 #include "unseen_record.h"
 
@@ -95,6 +96,15 @@ std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect,
       local->ratio, local->standard_error);
 }
 
+/// Why the effect is not itself in some part of the motion; empty: it is.
+std::string other_in_a_part(const Hypothesis& h, std::size_t effect, const ServoData& unseen,
+                            const SearchContext& context) {
+  const auto part = differing_part(h, effect, unseen, context);
+  if (!part) return "";
+  return fmt::format("{} it has {:.2g} +- {:.1g} of its strength: it stands in for something else",
+                     part->part, part->ratio, part->standard_error);
+}
+
 /// The first effect that is not to be believed, and why.
 std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis& h, const ServoData& unseen,
                                                                 const SearchContext& context) {
@@ -108,6 +118,9 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
       return std::pair{i, fmt::format("its strength is less than {:.0f} standard errors", settings.least_z)};
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (std::string why = weak_where_it_acts(h, i, all[i], settings); !why.empty())
+      return std::pair{i, std::move(why)};
+  for (std::size_t i = 0; i < h.effects.size(); ++i)
+    if (std::string why = other_in_a_part(h, i, unseen, context); !why.empty())
       return std::pair{i, std::move(why)};
   const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
   for (std::size_t i = 0; i < h.effects.size(); ++i) {

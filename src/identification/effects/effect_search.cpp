@@ -21,6 +21,8 @@
 namespace backlash::identification {
 namespace {
 
+constexpr double kMostNoise = 0.5;  // choice: of the deviation of the torque of the test record
+
 /// Every friction builds up over some path; it is called missing only where that shows.
 void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
   const auto at = std::find_if(trace.steps.begin(), trace.steps.end(),
@@ -175,6 +177,26 @@ void judge_remainder(const std::vector<ChannelRemainder>& all, const Hypothesis&
     trace.verdict = TraceVerdict::unexplained;
 }
 
+/// Where the records serve, and yet do not tell what the machine does.
+Trace cannot_tell(const model::Rig& declared, const std::string& reason) {
+  const double unknown = std::nan("");
+  const TraceChannel none = {unknown, unknown, unknown, unknown, unknown, {unknown, unknown, unknown}};
+  Trace trace;
+  trace.verdict = TraceVerdict::unexplained;
+  trace.told = false;
+  trace.cutoff = unknown;
+  trace.base = trace.augmented = declared;
+  trace.channels["torque"] = none;
+  if (simulation::load_moves_freely(declared)) trace.channels["deflection"] = none;
+  trace.unexplained = {"torque", reason, none.explainable};
+  return trace;
+}
+
+/// A machine of which a record shows little but noise lacks nothing that it shows.
+bool shows_nothing(const Trace& trace) {
+  return trace.verdict == TraceVerdict::nothing_missing && trace.channels.at("torque").floor > kMostNoise;
+}
+
 }  // namespace
 
 Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& train,
@@ -182,8 +204,15 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   const model::Rig declared = model::load_side(raw);
   const Records records = records_of(raw, train, test);
   SearchSettings settings(asked);
-  settings.fit = with_bands(settings.fit, declared, records.train);
-  const SearchResult result = search_effects(declared, records.train, records.test, settings, progress);
+  SearchResult result;
+  try {
+    settings.fit = with_bands(settings.fit, declared, records.train);
+    result = search_effects(declared, records.train, records.test, settings, progress);
+  } catch (const CannotIdentify& error) {
+    return cannot_tell(
+        declared,
+        std::string("the declared machine cannot be fitted to the training records: ") + error.what());
+  }
   const Hypothesis& found = result.found;
   Trace trace;
   trace.cutoff = settings.fit.cutoff;
@@ -201,6 +230,10 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
       trace);
   judge_remainder(remainders(result, on_test.back(), records, settings, trace), found, records.test, settings,
                   trace);
+  if (shows_nothing(trace))
+    return cannot_tell(
+        declared, fmt::format("{:.0f} % of how the {} of the test record varies is noise",
+                              100 * trace.channels.at("torque").floor, declared.linear ? "force" : "torque"));
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
 }

@@ -88,6 +88,10 @@ struct BeliefSettings {
   double least_local = 0.5;  // choice: of a strength, where the effect acts most: less is another effect
   double local_error = 0.1;  // choice: of a strength; where it is told worse the rest of the record counts
   double sure = 2;           // theory: standard errors, 95 %
+  // Where more is left than so many times the noise: of a strength, in a part of the records that holds this
+  // share of what the effect does, and tells it within this error: as far off, by so many standard errors, is
+  // another effect. Choices.
+  double beyond_noise = 2, least_constant = 0.5, least_share = 0.1, part_error = 0.3, clearly = 3;
 };
 
 /// What a residual may still follow (explainable.h).

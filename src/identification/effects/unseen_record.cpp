@@ -19,7 +19,7 @@ constexpr double kIndependent =
 
 // The encoders are calibrated by the deflection alone and the delay of the torque moves what was measured, so
 // that the prediction holds nothing of the record's torque.
-ServoPrediction predicted(Machine machine, const ServoData& record, const FitSettings& settings) {
+Calibration calibrated(Machine machine, const ServoData& record, const FitSettings& settings) {
   const std::vector<ServoData> data = {record};
   const Calibration like = machine.calibrations.front();
   machine.parameters.clear();
@@ -41,7 +41,11 @@ ServoPrediction predicted(Machine machine, const ServoData& record, const FitSet
     machine.largest_delay = delay;
   }
   calibrate();
-  return predict_servo(machine.rig, record, settings, machine.calibrations.front());
+  return machine.calibrations.front();
+}
+
+ServoPrediction predicted(const Machine& machine, const ServoData& record, const FitSettings& settings) {
+  return predict_servo(machine.rig, record, settings, calibrated(machine, record, settings));
 }
 
 std::vector<ServoPrediction> predicted_by_all(const Hypothesis& h, const ServoData& record,

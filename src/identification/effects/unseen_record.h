@@ -8,9 +8,12 @@
 
 namespace backlash::identification {
 
+/// Of a record that the machine was not fitted to. `settings` have their bands.
+Calibration calibrated(Machine machine, const ServoData& record, const FitSettings& settings);
+
 /// What a machine says of a record that it was not fitted to, with the record's own calibration. `settings`
 /// have their bands.
-ServoPrediction predicted(Machine machine, const ServoData& record, const FitSettings& settings);
+ServoPrediction predicted(const Machine& machine, const ServoData& record, const FitSettings& settings);
 
 /// The machine before any effect, then with each effect and those before it.
 std::vector<ServoPrediction> predicted_by_all(const Hypothesis& h, const ServoData& record,

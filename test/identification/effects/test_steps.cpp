@@ -12,6 +12,7 @@
 #include "identification/effects/local_strength.h"
 #include "identification/effects/search.h"
 #include "identification/effects/steps.h"
+#include "identification/effects/strength_in_parts.h"
 #include "support/one_inertia_bench.h"
 #include "support/servo.h"
 
@@ -285,6 +286,30 @@ TEST(LocalStrength, OfAnEffectIsItsStrengthAndOfAStandInIsNot) {
   EXPECT_NEAR(right.ratio, 1, 3 * right.standard_error);
   EXPECT_LT(right.standard_error, 0.1);
   EXPECT_LT(wrong.ratio + 3 * wrong.standard_error, 0.5);
+}
+
+/// The part of the records, of machines of these two, in which a cogging fitted to the first differs most.
+std::optional<PartStrength> part_of_cogging(const OneInertiaMachine& machine,
+                                            const OneInertiaMachine& other) {
+  const SearchBench bench{machine};
+  const Hypothesis h = *refitted(fit_declared(test::one_inertia_rig(), bench.context),
+                                 {cogging_effect(0.8, 7, 0.6)}, bench.context);
+  return differing_part(h, 0, servo_data(record_of(other, 5), test::one_inertia_rig()), bench.context);
+}
+
+// Three standard errors.
+TEST(StrengthInParts, OfAnEffectIsTheSameEverywhereAndOfAStandInIsNot) {
+  EXPECT_FALSE(part_of_cogging(with_cogging(), with_cogging()));
+  OneInertiaMachine weaker, half;
+  weaker.extra = [](double q, double) { return 0.3 * 0.8 * std::sin(7 * q + 0.6); };
+  const auto unseen = part_of_cogging(with_cogging(), weaker);
+  ASSERT_TRUE(unseen);
+  EXPECT_NE(unseen->part.find("on the unseen record"), std::string::npos);
+  EXPECT_NEAR(unseen->ratio, 0.3, 3 * unseen->standard_error);
+  half.extra = [](double q, double) { return q > 0.1 ? 1.6 * std::sin(7 * q + 0.6) : 0; };
+  const auto here = part_of_cogging(half, half);
+  ASSERT_TRUE(here);
+  EXPECT_GT(std::fabs(here->ratio - 1), 0.5);
 }
 
 TEST(HoldFriction, BelowZeroIsHeldAtZero) {
