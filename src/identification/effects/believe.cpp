@@ -97,9 +97,8 @@ std::string weak_where_it_acts(const Hypothesis& h, std::size_t effect,
 }
 
 /// Why the effect is not itself in some part of the motion; empty: it is.
-std::string other_in_a_part(const Hypothesis& h, std::size_t effect, const ServoData& unseen,
-                            const SearchContext& context) {
-  const auto part = differing_part(h, effect, unseen, context);
+std::string other_in_a_part(const StrengthInParts& parts, std::size_t effect) {
+  const auto part = parts.differing(effect);
   if (!part) return "";
   return fmt::format("{} it has {:.2g} +- {:.1g} of its strength: it stands in for something else",
                      part->part, part->ratio, part->standard_error);
@@ -119,9 +118,9 @@ std::optional<std::pair<std::size_t, std::string>> unbelievable(const Hypothesis
   for (std::size_t i = 0; i < h.effects.size(); ++i)
     if (std::string why = weak_where_it_acts(h, i, all[i], settings); !why.empty())
       return std::pair{i, std::move(why)};
+  const StrengthInParts parts(h, unseen, context);
   for (std::size_t i = 0; i < h.effects.size(); ++i)
-    if (std::string why = other_in_a_part(h, i, unseen, context); !why.empty())
-      return std::pair{i, std::move(why)};
+    if (std::string why = other_in_a_part(parts, i); !why.empty()) return std::pair{i, std::move(why)};
   const std::vector<ServoPrediction> on_unseen = predicted_by_all(h, unseen, context.settings.fit);
   for (std::size_t i = 0; i < h.effects.size(); ++i) {
     const Effect& effect = h.effects[i];

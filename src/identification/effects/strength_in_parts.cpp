@@ -9,6 +9,7 @@
 
 #include "effect_roles.h"
 #include "found_effects.h"
+#include "unseen_gain.h"
 #include "unseen_record.h"
 
 namespace backlash::identification {
@@ -21,7 +22,6 @@ constexpr double kStep = 0.02;                   // theory: of a strength; small
 struct Samples {
   std::vector<double> adds, left;                        // N m or rad
   std::vector<double> speed, rate, place, torque, time;  // SI units, sizes of speed and torque
-  double floor_square = 0;                               // N^2 m^2 or rad^2: sum of what noise alone leaves
 };
 
 /// The rig with all strengths of the effect larger by kStep.
@@ -42,14 +42,12 @@ void add_samples(const ServoData& data, const ServoPrediction& as_fitted, const 
   const auto signal = deflection ? &ServoPrediction::deflection : &ServoPrediction::torque;
   const auto measured =
       deflection ? &ServoPrediction::measured_deflection : &ServoPrediction::measured_torque;
-  const double floor = deflection ? as_fitted.deflection_floor : as_fitted.torque_floor;
   const auto& counts = deflection ? as_fitted.settled : as_fitted.counts;
   for (std::size_t k = 0; k < data.size(); ++k) {
     const double adds = ((stronger.*signal)[k] - (as_fitted.*signal)[k]) / kStep;
     if (!counts[k] || adds == 0) continue;
     s.adds.push_back(adds);
     s.left.push_back((as_fitted.*measured)[k] - (as_fitted.*signal)[k]);
-    s.floor_square += floor * floor;
     s.speed.push_back(std::fabs(data.motor_rate[k]));
     s.rate.push_back(data.motor_rate[k]);
     s.place.push_back(data.motor[k]);
@@ -88,19 +86,12 @@ constexpr std::array<Coordinate, 5> kCoordinates = {{
     {&Samples::time, {"early", "in the middle of the time", "late"}},
 }};
 
-bool at_noise(const Samples& s, double beyond) {
-  return std::inner_product(s.left.begin(), s.left.end(), s.left.begin(), 0.0) <
-         beyond * beyond * s.floor_square;
-}
-
-/// All samples, then thirds of them, of those that hold enough of what the effect does. None where little but
-/// noise is left, which no effect stands in for.
-std::vector<PartStrength> strengths(const Samples& s, const std::string& where,
-                                    const BeliefSettings& settings) {
+/// All samples, then thirds of them, of those that hold enough of what the effect does.
+std::vector<PartStrength> strengths_of(const Samples& s, const std::string& where, double least_share) {
   std::vector<std::size_t> order(s.adds.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::vector<PartStrength> all;
-  if (order.size() < kParts * kBlocks || at_noise(s, settings.beyond_noise)) return all;
+  if (order.size() < kParts * kBlocks) return all;
   all.push_back(strength(s, order, where));
   const double whole = std::inner_product(s.adds.begin(), s.adds.end(), s.adds.begin(), 0.0);
   for (const Coordinate& c : kCoordinates) {
@@ -112,7 +103,7 @@ std::vector<PartStrength> strengths(const Samples& s, const std::string& where,
                                           order.begin() + long(order.size() * (k + 1) / kParts));
       double share = 0;
       for (const std::size_t i : part) share += s.adds[i] * s.adds[i] / whole;
-      if (share >= settings.least_share) all.push_back(strength(s, part, where + " " + c.parts[k]));
+      if (share >= least_share) all.push_back(strength(s, part, where + " " + c.parts[k]));
     }
   }
   return all;
@@ -120,23 +111,45 @@ std::vector<PartStrength> strengths(const Samples& s, const std::string& where,
 
 }  // namespace
 
-std::optional<PartStrength> differing_part(const Hypothesis& h, std::size_t effect, const ServoData& unseen,
-                                           const SearchContext& context) {
-  const std::string& id = h.effects[effect].candidate.id;
-  const BeliefSettings& settings = context.settings.belief;
-  if (is_learned(id) || shapes_friction(id)) return std::nullopt;
+StrengthInParts::StrengthInParts(const Hypothesis& h, const ServoData& unseen, const SearchContext& context)
+    : h_(h), context_(context) {
   const Machine& machine = h.fitted->fit.machine;
-  const model::Rig more = stronger(h, effect);
   const FitSettings& fit = context.settings.fit;
-  const auto add = [&](const ServoData& data, const Calibration& calibration, Samples& samples) {
-    add_samples(data, predict_servo(machine.rig, data, fit, calibration),
-                predict_servo(more, data, fit, calibration), h.effects[effect].gain.deflection, samples);
+  const auto record = [&](const ServoData& data, const Calibration& calibration) {
+    return Record{&data, calibration, predict_servo(machine.rig, data, fit, calibration)};
   };
-  Samples seen, other;
-  for (std::size_t i = 0; i < context.data.size(); ++i) add(context.data[i], machine.calibrations[i], seen);
-  add(unseen, calibrated(machine, unseen, fit), other);
-  std::vector<PartStrength> all = strengths(seen, "on the training records", settings);
-  for (PartStrength& s : strengths(other, "on the unseen record", settings)) all.push_back(std::move(s));
+  for (std::size_t i = 0; i < context.data.size(); ++i)
+    seen_.push_back(record(context.data[i], machine.calibrations[i]));
+  unseen_.push_back(record(unseen, calibrated(machine, unseen, fit)));
+}
+
+std::vector<PartStrength> StrengthInParts::strengths(const std::vector<Record>& records, std::size_t effect,
+                                                     const model::Rig& stronger,
+                                                     const std::string& where) const {
+  const BeliefSettings& settings = context_.settings.belief;
+  const bool deflection = h_.effects[effect].gain.deflection;
+  double left_square = 0, noise = 0;
+  for (const Record& r : records) {
+    const Left of_record = left(r.prediction, deflection, settings);
+    left_square += of_record.total();
+    noise += of_record.noise;
+  }
+  if (left_square < settings.beyond_noise * settings.beyond_noise * noise) return {};
+  Samples samples;
+  for (const Record& r : records)
+    add_samples(*r.data, r.prediction, predict_servo(stronger, *r.data, context_.settings.fit, r.calibration),
+                deflection, samples);
+  return strengths_of(samples, where, settings.least_share);
+}
+
+std::optional<PartStrength> StrengthInParts::differing(std::size_t effect) const {
+  const std::string& id = h_.effects[effect].candidate.id;
+  if (is_learned(id) || shapes_friction(id)) return std::nullopt;
+  const BeliefSettings& settings = context_.settings.belief;
+  const model::Rig more = stronger(h_, effect);
+  std::vector<PartStrength> all = strengths(seen_, effect, more, "on the training records");
+  for (PartStrength& s : strengths(unseen_, effect, more, "on the unseen record"))
+    all.push_back(std::move(s));
   std::optional<PartStrength> worst;
   for (const PartStrength& s : all) {
     const double off = std::fabs(s.ratio - 1);

@@ -294,7 +294,8 @@ std::optional<PartStrength> part_of_cogging(const OneInertiaMachine& machine,
   const SearchBench bench{machine};
   const Hypothesis h = *refitted(fit_declared(test::one_inertia_rig(), bench.context),
                                  {cogging_effect(0.8, 7, 0.6)}, bench.context);
-  return differing_part(h, 0, servo_data(record_of(other, 5), test::one_inertia_rig()), bench.context);
+  const ServoData unseen = servo_data(record_of(other, 5), test::one_inertia_rig());
+  return StrengthInParts(h, unseen, bench.context).differing(0);
 }
 
 // Three standard errors.
