@@ -8,7 +8,6 @@
 
 #include "backlash_diagnosis/base/interruption.h"
 #include "steps.h"
-#include "unseen_record.h"
 
 namespace backlash::identification {
 namespace {
@@ -56,30 +55,12 @@ Hypothesis believe_physical(const Hypothesis& before, const ServoData& unseen, c
   }
 }
 
-/// Whether the unseen record is told better than by the declared machine, in a channel that effects gain in:
-/// of the signal, which a delay moves to where it may be smaller.
-bool tells_more(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
-                const SearchContext& context) {
-  const ServoPrediction before = predicted(declared.base->fit.machine, unseen, context.settings.fit),
-                        after = predicted(h.fitted->fit.machine, unseen, context.settings.fit);
-  return std::any_of(h.effects.begin(), h.effects.end(), [&](const Effect& effect) {
-    const auto error =
-        effect.gain.deflection ? &ServoPrediction::deflection_error : &ServoPrediction::torque_error;
-    return (after.*error).error < (before.*error).error;
-  });
-}
-
-/// Together, and with friction held at zero, they may tell less than the declared machine does.
+/// Together, and with friction held at zero, they may tell less than each did.
 Hypothesis believe_all(const Hypothesis& before, const Hypothesis& declared, const ServoData& unseen,
                        const SearchContext& context) {
-  const Hypothesis h = believe_physical(before, unseen, context);
-  if (h.effects.empty() || tells_more(h, declared, unseen, context)) return h;
-  Hypothesis none = declared;
-  none.rejected = h.rejected;
-  for (const Effect& effect : h.effects)
-    none = with_rejected(std::move(none), effect.candidate.id,
-                         "the unseen record is told no better than by the declared machine");
-  return believe_physical(none, unseen, context);
+  const Hypothesis h = believe_physical(before, unseen, context),
+                   together = believe_together(h, declared, unseen, context);
+  return together.fitted == h.fitted ? h : believe_physical(together, unseen, context);
 }
 
 }  // namespace

@@ -54,6 +54,11 @@ Hypothesis drop_stand_ins(const Hypothesis& h, const SearchContext& context);
 /// error.
 Hypothesis believe(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);
 
+/// The declared machine without effects where those that are believed one by one do not tell more of the
+/// unseen record together.
+Hypothesis believe_together(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
+                            const SearchContext& context);
+
 /// Of a machine that is coupled to other axes: with stiff teeth, unless the unseen record bears their
 /// compliance out.
 Hypothesis believe_compliance(const Hypothesis& h, const ServoData& unseen, const SearchContext& context);

@@ -364,6 +364,20 @@ TEST(Believe, DropsWhatTheUnseenRecordContradicts) {
   EXPECT_NE(reason(believed, "cogging").find("on the unseen record"), std::string::npos);
 }
 
+TEST(BelieveTogether, DropsAllWhereTheyTellNoMoreThanTheDeclaredMachine) {
+  const SearchBench bench{with_cogging()};
+  const Hypothesis declared = fit_declared(test::one_inertia_rig(), bench.context);
+  const Hypothesis h = *refitted(declared, {cogging_effect(0.8, 7, 0.6)}, bench.context);
+  const auto unseen = [](const OneInertiaMachine& machine) {
+    return servo_data(record_of(machine, 5), test::one_inertia_rig());
+  };
+  EXPECT_EQ(believe_together(h, declared, unseen(with_cogging()), bench.context).fitted, h.fitted);
+  const Hypothesis none = believe_together(h, declared, unseen(OneInertiaMachine()), bench.context);
+  EXPECT_TRUE(none.effects.empty());
+  EXPECT_EQ(none.fitted, declared.base);
+  EXPECT_NE(reason(none, "cogging").find("no better than by the declared machine"), std::string::npos);
+}
+
 TEST(SearchEffects, CanBeStoppedAndIsTheSameEveryTime) {
   const SearchBench bench{with_cogging()};
   const auto found = [&] {
