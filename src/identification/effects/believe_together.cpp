@@ -31,12 +31,15 @@ struct UnseenSize {
 /// two inertias as drop_stand_ins(): what is left far above the noise must be less than half, in squares.
 std::string together_not_borne_out(const Hypothesis& h, const Hypothesis& declared, const ServoData& unseen,
                                    const SearchContext& context) {
-  const UnseenSize before(predicted(declared.base->fit.machine, unseen, context.settings.fit)),
-      after(predicted(h.fitted->fit.machine, unseen, context.settings.fit));
+  const ServoPrediction was = predicted(declared.base->fit.machine, unseen, context.settings.fit),
+                        is = predicted(h.fitted->fit.machine, unseen, context.settings.fit);
   const bool better = std::any_of(h.effects.begin(), h.effects.end(), [&](const Effect& effect) {
-    return effect.gain.deflection ? after.deflection < before.deflection : after.torque < before.torque;
+    const auto channel =
+        effect.gain.deflection ? &ServoPrediction::deflection_error : &ServoPrediction::torque_error;
+    return (is.*channel).error < (was.*channel).error;
   });
   if (!better) return "the unseen record is told no better than by the declared machine";
+  const UnseenSize before(was), after(is);
   const double half = context.settings.revision.half;
   if (simulation::load_moves_freely(h.declared->rig) &&
       after.most() > context.settings.acceptance.near_floor && after.square() > half * before.square())
