@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 
@@ -31,7 +32,7 @@ report::Provenance provenance_of(const identification::Trace& trace, const rig_f
   p.command = {"trace_residual", "--rig", inputs.rig, "--train"};
   p.command.insert(p.command.end(), inputs.train.begin(), inputs.train.end());
   p.command.insert(p.command.end(), {"--test", inputs.test});
-  if (trace.told) p.command.insert(p.command.end(), {"--cutoff", to_text(trace.cutoff)});
+  if (std::isfinite(trace.cutoff)) p.command.insert(p.command.end(), {"--cutoff", to_text(trace.cutoff)});
   p.command.insert(p.command.end(), {"--out", folder});
   p.files.push_back({"rig, as declared", inputs.rig});
   for (const std::string& record : inputs.train) p.files.push_back({"record for training", record});

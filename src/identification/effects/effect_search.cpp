@@ -178,13 +178,13 @@ void judge_remainder(const std::vector<ChannelRemainder>& all, const Hypothesis&
 }
 
 /// Where the records serve, and yet do not tell what the machine does.
-Trace cannot_tell(const model::Rig& declared, const std::string& reason) {
+Trace cannot_tell(const model::Rig& declared, const TraceSettings& asked, const std::string& reason) {
   const double unknown = std::nan("");
   const TraceChannel none = {unknown, unknown, unknown, unknown, unknown, {unknown, unknown, unknown}};
   Trace trace;
   trace.verdict = TraceVerdict::unexplained;
   trace.told = false;
-  trace.cutoff = unknown;
+  trace.cutoff = asked.cutoff > 0 ? asked.cutoff : unknown;
   trace.base = trace.augmented = declared;
   trace.channels["torque"] = none;
   if (simulation::load_moves_freely(declared)) trace.channels["deflection"] = none;
@@ -210,7 +210,7 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
     result = search_effects(declared, records.train, records.test, settings, progress);
   } catch (const CannotIdentify& error) {
     return cannot_tell(
-        declared,
+        declared, asked,
         std::string("the declared machine cannot be fitted to the training records: ") + error.what());
   }
   const Hypothesis& found = result.found;
@@ -232,8 +232,9 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
                   trace);
   if (shows_nothing(trace))
     return cannot_tell(
-        declared, fmt::format("{:.0f} % of how the {} of the test record varies is noise",
-                              100 * trace.channels.at("torque").floor, declared.linear ? "force" : "torque"));
+        declared, asked,
+        fmt::format("{:.0f} % of how the {} of the test record varies is noise",
+                    100 * trace.channels.at("torque").floor, declared.linear ? "force" : "torque"));
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
 }
