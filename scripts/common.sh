@@ -104,3 +104,8 @@ use_workspace() {
   export ROS_HOSTNAME=localhost ROS_HOME=${WS}/ros_home ROS_MASTER_URI=${ROS_MASTER_URI:-http://localhost:11311}
   unset ROS_IP
 }
+
+# A port of this machine that nobody listens on.
+free_port() {
+  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'
+}

@@ -29,7 +29,7 @@ if [[ ! -e ${curve} || ${rig} -nt ${curve} || ${WS}/devel/lib/libbacklash_diagno
 fi
 
 # A roscore of its own on a free port, reachable from this machine only.
-port=$(/usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+port=$(free_port)
 export ROS_MASTER_URI=http://localhost:${port}
 roslaunch_pid=
 finish() {

@@ -60,6 +60,7 @@ for part in licence format tidy headers rooms lanes pages; do
   check "${part}" bash "${REPO}/scripts/check_style.sh" "${part}"
 done
 check api_doc bash "${REPO}/scripts/api_doc.sh" "${WS}/doc"
+check readme_commands bash "${REPO}/scripts/check_readme.sh"
 check install_space bash "${REPO}/scripts/check_install.sh"
 
 # One seed, one of each class; the long runs are told in doc/reliability.md.

@@ -43,7 +43,7 @@ Command command() {
        "a limit that is reached within so many days from the last entry is worth watching; "
        "default: 90"},
       {"json", "OUT.json", "report to write; '-' writes it to standard output instead of the summary"},
-      {"plot", "OUT.png", "also draw the file of --json"},
+      {"plot", "OUT.png", "also draw the history, its trend and the limit"},
   };
   c.notes =
       "A trend needs 10 estimates at different times over a day, and begins anew at each baseline. The rate "
@@ -124,9 +124,8 @@ void check_options(const Arguments& arguments) {
   const std::string json = arguments.text("json"), plot = arguments.text("plot");
   if (!json.empty() && json != kStandardOutput) check_output(json, inputs);
   if (plot.empty()) return;
-  if (json.empty() || json == kStandardOutput) throw UsageError("--plot draws the file of --json: give both");
   check_plot_path(plot);
-  inputs.push_back(json);
+  if (!json.empty() && json != kStandardOutput) inputs.push_back(json);
   check_output(plot, inputs);
 }
 
@@ -237,7 +236,10 @@ int run(const Arguments& arguments) {
     for (const std::string& warning : in.history.warnings) std::cerr << "backlash_trend: " << warning << '\n';
     std::cout << trend.message << '\n';
   }
-  if (arguments.has("plot")) plot_trend(out, arguments.text("plot"));
+  if (arguments.has("plot")) {
+    std::cout.flush();
+    plot_trend(json, arguments.text("plot"));
+  }
   return exit_code(in, trend);
 }
 

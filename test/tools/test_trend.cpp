@@ -127,7 +127,7 @@ TEST_F(TrendCommand, DrawsWhatItTells) {
   run("backlash_trend elbow.csv --limit 150e-6 --json t.json --plot t.png");
   EXPECT_EQ(read("t.png").substr(1, 3), "PNG");
   write_history(3, 0, "short.csv");
-  EXPECT_EQ(run("backlash_trend short.csv --json s.json --plot s.svg").code, 3);
+  EXPECT_EQ(run("backlash_trend short.csv --plot s.svg").code, 3);  // the JSON is optional
   expect_contains(read("s.svg"), "<svg");
 }
 
@@ -141,7 +141,6 @@ TEST_F(TrendCommand, RefusalsNameTheirReason) {
                                                 {"elbow.csv --horizon 0", 64},
                                                 {"elbow.csv --limit 1e-4 --limits limits.yaml", 64},
                                                 {"elbow.csv --baseline healthy.yaml", 64},
-                                                {"elbow.csv --plot t.png", 64},
                                                 {"elbow.csv --json elbow.csv", 64},
                                                 {"elbow.csv --json t.json --plot t.txt", 64},
                                                 {"foreign.csv", 65},

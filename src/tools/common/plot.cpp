@@ -4,22 +4,25 @@
 #include <filesystem>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/scratch_folder.h"
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/report/script.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/record_file.h"
 
 namespace backlash::tools {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Runs `name --out OUT -- DATA`; `what` is in the data file, whatever happens to the picture.
+/// Runs `name --out OUT -- DATA`; `what` is in the data file, whatever happens to the picture. Empty:
+/// nowhere.
 void draw(const std::string& name, const std::string& out, const std::string& data, const std::string& what) {
   const int code = report::run_script(name, {"--out", out, "--", data});
-  if (code == kCannotWrite) throw CannotWrite(out + ": cannot be written; " + what + " itself is in " + data);
-  if (code != kHealthy)
-    throw Error(name + " failed (exit code " + std::to_string(code) + "); " + what + " itself is in " + data);
+  const std::string kept = what.empty() ? "" : "; " + what + " itself is in " + data;
+  if (code == kCannotWrite) throw CannotWrite(out + ": cannot be written" + kept);
+  if (code != kHealthy) throw Error(name + " failed (exit code " + std::to_string(code) + ")" + kept);
 }
 
 }  // namespace
@@ -54,8 +57,11 @@ void plot_separability_map(const std::string& json_path, const std::string& pict
   draw("plot_separability_map.py", picture_path, json_path, "the map");
 }
 
-void plot_trend(const std::string& json_path, const std::string& picture_path) {
-  draw("plot_trend.py", picture_path, json_path, "the trend");
+void plot_trend(const std::string& json, const std::string& picture_path) {
+  const ScratchFolder scratch;
+  const std::string data = scratch.path("trend.json");
+  write_text(data, json);
+  draw("plot_trend.py", picture_path, data, "");
 }
 
 }  // namespace backlash::tools

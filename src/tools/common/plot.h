@@ -28,7 +28,7 @@ void plot_model_comparison(const std::string& json_path, const std::string& pict
 /// Draws the JSON of separability_map. Throws as plot_curve.
 void plot_separability_map(const std::string& json_path, const std::string& picture_path);
 
-/// Draws the JSON of backlash_trend. Throws as plot_curve.
-void plot_trend(const std::string& json_path, const std::string& picture_path);
+/// Draws the JSON of backlash_trend, given as text: its file is optional. Throws as plot_curve.
+void plot_trend(const std::string& json, const std::string& picture_path);
 
 }  // namespace backlash::tools

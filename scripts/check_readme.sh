@@ -1,0 +1,76 @@
+#!/bin/bash
+# Runs every command under "First questions" of the README in an empty folder, beside a simulated robot that publishes.
+# Exit codes 0 to 3 of a command are answers. Usage: bash scripts/check_readme.sh
+# SPDX-License-Identifier: BSD-3-Clause
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+if (($#)); then
+  sed -n '2,3s/^# //p' "$0"
+  [[ $1 == -h || $1 == --help ]] && exit 0
+  exit 64
+fi
+
+make_workspace
+use_workspace
+work=${WS}/check_readme
+rm -rf "${work}"
+mkdir -p "${work}/home" && cd "${work}"
+export HOME=${work}/home ROS_HOME=${work}/ros_home ROS_LOG_DIR=${work}/ros_log
+ROS_MASTER_URI=http://localhost:$(free_port)
+
+# Nodes are ended one after the other, the master last: a node that has lost its master takes seconds to go.
+started=()
+finish() {
+  local i
+  for ((i = ${#started[@]} - 1; i >= 0; --i)); do
+    kill -INT "${started[i]}" 2>/dev/null || true
+    wait "${started[i]}" 2>/dev/null || true
+  done
+}
+trap finish EXIT
+trap 'exit 130' INT TERM
+beside() {
+  "$@" >"beside_${#started[@]}.log" 2>&1 </dev/null &
+  started+=($!)
+}
+# within SECONDS COMMAND...: until the command succeeds.
+within() {
+  local end=$((SECONDS + $1))
+  shift
+  until "$@" >/dev/null 2>&1; do
+    ((SECONDS < end)) || fail "still not after a while: $*"
+    sleep 0.2
+  done
+}
+
+beside roscore -p "${ROS_MASTER_URI##*:}"
+within 30 rosparam list
+# One robot for `diagnoser.launch joint_states:=/arm/joint_states`, one for the default of `monitoring.launch`.
+for topic in /arm/joint_states /joint_states; do
+  beside rosrun "${PACKAGE}" simulator "__ns:=robot${#started[@]}" "_rig:=${REPO}/config/sarkar_1997.yaml" \
+    "joint_states:=${topic}"
+  within 30 rostopic info "${topic}"
+done
+
+mapfile -t commands < <(awk '/^## / {inside = $0 == "## First questions"} inside && sub(/^    /, "")' "${REPO}/README.md")
+((${#commands[@]} >= 12)) || fail "README.md: only ${#commands[@]} commands under 'First questions'"
+for command in "${commands[@]}"; do
+  echo "\$ ${command}"
+  case ${command} in
+    *'&')
+      eval "beside ${command%&}"
+      within 60 rosservice type /diagnoser/diagnose
+      continue
+      ;;
+    *backlash_trend*) within 120 test -s "${HOME}/backlash/joint.csv" ;;
+  esac
+  status=0
+  eval "${command}" >answer.txt 2>&1 || status=$?
+  tail -n 2 answer.txt
+  ((status <= 3)) || fail "exit code ${status} of: ${command}: $(cat answer.txt)"
+  [[ ${command} != rosservice* ]] || grep -qx 'success: True' answer.txt || fail "no answer: $(head -n 3 answer.txt)"
+done
+for made in report.html fitted.yaml fit.png report/report.html trend.png; do
+  [[ -s ${made} ]] || fail "${made}: no such file after all commands"
+done
