@@ -11,9 +11,9 @@
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/report/report_page.h"
 #include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/measured_text.h"
 #include "report/html_template.h"
 #include "report/json.h"
-#include "value_text.h"
 
 namespace backlash::findings {
 namespace {
@@ -168,7 +168,7 @@ std::string arm_verdict_sentence(const arm::ArmTrace& trace) {
                           step.parameters.front().measured.value);
     else
       text += fmt::format(": {} = {} {}.", step.parameters.front().name,
-                          with_error(step.parameters.front().measured),
+                          signal::with_error(step.parameters.front().measured),
                           step.parameters.front().unit == "-" ? "" : step.parameters.front().unit);
   }
   if (trace.cannot_tell) return "Cannot tell: " + trace.judged;
@@ -248,7 +248,7 @@ void print_arm_trace(const arm::ArmTrace& trace, std::ostream& out) {
   for (const arm::ArmStep& step : trace.steps) {
     out << fmt::format("\n{} {}{}\n", step.effect, step.link, step.joint);
     for (const arm::ArmParameter& p : step.parameters)
-      out << fmt::format("  {:<12} {} {}\n", p.name, with_error(p.measured), p.unit);
+      out << fmt::format("  {:<12} {} {}\n", p.name, signal::with_error(p.measured), p.unit);
   }
   for (const std::string& warning : trace.warnings) out << "warning: " << warning << '\n';
 }
@@ -261,7 +261,7 @@ report::Json page_step(const arm::ArmStep& step) {
       {"where", step.link + step.joint + (step.other_joint.empty() ? "" : " with " + step.other_joint)},
       {"parameters", report::Json::array()}};
   for (const arm::ArmParameter& p : step.parameters) {
-    const ValueText text = value_text(p.measured);
+    const signal::ValueText text = signal::value_text(p.measured);
     json["parameters"].push_back({{"name", p.name},
                                   {"value", text.value},
                                   {"error", text.error},

@@ -6,6 +6,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
 #include "backlash_diagnosis/findings/trace_report.h"
+#include "backlash_diagnosis/signal/measured_text.h"
 #include "report/json.h"
 
 namespace backlash::findings {
@@ -42,7 +43,7 @@ std::string change_summary(const changes::Changes& found) {
                         c.since_to);
     if (c.until) text += fmt::format(", until {:.1f} s", *c.until);
     for (const changes::ChangeSize& s : c.size)
-      text += fmt::format("; {} {} {}", s.name, with_error(s.measured), s.unit);
+      text += fmt::format("; {} {} {}", s.name, signal::with_error(s.measured), s.unit);
     if (c.effect == "unknown")
       text += "; no effect explains it" + (c.alike.empty() ? "" : ", nearest: " + joined(c.alike));
     else if (!c.alike.empty())

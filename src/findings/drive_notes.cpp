@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "backlash_diagnosis/findings/trace_report.h"
+#include "backlash_diagnosis/signal/measured_text.h"
 
 namespace backlash::findings {
 namespace {
@@ -25,7 +26,8 @@ std::vector<std::string> drive_notes(const identification::Trace& trace, const r
       if (!is_order(effect, p.name)) continue;
       const std::string part = rig_file::part_of_order(drive, p.measured.value, p.measured.standard_error);
       if (!part.empty())
-        notes.push_back(fmt::format("{}, {} {}: {}", effect.id, p.name, with_error(p.measured), part));
+        notes.push_back(
+            fmt::format("{}, {} {}: {}", effect.id, p.name, signal::with_error(p.measured), part));
     }
   return notes;
 }

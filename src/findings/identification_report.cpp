@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
 #include "report/json.h"
+#include "several_json.h"
 
 namespace backlash::findings {
 namespace {
@@ -186,6 +187,7 @@ std::string identification_json(const identification::Identification& found, con
   for (const auto& [name, channel] : found.channels)
     json["channels"][name] = {{"train", report::json_number(channel.error)},
                               {"floor", report::json_number(channel.floor)}};
+  json["several_machines"] = several_json(found.several, found.units, false);  // units are those of the axis
   if (found.delay)
     json["torque_delay"] = {{"value", report::json_number(found.delay->value)},
                             {"unit", "s"},

@@ -10,6 +10,7 @@
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "report/json.h"
+#include "several_json.h"
 #include "trace_contributions.h"
 
 namespace backlash::findings {
@@ -138,6 +139,7 @@ std::string trace_report_json(const identification::Trace& trace, const TraceInp
     json["unexplained"] = {{"channel", trace.unexplained->channel},
                            {"signature", trace.unexplained->signature},
                            {"explainable", report::json_number(trace.unexplained->explainable.value)}};
+  json["several_machines"] = several_json(trace.several, trace.units, trace.augmented.linear);
   json["independence"] = report::Json::array();
   for (const identification::Independence& i : trace.independence)
     json["independence"].push_back({{"channel", i.channel},

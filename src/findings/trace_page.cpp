@@ -9,15 +9,15 @@
 #include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/report/report_page.h"
+#include "backlash_diagnosis/signal/measured_text.h"
 #include "report/html_template.h"
-#include "value_text.h"
 
 namespace backlash::findings {
 namespace {
 
 /// Value, error where it is known, and unit.
 report::Json quantity(const signal::Measured& m, const std::string& unit) {
-  const ValueText text = value_text(m);
+  const signal::ValueText text = signal::value_text(m);
   return {{"value", text.value}, {"error", text.error}, {"unit", unit == "-" ? "" : unit}};
 }
 

@@ -8,7 +8,7 @@
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/model/axis_unit.h"
-#include "value_text.h"
+#include "backlash_diagnosis/signal/measured_text.h"
 
 namespace backlash::findings {
 namespace {
@@ -35,8 +35,8 @@ std::string effect_text(const identification::FoundEffect& e, bool linear) {
   text += ", " + e.channel + " error " + percent(e.test_error_before) + " -> " + percent(e.test_error_after) +
           "\n";
   for (const identification::EffectParameter& p : e.parameters)
-    text +=
-        fmt::format("    {:<24} {} {}\n", p.name, with_error(p.measured), model::axis_unit(p.unit, linear));
+    text += fmt::format("    {:<24} {} {}\n", p.name, signal::with_error(p.measured),
+                        model::axis_unit(p.unit, linear));
   const identification::Evidence& v = e.evidence;
   text += "    evidence: residual smaller by " + percent(v.gain) + " on the training records, " +
           percent(v.gain_held_out) + " on blocks left out of the fit (" + std::to_string(v.blocks_better) +
@@ -69,20 +69,6 @@ std::string percent(double share) {
   return std::isfinite(share) ? fmt::format("{:.3g} %", 100 * share) : "unknown";
 }
 
-ValueText value_text(const signal::Measured& m) {
-  if (!(m.standard_error > 0) || !std::isfinite(m.standard_error))
-    return {fmt::format("{:.6g}", m.value), ""};
-  // As many digits as the error leaves, which has two.
-  const double size = std::max(std::fabs(m.value), m.standard_error);
-  const int digits = 2 + int(std::floor(std::log10(size)) - std::floor(std::log10(m.standard_error)));
-  return {fmt::format("{:.{}g}", m.value, std::min(digits, 9)), fmt::format("{:.2g}", m.standard_error)};
-}
-
-std::string with_error(const signal::Measured& m) {
-  const ValueText text = value_text(m);
-  return text.error.empty() ? text.value : text.value + " +- " + text.error;
-}
-
 std::string to_string(identification::TraceVerdict verdict) {
   switch (verdict) {
     case identification::TraceVerdict::effect_found:
@@ -111,6 +97,8 @@ std::string verdict_sentence(const identification::Trace& trace) {
     text = "Nothing is missing: the declared model, fitted, has these errors on the test record: " +
            listed(errors) + ".";
   if (trace.verdict == identification::TraceVerdict::unexplained || trace.unexplained) {
+    if (trace.several)
+      text = identification::description(*trace.several, trace.units, trace.augmented.linear) + ". " + text;
     text += effects.empty() ? "Something is missing" : " Something more is missing";
     text += " that no effect explains";
     if (trace.unexplained) text += ", in " + trace.unexplained->channel + ": " + trace.unexplained->signature;
@@ -143,9 +131,9 @@ std::string trace_summary(const identification::Trace& trace) {
   text += fmt::format(machine, "parameter", "without effects", "with effects", "unit");
   for (const auto& [name, value] : trace.parameters) {
     const auto before = trace.base_parameters.find(name);
-    text +=
-        fmt::format(machine, name, before == trace.base_parameters.end() ? "-" : with_error(before->second),
-                    with_error(value), model::axis_unit(trace.units.at(name), linear));
+    text += fmt::format(machine, name,
+                        before == trace.base_parameters.end() ? "-" : signal::with_error(before->second),
+                        signal::with_error(value), model::axis_unit(trace.units.at(name), linear));
   }
   return text + remarks(trace);
 }

@@ -121,6 +121,11 @@ void warn_of_asymmetry(IdentificationCase& c) {
 constexpr double kBuildUp = 0.005;  // simulation: of the torque
 
 void warn_of_misfit(Identification& result) {
+  if (result.several) {
+    result.warnings.push_back(description(*result.several, result.units, false) +
+                              ". The values that follow are of none of them, and their errors hold them all");
+    return;
+  }
   const double build_up = result.one_inertia ? kBuildUp : 0;
   for (const auto& [name, channel] : result.channels)
     if (channel.error > std::max(kMisfit * channel.floor, std::hypot(channel.floor, build_up)))

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // CSV to bag or recording of ROS 2 and back.
+#include <fmt/format.h>
+
+#include <cmath>
 #include <iostream>
 
+#include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
@@ -25,14 +29,32 @@ Command command() {
        "NAME_accelerometer; default: the rig's, "
        "else the only one (reading) or 'joint' (writing)"},
       {"topic", "NAME", "topic to read in a bag, alone or as the last part; default: joint_states"},
+      {"from", "S", "only what is recorded from this time on, of the record's own [s]"},
+      {"to", "S", "only what is recorded before this time [s]"},
   };
   c.notes =
       "Only header stamps count. Time 0 of a CSV becomes the stamp 1000000000 s, as ROS refuses 0; the topic "
       "/record_info in the bag says so. A recorded bag without it begins at time 0.";
   c.examples = {"convert_record run.csv run.bag --joint elbow", "convert_record run.bag run.csv",
-                "convert_record rosbag2_run/ run.mcap --joint elbow"};
+                "convert_record rosbag2_run/ run.mcap --joint elbow",
+                "convert_record run.csv first_half.csv --to 10"};
   c.exit_codes = "  0   done\n";
   return c;
+}
+
+/// What --from and --to leave of it.
+record::Record part_of(record::Record record, const Arguments& arguments, const std::string& name) {
+  if (!arguments.has("from") && !arguments.has("to")) return record;
+  const Range any = Range::any();
+  const double from = arguments.number("from", -HUGE_VAL, any), to = arguments.number("to", HUGE_VAL, any);
+  if (!(from < to)) throw UsageError("--from must be before --to");
+  const double first = record.time.front(), last = record.time.back();
+  record = std::move(record).slice(from, to);
+  if (record.size() == 0)
+    throw BadData(
+        name, fmt::format("has no sample from {:.6g} s on before {:.6g} s; it lasts from {:.6g} to {:.6g} s",
+                          from, to, first, last));
+  return record;
 }
 
 int convert(const Arguments& arguments) {
@@ -46,7 +68,7 @@ int convert(const Arguments& arguments) {
   if (arguments.has("topic")) place.topic = arguments.text("topic");
   std::vector<std::string> inputs = {in};
   if (arguments.has("rig")) inputs.push_back(arguments.text("rig"));
-  const record::Record record = read_record(in, place);
+  const record::Record record = part_of(read_record(in, place), arguments, in);
   check_output(out, inputs);
   for (const std::string& warning : record.warnings)
     std::cerr << "convert_record: " << in << ": " << warning << '\n';

@@ -53,7 +53,11 @@ Command command() {
   c.examples = {"identify run.csv --rig config/two_inertia_servo.yaml --out fitted.yaml --json fit.json",
                 "identify runs/*.csv --rig config/yumrukcal_2013.yaml --out fitted.yaml --json fit.json "
                 "--plot fit.png"};
-  c.exit_codes = "  0   done\n  3   the records allow no procedure; OUT.json has the reason\n";
+  c.exit_codes =
+      "  0   done\n"
+      "  3   the records allow no procedure, or contradict each other (then the values hold none of them "
+      "well, "
+      "and their errors hold all); OUT.json has the reason\n";
   return c;
 }
 
@@ -89,7 +93,7 @@ int identify_joint(const Arguments& arguments) {
   findings::print_summary(found, std::cout);
   std::cout.flush();
   if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
-  return kHealthy;
+  return found.several ? kInconclusive : kHealthy;
 }
 
 int identify_machine(const Arguments& arguments) {

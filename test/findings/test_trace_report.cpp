@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/findings/trace_report.h"
+#include "backlash_diagnosis/signal/measured_text.h"
 #include "support/data.h"
 
 namespace backlash::findings {
@@ -201,10 +202,10 @@ TEST(TraceReport, ALearnedMapIsSaidToBeOne) {
 }
 
 TEST(TraceReport, NumbersHaveAsManyDigitsAsTheirErrorLeaves) {
-  EXPECT_EQ(with_error({6.31234, 0.0123}), "6.312 +- 0.012");
-  EXPECT_EQ(with_error({0.001, 20}), "0.001 +- 20");
-  EXPECT_EQ(with_error({15, 0}), "15");
-  EXPECT_EQ(with_error({2.5, kUnknown}), "2.5");
+  EXPECT_EQ(signal::with_error({6.31234, 0.0123}), "6.312 +- 0.012");
+  EXPECT_EQ(signal::with_error({0.001, 20}), "0.001 +- 20");
+  EXPECT_EQ(signal::with_error({15, 0}), "15");
+  EXPECT_EQ(signal::with_error({2.5, kUnknown}), "2.5");
   EXPECT_EQ(percent(0.01234), "1.23 %");
   EXPECT_EQ(percent(kUnknown), "unknown");
 }

@@ -243,6 +243,19 @@ TEST_F(Commands, CsvToBagToCsvIsTheSameFile) {
   EXPECT_EQ(read("a.csv"), read("d.csv"));
 }
 
+TEST_F(Commands, PartsOfARecordPutTogetherAreTheRecord) {
+  done("simulate rig.yaml --duration 0.5 --out a.csv");
+  done("convert_record a.csv first.csv --to 0.2");
+  done("convert_record a.csv last.bag --from 0.2 --rig rig.yaml");
+  done("convert_record last.bag last.csv --rig rig.yaml");
+  const std::string last = read("last.csv");
+  EXPECT_EQ(read("a.csv"), read("first.csv") + last.substr(last.find('\n') + 1));
+  EXPECT_EQ(run("convert_record a.csv x.csv --from 0.3 --to 0.3").code, 64);
+  const Outcome none = run("convert_record a.csv x.csv --from 7");
+  EXPECT_EQ(none.code, 65);
+  expect_contains(none.err, "a.csv: has no sample from 7 s on");
+}
+
 // For programs that start a command: lines instead of a summary, and the same curve.
 TEST_F(Commands, FeedbackIsAnObjectALine) {
   done("build_curve rig.yaml --points 3 --seeds 1 --periods 1 --out a.yaml");

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "backlash_diagnosis/base/random.h"
 #include "support/data.h"
@@ -52,6 +53,23 @@ TEST_F(Identify, ServoFromItsOwnRecord) {
     EXPECT_EQ(result.at("procedures").back().at("name"), "output_error");
   }
   done("simulate fit.yaml --duration 0.1 --out again.csv");  // the fitted file is a rig file
+}
+
+TEST_F(Identify, RecordsOfTwoMachinesContradictEachOther) {
+  write("worn.yaml",
+        std::regex_replace(read("servo.yaml"), std::regex("backlash_angle: 5.4e-4"), "backlash_angle: 8e-4"));
+  done("simulate servo.yaml --duration 6 --out new.csv");
+  done("simulate worn.yaml --duration 6 --seed 2 --out worn.csv");
+  const Outcome outcome = run("identify new.csv worn.csv --rig servo.yaml --out fit.yaml --json fit.json");
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  expect_contains(outcome.out, "warning: The records contradict each other");
+  const Json result = json("fit.json");
+  EXPECT_EQ(result.at("several_machines").at("differ"), Json{"backlash_angle"});
+  const Json& play = result.at("parameters").at("backlash_angle");
+  for (const double truth : {5.4e-4, 8e-4})  // a value of two machines holds both
+    EXPECT_NEAR(play.at("value").get<double>(), truth, 2 * play.at("standard_error").get<double>());
+  done("identify new.csv --rig servo.yaml --out fit.yaml --json fit.json");
+  EXPECT_TRUE(json("fit.json").at("several_machines").is_null());
 }
 
 TEST_F(Identify, DrawsWhatItSaw) {

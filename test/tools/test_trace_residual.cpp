@@ -104,10 +104,11 @@ TEST_F(TraceResidual, NamesTheEffectThatAnAxisLacks) {
 
 TEST_F(TraceResidual, WithTheEffectInTheRigNothingIsMissing) {
   emps_records(kAsymmetry);
+  record("emps", kAsymmetry, 40, 3, "--duration 12 --sample-rate 250", "more.csv");
   write("emps.yaml", read("emps.yaml") + kAsymmetry);
   done("convert_record train.csv train.bag --rig emps.yaml");
   const std::string out =
-      done("trace_residual --rig emps.yaml --train train.bag test.csv --test test.csv --out out --cutoff 8")
+      done("trace_residual --rig emps.yaml --train train.bag more.csv --test test.csv --out out --cutoff 8")
           .out;
   expect_contains(out, "Nothing is missing");
   const Json result = report();
@@ -116,7 +117,7 @@ TEST_F(TraceResidual, WithTheEffectInTheRigNothingIsMissing) {
   EXPECT_TRUE(result.at("steps").empty());
   EXPECT_TRUE(result.at("unexplained").is_null());
   EXPECT_EQ(result.at("cutoff").at("value"), 8);
-  EXPECT_EQ(result.at("train"), (Json{"train.bag", "test.csv"}));
+  EXPECT_EQ(result.at("train"), (Json{"train.bag", "more.csv"}));
   const std::string rig = read("out/rig.yaml");
   EXPECT_NE(rig.find(kAsymmetry), std::string::npos) << rig;  // as it was declared
   done("simulate out/rig.yaml --duration 0.1 --out again.csv");
@@ -195,6 +196,27 @@ std::string without_load(const std::string& csv) {
   return csv.substr(0, at) + without + csv.substr(at + with.size());
 }
 
+TEST_F(TraceResidual, RecordsOfTwoMachinesContradictEachOther) {
+  record("two_inertia_servo", "", 250, 1, "--duration 6", "train.csv");
+  write("declared.yaml", read("two_inertia_servo.yaml"));
+  write("two_inertia_servo.yaml",
+        std::regex_replace(read("declared.yaml"), std::regex("inertia: 108 "), "inertia: 140 "));
+  record("two_inertia_servo", "", 250, 2, "--duration 6", "test.csv");
+  const Outcome outcome =
+      run("trace_residual --rig declared.yaml --train train.csv --test test.csv --out out");
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  expect_contains(outcome.out, "The records contradict each other");
+  const Json result = report();
+  EXPECT_EQ(result.at("verdict"), "unexplained");
+  EXPECT_TRUE(result.at("steps").empty());
+  const Json& several = result.at("several_machines");
+  EXPECT_EQ(several.at("differ"), Json{"load_inertia"});
+  for (const auto& [place, truth] : std::vector<std::pair<int, double>>{{0, 108}, {1, 140}}) {
+    const Json& inertia = several.at("records").at(place).at("parameters").at("load_inertia");
+    EXPECT_NEAR(inertia.at("value").get<double>(), truth, 4 * inertia.at("standard_error").get<double>());
+  }
+}
+
 TEST_F(TraceResidual, Refusals) {
   emps_records("");
   const std::string head = read("test.csv").substr(0, 400);
@@ -202,6 +224,7 @@ TEST_F(TraceResidual, Refusals) {
   write("nan.csv", "time,motor_torque,motor_position\n0,1,0\n0.004,nan,0\n0.008,1,0\n");
   write("text.csv", "no record\n");
   record("emps", "", 40, 3, "--duration 12 --sample-rate 100", "slow.csv");
+  done("convert_record test.csv half.csv --from 6");
   write("bad.yaml", "schema_version: 1\nname: 3\n");
   write("motor.csv", without_load(read("train.csv")));
   const std::size_t before = files();
@@ -224,6 +247,9 @@ TEST_F(TraceResidual, Refusals) {
       {line("emps.yaml", "short.csv", "test.csv"), 65, "short"},
       {line("emps.yaml", "train.csv", "short.csv"), 65, "short"},
       {line("emps.yaml", "train.csv", "slow.csv"), 65, "sampled"},
+      {line("emps.yaml", "train.csv test.csv", "test.csv"), 65,
+       "100 % of the test record test.csv are samples"},
+      {line("emps.yaml", "train.csv half.csv", "test.csv"), 65, "samples of the training record half.csv"},
       {line("two_inertia_servo.yaml", "motor.csv", "test.csv"), 65, "load_position"},
       {line("emps.yaml", "train.csv", "test.csv", "test.csv"), 73, "test.csv"},
       {line("emps.yaml", "train.csv", "test.csv", "/proc/none"), 73, "/proc/none"},

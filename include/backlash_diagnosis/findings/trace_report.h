@@ -46,8 +46,4 @@ std::string effect_name(const identification::FoundEffect& effect);
 /// 0.0123 -> "1.23 %"
 std::string percent(double share);
 
-/// A value as people read it, with its standard error where that is known: "12.3 +- 0.4"; "15" for a fixed
-/// one.
-std::string with_error(const signal::Measured& measured);
-
 }  // namespace backlash::findings

@@ -20,6 +20,7 @@
 #include "backlash_diagnosis/identification/procedures/one_inertia.h"
 #include "backlash_diagnosis/identification/procedures/sensor_calibration.h"
 #include "backlash_diagnosis/identification/procedures/two_mass.h"
+#include "backlash_diagnosis/identification/several_machines.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/signal/robust_mean.h"
 
@@ -77,6 +78,7 @@ struct Identification {
   std::vector<Finding> findings;
   std::vector<std::string> warnings;
 
+  std::optional<SeveralMachines> several;  // where the records contradict each other; errors hold them all
   std::optional<SpeedCalibration> speed_calibration;
   std::optional<PositionCalibration> position_calibration;
   std::vector<CalibrationTrace> calibration_traces;

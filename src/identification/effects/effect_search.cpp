@@ -9,7 +9,9 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/record/shared_samples.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
+#include "contradicting_records.h"
 #include "effect_roles.h"
 #include "found_effects.h"
 #include "impossible_friction.h"
@@ -21,7 +23,8 @@
 namespace backlash::identification {
 namespace {
 
-constexpr double kMostNoise = 0.5;  // choice: of the deviation of the torque of the test record
+constexpr double kMostShared = 0.1;  // choice: of the test record, in a training record
+constexpr double kMostNoise = 0.5;   // choice: of the deviation of the torque of the test record
 
 /// Every friction builds up over some path; it is called missing only where that shows.
 void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
@@ -46,9 +49,21 @@ struct Records {
   ServoData test;
 };
 
+/// Errors on what the fit has seen confirm nothing.
+void require_unseen(const std::vector<record::Record>& train, const record::Record& test) {
+  for (const record::Record& known : train)
+    if (const double shared = record::shared_samples(test, known); shared > kMostShared)
+      throw CannotIdentify(fmt::format(
+          "{:.0f} % of the test record {} are samples of the training record {}, so that errors on it would "
+          "confirm nothing: give records that share none, such as the two halves of one (convert_record "
+          "--from, --to)",
+          100 * shared, test.name, known.name));
+}
+
 Records records_of(const model::Rig& rig, const std::vector<record::Record>& train,
                    const record::Record& test) {
   if (train.empty()) throw CannotIdentify("no training record");
+  require_unseen(train, test);
   Records records;
   for (const record::Record& record : train) records.train.push_back(traced_data(record, rig));
   double torque = 0;  // what the model says of the test record knows nothing of that record's torque
@@ -197,6 +212,20 @@ bool shows_nothing(const Trace& trace) {
   return trace.verdict == TraceVerdict::nothing_missing && trace.channels.at("torque").floor > kMostNoise;
 }
 
+/// Times the noise, of the training records and of the unseen one, the channel of which more is left.
+double most_left(const Trace& trace, const Hypothesis& found) {
+  double most = std::max(misfit(found).torque, misfit(found).deflection);
+  for (const auto& [name, c] : trace.channels) most = std::max(most, c.after / c.floor);
+  return most;
+}
+
+std::vector<std::string> names_of(const std::vector<record::Record>& train, const record::Record& test) {
+  std::vector<std::string> names;
+  for (const record::Record& record : train) names.push_back(record.name);
+  names.push_back(test.name);
+  return names;
+}
+
 }  // namespace
 
 Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& train,
@@ -235,6 +264,14 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
         declared, asked,
         fmt::format("{:.0f} % of how the {} of the test record varies is noise",
                     100 * trace.channels.at("torque").floor, declared.linear ? "force" : "torque"));
+  if (trace.unexplained) {
+    const auto tell = [&](const std::string&) {
+      if (progress && !progress(1, "fit of each record by itself")) throw Cancelled();
+    };
+    trace.several = contradicting_records(
+        declared, names_of(train, test), records.test, most_left(trace, found),
+        {records.train, motion_range(records.train), settings, tell, [](const auto&) {}});
+  }
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
 }

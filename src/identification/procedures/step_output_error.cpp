@@ -103,6 +103,39 @@ void allow_for_declared(const model::Rig& declared, std::map<std::string, signal
           std::hypot(measured.standard_error, rig_file::servo_parameter(name).get(declared) - measured.value);
 }
 
+/// Times the noise, of the channel of which more is left.
+double most_left(const std::map<std::string, ChannelError>& channels) {
+  double most = 0;
+  for (const auto& [name, channel] : channels) most = std::max(most, channel.error / channel.floor);
+  return most;
+}
+
+/// Whether each record alone is met, with other values; `settings` without what other records found.
+std::optional<SeveralMachines> contradicting(const IdentificationCase& c, const std::vector<ServoData>& data,
+                                             const std::vector<std::string>& names, double together,
+                                             OutputErrorSettings settings) {
+  if (data.size() < 2) return std::nullopt;
+  settings.findings.clear();
+  std::vector<RecordAlone> alone;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const OutputError fit = fit_output_error(c.declared, {data[i]}, settings);
+    const ServoPrediction& p = fit.predictions.front();
+    alone.push_back({names[i], fit.parameters,
+                     most_left({{"torque", p.torque_error}, {"deflection", p.deflection_error}})});
+    if (!is_met(alone.back().left, together)) return std::nullopt;
+  }
+  return several_machines(std::move(alone), together);
+}
+
+/// One value for machines that differ: as unsure as theirs are apart.
+void allow_for_several(const SeveralMachines& several, std::map<std::string, signal::Measured>& parameters) {
+  for (auto& [name, measured] : parameters)
+    for (const RecordAlone& r : several.records)
+      if (const auto at = r.values.find(name); at != r.values.end())
+        measured.standard_error =
+            std::max(measured.standard_error, std::fabs(at->second.value - measured.value));
+}
+
 /// Two flanks that the zero of both encoders lies between.
 double start_in_gap(const model::Rig& rig, double encoder_offset) {
   const double half = 0.5 * rig.mesh.backlash / rig.mesh.lever();
@@ -152,7 +185,11 @@ ProcedureReport run_output_error(IdentificationCase& c) {
       fmt::format("deflection error {:.2g} % (noise alone {:.2g} %)", 100 * d.error, 100 * d.floor);
   if (fit.rig.coupled) return report;
   const ChannelError t = c.result.channels["torque"];
-  if (lacks_something(d) || lacks_something(t)) allow_for_declared(c.declared, c.result.parameters);
+  if (lacks_something(d) || lacks_something(t)) {
+    allow_for_declared(c.declared, c.result.parameters);
+    c.result.several = contradicting(c, data, report.records, most_left(c.result.channels), settings);
+    if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
+  }
   report.message = fmt::format("torque error {:.2g} % (noise alone {:.2g} %), deflection {:.2g} % ({:.2g} %)",
                                100 * t.error, 100 * t.floor, 100 * d.error, 100 * d.floor);
   return report;

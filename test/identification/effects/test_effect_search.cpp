@@ -315,14 +315,16 @@ TEST(EffectSearch, ACoupledMachineHasNoComplianceThatTheUnseenRecordContradicts)
 
 TEST(EffectSearch, RefusesRecordsThatCannotTell) {
   const model::Rig rig = test::servo_file().rig;
-  const record::Record record = simulation::simulate_record(rig, test::servo_run(11), 3);
-  EXPECT_THROW(trace_residual(rig, {}, record), CannotIdentify);
+  const record::Record record = simulation::simulate_record(rig, test::servo_run(11), 3),
+                       unseen = simulation::simulate_record(rig, test::servo_run(12), 3);
+  EXPECT_THROW(trace_residual(rig, {}, unseen), CannotIdentify);
+  EXPECT_THROW(trace_residual(rig, {unseen, record}, record), CannotIdentify);  // it is not unseen
   record::Record without_load = record;
   without_load.column(record::Channel::load_position).clear();
-  EXPECT_THROW(trace_residual(rig, {without_load}, record), CannotIdentify);
+  EXPECT_THROW(trace_residual(rig, {without_load}, unseen), CannotIdentify);
   record::Record standing = record;
   for (double& position : standing.column(record::Channel::load_position)) position = 0.1;
-  EXPECT_THROW(trace_residual(rig, {standing}, record), CannotIdentify);
+  EXPECT_THROW(trace_residual(rig, {standing}, unseen), CannotIdentify);
   simulation::SimulationSettings faster = test::servo_run(11);
   faster.sensors.sampling_rate = 2000;
   EXPECT_THROW(trace_residual(rig, {record}, simulation::simulate_record(rig, faster, 3)), CannotIdentify);
@@ -330,9 +332,12 @@ TEST(EffectSearch, RefusesRecordsThatCannotTell) {
 
 TEST(EffectSearch, CanBeStopped) {
   const model::Rig rig = test::servo_file().rig;
-  const record::Record record = simulation::simulate_record(rig, test::servo_run(11), 3);
-  EXPECT_THROW(trace_residual(rig, {record}, record, {}, [](double, const std::string&) { return false; }),
-               Cancelled);
+  const auto record = [&](std::uint64_t seed) {
+    return simulation::simulate_record(rig, test::servo_run(seed), 3);
+  };
+  EXPECT_THROW(
+      trace_residual(rig, {record(11)}, record(12), {}, [](double, const std::string&) { return false; }),
+      Cancelled);
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/progress.h"
 #include "backlash_diagnosis/identification/fit/output_error.h"
+#include "backlash_diagnosis/identification/several_machines.h"
 #include "backlash_diagnosis/record/record.h"
 
 namespace backlash::identification {
@@ -132,6 +133,7 @@ struct Trace {
   std::vector<FoundEffect> steps;
   std::vector<RejectedEffect> rejected;  // each effect once
   std::optional<Unexplained> unexplained;
+  std::optional<SeveralMachines> several;  // where something is unexplained: why
   std::vector<std::string> notes;  // what was added to the model and is too small to be called missing
   std::vector<std::string> warnings;
   TraceSeries series;

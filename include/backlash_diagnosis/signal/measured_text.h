@@ -6,13 +6,16 @@
 
 #include "backlash_diagnosis/signal/measured.h"
 
-namespace backlash::findings {
+namespace backlash::signal {
 
 struct ValueText {
   std::string value;  // as many digits as the error leaves
   std::string error;  // two digits; empty: not known, or 0
 };
 
-ValueText value_text(const signal::Measured& m);
+ValueText value_text(const Measured& m);
 
-}  // namespace backlash::findings
+/// "1.234 +- 0.056"; the value alone where the error is not known, or 0.
+std::string with_error(const Measured& m);
+
+}  // namespace backlash::signal
