@@ -57,6 +57,14 @@ std::optional<SeveralMachines> several_machines(std::vector<RecordAlone> records
   return found;
 }
 
+void allow_for_several(const SeveralMachines& several, std::map<std::string, signal::Measured>& parameters) {
+  for (auto& [name, measured] : parameters)
+    for (const RecordAlone& r : several.records)
+      if (const auto at = r.values.find(name); at != r.values.end())
+        measured.standard_error =
+            std::max(measured.standard_error, std::fabs(at->second.value - measured.value));
+}
+
 std::string description(const SeveralMachines& several, const std::map<std::string, std::string>& units,
                         bool linear) {
   double left = 0;

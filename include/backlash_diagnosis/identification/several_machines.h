@@ -40,6 +40,9 @@ bool is_met(double left, double together, const SeveralSettings& settings = {});
 std::optional<SeveralMachines> several_machines(std::vector<RecordAlone> records, double together,
                                                 const SeveralSettings& settings = {});
 
+/// Widens the errors of values that stand for all of them: as unsure as theirs are apart.
+void allow_for_several(const SeveralMachines& several, std::map<std::string, signal::Measured>& parameters);
+
 /// In one or two sentences, without the last full stop. `units` as in the rig file; `linear`: of an axis.
 std::string description(const SeveralMachines& several, const std::map<std::string, std::string>& units,
                         bool linear);

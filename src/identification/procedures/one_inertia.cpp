@@ -17,6 +17,7 @@
 #include "backlash_diagnosis/signal/distributions.h"
 #include "backlash_diagnosis/signal/least_squares.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
+#include "backlash_diagnosis/signal/weighted_mean.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "missing_effects.h"
 
@@ -302,7 +303,7 @@ OneInertia identify_one_inertia(const record::Record& recorded, const OneInertia
   return out;
 }
 
-double relative_error(const OneInertia& machine, const record::Record& recorded) {
+OneInertia applied(const OneInertia& machine, const record::Record& recorded) {
   require_channels(recorded);
   const record::Record record = record::evenly_sampled(recorded);
   const Signals s = prepare(record, machine.cutoff);
@@ -311,8 +312,34 @@ double relative_error(const OneInertia& machine, const record::Record& recorded)
       picked(low_pass_sliding(s, signal::delayed(s.torque, machine.delay.value / s.interval)), s.used);
   const Eigen::Vector4d p(machine.inertia.value, machine.viscous.value, machine.coulomb.value,
                           machine.offset.value);
-  const Eigen::VectorXd residual = torque - picked(s.columns, s.used) * p;
-  return std::sqrt(residual.squaredNorm() / double(residual.size())) / spread(torque);
+  const Eigen::VectorXd predicted = picked(s.columns, s.used) * p;
+  OneInertia out = machine;
+  out.used = double(s.used.size()) / double(s.time.size());
+  out.relative_error = std::sqrt((torque - predicted).squaredNorm() / double(torque.size())) / spread(torque);
+  out.floor = floor_of(record, s, machine.inertia.value, spread(torque));
+  out.time.clear();
+  for (const auto k : s.used) out.time.push_back(s.time[k]);
+  out.measured.assign(torque.begin(), torque.end());
+  out.predicted.assign(predicted.begin(), predicted.end());
+  return out;
+}
+
+OneInertia combined(const std::vector<OneInertia>& machines) {
+  OneInertia all = machines.front();
+  const bool drawn = std::any_of(machines.begin(), machines.end(),
+                                 [](const OneInertia& m) { return m.relative_error > kMisfit * m.floor; });
+  for (signal::Measured OneInertia::*parameter :
+       {&OneInertia::inertia, &OneInertia::viscous, &OneInertia::coulomb, &OneInertia::offset}) {
+    std::vector<signal::Measured> values;
+    double least = std::numeric_limits<double>::infinity();
+    for (const OneInertia& m : machines) {
+      values.push_back(m.*parameter);
+      least = std::min(least, (m.*parameter).standard_error);
+    }
+    all.*parameter = signal::weighted_mean(values);
+    if (drawn) (all.*parameter).standard_error = std::max((all.*parameter).standard_error, least);
+  }
+  return all;
 }
 
 }  // namespace backlash::identification

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/model/gear_train.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
-#include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/weighted_mean.h"
 #include "procedures.h"
 
 namespace backlash::identification {
@@ -56,18 +56,11 @@ const Quantity kQuantities[] = {{"motor_inertia", &LockedOutput::inertia, true},
 /// Mean by the errors, which grow where the records contradict each other.
 signal::Measured combined(const std::vector<LockedOutput>& found, const Quantity& q,
                           std::vector<std::string>& contradicted) {
-  double weights = 0, sum = 0, chi2 = 0;
-  for (const LockedOutput& f : found) {
-    const double weight = std::pow((f.*q.at).standard_error, -2);
-    weights += weight;
-    sum += weight * (f.*q.at).value;
-  }
-  const double mean = sum / weights, free = double(found.size()) - 1;
-  for (const LockedOutput& f : found)
-    chi2 += std::pow(((f.*q.at).value - mean) / (f.*q.at).standard_error, 2);
-  if (free == 0) return {mean, 1 / std::sqrt(weights)};
-  if (q.common && 1 - signal::chi_square_probability(chi2, free) < kAgree) contradicted.emplace_back(q.name);
-  return {mean, std::sqrt(std::max(1.0, chi2 / free) / weights)};
+  std::vector<signal::Measured> values;
+  for (const LockedOutput& f : found) values.push_back(f.*q.at);
+  const signal::WeightedMean mean = signal::weighted_mean(values);
+  if (q.common && mean.chance < kAgree) contradicted.emplace_back(q.name);
+  return mean;
 }
 
 /// Stiffness of the teeth from that of teeth and coupling in series.

@@ -2,10 +2,12 @@
 // The one procedure for a machine of one inertia.
 #include <fmt/core.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
+#include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
@@ -53,36 +55,63 @@ void require_possible(const OneInertia& found, const std::string& record) {
   if (least.value < -by_noise * least.standard_error) refuse("coulomb friction of the one direction", least);
 }
 
-}  // namespace
+/// A record, and the machine that it tells by itself.
+struct Told {
+  const record::Record* record;
+  OneInertia machine;
+};
 
-ProcedureReport run_one_inertia(IdentificationCase& c) {
-  ProcedureReport report{"one_inertia", {}, ""};
-  if (c.records.size() != 1)
-    c.result.warnings.emplace_back("a machine of one inertia is fitted to the first record that allows it");
-  std::string reasons;
+/// All records that tell one; what is left out is a warning. Throws CannotIdentify where none does.
+std::vector<Told> told_by_each(IdentificationCase& c) {
+  std::vector<Told> all;
+  std::vector<std::string> reasons;
   for (const CaseRecord& r : c.records) {
     try {
-      c.result.one_inertia = identify_one_inertia(r.record);
+      all.push_back({&r.record, identify_one_inertia(r.record)});
+      require_possible(all.back().machine, r.record.name);
     } catch (const CannotIdentify& error) {
-      reasons += (reasons.empty() ? "" : "; ") + r.record.name + ": " + error.what();
-      continue;
+      if (!all.empty() && all.back().record == &r.record) all.pop_back();
+      reasons.emplace_back(error.what());
     }
-    report.records = {r.record.name};
-    c.result.torque = {trace_of(*c.result.one_inertia, r.record)};
-    break;
   }
-  if (!c.result.one_inertia) throw CannotIdentify(reasons);
-  const OneInertia& found = *c.result.one_inertia;
-  require_possible(found, report.records.front());
-  c.result.parameters = {{"inertia", found.inertia},
-                         {"viscous", found.viscous},
-                         {"coulomb", found.coulomb},
-                         {"offset", found.offset}};
-  for (const rig_file::RigParameter& p : rig_file::servo_parameters())
-    if (!p.one_inertia.empty()) c.result.units[p.one_inertia] = model::axis_unit(p.unit, c.declared.linear);
-  c.result.channels["torque"] = {found.relative_error, found.floor};
-  c.result.delay = found.delay;
-  c.result.warnings.insert(c.result.warnings.end(), found.warnings.begin(), found.warnings.end());
+  if (all.empty()) throw CannotIdentify(joined(reasons));
+  for (const std::string& reason : reasons) c.result.warnings.push_back("not used: " + reason);
+  for (const Told& t : all)
+    for (const std::string& warning : t.machine.warnings)
+      c.result.warnings.push_back(all.size() == 1 ? warning : t.record->name + ": " + warning);
+  return all;
+}
+
+std::map<std::string, signal::Measured> parameters_of(const OneInertia& machine) {
+  return {{"inertia", machine.inertia},
+          {"viscous", machine.viscous},
+          {"coulomb", machine.coulomb},
+          {"offset", machine.offset}};
+}
+
+/// Relative, over all records: norms add up.
+ChannelError error_of(const std::vector<OneInertia>& applied) {
+  double left = 0, noise = 0, all = 0;
+  for (const OneInertia& m : applied) {
+    const Eigen::Map<const Eigen::ArrayXd> torque(m.measured.data(), Eigen::Index(m.measured.size()));
+    const double square = (torque - torque.mean()).square().sum();
+    left += m.relative_error * m.relative_error * square;
+    noise += m.floor * m.floor * square;
+    all += square;
+  }
+  return {std::sqrt(left / all), std::sqrt(noise / all)};
+}
+
+/// Whether each record alone is met, with other values.
+std::optional<SeveralMachines> contradicting(const std::vector<Told>& told, const ChannelError& together) {
+  std::vector<RecordAlone> alone;
+  for (const Told& t : told)
+    alone.push_back({t.record->name, parameters_of(t.machine), t.machine.relative_error / t.machine.floor});
+  return several_machines(std::move(alone), together.error / together.floor);
+}
+
+/// The values of the rig that one inertia has.
+void take_machine(const OneInertia& found, IdentificationCase& c) {
   model::Body& body = c.result.rig.motor;
   body.inertia =
       found.inertia.value - c.declared.pinion.inertia - c.declared.gear.inertia - c.declared.link.inertia;
@@ -90,8 +119,35 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
   body.viscous_asymmetry = 0;
   body.coulomb_friction = std::max(0.0, found.coulomb.value);
   body.coulomb_asymmetry = std::clamp(found.offset.value, -body.coulomb_friction, body.coulomb_friction);
+}
+
+}  // namespace
+
+ProcedureReport run_one_inertia(IdentificationCase& c) {
+  ProcedureReport report{"one_inertia", {}, ""};
+  const std::vector<Told> told = told_by_each(c);
+  std::vector<OneInertia> alone, together;
+  for (const Told& t : told) alone.push_back(t.machine);
+  const OneInertia found = combined(alone);
+  for (const Told& t : told) {
+    OneInertia machine = found;
+    machine.cutoff = t.machine.cutoff;
+    machine.delay = t.machine.delay;
+    together.push_back(applied(machine, *t.record));
+    report.records.push_back(t.record->name);
+    c.result.torque.push_back(trace_of(together.back(), *t.record));
+  }
+  c.result.one_inertia = found;
+  c.result.parameters = parameters_of(found);
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters())
+    if (!p.one_inertia.empty()) c.result.units[p.one_inertia] = model::axis_unit(p.unit, c.declared.linear);
+  const ChannelError error = c.result.channels["torque"] = error_of(together);
+  c.result.delay = found.delay;
+  c.result.several = contradicting(told, error);
+  if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
+  take_machine(found, c);
   report.message = fmt::format("torque error {:.3g} %, low-pass {:.3g} Hz, torque acts {:.3g} ms late",
-                               100 * found.relative_error, found.cutoff, 1e3 * found.delay.value);
+                               100 * error.error, found.cutoff, 1e3 * found.delay.value);
   return report;
 }
 

@@ -127,15 +127,6 @@ std::optional<SeveralMachines> contradicting(const IdentificationCase& c, const 
   return several_machines(std::move(alone), together);
 }
 
-/// One value for machines that differ: as unsure as theirs are apart.
-void allow_for_several(const SeveralMachines& several, std::map<std::string, signal::Measured>& parameters) {
-  for (auto& [name, measured] : parameters)
-    for (const RecordAlone& r : several.records)
-      if (const auto at = r.values.find(name); at != r.values.end())
-        measured.standard_error =
-            std::max(measured.standard_error, std::fabs(at->second.value - measured.value));
-}
-
 /// Two flanks that the zero of both encoders lies between.
 double start_in_gap(const model::Rig& rig, double encoder_offset) {
   const double half = 0.5 * rig.mesh.backlash / rig.mesh.lever();

@@ -230,10 +230,22 @@ TEST(OneInertia, EmpsAsPublished) {
   EXPECT_NEAR(m.offset.value, -3.2, 0.01 * 3.2);
   // A least-squares prototype had 0.0365 and 0.0435 (of the norm with mean); 5 % for another cutoff.
   EXPECT_LT(m.relative_error, 0.0365 * 1.05);
-  EXPECT_LT(relative_error(m, record::read_csv(*validation)), 0.0435 * 1.05);
+  EXPECT_LT(applied(m, record::read_csv(*validation)).relative_error, 0.0435 * 1.05);
   EXPECT_LT(m.floor, 0.1 * m.relative_error);
   EXPECT_GT(m.delay.value, 0);
   EXPECT_LT(m.delay.value, 1e-3);
+}
+
+TEST(OneInertia, WhatDrawsAllRecordsAlikeIsNoSmallerInTheirMean) {
+  const auto machine = [](double error, double left) {
+    OneInertia m;
+    m.inertia = m.viscous = m.coulomb = m.offset = {10, error};
+    m.relative_error = left;
+    m.floor = 1;
+    return m;
+  };
+  EXPECT_DOUBLE_EQ(combined({machine(1, 1), machine(0.5, 1)}).coulomb.standard_error, 1 / std::sqrt(5));
+  EXPECT_DOUBLE_EQ(combined({machine(1, 2), machine(0.5, 2)}).coulomb.standard_error, 0.5);
 }
 
 TEST(OneInertia, TheTwoEmpsRecordsAgreeWithinTheirErrors) {

@@ -50,9 +50,13 @@ struct OneInertia {
 /// beyond 0.4 of the sampling rate or a delay beyond two intervals.
 OneInertia identify_one_inertia(const record::Record& record, const OneInertiaOptions& options = {});
 
-/// Relative error with which the identified machine predicts another record, at its own cutoff and delay,
-/// over all samples of that record that identify_one_inertia would use. Throws as above, but needs no second
-/// direction.
-double relative_error(const OneInertia& machine, const record::Record& record);
+/// What a machine says of a record, by its own parameters, cutoff and delay: errors, and the samples that
+/// identify_one_inertia would use. Throws as that, but needs no second direction.
+OneInertia applied(const OneInertia& machine, const record::Record& record);
+
+/// The machine of several records: of each parameter signal::weighted_mean(), with an error no smaller than
+/// the smallest of them where an effect that the equation lacks may draw all alike (more than 1.5 times the
+/// noise is left). Delay, cutoff and samples are those of the first.
+OneInertia combined(const std::vector<OneInertia>& machines);
 
 }  // namespace backlash::identification
