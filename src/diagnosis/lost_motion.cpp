@@ -17,6 +17,7 @@
 #include "backlash_diagnosis/diagnosis/wall_to_wall.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
+#include "same_throughout.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -189,10 +190,11 @@ void require_calm_sensor(const LockedMotion& motion, const Walls& walls, const W
   const double period = detect_period(motion.time, motion.torque).value_or(0);
   const double cycles = period > 0 ? 2 * (motion.time.back() - motion.time.front()) / period : 0;
   const bool too_many = cycles > 0 && double(walls.excursions.size()) > kManyExcursions * cycles + 1;
-  if (!too_many && double(play.outliers) <= kManyOutliers * double(play.passages)) return;
+  if (!too_many && double(play.outliers) <= kManyOutliers * double(play.plays.size())) return;
   throw Refusal{Status::out_of_domain,
                 "sensor_torque rings where the walls are read (" + std::to_string(walls.excursions.size()) +
-                    " excursions, " + std::to_string(play.outliers) + " of " + std::to_string(play.passages) +
+                    " excursions, " + std::to_string(play.outliers) + " of " +
+                    std::to_string(play.plays.size()) +
                     " passages far from the others) and the record has no motor_torque to go by"};
 }
 
@@ -244,7 +246,7 @@ std::string describe(const Walls& walls, const LostMotionSettings& settings, con
                             ? fmt::format("free play without elastic deflection, read at {:.4g} N m",
                                           median_of(walls.readings, &WallReading::torque))
                             : fmt::format("play from wall to wall at +-{:.4g} N m", walls.level);
-  message += ", median of " + std::to_string(play.passages) + " passages";
+  message += ", median of " + std::to_string(play.plays.size()) + " passages";
   if (play.outliers > 0) {
     message += ", " + std::to_string(play.outliers) +
                " of them far from the others (slips), the interval is wider for it";
@@ -285,6 +287,7 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
                               "declares: the rig is not this machine, or the motor did not reach both walls",
                               play.travel)};
   }
+  require_same_throughout(play.plays, half);
   estimate.status = Status::ok;
   // Friction on the flanks carries up to as much torque again to the walls.
   if (!settings.subtract_elastic_deflection && settings.elastic_deflection)

@@ -15,6 +15,7 @@
 #include "momentum_flank.h"
 #include "momentum_square_wave.h"
 #include "refusal.h"
+#include "same_throughout.h"
 
 namespace backlash::diagnosis {
 namespace momentum {
@@ -205,6 +206,7 @@ void fill(const record::Record& record, MomentumTransferSettings s, Estimate& es
   const Travels travels = travels_of(motor, flank, free_crossings(flank, shortness), shortness, s);
   const signal::RobustScale scale = signal::robust_scale(travels.gap, 0);
   const double half = half_width(travels, scale, motor, flank, s);
+  require_same_throughout(travels.gap, half);
   require_sense(scale.centre - half, scale.centre + half, s);
   estimate.angle_lower = std::max(0.0, scale.centre - half);
   estimate.angle_upper = scale.centre + half;

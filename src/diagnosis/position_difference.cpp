@@ -198,6 +198,7 @@ void require_steady(const TwoEncoders& motion, double inertia) {
 
 struct Fits {
   FlankFit fit, longer;
+  std::size_t half;  // samples, of the windows of `fit`
 };
 
 /// The shortest window that noise does not spoil, and the next.
@@ -208,8 +209,8 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
     half *= 2;
     FlankFit longer = fit_flanks(average_windows(motion, half), model);
     const bool noisy = longer.found && (!fit.found || fit.residual > kNoiseFalls * longer.residual);
-    if (!noisy && (fit.found || half >= kLongestWindow)) return {fit, longer};
-    if (2 * half > kLongestWindow) return {noisy ? longer : fit, longer};
+    if (!noisy && (fit.found || half >= kLongestWindow)) return {fit, longer, half / 2};
+    if (2 * half > kLongestWindow) return noisy ? Fits{longer, longer, half} : Fits{fit, longer, half / 2};
     fit = longer;
   }
 }
@@ -341,6 +342,11 @@ Answer read_locked(const TwoEncoders& motion, const FlankModel& model,
                    const PositionDifferenceSettings& settings) {
   const Fits fits = fit_record(motion, model);
   require_sound(fits.fit);
+  FlankReading whole;
+  whole.windows = average_windows(motion, fits.half);
+  whole.model = model;
+  whole.fit = fits.fit;
+  require_constant(whole);
   const double windows = fits.longer.found ? std::abs(fits.longer.gap - fits.fit.gap) : 0;
   const double unexplained = std::hypot(kLockedResidual * fits.fit.residual, kBounce * fits.fit.gap);
   const double half = std::hypot(std::hypot(scatter_of(fits.fit), windows),

@@ -94,13 +94,13 @@ WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<Wa
   result.ringing = median_of(readings, &WallReading::ringing);
   result.motion =
       std::hypot(kSettling * extrapolation, (switched ? kSwitchedRinging : kRampedRinging) * result.ringing);
-  result.passages = plays.size();
   result.outliers = scale.outliers;
   // Neighbouring passages share a wall, so n walls make n/2 independent passages; a median scatters 1.25
   // times as much as a mean; two walls and the drift are fitted.
   const double n = static_cast<double>(readings.size());
   const double standard_error = 1.25 * scale.deviation * std::sqrt(2 / n);
   result.scatter = signal::student_t_quantile(0.975, std::max(1.0, n - 3)) * standard_error;
+  result.plays = std::move(plays);
   return result;
 }
 

@@ -313,6 +313,44 @@ TEST(RigEstimators, CoherenceFallsWithTheGap) {
       diagnosis::Status::out_of_domain);
 }
 
+/// Two runs of the demo's rig, one after the other.
+record::Record of_two_plays(double first, double then, double rate) {
+  rig_file::RigFile file = rig_file::default_rig_file();
+  file.simulation.sensors.sampling_rate = rate;
+  record::Record all;
+  for (const double backlash : {first, then}) {
+    file.rig.mesh.backlash = backlash;
+    ++file.simulation.sensors.seed;
+    const record::Record run = simulation::simulate_record(file.rig, file.simulation, 2);
+    if (all.size() == 0) {
+      all = run;
+      continue;
+    }
+    for (const double t : run.time) all.time.push_back(2 + t);
+    for (const record::Channel channel : record::kChannels)
+      all.column(channel).insert(all.column(channel).end(), run.column(channel).begin(),
+                                 run.column(channel).end());
+  }
+  return all;
+}
+
+// No interval may leave out what a part of the record has.
+TEST(RigEstimators, APlayThatStepsWithinTheRecordIsNone) {
+  for (const double then : {40e-6, 160e-6}) {
+    const record::Record record = of_two_plays(80e-6, then, 5000);
+    const diagnosis::Diagnosis d =
+        diagnosis::diagnose(record, rig_file::default_rig_file().diagnosis, nullptr);
+    int refused = 0;
+    for (const diagnosis::Estimate& e : d.estimates) {
+      refused += e.message.find("the play is not the same throughout the record") == 0;
+      if (e.status != diagnosis::Status::ok) continue;
+      EXPECT_LE(e.lower, std::min(80e-6, then)) << e.method << ": " << e.message;
+      EXPECT_GE(e.upper, std::max(80e-6, then)) << e.method << ": " << e.message;
+    }
+    EXPECT_EQ(refused, 3) << then;  // lost_motion, position_difference, momentum_transfer
+  }
+}
+
 /// What position_difference says of a machine that differs from the declared one as far as its file allows.
 diagnosis::Estimate of_softer_servo(const rig_file::RigFile& declared, double gap, bool square_wave) {
   std::string softer = declared.text;

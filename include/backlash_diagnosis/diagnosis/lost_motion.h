@@ -66,7 +66,8 @@ struct LostMotionSettings {
 ///   out_of_domain      torque does not reach the level on both sides; torque jumps past the level and no
 ///                      elastic_deflection is given; output moves; motor does not come to rest at the walls;
 ///                      travel negative or smaller than the elastic deflection by more than the interval;
-///                      only sensor_torque is recorded and it rings where the walls are read
+///                      only sensor_torque is recorded and it rings where the walls are read; the play steps
+///                      or grows within the record
 /// `components` (angles at the axis of motor_position) come from the hysteresis loop, see hysteresis_loop.h;
 /// where torque is switched, gap is the play without elastic_deflection, compliance and coulomb are NaN and
 /// message says why.

@@ -28,7 +28,8 @@ struct WallToWall {
   double motion = 0;   ///< the same by ringing and settling
   double ringing = 0;  ///< rms of the position at one wall
   double step = 0;     ///< resolution of the position: the smallest change between two samples
-  std::size_t passages = 0, outliers = 0;
+  std::vector<double> plays;  ///< of each passage, in the order of time, without extrapolation
+  std::size_t outliers = 0;
 
   /// All three sources together.
   double half_interval() const;
