@@ -22,12 +22,12 @@ double drift_rate(const std::vector<WallReading>& readings);
 
 /// All in rad; equations in lost_motion.h.
 struct WallToWall {
-  double value = 0;    ///< travel less the deflections of both walls, extrapolated where switched
-  double travel = 0;   ///< median travel as measured
-  double scatter = 0;  ///< half width of the 95 % interval by the scatter between passages
-  double motion = 0;   ///< the same by ringing and settling
-  double ringing = 0;  ///< rms of the position at one wall
-  double step = 0;     ///< resolution of the position: the smallest change between two samples
+  double value = 0;           ///< travel less the deflections of both walls, extrapolated where switched
+  double travel = 0;          ///< median travel as measured
+  double scatter = 0;         ///< half width of the 95 % interval by the scatter between passages
+  double motion = 0;          ///< the same by ringing and settling
+  double ringing = 0;         ///< rms of the position at one wall
+  double step = 0;            ///< resolution of the position: the smallest change between two samples
   std::vector<double> plays;  ///< of each passage, in the order of time, without extrapolation
   std::size_t outliers = 0;
 
