@@ -45,6 +45,7 @@ void note_shape_of_friction(const Hypothesis& h, double least, Trace& trace) {
 }
 
 struct Records {
+  std::vector<std::string> names;  // of the training records, then of the test record
   std::vector<ServoData> train;
   ServoData test;
 };
@@ -65,7 +66,11 @@ Records records_of(const model::Rig& rig, const std::vector<record::Record>& tra
   if (train.empty()) throw CannotIdentify("no training record");
   require_unseen(train, test);
   Records records;
-  for (const record::Record& record : train) records.train.push_back(traced_data(record, rig));
+  for (const record::Record& record : train) {
+    records.names.push_back(record.name);
+    records.train.push_back(traced_data(record, rig));
+  }
+  records.names.push_back(test.name);
   double torque = 0;  // what the model says of the test record knows nothing of that record's torque
   for (const ServoData& data : records.train) torque = std::max(torque, usual_torque(data.torque));
   records.test = traced_data(test, rig, torque);
@@ -219,11 +224,16 @@ double most_left(const Trace& trace, const Hypothesis& found) {
   return most;
 }
 
-std::vector<std::string> names_of(const std::vector<record::Record>& train, const record::Record& test) {
-  std::vector<std::string> names;
-  for (const record::Record& record : train) names.push_back(record.name);
-  names.push_back(test.name);
-  return names;
+/// Whether that is unexplained for the records contradict each other.
+std::optional<SeveralMachines> several_of(const model::Rig& declared, const Records& records,
+                                          const SearchSettings& settings, double left,
+                                          const Progress& progress) {
+  const auto tell = [&](const std::string&) {
+    if (progress && !progress(1, "fit of each record by itself")) throw Cancelled();
+  };
+  return contradicting_records(
+      declared, records.names, records.test, left,
+      {records.train, motion_range(records.train), settings, tell, [](const auto&) {}});
 }
 
 }  // namespace
@@ -264,14 +274,8 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
         declared, asked,
         fmt::format("{:.0f} % of how the {} of the test record varies is noise",
                     100 * trace.channels.at("torque").floor, declared.linear ? "force" : "torque"));
-  if (trace.unexplained) {
-    const auto tell = [&](const std::string&) {
-      if (progress && !progress(1, "fit of each record by itself")) throw Cancelled();
-    };
-    trace.several = contradicting_records(
-        declared, names_of(train, test), records.test, most_left(trace, found),
-        {records.train, motion_range(records.train), settings, tell, [](const auto&) {}});
-  }
+  if (trace.unexplained)
+    trace.several = several_of(declared, records, settings, most_left(trace, found), progress);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
   return trace;
 }
