@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "backlash_diagnosis/arm/friction_speed.h"
+#include "backlash_diagnosis/arm/fit_records.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "fit_model.h"
@@ -82,6 +82,10 @@ class Tracer {
   Candidate unnamed_;  // what foretells the test record best where nothing is named
   ArmTrace trace_;
 };
+
+void require_one_arm(const ArmFit& fit) {
+  if (!fit.contradictions.empty()) throw CannotIdentify(description(fit.contradictions));
+}
 
 void Tracer::set_base() {
   if (rig_.fitted)
@@ -360,11 +364,13 @@ void Tracer::search_all(bool same_record) {
 ArmTrace Tracer::run(const std::vector<ArmRecord>& train, const ArmRecord& test, bool same_record) {
   trace_.joints = rig_.joint_names();
   tell(0, "reading the motion");
-  for (const ArmRecord& record : train)
-    for (ArmMotion& m : motions_of(record, rig_, trace_.warnings)) train_.push_back(std::move(m));
+  std::vector<RecordMotions> records;
+  for (const ArmRecord& record : train) records.push_back(motions_of(record, rig_, trace_.warnings));
+  for (const RecordMotions& record : records) train_.insert(train_.end(), record.begin(), record.end());
   test_ = motions_of(test, rig_, trace_.warnings);
   tell(0.1, "fitting the base machine");
   try {
+    if (!rig_.fitted) require_one_arm(fit_records(rig_, records, settings_.fit));
     set_base();
   } catch (const CannotIdentify& error) {
     trace_.augmented = rig_;

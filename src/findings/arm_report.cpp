@@ -49,6 +49,17 @@ std::vector<NamedValue> drive_values(const arm::ArmFit& fit) {
   return all;
 }
 
+/// Null where the records are of one arm.
+report::Json contradictions_json(const std::vector<arm::Contradiction>& all) {
+  if (all.empty()) return nullptr;
+  report::Json json = {{"joints", report::Json::array()}};
+  for (const arm::Contradiction& c : all)
+    json["joints"].push_back({{"joint", c.joint},
+                              {"alone", report::json_number(c.alone)},
+                              {"together", report::json_number(c.together)}});
+  return json;
+}
+
 report::Json body_json(const arm::BodyParameters& parameters) {
   const arm::Body b = arm::body_of(parameters);
   return {{"mass", b.mass},
@@ -80,6 +91,7 @@ std::string arm_identification_json(const arm::ArmFit& fit, const std::string& r
   for (std::size_t j = 0; j < fit.rig.joints.size(); ++j)
     json["channels"][torque_channel(fit.rig.joints[j].name)] = {{"train", report::json_number(fit.train[j])},
                                                                 {"floor", report::json_number(fit.floor[j])}};
+  json["several_machines"] = contradictions_json(fit.contradictions);
   json["common_scale"] = {{"uncertainty", fit.rig.common_error}};
   for (std::size_t i = 0; i < fit.rig.chain.size(); ++i)
     json["links"][fit.rig.chain.joints[i].link] = body_json(fit.rig.chain.links[i]);

@@ -2,10 +2,11 @@
 // Oracle: machines whose torques KDL computes.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <iostream>
 
 #include "arm_machines.h"
-#include "backlash_diagnosis/arm/fit.h"
+#include "backlash_diagnosis/arm/fit_records.h"
 #include "backlash_diagnosis/arm/trace.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
@@ -301,6 +302,39 @@ TEST_P(JointEffects, AreNamed) {
   const ArmTrace trace = trace_arm(healthy.declared, train, machine.record(3), false);
   expect_named(trace, c);
   EXPECT_EQ(trace.notes.size(), c.when == When::always ? 0u : 1u);  // the training does not have it
+}
+
+TEST(FitRecords, ABodyInOneOfThemContradictsTheOthers) {
+  const test::Machine machine(7);
+  test::Machine loaded(7);
+  Body body;
+  body.mass = 3;
+  body.centre = {0, 0, 0.1};
+  loaded.chain.links.back() += parameters_of(body);
+  std::vector<std::string> warnings;
+  const auto records = [&](const test::Machine& second) {
+    return std::vector<RecordMotions>{motions_of(machine.record(1), machine.declared, warnings),
+                                      motions_of(second.record(2), machine.declared, warnings)};
+  };
+  const ArmFit same = fit_records(machine.declared, records(machine));
+  EXPECT_TRUE(same.contradictions.empty()) << description(same.contradictions);
+  const ArmFit fit = fit_records(machine.declared, records(loaded));
+  std::vector<std::string> joints;
+  for (const Contradiction& c : fit.contradictions) joints.push_back(c.joint);
+  for (const std::size_t j : {1, 2})  // which lift it
+    EXPECT_NE(std::find(joints.begin(), joints.end(), machine.declared.joints[j].name), joints.end());
+  EXPECT_NE(fit.warnings.back().find("The records contradict each other"), std::string::npos);
+  for (std::size_t j = 0; j < 6; ++j)
+    for (const DriveTerm term : {DriveTerm::coulomb, DriveTerm::offset}) {
+      const signal::Measured &wide = fit.drives[j][std::size_t(term)],
+                             &own = same.drives[j][std::size_t(term)];
+      EXPECT_NEAR(wide.value, own.value, 2 * wide.standard_error + 4 * own.standard_error) << j;
+    }
+  const ArmTrace trace =
+      trace_arm(machine.declared, {machine.record(1), loaded.record(2)}, machine.record(3), false);
+  EXPECT_TRUE(trace.cannot_tell);
+  EXPECT_TRUE(trace.steps.empty());
+  EXPECT_NE(trace.judged.find("records contradict each other"), std::string::npos) << trace.judged;
 }
 
 // With the effect in the rig file nothing is missing any more, on records that nobody has seen.

@@ -45,6 +45,28 @@ TEST_F(Arm, ForetellsATrajectoryThatItHasNotSeen) {
   }
 }
 
+TEST_F(Arm, RecordsWithAndWithoutABodyContradictEachOther) {
+  const Outcome outcome =
+      run("identify free.csv payload.csv --rig rig/ur5_arm.yaml --out f.yaml --json f.json");
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  expect_contains(outcome.out, "warning: The records contradict each other");
+  const Json both = json("f.json");
+  std::vector<std::string> joints;
+  for (const Json& j : both.at("several_machines").at("joints")) joints.push_back(j.at("joint"));
+  EXPECT_EQ(joints, std::vector<std::string>(kJoints + 1, kJoints + 6));  // the first axis is vertical
+  done("identify free.csv a.csv --rig rig/ur5_arm.yaml --out f.yaml --json one.json");
+  const Json one = json("one.json");
+  EXPECT_TRUE(one.at("several_machines").is_null());
+  // What the arm without the body has lies within the errors.
+  for (const auto& [name, value] : one.at("parameters").items()) {
+    if (!both.at("parameters").contains(name)) continue;
+    const Json& wide = both.at("parameters").at(name);
+    const double error = wide.at("standard_error").is_null() ? 0 : wide.at("standard_error").get<double>(),
+                 own = value.at("standard_error").is_null() ? 0 : value.at("standard_error").get<double>();
+    EXPECT_NEAR(wide.at("value").get<double>(), value.at("value").get<double>(), 2 * error + 4 * own) << name;
+  }
+}
+
 TEST_F(Arm, NamesAPayloadThatNothingDeclares) {
   done("trace_residual --rig rig/ur5_arm.yaml --train free.csv --test payload.csv --out out");
   const Json report = json("out/report.json");

@@ -83,6 +83,12 @@ struct FittedEffect {
   double middle = 0, spread = 0;  // rad, of its joint's position: mean and standard deviation
 };
 
+/// A joint whose records are not of one arm: relative errors, see fit_records.h.
+struct Contradiction {
+  std::string joint;
+  double alone = 0, together = 0;
+};
+
 struct ArmFit {
   ArmRig rig;  // with fitted values; payload and tilt are not in its chain, free effects not in its joints
   BodyParameters payload = BodyParameters::Zero();  // times the sign
@@ -96,6 +102,7 @@ struct ArmFit {
   std::vector<double> deviation;     // sigma_j, unit of the channel; NaN for a joint that does not move
   std::vector<double> train, floor;  // per joint: norm(r) / norm(s - mean(s)); what white noise would leave
   Eigen::MatrixXd covariance;        // of all unknowns, in the order of the fit; empty: nothing was fitted
+  std::vector<Contradiction> contradictions;  // fit_records() alone looks for them
   std::vector<std::string> warnings;
 };
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <iostream>
 
-#include "backlash_diagnosis/arm/friction_speed.h"
+#include "backlash_diagnosis/arm/fit_records.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
 #include "backlash_diagnosis/findings/arm_report.h"
@@ -94,22 +94,22 @@ arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) 
 }
 
 int identify_arm(const Arguments& arguments) {
-  arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
-  std::vector<arm::ArmMotion> motions;
+  const arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
+  std::vector<arm::RecordMotions> records;
   std::vector<std::string> warnings;
   for (const std::string& path : arguments.positionals()) {
     const arm::ArmRecord record = read_arm_record(path, rig);
     for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
-    for (arm::ArmMotion& m : arm::motions_of(record, rig, warnings)) motions.push_back(std::move(m));
+    records.push_back(arm::motions_of(record, rig, warnings));
   }
   ProgressBar bar;
-  arm::ArmFit fit = arm::fit_arm_and_friction_speeds(rig, motions, {}, bar.progress());
+  arm::ArmFit fit = arm::fit_records(rig, records, {}, bar.progress());
   fit.warnings.insert(fit.warnings.end(), warnings.begin(), warnings.end());
   write_text(arguments.text("out"), findings::fitted_arm_text(fit, arguments.positionals()));
   write_text(arguments.text("json"),
              findings::arm_identification_json(fit, arguments.text("rig"), arguments.positionals()));
   findings::print_arm_summary(fit, std::cout);
-  return kHealthy;
+  return fit.contradictions.empty() ? kHealthy : kInconclusive;
 }
 
 int trace_arm_residual(const Arguments& arguments) {
