@@ -13,6 +13,7 @@ import plotting  # noqa: E402
 
 plt = plotting.pyplot()
 MEASURED, FITTED = "tab:blue", "tab:red"
+MOST_RECORDS = 4  # of which the fit is drawn
 
 
 def friction(axes, lines):
@@ -119,8 +120,8 @@ def trace(axes, detail, title, unit):
     axes.legend(loc="upper right")
 
 
-def panels(details):
-    drawn = []
+def panels(data):
+    details, drawn = data["details"], []
     if details.get("sensor_calibration", {}).get("traces"):
         drawn.append((calibration, (details["sensor_calibration"],)))
     for key, draw in (("friction_lines", friction), ("line_inertia", inertia), ("frequency_response", response),
@@ -128,9 +129,11 @@ def panels(details):
                       ("gap_map", gap_map)):
         if details.get(key):
             drawn.append((draw, (details[key],)))
-    for key, unit in (("torque", "torque [N m]"), ("deflection", "motor - load [rad]")):
-        for detail in details.get(key, [])[:1]:
-            drawn.append((trace, (detail, key, unit)))
+    linear = data["parameters"].get("coulomb", {}).get("unit") == "N"  # an axis of one inertia
+    torque, unit = ("force", "force [N]") if linear else ("torque", "torque [N m]")
+    for key, title, label in (("torque", torque, unit), ("deflection", "deflection", "motor - load [rad]")):
+        for detail in details.get(key, [])[:MOST_RECORDS]:
+            drawn.append((trace, (detail, title, label)))
     return drawn
 
 
@@ -141,7 +144,7 @@ def main():
     arguments = parser.parse_args()
     data = plotting.load_json(arguments.identification, "an identification")
     try:
-        drawn = panels(data["details"])
+        drawn = panels(data)
         if not drawn:
             plotting.fail(65, "%s: holds nothing to draw" % arguments.identification)
         columns = min(2, len(drawn))
