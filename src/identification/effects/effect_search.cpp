@@ -224,7 +224,7 @@ double most_left(const Trace& trace, const Hypothesis& found) {
   return most;
 }
 
-/// Whether that is unexplained for the records contradict each other.
+/// Why something is unexplained, where the records contradict each other.
 std::optional<SeveralMachines> several_of(const model::Rig& declared, const Records& records,
                                           const SearchSettings& settings, double left,
                                           const Progress& progress) {

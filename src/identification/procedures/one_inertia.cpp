@@ -326,6 +326,7 @@ OneInertia applied(const OneInertia& machine, const record::Record& recorded) {
 
 OneInertia combined(const std::vector<OneInertia>& machines) {
   OneInertia all = machines.front();
+  if (machines.size() == 1) return all;  // whatever its errors, which may be 0 without any noise
   const bool drawn = std::any_of(machines.begin(), machines.end(),
                                  [](const OneInertia& m) { return m.relative_error > kMisfit * m.floor; });
   for (signal::Measured OneInertia::*parameter :
