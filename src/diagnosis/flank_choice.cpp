@@ -30,6 +30,9 @@ constexpr double kSurelyWorse = 3;  // likewise, of one cut: not looked at any f
 constexpr double kTooNoisy = 4;  // what is typical over that of the sharpest cut: not read by any other law
 constexpr double kSharp = 3;     // the same: where laws are told apart
 constexpr double kNotFound = 4;  // mean square over that of the best law, of one that finds no flanks: choice
+constexpr double kLikewiseErrors = 4;  // by which they may differ: choice
+constexpr double kLikewise =
+    2;  // residual over that of the surest cut, of cuts that must tell the same: choice
 constexpr double kOutlying = 5;  // standard deviations, beyond which a window is left by any law: choice
 
 /// One way to cut the record: all windows of one length, by one torque.
@@ -85,6 +88,20 @@ Readings read(const std::vector<Cut>& cuts, const std::vector<char>& worth, cons
     if (!out.surest().found || error < out.error) out.best = k, out.change = change, out.error = error;
   }
   return out;
+}
+
+/// The play by another cut that leaves as little, the one that is farthest away beyond the errors of both;
+/// that of the surest where none is.
+double another_gap(const Readings& readings) {
+  const FlankFit& surest = readings.surest();
+  double gap = surest.gap, farthest = 0;
+  for (const FlankFit& other : readings.fits) {
+    if (!other.found || other.residual > kLikewise * surest.residual) continue;
+    const double beyond =
+        std::abs(other.gap - surest.gap) - kLikewiseErrors * std::hypot(error_of(other), error_of(surest));
+    if (beyond > farthest) farthest = beyond, gap = other.gap;
+  }
+  return gap;
 }
 
 /// u + h u^3 = (1 + h) t.
@@ -258,6 +275,7 @@ FlankReading read_flanks(const TwoEncoders& motion, const FlankModel& model, dou
   const Readings& chosen = laws[best].readings;
   reading.fit = chosen.surest();
   reading.windows_change = chosen.change;
+  reading.another_gap = another_gap(chosen);
   reading.declared_law = best == 0;
   const bool unsure = chosen.error > kSure * chosen.surest().gap;
   const bool noisy = best != 0 && cuts[chosen.best].balanced;

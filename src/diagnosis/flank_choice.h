@@ -19,7 +19,8 @@ constexpr double kResidualShare = 0.3;
 
 struct FlankReading {
   FlankFit fit;
-  double windows_change = 0;      // rad, change of the gap with windows twice (or half) as long
+  double windows_change = 0;  // rad, change of the gap with windows twice (or half) as long
+  double another_gap = 0;     // rad, by windows or a torque that tell another than `fit` beyond the errors
   double least = 0, largest = 0;  // rad, play by any law of the deflection that the record does not rule out
   bool declared_law = true;
   // How it was read.

@@ -217,10 +217,12 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
 
 void require_sound(const FlankFit& fit) {
   if (!fit.found)
-    throw Refusal{Status::out_of_domain,
-                  "torque does not press both flanks, or each in one direction of motion only, where play is "
-                  "not told from the dry friction of the motor, or flanks change within a few samples; loads "
-                  "that drive, or that are braked, would do"};
+    throw Refusal{
+        Status::out_of_domain,
+        "torque does not press both flanks, or each in one direction of motion only, where play is "
+        "not told from the dry friction of the motor, or each in a part of the path of its own, where "
+        "it is not told from errors of the encoders, or flanks change within a few samples; loads "
+        "that drive, or that are braked, and moves over other paths would do"};
   if (fit.stays < kFewestStays)
     throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
                                                  " times, needed are " + std::to_string(kFewestStays)};
@@ -259,7 +261,7 @@ std::vector<FlankFit> told_by_parts(const FlankReading& whole) {
 }
 
 /// Noise of the torque draws the compliance, and with it the play, towards that of no deflection at all. And
-/// a play that is another as soon as windows are longer is none.
+/// a play that is another as soon as windows are longer, or by other windows that leave as little, is none.
 void require_told(const FlankReading& reading) {
   const FlankFit& fit = reading.fit;
   if (!std::isfinite(fit.attenuation) || !std::isfinite(reading.windows_change))
@@ -272,6 +274,11 @@ void require_told(const FlankReading& reading) {
         fmt::format("the play changes by {:.4g} rad with the length of the windows: motion that is too "
                     "slow or too even to tell play from deflection",
                     reading.windows_change)};
+  if (std::abs(reading.another_gap - fit.gap) > kPartChange * fit.gap + kPartErrors * error_of(fit))
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("the play is {:.4g} rad over some windows and {:.4g} rad over others that are "
+                              "told as well: the torque, or the teeth, are not as declared",
+                              fit.gap, reading.another_gap)};
 }
 
 /// An interval as wide as the elastic deflection, or one twice as wide as the play and as a good part of the
