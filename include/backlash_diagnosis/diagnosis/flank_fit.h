@@ -51,8 +51,9 @@ struct FlankModel {
 };
 
 struct FlankFit {
-  /// Both flanks are pressed, in either direction of motion, and which is no function of position, speed,
-  /// acceleration and torque (of the squares of `side` these leave 0.3 % and more).
+  /// Both flanks are pressed (10 % of the windows on each), in either direction of motion, and which is no
+  /// function of position, speed, acceleration and torque (of the squares of `side` these leave 0.3 % and
+  /// more).
   bool found = false;
   double gap = 0, standard_error = 0;     // rad
   double least_gap = 0, largest_gap = 0;  // rad, over the travel, where `varies`
