@@ -17,8 +17,10 @@
 // Where each flank is pressed in one direction of motion only, as those of a light load that is dragged, a
 // play looks as more dry friction of the motor does: windows in which the motor moves away from the pressed
 // flank tell them apart, and a reading with fewer than three stays of such, or 4 % of its windows, is none.
-// Nor is one whose flanks change within its windows, as under a drive that chatters: such averages show no
-// play (describing function of a dead zone under dither).
+// Nor is one with less than a tenth of its windows on one of the flanks, nor one in which position, speed,
+// acceleration and torque tell which flank is pressed (moves to and fro over the same path): there play is
+// what the encoders may be off by. Nor one whose flanks change within its windows, as under a drive that
+// chatters: such averages show no play (describing function of a dead zone under dither).
 //
 // A load that moves tells the torque on the flanks as well: what the motion of both takes, fitted to the
 // recorded torque (with_balanced_torque), is free of its noise, which as a regressor would draw compliance
@@ -96,12 +98,12 @@ struct PositionDifferenceSettings {
 /// ranges above. Everything that lies in the record is answered by the status:
 ///   insufficient_data  no motor_position, no load_position, no torque, too few samples or changes of flank
 ///   out_of_domain      the output moves although it is locked; torque does not press both flanks, or each
-///                      in one direction of motion only; the torque alternates from sample to sample and
-///                      throws the motor by a tenth of its rms speed; the deflection does not follow it; the
-///                      interval would be as wide as the deflection, or more than a quarter of that and twice
-///                      the play; the encoders differ by more than 1 % in scale; the play is negative beyond
-///                      the interval, another in other parts of the record, or another with windows of
-///                      another length
+///                      in one direction of motion or in one part of the path only; the torque alternates
+///                      from sample to sample and throws the motor by a tenth of its rms speed; the
+///                      deflection does not follow it; the interval would be as wide as the deflection, or
+///                      more than a quarter of that and twice the play; the encoders differ by more than 1 %
+///                      in scale; the play is negative beyond the interval, another in other parts of the
+///                      record, or another with windows of another length or by another torque
 /// Torque is motor_torque where present, else sensor_torque, else output_torque, which the motor's inertia
 /// and friction do not reach: the friction in the fit is then that between the teeth and the sensor.
 Estimate estimate_position_difference(const record::Record& record,
