@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "../effects/contact_shape.h"
 #include "../fit/joint_fit.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
@@ -127,6 +128,47 @@ std::optional<SeveralMachines> contradicting(const IdentificationCase& c, const 
   return several_machines(std::move(alone), together);
 }
 
+double most_left(const OutputError& fit) {
+  double most = 0;
+  for (const ServoPrediction& p : fit.predictions)
+    most = std::max(most, most_left({{"torque", p.torque_error}, {"deflection", p.deflection_error}}));
+  return most;
+}
+
+/// The machine with the same values and Hertzian teeth, fitted; nothing where they leave more.
+std::optional<OutputError> with_hertzian_fit(const OutputError& fit, const std::vector<ServoData>& data,
+                                             OutputErrorSettings settings) {
+  double torque = 0;  // N m, standard deviation
+  for (const ServoData& d : data) torque = std::max(torque, spread(d.torque) / std::sqrt(double(d.size())));
+  const auto teeth = with_hertzian_teeth(fit.rig, torque);
+  if (!teeth) return std::nullopt;
+  settings.findings.clear();
+  settings.parameters.clear();
+  for (const rig_file::RigParameter& p : rig_file::servo_parameters())
+    if (p.known_to(*teeth) && (!p.contact.empty() || fit.parameters.count(p.name) > 0))
+      settings.parameters.push_back(p.name);
+  try {
+    OutputError other = fit_output_error(*teeth, data, settings);
+    if (most_left(other) < most_left(fit)) return other;
+  } catch (const CannotIdentify&) {
+  } catch (const InvalidParameter&) {  // values that no machine has
+  }
+  return std::nullopt;
+}
+
+/// Where teeth of another law leave less, no value is told better than by the difference between the laws.
+void allow_for_other_teeth(const OutputError& fit, const OutputError& other, Identification& result) {
+  for (const auto& [name, value] : other.parameters) {
+    if (!rig_file::servo_parameter(name).contact.empty()) continue;
+    signal::Measured& measured = result.parameters.at(name);
+    measured.standard_error = std::hypot(measured.standard_error, value.value - measured.value);
+  }
+  result.warnings.push_back(fmt::format(
+      "Hertzian teeth leave less than linear ones ({:.3g} times the noise instead of {:.3g}); with them the "
+      "backlash angle is {:.4g} rad: the errors hold both, trace_residual tells which",
+      most_left(other), most_left(fit), other.parameters.at("backlash_angle").value));
+}
+
 /// Two flanks that the zero of both encoders lies between.
 double start_in_gap(const model::Rig& rig, double encoder_offset) {
   const double half = 0.5 * rig.mesh.backlash / rig.mesh.lever();
@@ -178,6 +220,8 @@ ProcedureReport run_output_error(IdentificationCase& c) {
   const ChannelError t = c.result.channels["torque"];
   if (lacks_something(d) || lacks_something(t)) {
     allow_for_declared(c.declared, c.result.parameters);
+    if (const auto other = with_hertzian_fit(fit, data, settings))
+      allow_for_other_teeth(fit, *other, c.result);
     c.result.several = contradicting(c, data, report.records, most_left(c.result.channels), settings);
     if (c.result.several) allow_for_several(*c.result.several, c.result.parameters);
   }
