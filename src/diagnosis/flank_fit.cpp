@@ -417,9 +417,11 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   const double noise = squares / (p_[elastic_at_] * p_[elastic_at_]);
   const double left = 1 - noise * inverse_(elastic_at_, elastic_at_);
   fit.attenuation = left > 0 ? noise * p_[elastic_at_] * row[elastic_at_] / left : INFINITY;
-  fit.found = std::min(fit.used[0], fit.used[1]) >= kFewest && fit.against >= kFewestAgainst &&
-              (!model_.moving || double(std::min(fit.used[0], fit.used[1])) >= kShareOfFlank * count) &&
-              (gap.cols() > 1 || 1 > kOwnShare * alone) && !(model_.moving && share_that_swings() > kSwings);
+  const auto fewer = double(std::min(fit.used[0], fit.used[1]));
+  fit.found = fewer >= double(kFewest) && fit.against >= kFewestAgainst;
+  if (model_.moving)
+    fit.found = fit.found && fewer >= kShareOfFlank * count && share_that_swings() <= kSwings &&
+                (gap.cols() > 1 || kOwnShare * alone < 1);
   return fit;
 }
 
