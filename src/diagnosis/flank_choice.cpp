@@ -30,9 +30,9 @@ constexpr double kSurelyWorse = 3;  // likewise, of one cut: not looked at any f
 constexpr double kTooNoisy = 4;  // what is typical over that of the sharpest cut: not read by any other law
 constexpr double kSharp = 3;     // the same: where laws are told apart
 constexpr double kNotFound = 4;  // mean square over that of the best law, of one that finds no flanks: choice
-constexpr double kLikewiseErrors = 4;  // by which they may differ: choice
-constexpr double kLikewise =
-    2;  // residual over that of the surest cut, of cuts that must tell the same: choice
+// Cuts must tell the same play, to within so many of their errors, where what they leave is up to so many
+// times what the surest does. Choices.
+constexpr double kLikewiseErrors = 4, kLikewise = 2;
 constexpr double kOutlying = 5;  // standard deviations, beyond which a window is left by any law: choice
 
 /// One way to cut the record: all windows of one length, by one torque.

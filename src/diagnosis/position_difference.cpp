@@ -220,10 +220,9 @@ void require_sound(const FlankFit& fit) {
     throw Refusal{
         Status::out_of_domain,
         "torque does not press both flanks (10 % of the time at least), or each in one direction of motion "
-        "only, where play is "
-        "not told from the dry friction of the motor, or each in a part of the path of its own, where "
-        "it is not told from errors of the encoders, or flanks change within a few samples; loads "
-        "that drive, or that are braked, and moves over other paths would do"};
+        "only, where play is not told from the dry friction of the motor, or each in a part of the path of "
+        "its own, where it is not told from errors of the encoders, or flanks change within a few samples; "
+        "loads that drive, or that are braked, and moves over other paths would do"};
   if (fit.stays < kFewestStays)
     throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
                                                  " times, needed are " + std::to_string(kFewestStays)};

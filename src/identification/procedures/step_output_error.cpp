@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include "../effects/contact_shape.h"
 #include "../fit/joint_fit.h"
@@ -163,10 +166,13 @@ void allow_for_other_teeth(const OutputError& fit, const OutputError& other, Ide
     signal::Measured& measured = result.parameters.at(name);
     measured.standard_error = std::hypot(measured.standard_error, value.value - measured.value);
   }
-  result.warnings.push_back(fmt::format(
-      "Hertzian teeth leave less than linear ones ({:.3g} times the noise instead of {:.3g}); with them the "
-      "backlash angle is {:.4g} rad: the errors hold both, trace_residual tells which",
-      most_left(other), most_left(fit), other.parameters.at("backlash_angle").value));
+  std::string warning = fmt::format(
+      "Hertzian teeth leave less than linear ones, {:.3g} times the noise instead of {:.3g}: the errors hold "
+      "what either tells, trace_residual says which",
+      most_left(other), most_left(fit));
+  if (const auto play = other.parameters.find("backlash_angle"); play != other.parameters.end())
+    warning += fmt::format("; backlash_angle by them {:.4g}", play->second.value);
+  result.warnings.push_back(std::move(warning));
 }
 
 /// Two flanks that the zero of both encoders lies between.
