@@ -8,6 +8,7 @@
 #include "backlash_diagnosis/diagnosis/apd_shape.h"
 #include "backlash_diagnosis/diagnosis/declared_lock.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
+#include "doubted_declaration.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -183,6 +184,7 @@ Diagnosis diagnose(const PeriodWindow& window, const DiagnosisSettings& settings
         record.time.empty() ? not_served("no whole excitation period after settling") : each.estimate(input));
     diagnosis.estimates.back().method = each.name;
   }
+  doubt_declared_values(diagnosis.estimates);
   if (settings.coherence) diagnosis.coherence = detect_nonlinearity(record, *settings.coherence);
   diagnosis.verdict = combine(diagnosis.estimates, settings.limits, baseline);
   return diagnosis;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "doubted_declaration.h"
+
 namespace backlash::diagnosis {
 namespace {
 
@@ -149,6 +151,7 @@ void recall_waveform(Diagnosis& diagnosis, const EarlierWaveform& earlier, const
                                   [](const Estimate& estimate) { return estimate.method == kName; });
   if (place == diagnosis.estimates.end() || window.record.time.empty()) return;
   *place = recalled(diagnosis, earlier, window);
+  doubt_declared_values(diagnosis.estimates);
   diagnosis.verdict = combine(diagnosis.estimates, limits, baseline);
   const auto index = static_cast<int>(place - diagnosis.estimates.begin());
   const std::vector<int>& members = diagnosis.verdict.members;

@@ -71,9 +71,13 @@ LockedMotion collect(const record::Record& record, const LostMotionSettings& set
   if (position.empty()) throw Refusal{Status::insufficient_data, "the record has no motor_position"};
   if (torque.empty())
     throw Refusal{Status::insufficient_data, "the record has neither motor_torque nor sensor_torque"};
+  const std::vector<double>& sensor = record.column(record::Channel::sensor_torque);
+  const bool both = motor && sensor.size() == torque.size();
   LockedMotion motion;
   for (std::size_t i = 0; i < std::min({record.time.size(), position.size(), torque.size()}); ++i) {
     if (!std::isfinite(record.time[i]) || !std::isfinite(position[i]) || !std::isfinite(torque[i])) continue;
+    if (both && !std::isfinite(sensor[i])) continue;
+    if (both) motion.sensor.push_back(sensor[i]);
     motion.time.push_back(record.time[i]);
     motion.torque.push_back(torque[i]);
     motion.position.push_back(position[i]);
@@ -198,6 +202,23 @@ void require_calm_sensor(const LockedMotion& motion, const Walls& walls, const W
                     " passages far from the others) and the record has no motor_torque to go by"};
 }
 
+/// N m: torque at the walls by the torque sensor, without its offset; NaN without a sensor.
+double torque_by_sensor(const Walls& walls) {
+  std::vector<double> of_side[2];
+  for (const WallReading& reading : walls.readings)
+    if (std::isfinite(reading.sensor)) of_side[reading.side > 0].push_back(reading.sensor);
+  if (of_side[0].empty() || of_side[1].empty()) return kNaN;
+  return 0.5 * (signal::median(std::move(of_side[0])) + signal::median(std::move(of_side[1])));
+}
+
+/// rad, of both sides: by how much less or more than at `torque` the flanks yield if they hold what the
+/// torque sensor says: dry friction, a drive that gives other than it says, or a wrong sensor.
+double doubt_by_sensor(double torque, double by_sensor, const LostMotionSettings& settings) {
+  if (!settings.subtract_elastic_deflection || std::isnan(by_sensor)) return 0;
+  return 2 * std::abs(settings.elastic_deflection(torque) -
+                      settings.elastic_deflection(std::max(0.0, by_sensor)));
+}
+
 struct Parts {
   PlayComponents components;
   double flank_friction = kNaN;  // N m
@@ -275,11 +296,14 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
   }
   const Parts parts = find_parts(motion, walls, settings, play);
   double elastic = 2 * settings.elastic_uncertainty * std::abs(signal::median(deflections));
+  double friction = 0;  // rad
   if (settings.subtract_elastic_deflection && parts.flank_friction > 0) {
     // Friction carries part of the torque, so the flank may hold less than the motor gives.
     const double carried = std::max(0.0, torque - parts.flank_friction);
-    elastic += 2 * (settings.elastic_deflection(torque) - settings.elastic_deflection(carried));
+    friction = 2 * (settings.elastic_deflection(torque) - settings.elastic_deflection(carried));
   }
+  const double by_sensor = torque_by_sensor(walls);
+  elastic += std::max(friction, doubt_by_sensor(torque, by_sensor, settings));
   const double half = std::hypot(play.half_interval(), elastic);
   if (play.value + half < 0) {
     throw Refusal{Status::out_of_domain,
@@ -303,6 +327,9 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
   estimate.components = parts.components;
   estimate.components->at_torque = settings.subtract_elastic_deflection ? torque : walls.level;
   estimate.message = describe(walls, settings, play, parts);
+  if (settings.subtract_elastic_deflection && std::abs(by_sensor - torque) > kTorqueSpan * torque)
+    estimate.message +=
+        fmt::format("; by sensor_torque it is {:.4g} N m there, the interval holds both", by_sensor);
 }
 
 }  // namespace

@@ -30,6 +30,8 @@ constexpr double kNoisyTiming = 0.8;
 constexpr double kLeastOverFriction = 0.7;  // simulation: servos with up to twice the declared friction
 constexpr int kSettle = 2;                  // choice: looks at what is left in flight
 constexpr double kTangent = 1.5;  // theory: Hertz, deflection at a tangent stiffness over that at the secant
+constexpr double kUnlike = 0.4;   // simulation: rigs whose values are all off; share of the crossings
+constexpr double kNormal95 = 1.96;         // theory: standard deviations of 95 %, both ends
 constexpr double kToldElasticShare = 0.2;  // simulation: the level is told to some 10 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
@@ -100,6 +102,8 @@ double friction_in_flight(const Motor& motor, const MomentumTransferSettings& s)
 
 /// Of all crossings, rad but for the speed.
 struct Travels {
+  std::vector<int> side;
+  std::vector<double> impact;  // sample
   std::vector<double> gap, timing, elastic, law, smear;
   std::vector<double> impact_speed;  // rad/s
 };
@@ -131,6 +135,8 @@ Travels travels_of(const Motor& motor, const Flank& flank, const std::vector<Cro
     const double deflection = law + (s.flank_deflection ? s.flank_deflection(0.5 * flank.level) +
                                                               s.flank_deflection(c.impact_torque)
                                                         : 0);
+    all.side.push_back(c.side);
+    all.impact.push_back(c.impact);
     all.gap.push_back(c.side * (place(c.impact) - place(c.release)) - deflection);
     all.timing.push_back(std::abs(place(c.impact) - place(c.impact - blur)));
     all.elastic.push_back(deflection);
@@ -176,15 +182,6 @@ void require_sense(double lower, double upper, const MomentumTransferSettings& s
                     100 * s.elastic_uncertainty)};
 }
 
-void check_domain(const Motor& motor, const MomentumTransferSettings& s) {
-  const double cycle = internal_cycle(s);
-  if (cycle > 0 && cycle < kSamplesPerCycle * motor.interval)
-    throw Refusal{Status::out_of_domain,
-                  fmt::format("sampled at {:.4g} Hz, but motor and pinion swing against each other at {:.4g} "
-                              "Hz: needed are {:.4g} samples per cycle",
-                              1 / motor.interval, 1 / cycle, kSamplesPerCycle)};
-}
-
 void check_friction(const Flank& flank, const MomentumTransferSettings& s) {
   if (flank.level < kLeastOverFriction * s.motor_friction)
     throw Refusal{
@@ -194,19 +191,122 @@ void check_friction(const Flank& flank, const MomentumTransferSettings& s) {
                     flank.level, s.motor_friction)};
 }
 
+/// Of a record, by one machine.
+struct Reading {
+  Flank flank;
+  Travels travels;
+  signal::RobustScale scale;  // of the gap
+};
+
+Reading read(const Motor& motor, const MomentumTransferSettings& s) {
+  Reading r;
+  r.flank = calm_flank(motor, s);
+  check_friction(r.flank, s);
+  const double shortness = shortness_of_impacts(r.flank, motor.interval, s);
+  r.travels = travels_of(motor, r.flank, free_crossings(r.flank, shortness), shortness, s);
+  r.scale = signal::robust_scale(r.travels.gap, 0);
+  return r;
+}
+
+void check_domain(const Motor& motor, const MomentumTransferSettings& s) {
+  const double cycle = internal_cycle(s);
+  if (cycle > 0 && cycle < kSamplesPerCycle * motor.interval)
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("sampled at {:.4g} Hz, but motor and pinion swing against each other at {:.4g} "
+                              "Hz: needed are {:.4g} samples per cycle",
+                              1 / motor.interval, 1 / cycle, kSamplesPerCycle)};
+}
+
+/// The machine with each value that is uncertain `off` standard deviations from the declared one.
+std::vector<MomentumTransferSettings> moved(const MomentumTransferSettings& s, const Motor& motor,
+                                            double off) {
+  std::vector<MomentumTransferSettings> all;
+  const auto add = [&](double spread, auto&& move) {
+    if (!(spread > 0)) return;
+    all.push_back(s);
+    move(all.back(), spread);
+  };
+  const auto factor = [&](double MomentumTransferSettings::*value) {
+    return [=](MomentumTransferSettings& to, double spread) { to.*value *= std::exp(off * spread); };
+  };
+  using S = MomentumTransferSettings;
+  add(s.spread.motor_inertia, factor(&S::motor_inertia));
+  add(s.spread.motor_damping, factor(&S::motor_damping));
+  if (flexible(s)) add(s.spread.pinion_inertia, factor(&S::pinion_inertia));
+  if (flexible(s)) add(s.spread.coupling_stiffness, factor(&S::coupling_stiffness));
+  if (s.flank_deflection)
+    add(s.spread.flank_deflection, [&](S& to, double spread) {
+      to.flank_deflection = [of = s.flank_deflection, by = std::exp(off * spread)](double torque) {
+        return by * of(torque);
+      };
+    });
+  std::vector<double> sizes;
+  for (const double torque : motor.torque) sizes.push_back(std::abs(torque));
+  add(s.spread.motor_friction * signal::median(std::move(sizes)),
+      [&](S& to, double spread) { to.motor_friction = std::max(0.0, to.motor_friction + off * spread); });
+  return all;
+}
+
+/// By how much the gap of the same crossings changes in the median; 0 where few of them are found again, as
+/// the record is not one of such a machine.
+double change_of_gap(const Reading& from, const Reading& to) {
+  std::vector<double> changes;
+  std::size_t k = 0;
+  const auto reach = 2 * double(from.flank.half);
+  for (std::size_t i = 0; i < from.travels.gap.size(); ++i) {
+    while (k < to.travels.gap.size() && to.travels.impact[k] < from.travels.impact[i] - reach) ++k;
+    if (k == to.travels.gap.size()) break;
+    if (to.travels.side[k] == from.travels.side[i] && to.travels.impact[k] < from.travels.impact[i] + reach)
+      changes.push_back(to.travels.gap[k] - from.travels.gap[i]);
+  }
+  if (2 * changes.size() < from.travels.gap.size()) return 0;
+  return signal::median(std::move(changes));
+}
+
+/// By what the declared values leave open.
+double declared_half_width(const Motor& motor, const Reading& reading, const MomentumTransferSettings& s) {
+  const std::vector<MomentumTransferSettings> less = moved(s, motor, -1), more = moved(s, motor, 1);
+  const auto change = [&](const MomentumTransferSettings& machine) {
+    try {
+      return std::abs(change_of_gap(reading, read(motor, machine)));
+    } catch (const Refusal&) {
+      return 0.0;  // not such a machine
+    }
+  };
+  double squares = 0;
+  for (std::size_t i = 0; i < less.size(); ++i)
+    squares += std::pow(kNormal95 * std::max(change(less[i]), change(more[i])), 2);
+  return std::sqrt(squares);
+}
+
+/// All crossings of a gap are as wide. Where they are not, some are something else: swings of the motor that
+/// a wrong inertia or stiffness makes look like flights.
+void require_alike(const Travels& travels, double half, const MomentumTransferSettings& s) {
+  if (!s.output_locked) return;  // the interval of a free load holds them
+  const double low = signal::quantile(travels.gap, 0.5 * kUnlike),
+               high = signal::quantile(travels.gap, 1 - 0.5 * kUnlike);
+  if (high - low <= 2 * half) return;
+  throw Refusal{
+      Status::out_of_domain,
+      fmt::format(
+          "of the crossings a fifth travel less than {:.4g} rad and a fifth more than {:.4g} rad: not "
+          "all are crossings of one gap, or the rig is not this machine",
+          low, high)};
+}
+
 void fill(const record::Record& record, MomentumTransferSettings s, Estimate& estimate) {
   Motor motor = collect(record, s);
   check_domain(motor, s);
   if (!motor.torque_measured) tell_torque(motor, s);
   if (!s.output_locked && motor.torque_measured)
     for (int i = 0; i < kSettle; ++i) s.motor_friction = friction_in_flight(motor, s);
-  const Flank flank = calm_flank(motor, s);
-  check_friction(flank, s);
-  const double shortness = shortness_of_impacts(flank, motor.interval, s);
-  const Travels travels = travels_of(motor, flank, free_crossings(flank, shortness), shortness, s);
-  const signal::RobustScale scale = signal::robust_scale(travels.gap, 0);
-  const double half = half_width(travels, scale, motor, flank, s);
-  require_same_throughout(travels.gap, half);
+  const Reading reading = read(motor, s);
+  const auto& [flank, travels, scale] = reading;
+  const double told = half_width(travels, scale, motor, flank, s);
+  require_same_throughout(travels.gap, told);
+  require_alike(travels, told, s);
+  estimate.declared = declared_half_width(motor, reading, s);
+  const double half = std::hypot(told, estimate.declared);
   require_sense(scale.centre - half, scale.centre + half, s);
   estimate.angle_lower = std::max(0.0, scale.centre - half);
   estimate.angle_upper = scale.centre + half;

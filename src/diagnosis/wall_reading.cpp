@@ -112,6 +112,7 @@ WallReading read_wall(const LockedMotion& motion, const TorqueExcursion& excursi
   const std::size_t begin = end - window;
   reading.time = 0.5 * (motion.time[begin] + motion.time[end - 1]);
   reading.torque = excursion.side * hann_moments(motion.torque, begin, end).mean;
+  if (!motion.sensor.empty()) reading.sensor = excursion.side * hann_moments(motion.sensor, begin, end).mean;
   const Moments last = hann_moments(motion.position, begin, end);
   const std::size_t shift = std::min(window / 2, begin - excursion.begin);
   const Moments earlier = hann_moments(motion.position, begin - shift, end - shift);

@@ -146,9 +146,17 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
   difference.base_radius = momentum.base_radius = base_radius;
 }
 
-/// position_difference knows the deflection as well as the file knows the stiffness of sensor and contact.
+/// position_difference knows the deflection as well as the file knows the stiffness of sensor and contact,
+/// momentum_transfer the motor's side as well.
 void use_spread(RigFile& file) {
   const diagnosis::WaveformSpread& spread = file.diagnosis.waveform->spread;
+  diagnosis::MomentumSpread& momentum = file.diagnosis.momentum_transfer->spread;
+  momentum.motor_inertia = spread.motor_inertia, momentum.pinion_inertia = spread.pinion_inertia;
+  momentum.coupling_stiffness = spread.sensor_stiffness, momentum.motor_damping = spread.motor_damping;
+  momentum.flank_deflection = spread.contact_stiffness / file.diagnosis.waveform->contact_exponent;
+  momentum.motor_friction = std::isnan(spread.dry_friction)
+                                ? diagnosis::WaveformSpread::kDryFriction
+                                : spread.dry_friction / file.simulation.excitation.amplitude;
   diagnosis::PositionDifferenceSettings& difference = *file.diagnosis.position_difference;
   const double torque = file.simulation.excitation.amplitude, all = difference.elastic_deflection(torque);
   if (!(all > 0)) return;

@@ -318,6 +318,28 @@ TEST(LostMotionFree, FrictionOnTheFlanksOfARampIsInTheInterval) {
   EXPECT_GT(estimate.angle_upper - estimate.angle_lower, 2 * machine.compliance * machine.coulomb);
 }
 
+// A drive that gives 0.7 of what it says, or dry friction that takes 0.3: the flanks hold what the torque
+// sensor says, whatever its offset.
+TEST(LostMotionFree, TorqueThatTheSensorDoesNotConfirmIsInTheInterval) {
+  Machine machine;
+  machine.coulomb = 0;
+  Experiment experiment;
+  experiment.shape = Wave::square;
+  experiment.position_noise = 1e-6;
+  record::Record record = run(machine, experiment);
+  std::vector<double>& torque = record.column(record::Channel::motor_torque);
+  const std::vector<double> held = torque;
+  for (double& t : torque) t /= 0.7;
+  const LostMotionSettings settings = without_deflection(3, machine.compliance);
+  EXPECT_LT(estimate_lost_motion(record, settings).angle_upper, machine.gap);  // 0.6 c 4 / 0.7 too small
+  for (const double t : held) record.column(record::Channel::sensor_torque).push_back(0.97 * t + 0.5);
+  const Estimate estimate = estimate_lost_motion(record, settings);
+  expect_contains(estimate, machine.gap);
+  EXPECT_NE(estimate.message.find("by sensor_torque it is 3.88 N m"), std::string::npos) << estimate.message;
+  record.column(record::Channel::sensor_torque) = torque;  // and where it confirms it nothing changes
+  EXPECT_LT(estimate_lost_motion(record, settings).angle_upper, machine.gap);
+}
+
 TEST(LostMotionStated, SwitchedTorqueBeyondTheLevelIsCorrectedWhereDeflectionIsKnown) {
   Machine machine;
   machine.coulomb = 0;

@@ -22,7 +22,9 @@
 // - ringing: a quarter of its rms at one wall where torque is switched, four times that where it is ramped,
 // - settling: 0.3 times the extrapolation,
 // - resolution: one step of the position,
-// - elastic deflection, where subtracted: its uncertainty, and for ramps what friction on the flanks carries.
+// - elastic deflection, where subtracted: its uncertainty, and what the flanks yield more or less under the
+//   torque that sensor_torque says beside motor_torque (dry friction, a drive that gives other than it says),
+//   for ramps at least what friction on the flanks carries.
 // The shares of ringing and settling hold 95 % of the errors in simulations of a ringing rig (half gap 0 to
 // 150 um, square wave 7 to 15 Hz, sine and triangle 1 to 10 Hz).
 //

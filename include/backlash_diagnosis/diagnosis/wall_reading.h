@@ -5,11 +5,14 @@
 #include <cstddef>
 #include <vector>
 
+#include "backlash_diagnosis/base/not_a_number.h"
+
 namespace backlash::diagnosis {
 
 /// Torque [N m] and motor position [rad] over time [s], same length, finite values only.
 struct LockedMotion {
   std::vector<double> time, torque, position;
+  std::vector<double> sensor;  ///< N m, by the torque sensor beside `torque`; may be empty
 };
 
 /// Samples [begin, end) in which side * torque exceeds a level.
@@ -28,6 +31,7 @@ struct WallReading {
   int side = 1;
   double time = 0;           ///< s, middle of the window
   double torque = 0;         ///< N m, Hann-weighted mean of side * torque over the window
+  double sensor = kNaN;      ///< N m, the same of LockedMotion::sensor; NaN where that is empty
   double torque_change = 0;  ///< N m, size of the change of torque over the last third of the excursion
   double position = 0;       ///< Hann-weighted mean over the window
   double spread = 0;         ///< standard deviation over the window
