@@ -111,6 +111,7 @@ WallReading read_wall(const LockedMotion& motion, const TorqueExcursion& excursi
   reading.side = excursion.side;
   const std::size_t begin = end - window;
   reading.time = 0.5 * (motion.time[begin] + motion.time[end - 1]);
+  reading.held = motion.time[end - 1] - motion.time[excursion.begin];
   reading.torque = excursion.side * hann_moments(motion.torque, begin, end).mean;
   if (!motion.sensor.empty()) reading.sensor = excursion.side * hann_moments(motion.sensor, begin, end).mean;
   const Moments last = hann_moments(motion.position, begin, end);

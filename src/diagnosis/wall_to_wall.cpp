@@ -23,6 +23,17 @@ constexpr double kSwitchedRinging = 0.25;
 constexpr double kSettling = 0.3;
 constexpr double kRampedRinging = 4.0;
 
+// Longest over shortest excursion up to which all settle alike: choice.
+constexpr double kAlikeHeld = 1.5;
+
+/// Whether torque is held as long each time. Else the walls are at different stages of their ringing, and its
+/// medians are of none of them.
+bool held_alike(const std::vector<WallReading>& readings) {
+  std::vector<double> held;
+  for (const WallReading& r : readings) held.push_back(r.held);
+  return signal::quantile(held, 0.9) <= kAlikeHeld * signal::quantile(held, 0.1);
+}
+
 // Extrapolation of the travel to the end of the ringing.
 double settling(const std::vector<WallReading>& readings) {
   const double before = median_of(readings, &WallReading::earlier_spread);
@@ -89,11 +100,12 @@ WallToWall measure_wall_to_wall(const LockedMotion& motion, const std::vector<Wa
   const signal::RobustScale scale =
       signal::robust_scale(plays, 2 * result.step);  // each wall may be off by one step
   const double extrapolation = switched ? settling(readings) : 0;
-  result.value = scale.centre + extrapolation;
+  const bool alike = held_alike(readings);
+  result.value = scale.centre + (alike ? extrapolation : 0);
   result.travel = signal::median(travels);
   result.ringing = median_of(readings, &WallReading::ringing);
-  result.motion =
-      std::hypot(kSettling * extrapolation, (switched ? kSwitchedRinging : kRampedRinging) * result.ringing);
+  result.motion = std::hypot((alike ? kSettling : 1) * extrapolation,
+                             (switched ? kSwitchedRinging : kRampedRinging) * result.ringing);
   result.outliers = scale.outliers;
   // Neighbouring passages share a wall, so n walls make n/2 independent passages; a median scatters 1.25
   // times as much as a mean; two walls and the drift are fitted.

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/identification/identify.h"
@@ -14,22 +15,47 @@ const char* unit_of_gap(const diagnosis::WaveformSettings& machine) {
   return machine.angular ? "rad" : "m";
 }
 
-void put_parameters(Identification& result, const diagnosis::WaveformCommissioning& found) {
+constexpr double kNormal95 = 1.96;                   // theory: standard deviations of 95 %, both ends
+constexpr double kGainSpreads = 1, kGainErrors = 3;  // choice, as the verdict of `waveform` names values
+
+/// What the sensor's gain came out as, as a share of torque; 0 where that is within what was known of it.
+double torque_in_doubt(const diagnosis::WaveformSettings& declared,
+                       const diagnosis::WaveformCommissioning& found) {
+  const double off = std::abs(std::log(found.machine.sensor_gain / declared.sensor_gain));
+  const bool told = off > kGainSpreads * declared.spread.sensor_gain &&
+                    off > kGainErrors * found.machine.spread.sensor_gain;
+  return told ? off : 0;
+}
+
+/// Of what is told by a torque over a motion.
+bool is_torque(const std::string& unit) {
+  return unit.find('N') != std::string::npos || unit.find("kg") != std::string::npos;
+}
+
+void put_parameters(Identification& result, const diagnosis::WaveformCommissioning& found, double doubt) {
   for (const diagnosis::WaveformQuantity& q : diagnosis::waveform_quantities()) {
     if (!q.in(found.machine)) continue;
     const double value = found.machine.*q.at, spread = found.machine.spread.*q.spread;
     const double common = scale_power(q, found.machine) * found.machine.common_scale;
     const double error = q.factor ? value * std::hypot(spread, common) : spread;
-    result.parameters[q.name] = {value, error};
-    result.units[q.name] = q.unit_in(found.machine);
+    const std::string unit = q.unit_in(found.machine);
+    result.parameters[q.name] = {value, is_torque(unit) ? std::hypot(error, doubt * value) : error};
+    result.units[q.name] = unit;
   }
   const diagnosis::WaveformCommissioning::State& first = found.states.front();
   const char* const gap = found.machine.angular ? "backlash_angle" : "backlash";
-  result.parameters[gap] = {first.backlash, first.backlash * first.log_error};
+  result.parameters[gap] = {first.backlash,
+                            std::hypot(first.backlash * first.log_error, found.machine.finest() / kNormal95)};
   result.units[gap] = unit_of_gap(found.machine);
 }
 
-void warn(Identification& result, const diagnosis::WaveformCommissioning& found) {
+void warn(Identification& result, const diagnosis::WaveformCommissioning& found, double doubt) {
+  if (doubt > 0)
+    result.warnings.push_back(fmt::format(
+        "the torque sensor reads {:.3g} times what motor_torque makes it hold: where not the sensor is off "
+        "but "
+        "motor_torque, inertias, stiffnesses, damping and friction are by {:.2g} %, which their errors hold",
+        found.machine.sensor_gain, 100 * doubt));
   if (!found.untold.empty())
     result.warnings.push_back("the records do not tell " + joined(found.untold) +
                               ": what the rig file says of it is kept");
@@ -65,8 +91,9 @@ Identification commission(const rig_file::RigFile& file, const std::vector<recor
       result.channels[kNames[c]] = {state.residual[c], state.noise[c]};
   }
   result.procedures.push_back(report);
-  put_parameters(result, found);
-  warn(result, found);
+  const double doubt = torque_in_doubt(*file.diagnosis.waveform, found);
+  put_parameters(result, found, doubt);
+  warn(result, found, doubt);
   return result;
 }
 

@@ -16,6 +16,8 @@
 // Settling: where torque is switched, the mean m still approaches its limit while ringing dies out. With mean
 // and standard deviation S over the window (2) and half a window earlier (1), rho = S2/S1 <= 0.7:
 //   x = m2 + (m2 - m1) rho / (1 - rho).
+// Where torque is held half as long again at times, ringing is at different stages: m2 is taken, and the
+// whole extrapolation is in the interval.
 //
 // Interval, 95 %, root of the sum of squares of
 // - scatter: Student t (n - 3 degrees of freedom, n walls) times 1.25 s sqrt(2/n),

@@ -30,6 +30,7 @@ std::vector<TorqueExcursion> find_excursions(const std::vector<double>& torque, 
 struct WallReading {
   int side = 1;
   double time = 0;           ///< s, middle of the window
+  double held = 0;           ///< s, length of the excursion
   double torque = 0;         ///< N m, Hann-weighted mean of side * torque over the window
   double sensor = kNaN;      ///< N m, the same of LockedMotion::sensor; NaN where that is empty
   double torque_change = 0;  ///< N m, size of the change of torque over the last third of the excursion
