@@ -28,7 +28,8 @@
 //
 // Interval, 95 %: two standard errors of the fit with its priors, on the logarithm of the play, widened by
 // what the residual has of structure, and not below what equations of rigid flanks can tell (`finest`). With
-// a free link standard errors are 1.8 times as large: simulation.
+// a free link standard errors are 1.8 times as large; with position its interval is 2.9 of them to either
+// side, and the narrowest 1.5 times as wide: simulation.
 #pragma once
 
 #include <string>
@@ -102,7 +103,10 @@ struct WaveformSettings {
   /// Half width of the narrowest interval, in the unit of the play. Flanks are no smoother (ground, Ra 0.3
   /// um), equations no finer; of a mesh of angles the same of a gear of 15 mm, as no radius is known.
   /// Choices.
-  double finest() const { return angular ? 4e-5 : 6e-7; }
+  double finest() const {
+    const double least = angular ? 4e-5 : 6e-7;
+    return output == WaveformOutput::locked ? least : 1.5 * least;
+  }
 };
 
 /// What a fit rests on, for people to see: what was measured about the reversals, what the fitted machine
