@@ -72,11 +72,11 @@ LockedMotion collect(const record::Record& record, const LostMotionSettings& set
   if (torque.empty())
     throw Refusal{Status::insufficient_data, "the record has neither motor_torque nor sensor_torque"};
   const std::vector<double>& sensor = record.column(record::Channel::sensor_torque);
-  const bool both = motor && sensor.size() == torque.size();
+  const bool both = motor && sensor.size() == torque.size() &&
+                    std::all_of(sensor.begin(), sensor.end(), [](double t) { return std::isfinite(t); });
   LockedMotion motion;
   for (std::size_t i = 0; i < std::min({record.time.size(), position.size(), torque.size()}); ++i) {
     if (!std::isfinite(record.time[i]) || !std::isfinite(position[i]) || !std::isfinite(torque[i])) continue;
-    if (both && !std::isfinite(sensor[i])) continue;
     if (both) motion.sensor.push_back(sensor[i]);
     motion.time.push_back(record.time[i]);
     motion.torque.push_back(torque[i]);

@@ -357,6 +357,8 @@ TEST(LostMotionFree, TorqueThatTheSensorDoesNotConfirmIsInTheInterval) {
   EXPECT_NE(estimate.message.find("by sensor_torque it is 3.88 N m"), std::string::npos) << estimate.message;
   record.column(record::Channel::sensor_torque) = torque;  // and where it confirms it nothing changes
   EXPECT_LT(estimate_lost_motion(record, settings).angle_upper, machine.gap);
+  record.column(record::Channel::sensor_torque).back() = kNaN;  // nor where it has gaps
+  EXPECT_EQ(estimate_lost_motion(record, settings).status, Status::ok);
 }
 
 TEST(LostMotionStated, SwitchedTorqueBeyondTheLevelIsCorrectedWhereDeflectionIsKnown) {
