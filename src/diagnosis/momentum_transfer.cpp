@@ -247,7 +247,7 @@ std::vector<MomentumTransferSettings> moved(const MomentumTransferSettings& s, c
   return all;
 }
 
-/// By how much the gap of the same crossings changes in the median; 0 where few of them are found again, as
+/// By how much the gap of the same crossings changes in the median; NaN where few of them are found again, as
 /// the record is not one of such a machine.
 double change_of_gap(const Reading& from, const Reading& to) {
   std::vector<double> changes;
@@ -259,7 +259,7 @@ double change_of_gap(const Reading& from, const Reading& to) {
     if (to.travels.side[k] == from.travels.side[i] && to.travels.impact[k] < from.travels.impact[i] + reach)
       changes.push_back(to.travels.gap[k] - from.travels.gap[i]);
   }
-  if (2 * changes.size() < from.travels.gap.size()) return 0;
+  if (2 * changes.size() < from.travels.gap.size()) return kNaN;
   return signal::median(std::move(changes));
 }
 
@@ -270,12 +270,19 @@ double declared_half_width(const Motor& motor, const Reading& reading, const Mom
     try {
       return std::abs(change_of_gap(reading, read(motor, machine)));
     } catch (const Refusal&) {
-      return 0.0;  // not such a machine
+      return kNaN;  // not such a machine
     }
   };
   double squares = 0;
-  for (std::size_t i = 0; i < less.size(); ++i)
-    squares += std::pow(kNormal95 * std::max(change(less[i]), change(more[i])), 2);
+  for (std::size_t i = 0; i < less.size(); ++i) {
+    const double larger = std::fmax(change(less[i]), change(more[i]));  // of those that are told
+    if (std::isnan(larger))
+      throw Refusal{
+          Status::out_of_domain,
+          "with values as far from the declared ones as the rig file leaves open other crossings are "
+          "found: inertia, damping, friction and stiffness must be known better"};
+    squares += std::pow(kNormal95 * larger, 2);
+  }
   return std::sqrt(squares);
 }
 

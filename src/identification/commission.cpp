@@ -11,12 +11,12 @@
 namespace backlash::identification {
 namespace {
 
+constexpr double kNormal95 = 1.96;                   // theory: standard deviations of 95 %, both ends
+constexpr double kGainSpreads = 1, kGainErrors = 3;  // choice, as the verdict of `waveform` names values
+
 const char* unit_of_gap(const diagnosis::WaveformSettings& machine) {
   return machine.angular ? "rad" : "m";
 }
-
-constexpr double kNormal95 = 1.96;                   // theory: standard deviations of 95 %, both ends
-constexpr double kGainSpreads = 1, kGainErrors = 3;  // choice, as the verdict of `waveform` names values
 
 /// What the sensor's gain came out as, as a share of torque; 0 where that is within what was known of it.
 double torque_in_doubt(const diagnosis::WaveformSettings& declared,
@@ -53,8 +53,8 @@ void warn(Identification& result, const diagnosis::WaveformCommissioning& found,
   if (doubt > 0)
     result.warnings.push_back(fmt::format(
         "the torque sensor reads {:.3g} times what motor_torque makes it hold: where not the sensor is off "
-        "but "
-        "motor_torque, inertias, stiffnesses, damping and friction are by {:.2g} %, which their errors hold",
+        "but motor_torque, inertias, stiffnesses, damping and friction are by {:.2g} %, which their errors "
+        "hold",
         found.machine.sensor_gain, 100 * doubt));
   if (!found.untold.empty())
     result.warnings.push_back("the records do not tell " + joined(found.untold) +
