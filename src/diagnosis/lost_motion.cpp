@@ -32,6 +32,8 @@ constexpr double kReadLevelFree = 0.5;
 constexpr double kUnsettled = 0.1;
 // ... or if rms ringing is this share of the elastic deflection, so that the flank is left again.
 constexpr double kContactLoss = 0.5;
+// Ramps whose peaks are so many times the stated torque: dry friction holds what the peak has wound up.
+constexpr double kFarBeyond = 1.5;  // choice
 constexpr std::size_t kFewest = 2;  // excursions per side
 // Torque in the sensor rings with the motor, so that its excursions need not be those of the excitation. It
 // is not trusted with this share of deviating passages, or with so many times more excursions than half
@@ -219,6 +221,17 @@ double doubt_by_sensor(double torque, double by_sensor, const LostMotionSettings
                       settings.elastic_deflection(std::max(0.0, by_sensor)));
 }
 
+/// rad, of both sides: how much farther apart the walls are on the way back from peaks far beyond the stated
+/// torque than on the way there; 0 without such peaks. Dry friction hinders the one and holds the other.
+double held_from_peaks(const Walls& walls, const LostMotionSettings& settings) {
+  if (settings.subtract_elastic_deflection || walls.switched) return 0;
+  if (median_of(walls.readings, &WallReading::peak) < kFarBeyond * walls.level) return 0;
+  std::vector<double> of_side[2];
+  for (const WallReading& r : walls.readings)
+    of_side[r.side > 0].push_back(r.side * (r.position - r.arrival));
+  return std::max(0.0, signal::median(std::move(of_side[0])) + signal::median(std::move(of_side[1])));
+}
+
 struct Parts {
   PlayComponents components;
   double flank_friction = kNaN;  // N m
@@ -304,22 +317,23 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
   }
   const double by_sensor = torque_by_sensor(walls);
   elastic += std::max(friction, doubt_by_sensor(torque, by_sensor, settings));
-  const double half = std::hypot(play.half_interval(), elastic);
-  if (play.value + half < 0) {
+  const double told = std::hypot(play.half_interval(), elastic), held = held_from_peaks(walls, settings);
+  const double value = play.value - 0.5 * held, half = told + 0.5 * held;
+  if (value + half < 0) {
     throw Refusal{Status::out_of_domain,
                   fmt::format("the travel of {:.4g} rad is less than the elastic deflection that the rig "
                               "declares: the rig is not this machine, or the motor did not reach both walls",
                               play.travel)};
   }
-  require_same_throughout(play.plays, half);
+  require_same_throughout(play.plays, told);
   estimate.status = Status::ok;
   // Friction on the flanks carries up to as much torque again to the walls.
   if (!settings.subtract_elastic_deflection && settings.elastic_deflection)
     estimate.deflection =
         2 * (1 + settings.elastic_uncertainty) * settings.elastic_deflection(2 * walls.level);
-  estimate.backlash_angle = std::max(0.0, play.value);
-  estimate.angle_lower = std::max(0.0, play.value - half);
-  estimate.angle_upper = play.value + half;
+  estimate.backlash_angle = std::max(0.0, value);
+  estimate.angle_lower = std::max(0.0, value - half);
+  estimate.angle_upper = value + half;
   estimate.backlash = settings.base_radius * estimate.backlash_angle;
   estimate.lower = settings.base_radius * estimate.angle_lower;
   estimate.upper = settings.base_radius * estimate.angle_upper;
@@ -327,6 +341,13 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
   estimate.components = parts.components;
   estimate.components->at_torque = settings.subtract_elastic_deflection ? torque : walls.level;
   estimate.message = describe(walls, settings, play, parts);
+  if (held > 0)
+    estimate.message += fmt::format(
+        "; the ramps go on to {:.4g} N m: on the way there the walls are {:.4g} rad apart, on the way back "
+        "{:.4g} "
+        "rad, as friction holds what the peaks wind up, and the interval holds both; ramps to little more "
+        "than {:.4g} N m would tell",
+        median_of(walls.readings, &WallReading::peak), play.value - held, play.value, walls.level);
   if (settings.subtract_elastic_deflection && std::abs(by_sensor - torque) > kTorqueSpan * torque)
     estimate.message +=
         fmt::format("; by sensor_torque it is {:.4g} N m there, the interval holds both", by_sensor);

@@ -30,8 +30,11 @@ constexpr double kNoisyTiming = 0.8;
 constexpr double kLeastOverFriction = 0.7;  // simulation: servos with up to twice the declared friction
 constexpr int kSettle = 2;                  // choice: looks at what is left in flight
 constexpr double kTangent = 1.5;  // theory: Hertz, deflection at a tangent stiffness over that at the secant
-constexpr double kUnlike = 0.4;   // simulation: rigs whose values are all off; share of the crossings
-constexpr double kNormal95 = 1.96;         // theory: standard deviations of 95 %, both ends
+// Momentum at the impact over what friction took on the way, at least: below, the motor is led across the
+// gap.
+constexpr double kMomentumLeft = 0.1;
+constexpr double kUnlike = 0.4;     // simulation: rigs whose values are all off; share of the crossings
+constexpr double kNormal95 = 1.96;  // theory: standard deviations of 95 %, both ends
 constexpr double kToldElasticShare = 0.2;  // simulation: the level is told to some 10 %
 
 void require(bool valid, const char* name, double value, const char* limit) {
@@ -106,6 +109,7 @@ struct Travels {
   std::vector<double> impact;  // sample
   std::vector<double> gap, timing, elastic, law, smear;
   std::vector<double> impact_speed;  // rad/s
+  std::vector<double> friction;      // N m s, what viscous and dry friction took of the momentum on the way
 };
 
 /// [N m] On the flank, of the record's larger ones.
@@ -143,6 +147,9 @@ Travels travels_of(const Motor& motor, const Flank& flank, const std::vector<Cro
     all.law.push_back(law);
     all.smear.push_back(std::abs(place(c.impact) - place(c.impact - double(flank.half))));
     all.impact_speed.push_back(std::abs(at(motor.speed, c.impact)));
+    all.friction.push_back(s.motor_damping *
+                               std::abs(at(motor.position, c.impact) - at(motor.position, c.release)) +
+                           s.motor_friction * (c.impact - c.release) * motor.interval);
   }
   return all;
 }
@@ -286,6 +293,19 @@ double declared_half_width(const Motor& motor, const Reading& reading, const Mom
   return std::sqrt(squares);
 }
 
+/// A motor that friction leads across the gap hands over no momentum: what is on the flank is then the
+/// difference of torque and friction, and as wrong as the friction is.
+void require_momentum(const Travels& travels, const MomentumTransferSettings& s) {
+  const double momentum = s.motor_inertia * signal::median(travels.impact_speed),
+               friction = signal::median(travels.friction);
+  if (momentum >= kMomentumLeft * friction) return;
+  throw Refusal{
+      Status::out_of_domain,
+      fmt::format("the motor brings a momentum of {:.2g} N m s to the impacts, friction takes {:.2g} "
+                  "N m s on the way there: it is led across the gap, and does not fly",
+                  momentum, friction)};
+}
+
 /// All crossings of a gap are as wide. Where they are not, some are something else: swings of the motor that
 /// a wrong inertia or stiffness makes look like flights.
 void require_alike(const Travels& travels, double half, const MomentumTransferSettings& s) {
@@ -309,6 +329,7 @@ void fill(const record::Record& record, MomentumTransferSettings s, Estimate& es
     for (int i = 0; i < kSettle; ++i) s.motor_friction = friction_in_flight(motor, s);
   const Reading reading = read(motor, s);
   const auto& [flank, travels, scale] = reading;
+  require_momentum(travels, s);
   const double told = half_width(travels, scale, motor, flank, s);
   require_same_throughout(travels.gap, told);
   require_alike(travels, told, s);

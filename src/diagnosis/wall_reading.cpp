@@ -5,9 +5,12 @@
 #include <cmath>
 
 #include "backlash_diagnosis/signal/noise.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 
 namespace backlash::diagnosis {
 namespace {
+
+constexpr double kPeak = 0.95;  // quantile, past peaks of noise
 
 struct Line {
   double mean = 0, slope = 0, rms = 0;  // slope per sample, rms of the residual
@@ -48,6 +51,12 @@ Moments hann_moments(const std::vector<double>& values, std::size_t begin, std::
     squares += value * value;
   }
   return {values[begin] + weighted / weight_sum, std::sqrt(std::max(0.0, squares / n - sum * sum))};
+}
+
+std::vector<double> side_torque(const std::vector<double>& torque, const TorqueExcursion& excursion) {
+  std::vector<double> values;
+  for (std::size_t i = excursion.begin; i < excursion.end; ++i) values.push_back(excursion.side * torque[i]);
+  return values;
 }
 
 // Contiguous part of [begin, end) with the largest sum of side * torque - level.
@@ -98,18 +107,23 @@ std::vector<TorqueExcursion> find_excursions(const std::vector<double>& torque, 
 WallReading read_wall(const LockedMotion& motion, const TorqueExcursion& excursion, double level,
                       double torque_span, std::size_t limit) {
   const std::size_t end = excursion.end, length = end - excursion.begin;
-  const std::size_t fewest = std::min<std::size_t>(length, 4);
-  std::size_t window = std::max(fewest, length / 3);
-  const double change =
-      std::abs(fit_line(motion.torque, end - window, end).slope) * static_cast<double>(window);
-  if (change > torque_span) {
-    window = std::max(fewest, static_cast<std::size_t>(static_cast<double>(window) * torque_span / change));
-  }
+  const std::size_t fewest = std::min<std::size_t>(length, 4), third = std::max(fewest, length / 3);
+  const auto change_within = [&](std::size_t from) {
+    return std::abs(fit_line(motion.torque, from, from + third).slope) * static_cast<double>(third);
+  };
+  const auto window_for = [&](double change) {
+    if (change <= torque_span) return third;
+    return std::max(fewest, static_cast<std::size_t>(static_cast<double>(third) * torque_span / change));
+  };
 
   WallReading reading;
-  reading.torque_change = change;
+  reading.torque_change = change_within(end - third);
   reading.side = excursion.side;
-  const std::size_t begin = end - window;
+  const std::size_t window = window_for(reading.torque_change), begin = end - window;
+  reading.arrival = hann_moments(motion.position, excursion.begin,
+                                 excursion.begin + window_for(change_within(excursion.begin)))
+                        .mean;
+  reading.peak = signal::quantile(side_torque(motion.torque, excursion), kPeak);
   reading.time = 0.5 * (motion.time[begin] + motion.time[end - 1]);
   reading.held = motion.time[end - 1] - motion.time[excursion.begin];
   reading.torque = excursion.side * hann_moments(motion.torque, begin, end).mean;

@@ -247,6 +247,27 @@ TEST(MomentumTransfer, RefusesFlightsThatTheDeclaredInertiaDoesNotExplain) {
   EXPECT_NE(e.message.find("fly freely"), std::string::npos) << e.message;
 }
 
+// A motor that viscous friction leads from wall to wall at its terminal speed, tau / c, after J / c = 1 ms:
+// of what is on the flank its momentum says nothing.
+TEST(MomentumTransfer, RefusesAMotorThatFrictionLeadsAcrossTheGap) {
+  constexpr double kGap = 0.03, kDamping = 1;  // rad, N m s/rad: 30 ms on the way
+  record::Record r;
+  for (int i = 0; i < kRate; ++i) {
+    const double t = i / kRate, half = std::floor(20 * t + 1e-9), since = t - half / 20;
+    const double sign = std::fmod(half, 2) == 0 ? 1 : -1, speed = kTorque / kDamping;
+    const bool flies = since < kGap / speed;
+    r.time.push_back(t);
+    r.column(record::Channel::motor_torque).push_back(sign * kTorque);
+    r.column(record::Channel::motor_position)
+        .push_back(sign * (flies ? speed * since - 0.5 * kGap : 0.5 * kGap));
+  }
+  MomentumTransferSettings s = settings();
+  s.motor_damping = kDamping;
+  const Estimate e = estimate_momentum_transfer(r, s);
+  EXPECT_EQ(e.status, Status::out_of_domain);
+  EXPECT_NE(e.message.find("led across the gap"), std::string::npos) << e.message;
+}
+
 TEST(MomentumTransfer, RefusesSettingsOutOfRange) {
   const auto refused = [](void (*spoil)(MomentumTransferSettings&)) {
     MomentumTransferSettings s = settings();

@@ -13,6 +13,10 @@
 //
 // Play: median over neighbouring walls of x(+) - x(-), after a common linear drift is taken out.
 //
+// Ramps on to 1.5 T and more: dry friction hinders the way to the peak and holds what it winds up on the way
+// back, so the walls at T are c (T - Fc) and c (T + Fc) deep. Play is then the middle of both ways (as gear
+// makers read a loop up to the rated torque), and the interval holds both.
+//
 // Settling: where torque is switched, the mean m still approaches its limit while ringing dies out. With mean
 // and standard deviation S over the window (2) and half a window earlier (1), rho = S2/S1 <= 0.7:
 //   x = m2 + (m2 - m1) rho / (1 - rho).

@@ -89,8 +89,10 @@ struct MomentumTransferSettings {
 ///                      0
 ///   out_of_domain      sampling too slow for the coupling; impacts cannot be told from noise; flanks never
 ///                      change; no free flight between them: torque is left that inertia and damping do not
-///                      explain (friction, another machine); less travel than elastic deflection; flanks that
-///                      carry less than 0.7 of the dry friction; the play steps or grows within the record
+///                      explain (friction, another machine); a motor whose momentum at the impacts is less
+///                      than a tenth of what friction took on the way; less travel than elastic deflection;
+///                      flanks that carry less than 0.7 of the dry friction; the play steps or grows within
+///                      the record
 ///   below_range        the interval, which is given, holds 0: contact is not lost for longer than the
 ///                      averaging resolves
 Estimate estimate_momentum_transfer(const record::Record& record, const MomentumTransferSettings& settings);

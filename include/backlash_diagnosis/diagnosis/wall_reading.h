@@ -34,7 +34,9 @@ struct WallReading {
   double torque = 0;         ///< N m, Hann-weighted mean of side * torque over the window
   double sensor = kNaN;      ///< N m, the same of LockedMotion::sensor; NaN where that is empty
   double torque_change = 0;  ///< N m, size of the change of torque over the last third of the excursion
+  double peak = 0;           ///< N m, side * torque that the excursion's 95th percentile has
   double position = 0;       ///< Hann-weighted mean over the window
+  double arrival = 0;        ///< the same at the excursion's begin, on the way to the peak
   double spread = 0;         ///< standard deviation over the window
   double earlier_position = 0, earlier_spread = 0;  ///< the same, half a window earlier
   /// rms about a straight line, from the window's begin until torque falls below half the level
