@@ -82,7 +82,10 @@ Readings read(const std::vector<Cut>& cuts, const std::vector<char>& worth, cons
   for (std::size_t k = 0; k < cuts.size(); ++k)
     out.fits.push_back(worth[k] ? fit_flanks(cuts[k].windows, model) : FlankFit{});
   for (std::size_t k = 0; k < cuts.size(); ++k) {
-    if (!out.fits[k].found) continue;
+    if (!out.fits[k].found) {  // the one that comes closest tells what the record lacks
+      if (out.fits[k].lack > out.surest().lack) out.best = k;
+      continue;
+    }
     const double change = windows_change(cuts, out.fits, k),
                  error = std::hypot(error_of(out.fits[k]), change);
     if (!out.surest().found || error < out.error) out.best = k, out.change = change, out.error = error;
@@ -265,7 +268,10 @@ FlankReading read_flanks(const TwoEncoders& motion, const FlankModel& model, dou
   std::vector<Cut> cuts = cuts_of(motion);
   const std::vector<Law> laws = read_laws(cuts, model, large_torque);
   FlankReading reading;
-  if (!laws[0].readings.surest().found) return reading;
+  if (!laws[0].readings.surest().found) {
+    reading.fit.lack = laws[0].readings.surest().lack;
+    return reading;
+  }
   const std::vector<double> squares = squares_of_laws(laws, cuts);
   const auto least = std::size_t(std::min_element(squares.begin(), squares.end()) - squares.begin());
   // Each stay on a flank tells once.

@@ -418,10 +418,15 @@ FlankFit Fitter::result(const MatrixXd& gap) const {
   const double left = 1 - noise * inverse_(elastic_at_, elastic_at_);
   fit.attenuation = left > 0 ? noise * p_[elastic_at_] * row[elastic_at_] / left : INFINITY;
   const auto fewer = double(std::min(fit.used[0], fit.used[1]));
-  fit.found = fewer >= double(kFewest) && fit.against >= kFewestAgainst;
-  if (model_.moving)
-    fit.found = fit.found && fewer >= kShareOfFlank * count && share_that_swings() <= kSwings &&
-                (gap.cols() > 1 || kOwnShare * alone < 1);
+  fit.lack = [&] {
+    if (fewer < std::max(double(kFewest), model_.moving ? kShareOfFlank * count : 0))
+      return FlanksLack::pressed;
+    if (fit.against < kFewestAgainst) return FlanksLack::both_directions;
+    if (model_.moving && share_that_swings() > kSwings) return FlanksLack::whole_windows;
+    if (model_.moving && gap.cols() == 1 && kOwnShare * alone >= 1) return FlanksLack::own_part;
+    return FlanksLack::nothing;
+  }();
+  fit.found = fit.lack == FlanksLack::nothing;
   return fit;
 }
 
@@ -449,7 +454,7 @@ FlankFit Fitter::fit() {
     solve(MatrixXd::Ones(n_, 1), deviation);
     fit = result(MatrixXd::Ones(n_, 1));
     if (fit.residual > kVaries * varying.residual) {
-      varying.found = fit.found;
+      varying.found = fit.found, varying.lack = fit.lack;
       fit = varying;
       fit.varies = true;
       fit.least_gap = knots.minCoeff();

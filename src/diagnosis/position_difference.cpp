@@ -215,14 +215,29 @@ Fits fit_record(const TwoEncoders& motion, const FlankModel& model) {
   }
 }
 
+const char* what_lacks(FlanksLack lack) {
+  switch (lack) {
+    case FlanksLack::both_directions:
+      return "each flank is pressed in one direction of motion only, where play is not told from the dry "
+             "friction "
+             "of the motor; loads that drive, or that are braked, would do";
+    case FlanksLack::whole_windows:
+      return "flanks change within a few samples: a drive that chatters; calmer torque or faster sampling "
+             "would do";
+    case FlanksLack::own_part:
+      return "each flank is pressed in a part of the path, or at a torque, of its own, where play is not "
+             "told from "
+             "errors of the encoders and from what the teeth yield; moves over other paths and at other "
+             "speeds "
+             "would do";
+    default:
+      return "torque does not press both flanks (10 % of the time at least); loads that drive, or that are "
+             "braked, would do";
+  }
+}
+
 void require_sound(const FlankFit& fit) {
-  if (!fit.found)
-    throw Refusal{
-        Status::out_of_domain,
-        "torque does not press both flanks (10 % of the time at least), or each in one direction of motion "
-        "only, where play is not told from the dry friction of the motor, or each in a part of the path of "
-        "its own, where it is not told from errors of the encoders, or flanks change within a few samples; "
-        "loads that drive, or that are braked, and moves over other paths would do"};
+  if (!fit.found) throw Refusal{Status::out_of_domain, what_lacks(fit.lack)};
   if (fit.stays < kFewestStays)
     throw Refusal{Status::insufficient_data, "the motor lies on a flank only " + std::to_string(fit.stays) +
                                                  " times, needed are " + std::to_string(kFewestStays)};

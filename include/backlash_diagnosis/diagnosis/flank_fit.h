@@ -50,7 +50,18 @@ struct FlankModel {
   bool moving = false;           // the load travels: f and b may depend on its position, friction has a sign
 };
 
+/// What keeps a record from showing two flanks; the later, the closer it comes.
+enum class FlanksLack {
+  pressed,          ///< a flank is pressed in less than 10 % of the windows
+  both_directions,  ///< each is pressed in one direction of motion only: dry friction of the motor looks
+                    ///< alike
+  whole_windows,    ///< flanks change within the windows
+  own_part,         ///< position, speed, acceleration and torque tell which is pressed
+  nothing
+};
+
 struct FlankFit {
+  FlanksLack lack = FlanksLack::pressed;  ///< `nothing` where `found`
   /// Both flanks are pressed (10 % of the windows on each), in either direction of motion, and which is no
   /// function of position, speed, acceleration and torque (of the squares of `side` these leave 0.3 % and
   /// more).
