@@ -338,6 +338,33 @@ TEST(FitRecords, ABodyInOneOfThemContradictsTheOthers) {
 }
 
 // With the effect in the rig file nothing is missing any more, on records that nobody has seen.
+// A joint whose torque, or whose position and speed, count the other way than the URDF says.
+TEST(FitRecords, AJointWithAnotherSignIsNamed) {
+  const test::Machine machine(1);
+  std::vector<std::string> warnings;
+  const auto refusal = [&](std::size_t joint, const std::vector<record::Channel>& channels) -> std::string {
+    ArmRecord record = machine.record(10);
+    for (const record::Channel channel : channels)
+      for (double& x : record.joints[joint].column(channel)) x = -x;
+    try {
+      fit_records(machine.declared, {motions_of(record, machine.declared, warnings)});
+      return "";
+    } catch (const CannotIdentify& error) {
+      return error.what();
+    }
+  };
+  EXPECT_EQ(refusal(0, {}), "");
+  for (const std::size_t joint : {0u, 2u, 4u}) {
+    const std::string name = machine.declared.joints[joint].name;
+    EXPECT_EQ(refusal(joint, {machine.declared.channel}).find(name), 0u)
+        << refusal(joint, {machine.declared.channel});
+    const std::string moved =
+        refusal(joint, {record::Channel::motor_position, record::Channel::motor_velocity});
+    EXPECT_EQ(moved.find(name), 0u) << moved;
+    EXPECT_NE(moved.find("the sign of its torque or of its position"), std::string::npos) << moved;
+  }
+}
+
 TEST(Trace, TheRigThatIsWrittenClosesTheLoop) {
   const EffectCase c = {When::always, unknown_effect("cogging", 1.5, 7.3), 1};
   test::Machine machine(31);

@@ -23,7 +23,9 @@ std::string description(const std::vector<Contradiction>& contradictions);
 
 /// fit_arm_and_friction_speeds() of all records together; of two to eight also of each alone. Where they
 /// contradict each other the fit says so (contradictions, a warning), and each standard error is at least as
-/// large as the distance to the value of any record alone. Throws as that.
+/// large as the distance to the value of any record alone. Throws as that, and CannotIdentify where friction
+/// of a joint comes out as a torque that drives it: a sign is wrong. Warns of joints of which a tenth of the
+/// torque, and five times the noise, is left.
 ArmFit fit_records(const ArmRig& rig, const std::vector<RecordMotions>& records,
                    const FitSettings& settings = {}, const Progress& progress = nullptr);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../fit/record_sense.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/axis_unit.h"
@@ -277,6 +278,12 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   if (trace.unexplained)
     trace.several = several_of(declared, records, settings, most_left(trace, found), progress);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
+  for (std::size_t i = 0; i < records.train.size(); ++i) {
+    const ServoData& d = records.train[i];
+    for (const std::string& warning :
+         unit_warnings({records.names[i], d.interval, d.torque, d.motor, d.load}, declared))
+      trace.warnings.push_back(warning);
+  }
   return trace;
 }
 
