@@ -84,9 +84,9 @@ void require_rubbing(const ArmFit& fit, const RecordMotions& motions) {
     if (sum.friction < kLeastFriction * kLeastFriction * sum.torque) continue;
     if (sum.power > -kDriving * std::sqrt(sum.friction * sum.speed)) continue;
     throw CannotIdentify(
-        fmt::format("{}: friction comes out as a torque that drives it (Coulomb {:.3g} N m, viscous {:.3g} N "
-                    "m s/rad): the "
-                    "sign of its torque or of its position is not that of the rig file and the URDF",
+        fmt::format("{}: friction comes out as a torque that drives it (Coulomb {:.3g} N m, viscous {:.3g} "
+                    "N m s/rad): the sign of its torque or of its position is not that of the rig file and "
+                    "the URDF",
                     drive.name, drive.terms[std::size_t(DriveTerm::coulomb)],
                     drive.terms[std::size_t(DriveTerm::viscous)]));
   }
@@ -96,9 +96,9 @@ void warn_of_misfit(ArmFit& fit) {
   for (std::size_t j = 0; j < fit.train.size(); ++j)
     if (fit.train[j] > std::max(kMisfit, kFarAboveNoise * fit.floor[j]))
       fit.warnings.push_back(
-          fmt::format("{}: the fitted arm leaves {:.3g} % of its torque where noise alone would leave {:.3g} "
-                      "%: it has an effect "
-                      "that the rig file lacks, or its signs, axis or links are not as declared",
+          fmt::format("{}: the fitted arm leaves {:.3g} % of its torque where noise alone would leave "
+                      "{:.3g} %: it has an effect that the rig file lacks, or its signs, axis or links are "
+                      "not as declared",
                       fit.rig.joints[j].name, 100 * fit.train[j], 100 * fit.floor[j]));
 }
 

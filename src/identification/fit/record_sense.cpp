@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kFollows = 0.9;                             // choice: correlation of a load that moves along
 constexpr double kLeastTravel = 0.8, kLargestTravel = 1.25;  // choice: gaps and deflections are far smaller
+constexpr double kStandsStill = 0.05;                        // choice: of the travel of the other
 constexpr double kLooser = 20;  // choice: a play or compliance so many times the declared is not believed
 constexpr double kBand = 20, kWidestBand = 0.1;  // Hz, of the sampling rate: choice
 constexpr double kStands = 0.05;                 // choice: of the rms speed, below which friction has no sign
@@ -118,6 +119,10 @@ void require_rate(const RecordedMotion& m, const model::Rig& rig) {
                               m.interval, swings));
 }
 
+bool load_moves(const RecordedMotion& m) {
+  return !m.load.empty() && signal::peak_to_peak(m.load) > kStandsStill * signal::peak_to_peak(m.motor);
+}
+
 bool is_asked(const RecordedMotion& motion, const model::Rig& rig) {
   return (simulation::load_moves_freely(rig) || rig.mesh.rigid) && motion.motor.size() >= kFewest &&
          motion.torque.size() == motion.motor.size();
@@ -136,7 +141,8 @@ void require_sense(const RecordedMotion& motion, const model::Rig& rig) {
 std::vector<std::string> unit_warnings(const RecordedMotion& motion, const model::Rig& rig) {
   if (!is_asked(motion, rig)) return {};
   const Spent on = spent(motion);
-  const double times = on.inertia / (rig.motor.inertia + (rig.mesh.rigid ? 0 : rig.link.inertia));
+  const bool alone = rig.mesh.rigid || !load_moves(motion);  // as of the driver by itself
+  const double times = on.inertia / (rig.motor.inertia + (alone ? 0 : rig.link.inertia));
   if (on.inertia_share < kClearShare || (times <= kHeavier && times >= 1 / kHeavier)) return {};
   return {
       fmt::format("{}: {} is {:.3g} times what the rig file says: another machine, or units other than {}",

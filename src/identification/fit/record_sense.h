@@ -18,9 +18,8 @@ struct RecordedMotion {
 };
 
 /// Throws BadData, naming the record, where
-/// - load_position turns against motor_position, or travels less than 0.8 or more than 1.25 times as far, of
-/// a
-///   load that moves with the motor;
+/// - load_position of a load that moves with the motor turns against motor_position, or travels less than 0.8
+///   or more than 1.25 times as far;
 /// - motor_torque works against the motion: what it would be spent on, tau = J a + d w + C sign(w) + c, has
 ///   both a negative inertia and friction that drives;
 /// - motor and load swing against each other more than ten times between two samples: time in other units.

@@ -111,6 +111,11 @@ TEST(RecordSense, WarnsOfAnInertiaOfAnotherSize) {
   EXPECT_TRUE(warnings(good()).empty());
   EXPECT_TRUE(warnings(moved(3 * all(), 20, 60)).empty());
   EXPECT_TRUE(warnings(moved(0.02 * all(), 200, 600)).empty());  // friction takes nearly all
+  Columns driver = moved(servo().motor.inertia, 0.2, 0.6);  // by itself, with and without the other encoder
+  driver.load.assign(driver.motor.size(), 0.3);
+  EXPECT_TRUE(warnings(driver).empty());
+  driver.load.clear();
+  EXPECT_TRUE(warnings(driver).empty());
   const double degrees = 180 / M_PI;
   ASSERT_EQ(warnings(scaled(good(), 1, degrees, degrees)).size(), 1u);
   EXPECT_NE(warnings(scaled(good(), 1, degrees, degrees))[0].find("0.0175 times"), std::string::npos);
