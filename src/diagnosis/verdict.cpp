@@ -340,7 +340,10 @@ Verdict with_declared_wrong(Verdict verdict, const Estimates& all) {
   return verdict;
 }
 
-Verdict nothing_sound(const Estimates& estimates) {
+/// Methods that looked at the record and refused it come first, then those that lack something.
+Verdict nothing_sound(Estimates estimates) {
+  std::stable_partition(estimates.begin(), estimates.end(),
+                        [](const Estimate& e) { return e.status != Status::insufficient_data; });
   Verdict verdict;
   verdict.agreement = "none";
   verdict.message = "cannot tell";

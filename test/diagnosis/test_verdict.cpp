@@ -334,6 +334,15 @@ TEST(Verdict, NothingSoundCannotTellAndSaysWhy) {
   EXPECT_EQ(combined({}).estimate, -1);
 }
 
+// What the record itself refuses is of more use than what nobody asked for.
+TEST(Verdict, NothingSoundSaysFirstWhatTheRecordRefuses) {
+  const Verdict v =
+      combined({unable("undeclared", Status::insufficient_data, "the rig file declares no such"),
+                unable("tried", Status::out_of_domain, "one flank only")});
+  EXPECT_EQ(v.message.find("cannot tell; tried: out_of_domain (one flank only); undeclared: "), 0u)
+      << v.message;
+}
+
 TEST(Verdict, BaselineLimitsTheGrowth) {
   Baseline baseline;
   baseline.backlash = 1.8e-4;
