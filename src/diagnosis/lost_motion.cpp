@@ -344,9 +344,8 @@ void fill(const record::Record& record, const LostMotionSettings& settings, Esti
   if (held > 0)
     estimate.message += fmt::format(
         "; the ramps go on to {:.4g} N m: on the way there the walls are {:.4g} rad apart, on the way back "
-        "{:.4g} "
-        "rad, as friction holds what the peaks wind up, and the interval holds both; ramps to little more "
-        "than {:.4g} N m would tell",
+        "{:.4g} rad, as friction holds what the peaks wind up, and the interval holds both; ramps to little "
+        "more than {:.4g} N m would tell",
         median_of(walls.readings, &WallReading::peak), play.value - held, play.value, walls.level);
   if (settings.subtract_elastic_deflection && std::abs(by_sensor - torque) > kTorqueSpan * torque)
     estimate.message +=

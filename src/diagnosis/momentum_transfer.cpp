@@ -30,8 +30,8 @@ constexpr double kNoisyTiming = 0.8;
 constexpr double kLeastOverFriction = 0.7;  // simulation: servos with up to twice the declared friction
 constexpr int kSettle = 2;                  // choice: looks at what is left in flight
 constexpr double kTangent = 1.5;  // theory: Hertz, deflection at a tangent stiffness over that at the secant
-// Momentum at the impact over what friction took on the way, at least: below, the motor is led across the
-// gap.
+// Simulation: momentum at the impact over what friction took on the way, at least. Servos have 0.9 and more,
+// slow ramps less than 0.004.
 constexpr double kMomentumLeft = 0.1;
 constexpr double kUnlike = 0.4;     // simulation: rigs whose values are all off; share of the crossings
 constexpr double kNormal95 = 1.96;  // theory: standard deviations of 95 %, both ends

@@ -219,17 +219,14 @@ const char* what_lacks(FlanksLack lack) {
   switch (lack) {
     case FlanksLack::both_directions:
       return "each flank is pressed in one direction of motion only, where play is not told from the dry "
-             "friction "
-             "of the motor; loads that drive, or that are braked, would do";
+             "friction of the motor; loads that drive, or that are braked, would do";
     case FlanksLack::whole_windows:
       return "flanks change within a few samples: a drive that chatters; calmer torque or faster sampling "
              "would do";
     case FlanksLack::own_part:
       return "each flank is pressed in a part of the path, or at a torque, of its own, where play is not "
-             "told from "
-             "errors of the encoders and from what the teeth yield; moves over other paths and at other "
-             "speeds "
-             "would do";
+             "told from errors of the encoders and from what the teeth yield; moves over other paths and at "
+             "other speeds would do";
     default:
       return "torque does not press both flanks (10 % of the time at least); loads that drive, or that are "
              "braked, would do";

@@ -32,13 +32,9 @@ constexpr double kClearShare = 0.3;  // choice: of the torque, that an inertia m
 constexpr double kHeavier = 10;      // choice: rig files are right within 40 %
 constexpr std::size_t kFewest = 64;
 
-double mean(const Eigen::VectorXd& x) {
-  return x.size() > 0 ? x.mean() : 0;
-}
-
 Eigen::VectorXd varying(const std::vector<double>& x) {
-  Eigen::VectorXd v = Eigen::Map<const Eigen::VectorXd>(x.data(), Eigen::Index(x.size()));
-  return v.array() - mean(v);
+  const Eigen::Map<const Eigen::VectorXd> v(x.data(), Eigen::Index(x.size()));
+  return v.array() - v.mean();
 }
 
 /// rad: difference of the travels that the declared play and teeth allow.
