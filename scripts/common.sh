@@ -54,24 +54,26 @@ make_workspace() {
     case ${entry##*/} in build | devel | install) continue ;; esac
     [[ ${folder}/${entry##*/} -ef ${entry} ]] || ln -sfn "${entry}" "${folder}/"
   done
-  # CMake refuses a build folder that was made elsewhere (a copied or moved repository).
+  # CMake refuses a build folder that was made elsewhere (a copied or moved repository) or for another build tool.
   local cache=${WS}/build/CMakeCache.txt
-  if [[ -e ${cache} ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=${WS}/src" "${cache}"; then
+  if [[ -e ${cache} ]] && ! { grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=${WS}/src" "${cache}" &&
+    grep -qxF CMAKE_GENERATOR:INTERNAL=Ninja "${cache}"; }; then
     rm -rf "${WS}/build" "${WS}/devel" "${WS}/install"
   fi
 }
 
-# Of what make prints, how far it is: one line that is written again and again on a terminal, else a line per fifth.
+# Of what ninja prints, how far it is: one line that is written again and again on a terminal, else a line per fifth. Its count
+# is of all files that the whole build compiles and links.
 show_progress() {
-  local line percent shown=0
+  local line done total shown=0
   while IFS= read -r line; do
-    [[ ${line} =~ ^\[\ *([0-9]+)%\] ]] || continue
-    percent=${BASH_REMATCH[1]}
+    [[ ${line} =~ ^\[([0-9]+)/([0-9]+)\] ]] || continue
+    done=${BASH_REMATCH[1]} total=${BASH_REMATCH[2]}
     if [[ -t 2 ]]; then
-      printf '\r%3d %% built' "${percent}" >&2
-    elif ((percent >= shown + 20)); then
-      shown=$((percent - percent % 20))
-      printf '%3d %% built\n' "${shown}" >&2
+      printf '\rbuilt %d of %d files' "${done}" "${total}" >&2
+    elif ((done * 5 >= (shown + 1) * total)); then
+      shown=$((done * 5 / total))
+      printf 'built %d of %d files\n' "${done}" "${total}" >&2
     fi
   done
   [[ ! -t 2 ]] || printf '\r\033[K' >&2
@@ -84,7 +86,7 @@ build() {
   local log=${WS}/log/build${1:+_${1//\//_}}.log
   (
     flock 9  # demo.sh and test.sh may run at the same time
-    catkin_make --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 "-j$(nproc)" "$@" 2>&1 </dev/null 9>&- |
+    catkin_make --use-ninja --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 "-j$(nproc)" "$@" 2>&1 </dev/null 9>&- |
       tee "${log}" | show_progress
     ((PIPESTATUS[0] == 0))
   ) 9>"${WS}/lock" && return 0

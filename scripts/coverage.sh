@@ -29,7 +29,7 @@ study() {
 }
 
 echo "== identify, servos of another simulator"
-python3 "${REPO}/test/tools/coverage/identify_servos.py" "${out}/servos" --make "${executables}/make_machine" \
+python3 "${REPO}/test/campaigns/coverage/identify_servos.py" "${out}/servos" --make "${executables}/make_machine" \
   --identify "${executables}/identify" --rig "${servo}" | tee "${out}/identify_servos.txt"
 study servo --servo "${servo}" --machines 40
 study joint --joint "${joint}" --machines 200

@@ -1,7 +1,7 @@
 #!/bin/bash
 # Builds the package if need be, makes the servos of scripts/trace_machines.sh, runs diagnose_record on both motions of
 # each and counts the intervals that miss the play. Everything is kept in OUT (default: build/machines of this
-# repository). Usage: bash scripts/diagnose_machines.sh [OUT [OPTION...]]; options as test/tools/diagnosis_table.py.
+# repository). Usage: bash scripts/diagnose_machines.sh [OUT [OPTION...]]; options as test/campaigns/diagnosis_table.py.
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -22,5 +22,5 @@ echo "Building in ${WS}"
 build
 build "${PACKAGE}_test_machine"
 executables=${WS}/devel/lib/${PACKAGE}
-python3 "${REPO}/test/tools/diagnosis_table.py" --diagnose "${executables}/diagnose_record" \
+python3 "${REPO}/test/campaigns/diagnosis_table.py" --diagnose "${executables}/diagnose_record" \
   --make "${executables}/make_machine" --keep "${out}" "$@"

@@ -8,7 +8,7 @@ set -euo pipefail
 
 # One line per purpose.
 run=(
-  build-essential ccache cmake                                    # compiler and build
+  build-essential ccache cmake ninja-build                        # compiler and build
   catkin ros-core-dev                                             # ROS 1: build system, roscpp, rosbag, messages
   libactionlib-dev libdiagnostic-updater-dev                      # ROS 1 libraries outside the core
   libdynamic-reconfigure-config-init-mutex-dev python3-dynamic-reconfigure

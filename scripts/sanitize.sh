@@ -31,7 +31,7 @@ run_gtests() {
   mkdir -p "${WS}/reports"
   local room log total=0 passed skipped
   for room in base signal record model simulation diagnosis rig_file identification changes studies report findings ros tools; do
-    make -C "${WS}/build" "-j$(nproc)" "${PACKAGE}_test_${room}" >"${WS}/log/build_${room}.log" 2>&1 ||
+    ninja -C "${WS}/build" "${PACKAGE}_test_${room}" >"${WS}/log/build_${room}.log" 2>&1 ||
       fail "the tests of ${room} cannot be built, see ${WS}/log/build_${room}.log"
     log=${WS}/log/${room}.log
     # Into files: commands that a test starts report too, and the test reads what they print.
@@ -51,7 +51,7 @@ run_gtests() {
 
 # A node reports into files of its own and goes on; any report fails the run.
 run_thread() {
-  make -C "${WS}/build" "-j$(nproc)" >"${WS}/log/build_all.log" 2>&1 || fail "the build failed, see ${WS}/log"
+  ninja -C "${WS}/build" >"${WS}/log/build_all.log" 2>&1 || fail "the build failed, see ${WS}/log"
   mkdir -p "${ROS_HOME}" "${WS}/reports"
   local test
   for test in diagnoser diagnoser_input simulator trace_residual; do

@@ -42,7 +42,7 @@ check() {
 # run_tests WHAT JOBS TARGET...: the exit code says nothing about the tests, only about the run.
 run_tests() {
   echo "Running the $1; their output goes to ${WS}/log/run_$1.log"
-  quietly "run_$1" make -C "${WS}/build" "-j$2" "${@:3}" || outside+=(--failed "run_$1: the run broke off")
+  quietly "run_$1" ninja -C "${WS}/build" "-j$2" "${@:3}" || outside+=(--failed "run_$1: the run broke off")
 }
 # rostest_targets -l|-L: the rostests whose file says that they run beside others, or those that measure rates.
 rostest_targets() {

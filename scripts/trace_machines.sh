@@ -1,7 +1,7 @@
 #!/bin/bash
 # Builds the package if need be, makes the test machines, runs trace_residual on each and prints the confusion table
 # against the goals. Everything is kept in OUT (default: build/machines of this repository), and what is there already
-# is not run again. Usage: bash scripts/trace_machines.sh [OUT [OPTION...]]; options as test/tools/confusion_table.py.
+# is not run again. Usage: bash scripts/trace_machines.sh [OUT [OPTION...]]; options as test/campaigns/confusion_table.py.
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -22,5 +22,5 @@ echo "Building in ${WS}"
 build
 build "${PACKAGE}_test_machine"
 executables=${WS}/devel/lib/${PACKAGE}
-python3 "${REPO}/test/tools/confusion_table.py" --trace "${executables}/trace_residual" \
+python3 "${REPO}/test/campaigns/confusion_table.py" --trace "${executables}/trace_residual" \
   --make "${executables}/make_machine" --keep "${out}" "$@"

@@ -31,7 +31,7 @@ constexpr double kReadLevelFree = 0.5;
 // The motor is not at rest at the walls if ringing and settling make this share of the travel uncertain, ...
 constexpr double kUnsettled = 0.1;
 // ... or if rms ringing is this share of the elastic deflection, so that the flank is left again.
-constexpr double kContactLoss = 0.5;
+constexpr double kAssumedLoss = 0.5;
 // Ramps whose peaks are so many times the stated torque: dry friction holds what the peak has wound up.
 constexpr double kFarBeyond = 1.5;  // choice
 constexpr std::size_t kFewest = 2;  // excursions per side
@@ -184,7 +184,7 @@ std::vector<double> deflections_of(const Walls& walls, const LostMotionSettings&
 
 void require_rest(const WallToWall& play, double deflection) {
   const bool settled = play.motion <= kUnsettled * std::abs(play.travel);
-  const bool touching = deflection == 0 || play.ringing <= kContactLoss * deflection;
+  const bool touching = deflection == 0 || play.ringing <= kAssumedLoss * deflection;
   if (settled && touching) return;
   throw Refusal{Status::out_of_domain,
                 fmt::format("the motor does not come to rest at the walls: its position varies by {:.4g} rad "

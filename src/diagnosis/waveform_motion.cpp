@@ -33,20 +33,21 @@ struct State {
 };
 
 /// v where the machine has it.
-Lanes per_inertia(const Lanes& v) {
+DIAGNOSIS_LANES Lanes per_inertia(const Lanes& v) {
   return v > 0 ? 1 / v : Lanes{};
 }
 
 /// By what power of their penetration the teeth resist.
 enum class Teeth { line, power, hertz };
 
-template <WaveformOutput Output, Teeth Law>
+template <Teeth Law>
 struct Train {
   Lanes half_gap, motor_damping, dry, slow, ki, ci, per_jm, per_jp, per_jg, ko, co, contact, loss, slope;
   Lanes per_jl, link_damping, link_dry, contact_damping;
   double lever, exponent;
+  WaveformOutput behind;
 
-  explicit Train(const Lanes* v, const WaveformGrid& grid)
+  DIAGNOSIS_LANES explicit Train(const Lanes* v, const WaveformGrid& grid)
       : half_gap(v[kHalfGap]),
         motor_damping(v[kMotorDamping]),
         dry(positive(v[kDryFriction])),
@@ -66,7 +67,8 @@ struct Train {
         link_dry(positive(v[kLinkFriction])),
         contact_damping(v[kContactDamping]),
         lever(grid.base_radius),
-        exponent(grid.exponent) {}
+        exponent(grid.exponent),
+        behind(grid.output) {}
 
   /// At penetration `depth` [m], approaching at `rate` [m/s]: N, no tension.
   DIAGNOSIS_LANES Lanes push(const Lanes& depth, const Lanes& rate) const {
@@ -89,9 +91,9 @@ struct Train {
 
   /// Of the gear and of the link, rad/s^2.
   DIAGNOSIS_LANES void output(const State& s, const Lanes& teeth, State& rate) const {
-    if constexpr (Output == WaveformOutput::locked) {
+    if (behind == WaveformOutput::locked) {
       rate.wg = (teeth - ko * s.qg - co * s.wg) * per_jg;
-    } else if constexpr (Output == WaveformOutput::link) {
+    } else if (behind == WaveformOutput::link) {
       rate.wg = (teeth - link_damping * s.wg) * per_jl;
     } else {
       const Lanes out = ko * (s.qg - s.ql) + co * (s.wg - s.wl);
@@ -107,7 +109,7 @@ struct Train {
     const Lanes pushed = lever * push(depth, x < 0 ? -v : v);
     const Lanes teeth = x < 0 ? -pushed : pushed;
     const Lanes sensor = ki * (s.qm - s.qp) + ci * (s.wm - s.wp);
-    State rate;
+    State rate{};
     rate.qm = s.wm, rate.wm = (drive + slope * s.qm - motor_damping * s.wm - sensor) * per_jm;
     rate.qp = s.wp, rate.wp = (sensor - teeth) * per_jp;
     rate.qg = s.wg;
@@ -115,12 +117,12 @@ struct Train {
     return rate;
   }
 
-  DIAGNOSIS_LANES static State along(const State& s, const State& r, double h) {
-    State next;
+  DIAGNOSIS_LANES State along(const State& s, const State& r, double h) const {
+    State next{};
     next.qm = s.qm + h * r.qm, next.wm = s.wm + h * r.wm;
     next.qp = s.qp + h * r.qp, next.wp = s.wp + h * r.wp;
     next.qg = s.qg + h * r.qg, next.wg = s.wg + h * r.wg;
-    if constexpr (Output == WaveformOutput::coupled_link)
+    if (behind == WaveformOutput::coupled_link)
       next.ql = s.ql + h * r.ql, next.wl = s.wl + h * r.wl;
     return next;
   }
@@ -130,8 +132,8 @@ struct Train {
     const State c = rate(along(s, b, h / 2), drive), d = rate(along(s, c, h), drive);
     s = along(along(along(along(s, a, h / 6), b, h / 3), c, h / 3), d, h / 6);
     brake(dry * per_jm * h, h, s.qm, s.wm);
-    if constexpr (Output == WaveformOutput::link) brake(link_dry * per_jl * h, h, s.qg, s.wg);
-    if constexpr (Output == WaveformOutput::coupled_link) brake(link_dry * per_jl * h, h, s.ql, s.wl);
+    if (behind == WaveformOutput::link) brake(link_dry * per_jl * h, h, s.qg, s.wg);
+    if (behind == WaveformOutput::coupled_link) brake(link_dry * per_jl * h, h, s.ql, s.wl);
   }
 
   /// Dry friction of one step, implicitly, so that what sticks stays: `most` is the speed that it takes at
@@ -146,27 +148,27 @@ struct Train {
 
 /// 5 ms before a reversal nothing else moves: the gear of a locked output follows the pinion on its flank; a
 /// free link is driven by it.
-template <WaveformOutput Output, Teeth Law>
-State start(const Train<Output, Law>& train, const WaveformWindow& window, const Lanes* v) {
+template <Teeth Law>
+DIAGNOSIS_LANES State start(const Train<Law>& train, const WaveformWindow& window, const Lanes* v) {
   const Lanes load = positive(v[kStartFlank]);
   Lanes depth = {}, share = {};
   for (int i = 0; i < kWaveformSets; ++i) {
     if (!(load[i] > 0)) continue;
     const auto [deep, stiffness] = train.pressed(load[i], i);
     depth[i] = deep;
-    share[i] = Output == WaveformOutput::locked ? stiffness / (stiffness + train.ko[i]) : 1;
+    share[i] = train.behind == WaveformOutput::locked ? stiffness / (stiffness + train.ko[i]) : 1;
   }
   const Lanes off = v[kStartFlank] < 0 ? v[kStartFlank] / train.ki : Lanes{};
   State s{};
-  if constexpr (Output == WaveformOutput::locked) s.qg = window.side * load / train.ko;
+  if (train.behind == WaveformOutput::locked) s.qg = window.side * load / train.ko;
   s.qp = s.qg + window.side * ((train.half_gap + depth) / train.lever + off);
   s.qm = s.qp + window.side * v[kStartTwist] / train.ki;
   s.wp = window.side * v[kStartPinionRate] / (kWaveformRateTime * train.ki);
   s.wm = s.wp + window.side * v[kStartTwistRate] / (kWaveformRateTime * train.ki);
   s.wg = s.wp * share;
-  if constexpr (Output != WaveformOutput::locked)
+  if (train.behind != WaveformOutput::locked)
     s.wg = s.wp + window.side * v[kStartGearRate] / (kWaveformRateTime * train.ki);
-  if constexpr (Output == WaveformOutput::coupled_link) {
+  if (train.behind == WaveformOutput::coupled_link) {
     s.ql = -window.side * load / train.ko * train.per_jg / (train.per_jg + train.per_jl);
     s.wl = s.wg;
   }
@@ -195,7 +197,7 @@ double lagged(const WaveformRows& torque, const WaveformRows& rate, int step, st
 /// Torque of the motor over one step, N m.
 class Drive {
  public:
-  Drive(const WaveformWindow& window, const WaveformGrid& grid, const Lanes& delay)
+  DIAGNOSIS_LANES Drive(const WaveformWindow& window, const WaveformGrid& grid, const Lanes& delay)
       : window_(window), grid_(grid), delay_(delay), change_(window.reversal + delay) {}
 
   DIAGNOSIS_LANES Lanes at(std::size_t sample, int j) const {
@@ -215,13 +217,13 @@ class Drive {
   Lanes delay_, change_;
 };
 
-template <WaveformOutput Output, Teeth Law>
+template <Teeth Law>
 DIAGNOSIS_LANES void move_all(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
   Lanes v[kAllValues];
   for (std::size_t k = 0; k < kAllValues; ++k)
     for (std::size_t i = 0; i < kWaveformSets; ++i) v[k][static_cast<int>(i)] = sets[k][i];
-  const Train<Output, Law> train(v, grid);
+  const Train<Law> train(v, grid);
   State s = start(train, window, v);
   const double h = grid.interval / grid.steps;
   const Drive drive(window, grid, v[kSwitchDelay]);
@@ -250,25 +252,11 @@ DIAGNOSIS_LANES void move_all(const WaveformWindow& window, const WaveformGrid& 
       motion.torque[k][i] = lagged(torque, rate, static_cast<int>(k * steps), i, sets[kSensorLag][i], h);
 }
 
-template <WaveformOutput Output>
-DIAGNOSIS_LANES void move_by_teeth(const WaveformWindow& window, const WaveformGrid& grid, int samples,
-                                   const WaveformSets& sets, WaveformMotion& motion) {
-  if (grid.exponent == kHertzExponent)
-    return move_all<Output, Teeth::hertz>(window, grid, samples, sets, motion);
-  if (grid.exponent == 1) return move_all<Output, Teeth::line>(window, grid, samples, sets, motion);
-  move_all<Output, Teeth::power>(window, grid, samples, sets, motion);
-}
-
 DIAGNOSIS_LANES void move_any(const WaveformWindow& window, const WaveformGrid& grid, int samples,
                               const WaveformSets& sets, WaveformMotion& motion) {
-  switch (grid.output) {
-    case WaveformOutput::locked:
-      return move_by_teeth<WaveformOutput::locked>(window, grid, samples, sets, motion);
-    case WaveformOutput::link:
-      return move_by_teeth<WaveformOutput::link>(window, grid, samples, sets, motion);
-    case WaveformOutput::coupled_link:
-      return move_by_teeth<WaveformOutput::coupled_link>(window, grid, samples, sets, motion);
-  }
+  if (grid.exponent == kHertzExponent) return move_all<Teeth::hertz>(window, grid, samples, sets, motion);
+  if (grid.exponent == 1) return move_all<Teeth::line>(window, grid, samples, sets, motion);
+  move_all<Teeth::power>(window, grid, samples, sets, motion);
 }
 
 #if defined(__x86_64__)

@@ -12,7 +12,7 @@ namespace {
 
 /// What belongs to the parameters of a machine of one inertia, by the names of the table.
 template <typename Value>
-std::map<std::string, Value> by_table(const std::map<std::string, Value>& one_inertia) {
+std::map<std::string, Value> values_by_table(const std::map<std::string, Value>& one_inertia) {
   std::map<std::string, Value> all;
   for (const rig_file::RigParameter& p : rig_file::servo_parameters())
     if (const auto at = one_inertia.find(p.one_inertia); at != one_inertia.end()) all[p.name] = at->second;
@@ -28,7 +28,7 @@ std::string fitted_rig_text(const rig_file::RigFile& declared, const Identificat
   rig_file::RigDocument document(declared);
   const double ratio = declared.rig.motor_axis_ratio();
   if (declared.rig.mesh.rigid)
-    document.set_fitted({found.rig, ratio, by_table(found.parameters), by_table(found.units)});
+    document.set_fitted({found.rig, ratio, values_by_table(found.parameters), values_by_table(found.units)});
   else
     document.set_fitted({found.rig, ratio, found.parameters, found.units});
   if (found.gap_map && gap_varies(declared.rig))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Plays of simulated arms with the motors' encoders alone, whose truth is known: right or "cannot tell",
-// never the wrong joint. How often is counted by tools/arm_traverse.
+// never the wrong joint. How often is counted by campaigns/arm_traverse.
 #include <gtest/gtest.h>
 
 #include <cmath>

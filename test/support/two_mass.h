@@ -14,7 +14,7 @@
 namespace backlash::test {
 
 /// Seen from the load. Coulomb friction grows linearly over 1e-3 rad/s either side of standstill.
-struct TwoMass {
+struct TwoMasses {
   double motor_inertia = 8.4, load_inertia = 40.5;  // kg m^2 (Yumrukcal 2013, Table 5.1, row 1a)
   double stiffness = 355e3, damping = 515;          // N m/rad, N m s/rad
   double motor_coulomb = 80, load_coulomb = 15;     // N m
@@ -71,14 +71,14 @@ struct TwoMassSensors {
   unsigned seed = 1;
 };
 
-inline record::Record simulate(const TwoMass& machine, double duration, const TwoMassSensors& sensors = {},
+inline record::Record simulate(const TwoMasses& machine, double duration, const TwoMassSensors& sensors = {},
                                double h = 1e-5) {
   record::Record record;
   Random random(sensors.seed);
   const auto rounded = [](double value, double step) {
     return step > 0 ? step * std::round(value / step) : value;
   };
-  TwoMass::State s = {machine.load_position + machine.centre(machine.load_position) + machine.start_offset,
+  TwoMasses::State s = {machine.load_position + machine.centre(machine.load_position) + machine.start_offset,
                       machine.load_position, machine.motor_speed, machine.motor_speed};
   const int inner = static_cast<int>(std::lround(1e-3 / h)), samples = static_cast<int>(duration * 1000);
   for (int i = 0; i < samples; ++i) {

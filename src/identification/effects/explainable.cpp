@@ -90,7 +90,7 @@ Samples samples(const std::vector<Predicted>& records, bool deflection, double c
   return s;
 }
 
-Eigen::MatrixXd joined(const std::vector<Eigen::MatrixXd>& parts) {
+Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXd>& parts) {
   Eigen::Index columns = 0;
   for (const Eigen::MatrixXd& p : parts) columns += p.cols();
   Eigen::MatrixXd all(parts.front().rows(), columns);
@@ -103,7 +103,7 @@ Eigen::MatrixXd joined(const std::vector<Eigen::MatrixXd>& parts) {
 Eigen::MatrixXd with_direction(const std::vector<double>& x, const Samples& s, int knots) {
   const Eigen::MatrixXd hats = signal::hat_functions(x, knots);
   const Eigen::Map<const Eigen::VectorXd> direction(s.direction.data(), Eigen::Index(s.direction.size()));
-  return joined({hats, direction.asDiagonal() * hats});
+  return stacked({hats, direction.asDiagonal() * hats});
 }
 
 /// The orders of the position that hold most of the residual of these samples.
@@ -162,9 +162,9 @@ Eigen::MatrixXd of_time(const Samples& s, int knots) {
       if (time[k] < 0) hats.row(Eigen::Index(k)).setZero();
     parts.push_back(hats);
   }
-  const Eigen::MatrixXd all = joined(parts);
+  const Eigen::MatrixXd all = stacked(parts);
   const Eigen::Map<const Eigen::VectorXd> direction(s.direction.data(), Eigen::Index(s.direction.size()));
-  return joined({all, direction.asDiagonal() * all});
+  return stacked({all, direction.asDiagonal() * all});
 }
 
 /// Functions of two states.
@@ -173,7 +173,7 @@ Eigen::MatrixXd pairs(const Samples& s, int knots) {
                         v = signal::hat_functions(s.velocity, knots),
                         a = signal::hat_functions(s.acceleration, knots),
                         t = signal::hat_functions(s.transmitted, knots);
-  return joined({signal::row_products(q, v), signal::row_products(v, a), signal::row_products(v, t)});
+  return stacked({signal::row_products(q, v), signal::row_products(v, a), signal::row_products(v, t)});
 }
 
 double unevenness(const std::vector<double>& residual) {
@@ -241,7 +241,7 @@ Remainder remainder(const std::vector<Predicted>& records, bool deflection, doub
     all.push_back(waves(s, orders));
   }
   all.push_back(pairs(s, settings.knots_of_pair));
-  out.explainable = signal::predicted_share(joined(all), y, s.block);
+  out.explainable = signal::predicted_share(stacked(all), y, s.block);
   std::stable_sort(out.follows.begin(), out.follows.end(),
                    [](const Follows& a, const Follows& b) { return a.share.value > b.share.value; });
   if (out.follows.front().share.lower > out.explainable.lower) out.explainable = out.follows.front().share;

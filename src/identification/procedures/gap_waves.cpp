@@ -3,9 +3,7 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
@@ -16,6 +14,7 @@
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/signal/least_squares.h"
+#include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/spectrum.h"
 
 namespace backlash::identification {
@@ -172,7 +171,7 @@ double f_tail(double f, double of_wave, double freedom) {
 class Left {
  public:
   Left(const Cells& cells, const MatrixXd& a) : cells_(cells) {
-    q_ = Eigen::HouseholderQR<MatrixXd>(a).householderQ() * MatrixXd::Identity(a.rows(), a.cols());
+    q_ = signal::orthonormal_basis(a);
     left_ = beside(cells.value);
     correlation_ = signal::correlation_length({left_.begin(), left_.end()});
   }
@@ -183,11 +182,10 @@ class Left {
     put_wave(cells_, order, wave, 0);
     wave.colwise().normalize();
     wave = beside(wave);
-    const MatrixXd gram = wave.transpose() * wave;
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> parts(gram);
-    if (!(parts.eigenvalues()[0] > kBeside)) return 0;
-    const VectorXd along = parts.eigenvectors().transpose() * (wave.transpose() * left_);
-    return (along.array().square() / parts.eigenvalues().array()).sum();
+    const MatrixXd gram = signal::gram(wave);
+    if (!(signal::symmetric_eigenvalues(gram)[0] > kBeside)) return 0;
+    const VectorXd along = wave.transpose() * left_;
+    return along.dot(signal::solve_symmetric(gram, along).col(0));
   }
 
   /// Chance of this gain by noise alone, with `tried` orders.
@@ -325,7 +323,7 @@ class Search {
   bool runs_agree(std::size_t wave) const {
     if (!cells_.apart) return true;
     MatrixXd a = columns(cells_, base_, waves_);
-    const VectorXd size = a.colPivHouseholderQr().solve(cells_.value),
+    const VectorXd size = signal::solve_least_squares(a, cells_.value).x,
                    slope = slope_over_order(a, size, wave);
     const Index linear = a.cols();
     a.conservativeResize(Eigen::NoChange, linear + 2);
@@ -345,7 +343,7 @@ class Search {
       std::vector<std::size_t> free;
       for (std::size_t k = 0; k < waves_.size(); ++k)
         if (waves_[k].free) free.push_back(k);
-      const VectorXd size = a.colPivHouseholderQr().solve(cells_.value);
+      const VectorXd size = signal::solve_least_squares(a, cells_.value).x;
       a.conservativeResize(Eigen::NoChange, linear + Index(free.size()));
       for (std::size_t i = 0; i < free.size(); ++i) {
         a.col(linear + Index(i)) = slope_over_order(a, size, free[i]);

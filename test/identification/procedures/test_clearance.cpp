@@ -12,14 +12,14 @@ namespace backlash::identification {
 namespace {
 
 using test::simulate;
-using test::TwoMass;
+using test::TwoMasses;
 using test::TwoMassSensors;
 
-constexpr double kGap = 4.4e-4;  // rad, of TwoMass
+constexpr double kGap = 4.4e-4;  // rad, of TwoMasses
 
 /// A hand that swings the load: a sine of a little varying size and pace.
-TwoMass pushed(double inertia, double torque, double frequency) {
-  TwoMass machine;
+TwoMasses pushed(double inertia, double torque, double frequency) {
+  TwoMasses machine;
   machine.load_inertia = inertia;
   machine.braked = true;
   machine.load_torque = [=](double t) {
@@ -60,7 +60,7 @@ TEST(Clearance, FreeFlightBetweenElasticFlanksInClosedForm) {
 TEST(Clearance, TheRigOfTheThesisPushedByHand) {
   const double runs[][3] = {{42, 40, 1.5}, {42, 40, 2}, {42, 80, 1.5}, {108, 80, 1}, {108, 80, 1.5}};
   for (const auto& run : runs) {
-    const TwoMass machine = pushed(run[0], run[1], run[2]);
+    const TwoMasses machine = pushed(run[0], run[1], run[2]);
     const Clearance c = identify_clearance(simulate(machine, 8));
     EXPECT_NEAR(c.gap.value, kGap, 3 * c.gap.standard_error) << run[0] << ' ' << run[1] << ' ' << run[2];
     EXPECT_LT(c.gap.standard_error, 0.03 * kGap);  // three of the steps of the sensor are 5 %
@@ -75,7 +75,7 @@ TEST(Clearance, TheRigOfTheThesisPushedByHand) {
 }
 
 TEST(Clearance, StiffnessAndInertiaMayBeGiven) {
-  const TwoMass machine = pushed(42, 40, 2);
+  const TwoMasses machine = pushed(42, 40, 2);
   ClearanceSettings settings;
   settings.stiffness = machine.stiffness;
   settings.load_inertia = machine.load_inertia;
@@ -88,7 +88,7 @@ TEST(Clearance, StiffnessAndInertiaMayBeGiven) {
 
 TEST(Clearance, SpringBackOfTheMotorIsTakenOff) {
   // The brake gives way by thirty steps of the motor's sensor on either side, and the flanks with it.
-  const TwoMass machine = pushed(42, 80, 1.5);
+  const TwoMasses machine = pushed(42, 80, 1.5);
   record::Record record = simulate(machine, 6);
   auto& motor = record.column(record::Channel::motor_position);
   auto& load = record.column(record::Channel::load_position);
@@ -107,7 +107,7 @@ TEST(Clearance, StandardErrorCoversTheScatter) {
   const int runs = 8;
   double squares = 0, stated = 0;
   for (int seed = 0; seed < runs; ++seed) {
-    TwoMass machine = pushed(42, 50 + 3 * seed, 1.5 + 0.05 * seed);  // steps of a sensor repeat, hands do not
+    TwoMasses machine = pushed(42, 50 + 3 * seed, 1.5 + 0.05 * seed);  // steps of a sensor repeat, hands do not
     const signal::Measured gap = identify_clearance(simulate(machine, 4)).gap;
     squares += std::pow(gap.value - kGap, 2) / runs;
     stated += std::pow(gap.standard_error, 2) / runs;
@@ -118,7 +118,7 @@ TEST(Clearance, StandardErrorCoversTheScatter) {
 }
 
 TEST(Clearance, WhatCannotBeToldIsRefused) {
-  const TwoMass machine = pushed(42, 80, 1.5);
+  const TwoMasses machine = pushed(42, 80, 1.5);
   const record::Record record = simulate(machine, 4);
   record::Record blind = record;
   blind.column(record::Channel::motor_position).clear();

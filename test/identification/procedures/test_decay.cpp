@@ -12,13 +12,13 @@ namespace backlash::identification {
 namespace {
 
 using test::simulate;
-using test::TwoMass;
+using test::TwoMasses;
 using test::TwoMassSensors;
 
 const TwoMassSensors kPerfect = {0, 0, 0, 0, 1, 1};
 
-TwoMass square_wave(double amplitude, double period, double damping = 515) {
-  TwoMass machine;
+TwoMasses square_wave(double amplitude, double period, double damping = 515) {
+  TwoMasses machine;
   machine.damping = damping;
   machine.motor_torque = [=](double t, double) {
     return std::fmod(t, period) < period / 2 ? amplitude : -amplitude;
@@ -26,7 +26,7 @@ TwoMass square_wave(double amplitude, double period, double damping = 515) {
   return machine;
 }
 
-DecaySettings settings_of(const TwoMass& machine) {
+DecaySettings settings_of(const TwoMasses& machine) {
   DecaySettings s;
   s.stiffness.value = machine.stiffness;
   s.reduced_inertia.value = machine.reduced_inertia();
@@ -94,7 +94,7 @@ TEST(Decay, StandardErrorIsThatOfTheScatter) {
 
 TEST(Decay, TheRigOfTheThesisWithItsSensors) {
   for (const RingingSignal signal : {RingingSignal::speed_difference, RingingSignal::position_difference}) {
-    const TwoMass machine = square_wave(200, 1);
+    const TwoMasses machine = square_wave(200, 1);
     DecaySettings settings = settings_of(machine);
     settings.signal = signal;
     const DecayIdentification d = identify_decay(simulate(machine, 6), settings);
@@ -113,7 +113,7 @@ TEST(Decay, TheRigOfTheThesisWithItsSensors) {
 }
 
 TEST(Decay, BearingDampingIsTakenOff) {
-  TwoMass machine = square_wave(200, 1);
+  TwoMasses machine = square_wave(200, 1);
   machine.motor_viscous = 13;
   machine.load_viscous = 7;
   DecaySettings settings = settings_of(machine);
@@ -128,7 +128,7 @@ TEST(Decay, BearingDampingIsTakenOff) {
 }
 
 TEST(Decay, PassagesOfTheGapServeWithoutATorque) {
-  const TwoMass machine = square_wave(200, 1);
+  const TwoMasses machine = square_wave(200, 1);
   record::Record record = simulate(machine, 4);
   record.column(record::Channel::motor_torque).clear();
   record.column(record::Channel::motor_velocity).clear();
@@ -139,7 +139,7 @@ TEST(Decay, PassagesOfTheGapServeWithoutATorque) {
 }
 
 TEST(Decay, LostContactIsNotUsed) {
-  const TwoMass machine = square_wave(300, 0.5, 50);  // bounces several times
+  const TwoMasses machine = square_wave(300, 0.5, 50);  // bounces several times
   const record::Record record = simulate(machine, 4, kPerfect);
   const DecayIdentification d = identify_decay(record, settings_of(machine));
   EXPECT_NEAR(d.damping.value, machine.damping, 1e-3 * machine.damping);
@@ -170,7 +170,7 @@ TEST(Decay, LostContactIsNotUsed) {
 }
 
 TEST(Decay, WrongStiffnessIsTold) {
-  const TwoMass machine = square_wave(200, 1);
+  const TwoMasses machine = square_wave(200, 1);
   DecaySettings settings = settings_of(machine);
   settings.stiffness.value *= 1.3;
   const DecayIdentification d = identify_decay(simulate(machine, 4), settings);

@@ -175,11 +175,11 @@ TEST(GapMap, OversampledPlacesDoNotRuleTheMean) {
 }
 
 TEST(GapMap, SimulatedRunsOfTheMachine) {
-  test::TwoMass machine;
+  test::TwoMasses machine;
   machine.load_viscous = 5;
   machine.gap = [](double q) { return 4.4e-4 * (1 + 0.15 * std::sin(2 * q + 0.5)); };
   const auto simulated = [&](double speed) {
-    test::TwoMass m = machine;
+    test::TwoMasses m = machine;
     m.motor_torque = [=](double t, double w) {
       return 300 * (std::min(1.0, t) * speed - w) + std::copysign(80, speed) + std::copysign(15, speed) +
              5 * speed;
@@ -344,13 +344,13 @@ TEST(GapMap, AFaultOfTheLoadIsNoWave) {
 }
 
 TEST(GapMap, SimulatedMachineWhoseGapFollowsBothGears) {
-  test::TwoMass machine;
+  test::TwoMasses machine;
   machine.gap = [](double q) {
     return 4.4e-4 * (1 + 0.15 * std::sin(q + 0.5) + 0.1 * std::sin(280.0 / 15 * q - 0.3));
   };
   machine.centre = [](double q) { return 1e-5 * std::cos(280.0 / 15 * q); };
   const auto simulated = [&](double speed) {
-    test::TwoMass m = machine;
+    test::TwoMasses m = machine;
     m.motor_torque = [=](double t, double w) {
       return 300 * (std::min(1.0, t) * speed - w) + std::copysign(80, speed) + std::copysign(15, speed);
     };

@@ -9,7 +9,7 @@
 #include "tools/command_runner.h"
 
 #ifdef BACKLASH_DIAGNOSIS_MUJOCO
-#include "tools/blind_arms/world.h"
+#include "campaigns/blind_arms/world.h"
 #endif
 
 namespace backlash::test {
