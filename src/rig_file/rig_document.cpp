@@ -70,6 +70,26 @@ bool replace_map(std::string& line, const std::string& key, const std::string& v
   return replace_scalar(line, key, line.substr(open, close + 1 - open), value, comment);
 }
 
+/// The same for one entry of "name: {..., key: scalar, ...}"; without `scalar` the entry is new.
+bool replace_in_map(std::string& line, const std::string& key, const std::string& scalar,
+                    const std::string& value) {
+  const std::size_t open = line.find('{');
+  if (open == std::string::npos) return false;
+  if (scalar.empty()) {
+    line.insert(open + 1, key + ": " + value + ", ");
+    return true;
+  }
+  const std::string old = key + ": " + scalar;
+  for (std::size_t at = line.find(old, open); at != std::string::npos; at = line.find(old, at + 1)) {
+    const std::size_t end = at + old.size();
+    const bool whole = end < line.size() && (line[end] == ',' || line[end] == '}' || line[end] == ' ');
+    if (!whole || (line[at - 1] != ' ' && line[at - 1] != '{')) continue;
+    line.replace(at, old.size(), key + ": " + value);
+    return true;
+  }
+  return false;
+}
+
 /// The lines of entries that are indented by two, at another column.
 std::vector<std::string> indented(const std::vector<std::string>& entries, std::size_t column) {
   std::vector<std::string> lines;
@@ -103,11 +123,16 @@ void RigDocument::set(const std::string& key, const std::string& value, const st
   const YamlTree read = tree();
   const std::vector<std::string> path = split(key, '.');
   const YamlNode* map = read.root;
+  int line = 0;  // of the key whose map this is
+  const auto in_braces = [&] {
+    return map != read.root && map->line == line && lines_.at(std::size_t(line) - 1).find('{') != std::string::npos;
+  };
   for (std::size_t depth = 0; depth < path.size(); ++depth) {
     const auto found = map->entries.find(path[depth]);
     const bool last = depth + 1 == path.size();
     if (found == map->entries.end()) {
       if (!last || map->entries.empty()) throw BadData(name_, key + ": its map is missing");
+      if (in_braces() && replace_in_map(lines_.at(std::size_t(line) - 1), path[depth], "", value)) return;
       const auto before = std::ptrdiff_t(map->line) - 1;  // of the first key in the map
       const std::string indent(column_of(lines_.at(before)), ' ');
       lines_.insert(lines_.begin() + before, with_comment(indent + path[depth] + ": " + value, comment));
@@ -118,6 +143,11 @@ void RigDocument::set(const std::string& key, const std::string& value, const st
       if (entry.value->kind != YamlNode::Kind::map)
         throw BadData(name_, key + ": " + path[depth] + " is no map");
       map = entry.value;
+      line = entry.line;
+    } else if (in_braces()) {
+      if (entry.value->kind != YamlNode::Kind::plain ||
+          !replace_in_map(lines_.at(std::size_t(line) - 1), path[depth], entry.value->scalar, value))
+        throw BadData(fmt::format("{}:{}", name_, entry.line), key + ": is no plain value of a map on a line");
     } else if (entry.value->kind == YamlNode::Kind::map) {
       if (!replace_map(lines_.at(entry.line - 1), path[depth], value, comment))
         throw BadData(fmt::format("{}:{}", name_, entry.line), key + ": is no map on a line of its own");

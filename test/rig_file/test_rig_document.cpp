@@ -42,8 +42,18 @@ TEST(RigDocument, AddsAnAbsentKeyToItsMap) {
   EXPECT_NE(changed.find("# new\n    law: 'x'\n"), std::string::npos) << changed;
 }
 
+TEST(RigDocument, ReplacesAndAddsInAMapOnOneLine) {
+  const std::string text = "motor:\n  friction: {forward: 1.5, backward: 1.5}   # N m\n";
+  RigDocument document(text, "t");
+  document.set("motor.friction.backward", "2");
+  EXPECT_EQ(document.text(), "motor:\n  friction: {forward: 1.5, backward: 2}   # N m\n");
+  document.set("motor.friction.forward", "1");
+  document.set("motor.friction.rest", "3");
+  EXPECT_EQ(document.text(), "motor:\n  friction: {rest: 3, forward: 1, backward: 2}   # N m\n");
+}
+
 TEST(RigDocument, RefusesWhatItCannotDo) {
-  for (const char* key : {"absent.x", "a.x", "part", "part.flow.inertia", "part.deeper.law"})
+  for (const char* key : {"absent.x", "a.x", "part", "part.deeper.law"})
     EXPECT_THROW(with_value(key, "1"), BadData) << key;
   EXPECT_THROW(RigDocument("- 1\n", "t").set("a", "1"), BadData);
 }
