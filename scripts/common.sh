@@ -111,3 +111,8 @@ use_workspace() {
 free_port() {
   /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'
 }
+
+# The tests that only scripts/nightly.sh runs, as a filter of gtest.
+nightly_tests() {
+  grep -v '^#' "${REPO}/test/nightly.txt" | paste -sd:
+}

@@ -12,7 +12,9 @@ run=(
   catkin ros-core-dev                                             # ROS 1: build system, roscpp, rosbag, messages
   libactionlib-dev libdiagnostic-updater-dev                      # ROS 1 libraries outside the core
   libdynamic-reconfigure-config-init-mutex-dev python3-dynamic-reconfigure
-  rosbash python3-rostest librostest-dev libgtest-dev             # rosrun; the package's CMake file asks for rostest
+  libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
+  ros-robot-state-publisher                                       # arm.launch
+  rosbash python3-rosnode                                         # rosrun, rosnode
   python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
   liblz4-dev libsqlite3-dev libzstd-dev                           # recordings of ROS 2
@@ -22,9 +24,8 @@ run=(
   python3-cryptography python3-distributed                        # fleet_report: Dask, with TLS between its processes
 )
 tests=(
-  catkin-lint
-  libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
-  ros-robot-state-publisher python3-tf2-msgs                      # arm.launch, and what it tells tf
+  catkin-lint libgtest-dev librostest-dev python3-rostest
+  python3-tf2-msgs                                                # what arm.launch publishes
   chromium chromium-driver python3-selenium                       # tests that look at the pages in a browser
   liborocos-kdl-dev                                               # oracle of the arm's dynamics
   libmujoco-dev                                                   # runs what export_model writes

@@ -1,20 +1,25 @@
 #!/bin/bash
 # Runs the tests of the last commit on another Debian, in a root of its own: makes the root with debootstrap (once), clones
 # the repository into it, installs the dependencies there and runs the tests. Ends with that run's last line and exit code.
-# Usage: bash scripts/test_in.sh [--roots FOLDER] bookworm|trixie|bullseye [COMMAND ARGUMENT...]
+# Usage: bash scripts/test_in.sh [--roots FOLDER] [--fresh] bookworm|trixie|bullseye [COMMAND ARGUMENT...]
 #   --roots FOLDER  where the roots are kept, some 6 GB each (default: $BACKLASH_DIAGNOSIS_ROOTS, else build/roots)
+#   --fresh         in a new root, in memory and gone at the end, with nothing installed; uses this machine's ccache
 #   COMMAND         runs in place of: bash scripts/test.sh
+# Exit code 77 where no root can be made.
 # As root, with the right to mount. Measured records of ../shared are seen in the root, read only, where they are there.
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-usage() { sed -n '2,7s/^# //p' "$0"; }
+usage() { sed -n '2,9s/^# //p' "$0"; }
+cannot() { echo "$(basename "$0"): $1" >&2 && exit 77; }
 
 roots=${BACKLASH_DIAGNOSIS_ROOTS:-${REPO}/build/roots}
+fresh=()
 while (($#)); do
   case $1 in
     --roots) roots=${2:?--roots needs a folder} && shift 2 ;;
+    --fresh) fresh=(--fresh) && shift ;;
     -h | --help) usage && exit 0 ;;
     *) break ;;
   esac
@@ -30,21 +35,27 @@ home=/srv/backlash_diagnosis  # of the clone in the root
 # All that this script mounts, and all that the tests start, lives in namespaces that end with the script, however it
 # ends: nothing is left to unmount, and who deletes the root later does not reach through a mount.
 if [[ ${BACKLASH_DIAGNOSIS_IN_NAMESPACE:-} != "$$" ]]; then
-  ((EUID == 0)) || fail "run as root: it makes a root file system and changes into it"
+  ((EUID == 0)) || cannot "run as root: it makes a root file system and changes into it"
   unshare --mount --pid --fork true 2>/dev/null ||
-    fail "no mounts are allowed here (a container without CAP_SYS_ADMIN?): the tests need /proc, /dev and a clean end"
+    cannot "no mounts are allowed here (a container without CAP_SYS_ADMIN?): the tests need /proc, /dev and a clean end"
   mkdir -p "${roots}"
   roots=$(cd "${roots}" && pwd -P)
   touch "${roots}/CATKIN_IGNORE"  # the roots hold packages of their own
   # shellcheck disable=SC2016
   exec unshare --mount --propagation private --pid --fork --kill-child \
-    env BACKLASH_DIAGNOSIS_IN_NAMESPACE=1 bash "$0" --roots "${roots}" "${suite}" "${command[@]}"
+    env BACKLASH_DIAGNOSIS_IN_NAMESPACE=1 bash "$0" --roots "${roots}" "${fresh[@]}" "${suite}" "${command[@]}"
 fi
 trap 'exit 130' INT  # the first process of a namespace hears only what it asks for; with it all others end
 trap 'exit 143' TERM
 root=${roots}/${suite}
-exec 9>"${roots}/${suite}.lock"
-flock --nonblock 9 || fail "another run uses ${root}"
+if ((${#fresh[@]})); then
+  mkdir -p "${roots}/fresh"
+  mount -t tmpfs -o size=12G tmpfs "${roots}/fresh" || cannot "cannot mount a file system in memory"
+  root=${roots}/fresh/${suite}
+else
+  exec 9>"${roots}/${suite}.lock"
+  flock --nonblock 9 || fail "another run uses ${root}"
+fi
 
 # The Debian mirrors of this machine, for the other suite: "URI SUITE COMPONENT" a line.
 mirrors() {
@@ -58,11 +69,12 @@ mirrors() {
 make_root() {
   local mirror
   command -v debootstrap >/dev/null || install_dependencies run debootstrap
+  [[ -n $(command -v debootstrap) ]] || cannot "debootstrap cannot be installed"
   mirror=$(mirrors | awk -v suite="${suite}" '$2 == suite { print $1; exit }')
   echo "Making a root of Debian ${suite} in ${root} (minutes)"
   rm -rf --one-file-system "${root}.part"
   debootstrap --variant=minbase --include=ca-certificates,git "${suite}" "${root}.part" "${mirror}" \
-    >"${root}.log" 2>&1 || { tail -n 20 "${root}.log" >&2 && fail "debootstrap failed, all of it in ${root}.log"; }
+    >"${root}.log" 2>&1 || { tail -n 20 "${root}.log" >&2 && cannot "debootstrap failed, see above"; }
   mv "${root}.part" "${root}"
 }
 
@@ -86,6 +98,11 @@ mount_root() {
     mkdir -p "${root}/srv/shared"
     mount --bind "$(cd "${shared}" && pwd -P)" "${root}/srv/shared" && mount -o remount,bind,ro "${root}/srv/shared"
   fi
+  local cache
+  if ((${#fresh[@]})) && cache=$(ccache --get-config cache_dir 2>/dev/null) && [[ -n ${cache} ]]; then
+    mkdir -p "${cache}" "${root}/root/.cache/ccache"
+    mount --bind "${cache}" "${root}/root/.cache/ccache" || fail "cannot mount ${cache}"
+  fi
 }
 
 # The clone takes the place of the last one; what was built from that stays.
@@ -102,7 +119,8 @@ clone() {
 configure_root
 mount_root
 clone
-echo "Debian ${suite}, commit $(git -C "${root}${home}" rev-parse --short HEAD): installing the dependencies, then ${command[*]}"
-# shellcheck disable=SC2016
+prepare=true what="nothing"
+((${#fresh[@]})) || prepare="bash scripts/install_dependencies.sh test" what="the dependencies"
+echo "Debian ${suite}, commit $(git -C "${root}${home}" rev-parse --short HEAD): installing ${what}, then ${command[*]}"
 chroot "${root}" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 "TERM=${TERM:-dumb}" "CI=${CI:-}" \
-  bash -c 'cd "$0" && bash scripts/install_dependencies.sh test && exec "$@"' "${home}" "${command[@]}"
+  bash -c "cd \"\$0\" && ${prepare} && exec \"\$@\"" "${home}" "${command[@]}"

@@ -403,7 +403,9 @@ TEST(Csv, MeasuredRecordsAreReadWhole) {
   const fs::path folder = measured_data();
   if (!fs::is_directory(folder)) GTEST_SKIP() << "no measured data at " << folder;
   std::size_t count = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+  for (auto at = fs::recursive_directory_iterator(folder); at != fs::recursive_directory_iterator(); ++at) {
+    const fs::directory_entry& entry = *at;
+    if (entry.path().filename() == "raw") at.disable_recursion_pending();  // in the formats of their makers
     if (entry.path().extension() != ".csv") continue;
     std::ifstream in(entry.path());
     std::string line;

@@ -188,8 +188,9 @@ TEST(TracedRig, RefusesBeforehandWhatItCannotWrite) {
       std::regex_replace(servo, std::regex("    contact:\n(      .*\n)+"),
                          "    contact: {law: linear, stiffness: 460e3, damping: 483}\n");
   EXPECT_NE(contact, servo);
-  for (const std::string& text : {contact, servo + "terms: [{id: gravity, amplitude: 1, phase: 0}]\n"})
-    EXPECT_THROW(check_traced_rig_text(rig_file::rig_file_from_text(text, "rig.yaml")), BadData);
+  EXPECT_NO_THROW(check_traced_rig_text(rig_file::rig_file_from_text(contact, "rig.yaml")));
+  const std::string terms = servo + "terms: [{id: gravity, amplitude: 1, phase: 0}]\n";
+  EXPECT_THROW(check_traced_rig_text(rig_file::rig_file_from_text(terms, "rig.yaml")), BadData);
 }
 
 }  // namespace
