@@ -41,12 +41,15 @@ started() {
   for node in $2; do rosnode list 2>/dev/null | grep -qx "${node}" || return 1; done
 }
 for launch in "${launches[@]}"; do
+  # Arguments without a default: exciter.launch asks for the machine and its limits.
+  mapfile -t given < <(sed -nE '/default=|value=/!s/.*<arg name="([a-z_]+)".*/\1/p' "${REPO}/launch/${launch##* }" |
+    sed -e "s,^rig$,rig:=${REPO}/config/yumrukcal_2013.yaml," -e 's/.*lower$/&:=-1/' -e '/:=/!s/$/:=1/')
   port=$(free_port)
   export ROS_MASTER_URI=http://localhost:${port}
   # shellcheck disable=SC2086
-  nodes=$(roslaunch --nodes ${launch}) || fail "${launch}: cannot be read"
+  nodes=$(roslaunch --nodes ${launch} "${given[@]}") || fail "${launch}: cannot be read"
   # shellcheck disable=SC2086
-  roslaunch --port "${port}" ${launch} >/tmp/launch.log 2>&1 </dev/null &
+  roslaunch --port "${port}" ${launch} "${given[@]}" >/tmp/launch.log 2>&1 </dev/null &
   launched=$! good=
   for ((i = 0; i < 150; ++i)); do
     started /tmp/launch.log "${nodes}" && good=1 && break

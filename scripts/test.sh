@@ -1,6 +1,6 @@
 #!/bin/bash
-# Installs, builds and runs every test; the last line is "N passed, N failed, N skipped" and the exit code is 0
-# only if nothing failed and something passed. Usage: bash scripts/test.sh
+# Installs, builds and runs the tests that protect a change; scripts/nightly.sh has those that take hours. The last line is
+# "N passed, N failed, N skipped"; exit code 0 only if nothing failed and something passed. Usage: bash scripts/test.sh
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -50,8 +50,17 @@ rostest_targets() {
 }
 mapfile -t beside < <(rostest_targets -l)
 mapfile -t alone < <(rostest_targets -L)
-run_tests gtests "$(nproc)" "run_tests_${PACKAGE}_gtest"
-run_tests rostests_beside_others 2 "${beside[@]}"
+# Those that take long are for nightly.sh; a name in its list that no test has would protect nothing.
+nightly_list_is_whole() {
+  local binary known
+  known=$(for binary in "${WS}/devel/lib/${PACKAGE}/${PACKAGE}"_test_*; do
+    "${binary}" --gtest_list_tests | sed 's/ *#.*//' | awk '/^[^ ]/ {suite = $1} /^ / {print suite $1}'
+  done)
+  ! grep -v '^#' "${REPO}/test/nightly.txt" | grep -vxF "${known}" | sed 's/$/: in test\/nightly.txt, and no such test/'
+}
+check nightly_list nightly_list_is_whole
+GTEST_FILTER="-$(nightly_tests)" run_tests gtests "$(nproc)" "run_tests_${PACKAGE}_gtest"
+run_tests rostests_beside_others 3 "${beside[@]}"
 run_tests rostests_alone 1 "${alone[@]}"
 
 echo "Checking style, documentation, installation and faults"
@@ -59,12 +68,9 @@ check catkin_lint catkin_lint --strict "${REPO}"
 for part in licence format tidy headers rooms lanes pages; do
   check "${part}" bash "${REPO}/scripts/check_style.sh" "${part}"
 done
-check api_doc bash "${REPO}/scripts/api_doc.sh" "${WS}/doc"
-check readme_commands bash "${REPO}/scripts/check_readme.sh"
-check install_space bash "${REPO}/scripts/check_install.sh"
-
-# One seed, one of each class; the long runs are told in doc/reliability.md.
+# One seed, one of each class; the long runs are in doc/reliability.md.
 check fault_campaign bash "${REPO}/scripts/fault_campaign.sh" --seed 1 --count 1 all
 grep '^NOT TRIED' "${WS}/log/fault_campaign.log" || true
+check fresh_machine bash "${REPO}/scripts/check_fresh.sh"
 
 /usr/bin/python3 "${REPO}/scripts/summarise_tests.py" "${results}" "${outside[@]}"
