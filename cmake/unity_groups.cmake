@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Compiles the files of a target in groups, each as one translation unit: what costs is reading the headers and writing
-# the same templates again and again. Two files that keep the same name to themselves go into different groups, so a file
-# may use any name that is free in its own room. Names are what a file defines in column 0, as .clang-format has it.
+# the same templates again and again. Two files that keep the same name to themselves go into different groups, and one that
+# has a name of a header's constant is compiled alone, so a file may use any name that is free in its own room. Names are what
+# a file defines in column 0, as .clang-format has it.
 
 # unity_groups(TARGET FILES_PER_GROUP): for sources that are given by whole path. -DBACKLASH_DIAGNOSIS_UNITY=OFF compiles
 # each file alone, which shows headers that lack an include.
@@ -18,6 +19,18 @@ function(unity_groups target files_per_group)
       continue()
     endif()
     defined_names(${source} own shared)
+    # In one unit with others its own name would hide the header's from them, without a word of the compiler.
+    names_of_headers(${source} of_headers)
+    set(hides FALSE)
+    foreach(name IN LISTS own)
+      if(name IN_LIST of_headers)
+        set(hides TRUE)
+      endif()
+    endforeach()
+    if(hides)
+      set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+      continue()
+    endif()
     set(place -1)
     set(group 0)
     while(place LESS 0)
@@ -54,6 +67,33 @@ function(unity_groups target files_per_group)
     set_property(SOURCE ${source} PROPERTY UNITY_GROUP "${target}_${place}")
   endforeach()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+endfunction()
+
+# Constants of the headers of a source's room and of base: those that a name of its own would hide.
+function(names_of_headers source result)
+  set(names)
+  if(source MATCHES "/(src|test)/(nightly/)?([a-z_]+)/")
+    set(room ${CMAKE_MATCH_3})
+    get_property(names GLOBAL PROPERTY backlash_diagnosis_names_of_${room})
+  endif()
+  if(room AND NOT names)
+    set(names none)
+    foreach(folder include/backlash_diagnosis/${room} src/${room} include/backlash_diagnosis/base)
+      file(GLOB_RECURSE headers ${PROJECT_SOURCE_DIR}/${folder}/*.h)
+      foreach(header IN LISTS headers)
+        file(STRINGS ${header} lines REGEX "^(inline )?(constexpr|const) .* k[A-Z]")
+        foreach(line IN LISTS lines)
+          string(REGEX MATCHALL " k[A-Z][A-Za-z0-9]*( =|\\[|{|\\()" found "${line}")
+          foreach(name IN LISTS found)
+            string(REGEX REPLACE "[^A-Za-z0-9]" "" name "${name}")
+            list(APPEND names ${name})
+          endforeach()
+        endforeach()
+      endforeach()
+    endforeach()
+    set_property(GLOBAL PROPERTY backlash_diagnosis_names_of_${room} "${names}")
+  endif()
+  set(${result} ${names} PARENT_SCOPE)
 endfunction()
 
 # Functions, types and constants that a file defines: those in its unnamed namespaces (own) and the others (shared).
