@@ -9,7 +9,7 @@ import os
 import re
 import sys
 
-ROOM = re.compile(r"^room\((\w+)((?: KNOWS(?: [a-z_]+)+)?)(?: READS_PRIVATE (\w+))?", re.MULTILINE)
+ROOM = re.compile(r"^room\((\w+)(?: COMPUTES)?((?: KNOWS(?: [a-z_]+)+)?)(?: READS_PRIVATE (\w+))?", re.MULTILINE)
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 

@@ -122,8 +122,7 @@ struct Train {
     next.qm = s.qm + h * r.qm, next.wm = s.wm + h * r.wm;
     next.qp = s.qp + h * r.qp, next.wp = s.wp + h * r.wp;
     next.qg = s.qg + h * r.qg, next.wg = s.wg + h * r.wg;
-    if (behind == WaveformOutput::coupled_link)
-      next.ql = s.ql + h * r.ql, next.wl = s.wl + h * r.wl;
+    if (behind == WaveformOutput::coupled_link) next.ql = s.ql + h * r.ql, next.wl = s.wl + h * r.wl;
     return next;
   }
 

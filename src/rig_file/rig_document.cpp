@@ -125,7 +125,8 @@ void RigDocument::set(const std::string& key, const std::string& value, const st
   const YamlNode* map = read.root;
   int line = 0;  // of the key whose map this is
   const auto in_braces = [&] {
-    return map != read.root && map->line == line && lines_.at(std::size_t(line) - 1).find('{') != std::string::npos;
+    return map != read.root && map->line == line &&
+           lines_.at(std::size_t(line) - 1).find('{') != std::string::npos;
   };
   for (std::size_t depth = 0; depth < path.size(); ++depth) {
     const auto found = map->entries.find(path[depth]);
@@ -147,7 +148,8 @@ void RigDocument::set(const std::string& key, const std::string& value, const st
     } else if (in_braces()) {
       if (entry.value->kind != YamlNode::Kind::plain ||
           !replace_in_map(lines_.at(std::size_t(line) - 1), path[depth], entry.value->scalar, value))
-        throw BadData(fmt::format("{}:{}", name_, entry.line), key + ": is no plain value of a map on a line");
+        throw BadData(fmt::format("{}:{}", name_, entry.line),
+                      key + ": is no plain value of a map on a line");
     } else if (entry.value->kind == YamlNode::Kind::map) {
       if (!replace_map(lines_.at(entry.line - 1), path[depth], value, comment))
         throw BadData(fmt::format("{}:{}", name_, entry.line), key + ": is no map on a line of its own");

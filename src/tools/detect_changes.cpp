@@ -9,8 +9,8 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/not_a_number.h"
 #include "backlash_diagnosis/changes/arm_changes.h"
+#include "backlash_diagnosis/changes/change_report.h"
 #include "backlash_diagnosis/changes/changes_of_rig.h"
-#include "backlash_diagnosis/findings/change_report.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
@@ -70,7 +70,7 @@ record::Record read(const std::string& path, const rig_file::RigFile& rig,
   return record;
 }
 
-changes::Changes changes_of_joint(findings::ChangeInputs& inputs, const changes::ChangeSettings& settings,
+changes::Changes changes_of_joint(changes::ChangeInputs& inputs, const changes::ChangeSettings& settings,
                                   const Progress& progress) {
   const rig_file::RigFile rig = rig_file::load_rig_file(inputs.rig);
   inputs.joint = rig.rig.joint;
@@ -83,7 +83,7 @@ changes::Changes changes_of_joint(findings::ChangeInputs& inputs, const changes:
   return found;
 }
 
-changes::Changes changes_of_arm(const findings::ChangeInputs& inputs, const changes::ChangeSettings& settings,
+changes::Changes changes_of_arm(const changes::ChangeInputs& inputs, const changes::ChangeSettings& settings,
                                 const Progress& progress) {
   const arm::ArmRig rig = arm::load_arm_rig(inputs.rig);
   std::vector<std::string> warnings;
@@ -101,7 +101,7 @@ changes::Changes changes_of_arm(const findings::ChangeInputs& inputs, const chan
 }
 
 int detect(const Arguments& arguments) {
-  findings::ChangeInputs inputs = {
+  changes::ChangeInputs inputs = {
       arguments.text("rig"), "", arguments.texts("healthy"), arguments.positional(0),
       arguments.number("false-alarms-per-hour", changes::ChangeSettings{}.false_alarms_per_hour,
                        Range::positive())};
@@ -121,8 +121,8 @@ int detect(const Arguments& arguments) {
     found.cannot_tell = error.what();
     found.noise = kNaN;  // nothing was learned
   }
-  write_text(arguments.text("json"), findings::change_json(found, inputs));
-  std::cout << findings::change_summary(found);
+  write_text(arguments.text("json"), changes::change_json(found, inputs));
+  std::cout << changes::change_summary(found);
   if (!found.changes.empty()) return kFault;
   if (found.cannot_tell.empty()) return kHealthy;
   std::cerr << "detect_changes: " << found.cannot_tell << '\n';

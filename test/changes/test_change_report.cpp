@@ -4,13 +4,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "backlash_diagnosis/findings/change_report.h"
+#include "backlash_diagnosis/changes/change_report.h"
 
-namespace backlash::findings {
+namespace backlash::changes {
 namespace {
 
 TEST(ChangeReport, AJointThatWasNotJudgedIsNotCalledHealthy) {
-  changes::Changes found;
+  Changes found;
   EXPECT_EQ(change_summary(found), "no change found\n0 windows of motion judged\n");
   found.unjudged = {{"elbow", "moves for 2 s"}};
   const std::string text = change_summary(found);
@@ -23,4 +23,4 @@ TEST(ChangeReport, AJointThatWasNotJudgedIsNotCalledHealthy) {
 }
 
 }  // namespace
-}  // namespace backlash::findings
+}  // namespace backlash::changes

@@ -7,7 +7,7 @@
 
 #include "backlash_diagnosis/changes/changes.h"
 
-namespace backlash::findings {
+namespace backlash::changes {
 
 /// What was asked: paths as the user gave them.
 struct ChangeInputs {
@@ -18,10 +18,10 @@ struct ChangeInputs {
 };
 
 /// One line per change; or that none was found.
-std::string change_summary(const changes::Changes& changes);
+std::string change_summary(const Changes& changes);
 
 /// The detect_changes JSON of the design, and beyond it inputs, threshold, noise, warnings and of each change
 /// gain, errors before and after, and what fits alike.
-std::string change_json(const changes::Changes& changes, const ChangeInputs& inputs);
+std::string change_json(const Changes& changes, const ChangeInputs& inputs);
 
-}  // namespace backlash::findings
+}  // namespace backlash::changes

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/findings/change_report.h"
+#include "backlash_diagnosis/changes/change_report.h"
 
 #include <fmt/format.h>
 
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/base/version.h"
-#include "backlash_diagnosis/findings/trace_report.h"
 #include "backlash_diagnosis/signal/measured_text.h"
 #include "report/json.h"
 
-namespace backlash::findings {
+namespace backlash::changes {
 namespace {
 
-report::Json change_json(const changes::Change& c, const std::string& joint) {
+report::Json change_json(const Change& c, const std::string& joint) {
   report::Json size = report::Json::object();
-  for (const changes::ChangeSize& s : c.size) {
+  for (const ChangeSize& s : c.size) {
     size[s.name] = report::measured(s.measured);
     size[s.name]["unit"] = s.unit;
   }
@@ -35,14 +34,14 @@ report::Json change_json(const changes::Change& c, const std::string& joint) {
 
 }  // namespace
 
-std::string change_summary(const changes::Changes& found) {
+std::string change_summary(const Changes& found) {
   std::string text;
-  for (const changes::Change& c : found.changes) {
+  for (const Change& c : found.changes) {
     const std::string place = !c.link.empty() ? " at " + c.link : !c.joint.empty() ? " of " + c.joint : "";
     text += fmt::format("{}{} since {:.1f} s ({:.1f} to {:.1f})", c.effect, place, c.since, c.since_from,
                         c.since_to);
     if (c.until) text += fmt::format(", until {:.1f} s", *c.until);
-    for (const changes::ChangeSize& s : c.size)
+    for (const ChangeSize& s : c.size)
       text += fmt::format("; {} {} {}", s.name, signal::with_error(s.measured), s.unit);
     if (c.effect == "unknown")
       text += "; no effect explains it" + (c.alike.empty() ? "" : ", nearest: " + joined(c.alike));
@@ -56,7 +55,7 @@ std::string change_summary(const changes::Changes& found) {
   if (text.empty())
     text =
         found.unjudged.empty() ? "no change found\n" : "no change found of the joints that could be judged\n";
-  for (const changes::Unjudged& u : found.unjudged) text += "not judged: " + u.joint + ": " + u.why + "\n";
+  for (const Unjudged& u : found.unjudged) text += "not judged: " + u.joint + ": " + u.why + "\n";
   if (!found.different.empty())
     text +=
         "from its beginning the record differs from the healthy ones, so that since when cannot be told: " +
@@ -64,11 +63,11 @@ std::string change_summary(const changes::Changes& found) {
   return text + fmt::format("{} windows of motion judged\n", found.windows);
 }
 
-std::string change_json(const changes::Changes& found, const ChangeInputs& inputs) {
+std::string change_json(const Changes& found, const ChangeInputs& inputs) {
   report::Json changes = report::Json::array();
-  for (const changes::Change& c : found.changes) changes.push_back(change_json(c, inputs.joint));
+  for (const Change& c : found.changes) changes.push_back(change_json(c, inputs.joint));
   report::Json unjudged = report::Json::array();
-  for (const changes::Unjudged& u : found.unjudged) unjudged.push_back({{"joint", u.joint}, {"why", u.why}});
+  for (const Unjudged& u : found.unjudged) unjudged.push_back({{"joint", u.joint}, {"why", u.why}});
   report::Json json = {
       {"schema_version", 1},
       {"version", version()},
@@ -91,4 +90,4 @@ std::string change_json(const changes::Changes& found, const ChangeInputs& input
   return report::dumped(json, 2);
 }
 
-}  // namespace backlash::findings
+}  // namespace backlash::changes
