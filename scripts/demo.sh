@@ -59,12 +59,13 @@ start() {
   tail -n 20 "${log}" >&2
   fail "the nodes did not start"
 }
-# record FILE: three seconds of the running joint, all of them: a busy computer loses messages, then once more.
+# record FILE: three seconds of the running joint, all of them: a busy computer loses messages, then it is tried again.
 record() {
   for ((i = 0; i < 5; ++i)); do
     quiet rosbag record --quiet --buffsize=0 --duration=3 --output-name="$1" /joint_states
     say lost "$1" "${sampling_rate}" && return 0
   done
+  echo "   This computer is too busy to record all of them; what is lost is lost."
 }
 
 # The machine is not quite that of its rig file, as no machine is.

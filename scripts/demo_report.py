@@ -45,8 +45,7 @@ def lost(bag, rate):
         stamps = [message.header.stamp.to_sec() for _, message, _ in opened.read_messages("/joint_states")]
     steps = [b - a for a, b in zip(stamps, stamps[1:])]
     missing = sum(round(step * float(rate)) - 1 for step in steps)
-    print("   %d samples in %.1f s, %d lost%s: %s"
-          % (len(stamps), stamps[-1] - stamps[0], missing, ", once more" if missing else "", os.path.basename(bag)))
+    print("   %s: %d samples in %.1f s, %d lost" % (os.path.basename(bag), len(stamps), stamps[-1] - stamps[0], missing))
     return 1 if missing else 0
 
 
