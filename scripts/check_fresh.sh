@@ -43,7 +43,7 @@ started() {
 for launch in "${launches[@]}"; do
   # Arguments without a default: exciter.launch asks for the machine and its limits.
   mapfile -t given < <(sed -nE '/default=|value=/!s/.*<arg name="([a-z_]+)".*/\1/p' "${REPO}/launch/${launch##* }" |
-    sed -e "s,^rig$,rig:=${REPO}/config/yumrukcal_2013.yaml," -e 's/.*lower$/&:=-1/' -e '/:=/!s/$/:=1/')
+    sed -e "s,^rig$,rig:=${REPO}/config/yumrukcal_2013.yaml," -e "s,^rig_folder$,rig_folder:=${REPO}/config/simulated_robot," -e 's/.*lower$/&:=-1/' -e '/:=/!s/$/:=1/')
   port=$(free_port)
   export ROS_MASTER_URI=http://localhost:${port}
   # shellcheck disable=SC2086
