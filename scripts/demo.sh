@@ -97,11 +97,12 @@ start /diagnoser/diagnose backlash:="${new}" rig:="${out}/fitted.yaml" curve:="$
 answers=()
 for backlash in "${new}" "${worn[@]}"; do
   quiet rosservice call /simulator/set_backlash "{backlash: ${backlash}}"
-  for ((i = 0; i < 20; ++i)); do # the fit of the whole motion takes some seconds, in the background
+  since=${SECONDS}
+  sleep 4 # so that its last 20 periods are of this backlash
+  for ((i = 0; i < 20; ++i)); do # the fit of the whole motion is made in the background
     rosservice call /diagnoser/diagnose "{joint: '', periods: 20, timeout: 30.0}" >"answer_${backlash}.yaml" ||
       fail "the service did not answer"
-    say fitted "answer_${backlash}.yaml" && break
-    sleep 0.5
+    say fitted "answer_${backlash}.yaml" "$((SECONDS - since))" && break
   done
   answers+=("answer_${backlash}.yaml" "${backlash}")
   say answer "${answers[@]: -2}"

@@ -4,15 +4,16 @@
 
 usage: demo_report.py ACT FILE...; exit code 1 of `lost` and `fitted` is a no.
 """
-import csv
 import json
 import os
+import re
 import sys
 
 import yaml
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 MICRO = 1e6
+FIT_TAKES = 2.5  # s of samples that the fit of the whole motion looks at, and a bit
 SHOWN = ("apd_skewness", "apd_shape", "lost_motion", "position_difference", "momentum_transfer", "waveform")
 # Parameter of identify, what it is called here, its place in the rig file, its unit
 VALUES = (("motor_inertia", "motor inertia", ("motor", "inertia"), "kg m^2"),
@@ -78,11 +79,11 @@ def interval(e):
     return "%.1f [%.1f, %.1f]" % (value, low, high) if value == value else e["status_name"]
 
 
-def fitted(path):
-    """0 where the background fit of the whole motion has ended after the wear."""
-    answer = load_yaml(path)
-    message = estimates_of(answer)["waveform"]["message"] + answer["verdict"]["message"]
-    return 1 if "being fitted" in message or "ended" in message else 0
+def fitted(path, since):
+    """0 where the background fit of the whole motion is of samples of the last `since` seconds."""
+    message = estimates_of(load_yaml(path))["waveform"]["message"]
+    ended = re.search(r"ended ([0-9.]+) s before", message)
+    return 0 if "being fitted" not in message and float(ended.group(1) if ended else 0) + FIT_TAKES <= float(since) else 1
 
 
 def answer(path, true):
