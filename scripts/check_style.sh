@@ -96,6 +96,10 @@ lanes() {
     echo "${file}: has code for AVX, and CMakeLists.txt does not compile it with -ffp-contract=off" >&2
     status=1
   done
+  # Without optimisation a function that is not inlined by force passes vectors as its own instruction set does, not its caller's.
+  while IFS= read -r file; do
+    ! grep -HnE '^ *[A-Za-z].*[( ]const (Lanes|State|Train<Law>)[&*] [a-z_]+.*[{)]$' "${file}" | grep -vE '_LANES|;$' >&2 || status=1
+  done < <(grep -rlE 'target\("avx' src)
   return "${status}"
 }
 

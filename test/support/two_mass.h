@@ -79,7 +79,7 @@ inline record::Record simulate(const TwoMasses& machine, double duration, const 
     return step > 0 ? step * std::round(value / step) : value;
   };
   TwoMasses::State s = {machine.load_position + machine.centre(machine.load_position) + machine.start_offset,
-                      machine.load_position, machine.motor_speed, machine.motor_speed};
+                        machine.load_position, machine.motor_speed, machine.motor_speed};
   const int inner = static_cast<int>(std::lround(1e-3 / h)), samples = static_cast<int>(duration * 1000);
   for (int i = 0; i < samples; ++i) {
     const double t = 1e-3 * i, torque = machine.motor_torque(t, s[2]);  // held over a sample

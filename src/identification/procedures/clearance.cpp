@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kCutoff = 3.85;      // simulation: times the frequency of the load on a flank
 constexpr double kFineCutoff = 11.5;  // simulation: the same
-constexpr double kStray = 0.02;      // choice: of the travel, deviation of a passage that fits
+constexpr double kStray = 0.02;       // choice: of the travel, deviation of a passage that fits
 constexpr double kOutlier = 3;        // choice: of the median deviation
 constexpr int kPushes[] = {2, 3};     // choice: degrees of the push over J
 constexpr double kSlow = 0.2;         // choice: of the fastest: below it friction changes

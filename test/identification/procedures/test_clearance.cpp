@@ -107,7 +107,8 @@ TEST(Clearance, StandardErrorCoversTheScatter) {
   const int runs = 8;
   double squares = 0, stated = 0;
   for (int seed = 0; seed < runs; ++seed) {
-    TwoMasses machine = pushed(42, 50 + 3 * seed, 1.5 + 0.05 * seed);  // steps of a sensor repeat, hands do not
+    TwoMasses machine =
+        pushed(42, 50 + 3 * seed, 1.5 + 0.05 * seed);  // steps of a sensor repeat, hands do not
     const signal::Measured gap = identify_clearance(simulate(machine, 4)).gap;
     squares += std::pow(gap.value - kGap, 2) / runs;
     stated += std::pow(gap.standard_error, 2) / runs;
