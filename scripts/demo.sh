@@ -15,10 +15,14 @@ new=2.0e-5                      # m, backlash of the new joint
 worn=(6.0e-5 9.0e-5 1.3e-4)     # m, as it wears
 sampling_rate=2500              # Hz
 
-install_dependencies run
+install_dependencies build
+mkdir -p "${WS}/log"
+install_dependencies run >"${WS}/log/install_run.log" 2>&1 & # beside the compiler
+installed=$!
 echo "Building in ${WS} (minutes the first time, seconds later)"
 programs=(simulator diagnoser simulate identify build_curve diagnose_record trace_residual)
 build "${PACKAGE}_generate_messages_py" "${programs[@]/#/${PACKAGE}_}" -DCATKIN_ENABLE_TESTING=OFF || exit 1
+wait "${installed}" || { cat "${WS}/log/install_run.log" >&2 && exit 1; }
 use_workspace
 
 out=${WS}/demo

@@ -1,25 +1,27 @@
 #!/bin/bash
 # Installs what the package needs from Debian 12 and is not there yet; without anything missing it only looks. Debian
 # packages ROS 1 itself, so no foreign archive is needed. Run as root or with sudo.
-# Usage: bash scripts/install_dependencies.sh [run|test] [PACKAGE...]
-#   run   builds and runs the package and the demo; test (default): also what the tests call (browser, clang, doxygen)
+# Usage: bash scripts/install_dependencies.sh [build|run|test] [PACKAGE...]
+#   build compiles the package; run: also runs all of it, and the demo; test (default): also what the tests call
 # SPDX-License-Identifier: BSD-3-Clause
 set -euo pipefail
 
 # One line per purpose.
-run=(
+build=(
   build-essential ccache cmake ninja-build                        # compiler and build
   catkin ros-core-dev                                             # ROS 1: build system, roscpp, rosbag, messages
   libactionlib-dev libdiagnostic-updater-dev                      # ROS 1 libraries outside the core
   libdynamic-reconfigure-config-init-mutex-dev python3-dynamic-reconfigure
-  libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
-  ros-robot-state-publisher                                       # arm.launch
-  rosbash python3-rosnode                                         # rosrun, rosnode
-  python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
   libboost-dev libboost-program-options-dev libeigen3-dev libfmt-dev libyaml-cpp-dev nlohmann-json3-dev
   liblz4-dev libsqlite3-dev libzstd-dev                           # recordings of ROS 2
   libsundials-dev                                                 # has no rosdep key, hence not in package.xml
   liburdfdom-dev liburdfdom-headers-dev                           # robots as URDF
+)
+run=(
+  rosbash python3-rosnode                                         # rosrun, rosnode
+  python3-actionlib python3-actionlib-msgs python3-diagnostic-msgs python3-sensor-msgs python3-std-srvs
+  libdiagnostic-aggregator-dev libdiagnostic-aggregator-tools     # its node, for monitoring.launch; the plugins are in -dev
+  ros-robot-state-publisher                                       # arm.launch
   python3-matplotlib python3-numpy python3-yaml                   # plots
   python3-cryptography python3-distributed                        # fleet_report: Dask, with TLS between its processes
 )
@@ -30,15 +32,17 @@ tests=(
   liborocos-kdl-dev                                               # oracle of the arm's dynamics
   libmujoco-dev                                                   # runs what export_model writes
   clang-format clang-tidy doxygen                                 # what scripts/check_style.sh and api_doc.sh call
+  debootstrap                                                     # roots with nothing, for scripts/check_fresh.sh
 )
 case ${1:-} in
-  run) packages=("${run[@]}" "${@:2}") ;;
-  test) packages=("${run[@]}" "${tests[@]}" "${@:2}") ;;
+  build) packages=("${build[@]}" "${@:2}") ;;
+  run) packages=("${build[@]}" "${run[@]}" "${@:2}") ;;
+  test) packages=("${build[@]}" "${run[@]}" "${tests[@]}" "${@:2}") ;;
   -h | --help)
     sed -n '2,5s/^# //p' "$0"
     exit 0
     ;;
-  *) packages=("${run[@]}" "${tests[@]}" "$@") ;;
+  *) packages=("${build[@]}" "${run[@]}" "${tests[@]}" "$@") ;;
 esac
 
 missing=()
