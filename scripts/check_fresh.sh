@@ -30,7 +30,7 @@ grep -q 'The model lacks cogging' /tmp/demo.txt || fail "trace_residual does not
 make_workspace
 [[ -s ${WS}/demo/demo.png ]] || fail "no picture"
 
-build all -DCATKIN_ENABLE_TESTING=OFF || fail "the package does not build with what 'run' installs"
+build all || fail "the package does not build with what 'run' installs"
 use_workspace
 mapfile -t launches < <(cat "${REPO}/README.md" "${REPO}"/doc/howto/*.md | grep -ohE "${PACKAGE} [a-z_]+\.launch" | sort -u)
 ((${#launches[@]} >= 4)) || fail "README.md and doc/howto name only ${#launches[@]} launch files"

@@ -86,8 +86,7 @@ build() {
   local log=${WS}/log/build${1:+_${1//\//_}}.log
   (
     flock 9  # demo.sh and test.sh may run at the same time
-    catkin_make --use-ninja --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
-      -DCATKIN_ENABLE_TESTING=ON "-j$(nproc)" "$@" 2>&1 </dev/null 9>&- |
+    catkin_make --use-ninja --directory "${WS}" -DPYTHON_EXECUTABLE=/usr/bin/python3 "-j$(nproc)" "$@" 2>&1 </dev/null 9>&- |
       tee "${log}" | show_progress
     ((PIPESTATUS[0] == 0))
   ) 9>"${WS}/lock" && return 0

@@ -21,7 +21,7 @@ install_dependencies run >"${WS}/log/install_run.log" 2>&1 & # beside the compil
 installed=$!
 echo "Building in ${WS} (minutes the first time, seconds later)"
 programs=(simulator diagnoser simulate identify build_curve diagnose_record trace_residual)
-build "${PACKAGE}_generate_messages_py" "${programs[@]/#/${PACKAGE}_}" -DCATKIN_ENABLE_TESTING=OFF || exit 1
+build "${PACKAGE}_generate_messages_py" "${programs[@]/#/${PACKAGE}_}" || exit 1
 wait "${installed}" || { cat "${WS}/log/install_run.log" >&2 && exit 1; }
 use_workspace
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Which effect of one joint takes most of what a fit leaves, beside all that the fit could have changed.
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -60,14 +59,13 @@ struct Left {
 Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns) {
   const Eigen::VectorXd scale = columns.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
   const Eigen::MatrixXd scaled = columns * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(signal::gram(scaled));
+  const signal::SymmetricEigen parts = signal::symmetric_eigen(signal::gram(scaled));
   std::vector<Eigen::Index> kept;
   for (Eigen::Index i = 0; i < scaled.cols(); ++i)
-    if (solver.eigenvalues()[i] > kNone) kept.push_back(i);
+    if (parts.values[i] > kNone) kept.push_back(i);
   Eigen::MatrixXd basis(columns.rows(), Eigen::Index(kept.size()));
   for (std::size_t i = 0; i < kept.size(); ++i)
-    basis.col(Eigen::Index(i)) =
-        scaled * solver.eigenvectors().col(kept[i]) / std::sqrt(solver.eigenvalues()[kept[i]]);
+    basis.col(Eigen::Index(i)) = scaled * parts.vectors.col(kept[i]) / std::sqrt(parts.values[kept[i]]);
   return basis;
 }
 
@@ -219,7 +217,7 @@ double Search::share(const Left& left, JointEffect& effect, std::size_t j) const
   for (Eigen::Index i = 0; i < z.cols(); ++i)
     if (!(gram(i, i) > kToldApart * z.col(i).squaredNorm())) return 0;
   const Eigen::VectorXd moment = own.transpose() * left.residual;
-  const Eigen::VectorXd values = gram.ldlt().solve(moment);
+  const Eigen::VectorXd values = signal::solve_symmetric(gram, moment);
   effect.values.head(z.cols()) = values;
   if (effect.spec().positive && !(values[0] > 0)) return 0;
   const double taken = moment.dot(values) / left.residual.squaredNorm();

@@ -10,4 +10,10 @@ Eigen::VectorXd symmetric_eigenvalues(const MatrixView& a) {
   return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
+SymmetricEigen symmetric_eigen(const MatrixView& a) {
+  const Eigen::MatrixXd matrix = a;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
 }  // namespace backlash::signal

@@ -102,6 +102,9 @@ TEST(LinearAlgebra, EigenvaluesOfAChainOfMasses) {
   }
   const Eigen::VectorXd values = symmetric_eigenvalues(a);
   for (int k = 1; k <= n; ++k) EXPECT_NEAR(values[k - 1], 2 - 2 * std::cos(k * M_PI / (n + 1)), 1e-14) << k;
+  const SymmetricEigen parts = symmetric_eigen(a);
+  EXPECT_LT(distance(parts.values, values), 1e-14);
+  EXPECT_LT(distance(parts.vectors * parts.values.asDiagonal() * parts.vectors.transpose(), a), 1e-14);
 }
 
 }  // namespace

@@ -52,4 +52,12 @@ Eigen::MatrixXd orthonormal_basis(const MatrixView& a);
 /// Eigenvalues of a symmetric matrix, in increasing order. Only the lower triangle is read.
 Eigen::VectorXd symmetric_eigenvalues(const MatrixView& a);
 
+struct SymmetricEigen {
+  Eigen::VectorXd values;   // in increasing order
+  Eigen::MatrixXd vectors;  // columns, orthonormal
+};
+
+/// A = V diag(values) V^T. Only the lower triangle is read.
+SymmetricEigen symmetric_eigen(const MatrixView& a);
+
 }  // namespace backlash::signal
