@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "backlash_diagnosis/record/even_grid.h"
 #include "backlash_diagnosis/signal/noise.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
@@ -208,8 +209,10 @@ void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycl
 
 }  // namespace
 
-TraverseData traverse_data(const record::Record& record, const GapTraverseSettings& settings,
+TraverseData traverse_data(const record::Record& recorded, const GapTraverseSettings& settings,
                            const TraverseMotor& motor) {
+  const record::EvenGrid even = record::even_grid(recorded);
+  const record::Record& record = even.record;
   TraverseData d;
   d.interval = record.sampling_interval();
   const double cycle = cycle_of(settings);
@@ -228,7 +231,9 @@ TraverseData traverse_data(const record::Record& record, const GapTraverseSettin
   }
   if (!(squares > 0)) throw Refusal{Status::insufficient_data, "the motor does not move"};
   d.slow = kFade * std::sqrt(squares);
-  for (std::size_t i = 0; i < n; ++i) d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares);
+  for (std::size_t i = 0; i < n; ++i)  // beside a lost sample the differences are not measured
+    d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares) &&
+                  even.whole(i - std::min<std::size_t>(i, 1), std::min<std::size_t>(3, n - i + (i > 0)));
   const std::vector<double> teeth = torque_of_teeth(d, motor);
   d.torque_noise = signal::noise_from_differences(d.torque, 2);
   d.position_noise = std::max(signal::noise_from_differences(d.position, 4),

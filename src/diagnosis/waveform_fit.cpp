@@ -93,12 +93,14 @@ void WaveformFit::residuals(std::size_t window, const WaveformMotion& motion, st
   const auto first = static_cast<std::size_t>(data_.windows[window].first);
   const auto length = static_cast<std::size_t>(stage_.lengths[window]);
   for (std::size_t i = 0; i < length; ++i) {
-    const bool seen = i >= static_cast<std::size_t>(data_.unseen);
+    const bool seen = i >= static_cast<std::size_t>(data_.unseen) && !data_.lost[first + i];
     *to++ = seen ? (data_.torque[first + i] - motion.torque[i][set]) / stage_.noise[kTorqueChannel] : 0;
   }
   if (data_.position.empty()) return;
   for (std::size_t i = 0; i < length; ++i)
-    *to++ = (data_.position[first + i] - motion.position[i][set]) / stage_.noise[kPositionChannel];
+    *to++ = data_.lost[first + i]
+                ? 0
+                : (data_.position[first + i] - motion.position[i][set]) / stage_.noise[kPositionChannel];
 }
 
 double WaveformFit::start_cost(std::size_t window, const WaveformStart& start) const {
@@ -313,7 +315,8 @@ std::vector<double> WaveformFit::residual(std::size_t window, WaveformChannel ch
   const auto& moved = channel == kTorqueChannel ? motion.torque : motion.position;
   std::vector<double> r;
   for (std::size_t i = 0; i < static_cast<std::size_t>(length); ++i)
-    r.push_back(channel == kTorqueChannel && i < static_cast<std::size_t>(data_.unseen)
+    r.push_back((channel == kTorqueChannel && i < static_cast<std::size_t>(data_.unseen)) ||
+                        data_.lost[static_cast<std::size_t>(w.first) + i]
                     ? 0
                     : measured[static_cast<std::size_t>(w.first) + i] - moved[i][0]);
   return r;

@@ -44,6 +44,7 @@ struct WaveformStartGuess {
 /// What is fitted to.
 struct WaveformData {
   std::vector<double> torque, position;  // N m, rad; no position: torque alone
+  std::vector<bool> lost;                // of each row: it was not recorded and does not count
   std::vector<WaveformWindow> windows;
   std::vector<WaveformStartGuess> guesses;  // one per window
   int starts = kStartValues;                // how many of the start values are fitted, the first ones

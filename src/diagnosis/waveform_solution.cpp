@@ -52,11 +52,13 @@ constexpr Look kLast = {12, 0, 15, true};
 
 class Solver {
  public:
-  Solver(const record::Record& record, const WaveformSettings& settings, double told, double told_error,
+  Solver(const record::EvenGrid& even, const WaveformSettings& settings, double told, double told_error,
          const std::vector<double>& places)
       : settings_(settings), ring_(waveform_ring(settings)), told_gap_(told), told_error_(told_error) {
     const bool free = settings.output != WaveformOutput::locked;
-    data_.windows = waveform_windows(record, ring_, kMostWindows, free, places);
+    const record::Record& record = even.record;
+    data_.windows = waveform_windows(even, ring_, kMostWindows, free, places);
+    data_.lost = even.lost;
     data_.torque = record.column(record::Channel::sensor_torque);
     data_.position = record.column(record::Channel::motor_position);
     time_ = record.time;
@@ -363,7 +365,7 @@ const char* waveform_value_name(int which) {
 
 WaveformSolution solve_waveform(const record::Record& record, const WaveformSettings& settings, double told,
                                 double told_error, const std::vector<double>& places) {
-  return Solver(record, settings, told, told_error, places).solve();
+  return Solver(record::even_grid(record), settings, told, told_error, places).solve();
 }
 
 }  // namespace backlash::diagnosis

@@ -68,8 +68,11 @@ WaveformValues waveform_values(const record::Record& record, double from, double
   try {
     const record::Record part = record.slice(from, to);
     check_waveform(part, settings);
-    std::vector<double> places = waveform_reversals(record.column(record::Channel::motor_torque));
-    const auto before = std::lower_bound(record.time.begin(), record.time.end(), from) - record.time.begin();
+    const record::EvenGrid even = record::even_grid(record);
+    std::vector<double> places = waveform_reversals(even);
+    const auto before =
+        std::lower_bound(even.record.time.begin(), even.record.time.end(), part.time.front()) -
+        even.record.time.begin();
     for (double& place : places) place -= static_cast<double>(before);
     fill(solve_waveform(part, settings, backlash / 2, spread, places), settings, out);
   } catch (const Refusal& refusal) {

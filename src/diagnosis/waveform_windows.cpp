@@ -23,6 +23,8 @@ constexpr double kMostBetween = 0.05;    // share of samples: a sine has 0.23, n
 constexpr double kLargestSpread = 0.25;  // of the level, standard deviation about it: choice; a sine has 0.3
 constexpr double kSamePlace = 1.5;  // samples, of a reversal in two records: theory, one and its rounding
 constexpr std::size_t kFewest = 4;  // windows: choice
+constexpr double kSeen =
+    0.9;  // share of a window's samples that were recorded: choice; the start before it: all
 
 void check_even(const record::Record& record) {
   const double dt = record.sampling_interval();
@@ -94,27 +96,33 @@ double middle_size(const std::vector<double>& values) {
 }
 
 /// Where each reversal was, in samples, from a line through them all: a steady period that is no whole number
-/// of samples is then known more finely than one.
-std::vector<double> steady(const std::vector<int>& reversals) {
-  if (reversals.size() < 2) return {reversals.begin(), reversals.end()};
-  const auto n = static_cast<double>(reversals.size());
-  double mean = 0, slope = 0, squares = 0;
-  for (const int r : reversals) mean += r / n;
-  for (std::size_t k = 0; k < reversals.size(); ++k) {
-    const double x = static_cast<double>(k) - (n - 1) / 2;
+/// of samples is then known more finely than one. A reversal beside a lost sample may be one off and is not
+/// asked.
+std::vector<double> steady(const std::vector<int>& reversals, const record::EvenGrid& even) {
+  std::vector<std::size_t> asked;
+  for (std::size_t k = 0; k < reversals.size(); ++k)
+    if (even.whole(static_cast<std::size_t>(reversals[k]) - 1, 2)) asked.push_back(k);
+  if (asked.size() < 2) return {reversals.begin(), reversals.end()};
+  const auto n = static_cast<double>(asked.size());
+  double sum = 0, mean = 0, slope = 0, squares = 0;
+  for (const std::size_t k : asked) sum += static_cast<double>(k), mean += reversals[k] / n;
+  const double middle = sum / n;
+  for (const std::size_t k : asked) {
+    const double x = static_cast<double>(k) - middle;
     slope += x * reversals[k], squares += x * x;
   }
   slope /= squares;
   std::vector<double> line;
   for (std::size_t k = 0; k < reversals.size(); ++k)
-    line.push_back(mean + slope * (static_cast<double>(k) - (n - 1) / 2));
-  for (std::size_t k = 0; k < reversals.size(); ++k)
+    line.push_back(mean + slope * (static_cast<double>(k) - middle));
+  for (const std::size_t k : asked)
     if (std::fabs(line[k] - reversals[k]) > 0.75) return {reversals.begin(), reversals.end()};
   return line;
 }
 
 /// Those of `places` that are these reversals, or what these tell themselves.
-std::vector<double> known_places(const std::vector<int>& reversals, const std::vector<double>& places) {
+std::vector<double> known_places(const std::vector<int>& reversals, const std::vector<double>& places,
+                                 const record::EvenGrid& even) {
   std::vector<double> at;
   for (const int r : reversals)
     for (const double place : places)
@@ -122,13 +130,13 @@ std::vector<double> known_places(const std::vector<int>& reversals, const std::v
         at.push_back(place);
         break;
       }
-  return at.size() == reversals.size() ? at : steady(reversals);
+  return at.size() == reversals.size() ? at : steady(reversals, even);
 }
 
 }  // namespace
 
-std::vector<double> waveform_reversals(const std::vector<double>& torque) {
-  return steady(torque_of(torque).reversals);
+std::vector<double> waveform_reversals(const record::EvenGrid& even) {
+  return steady(torque_of(even.record.column(record::Channel::motor_torque)).reversals, even);
 }
 
 int waveform_lead(double ring, double interval) {
@@ -140,8 +148,9 @@ int waveform_length(const WaveformWindow& window, double rings, double ring, dou
   return std::min(window.samples, wanted);
 }
 
-std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free,
+std::vector<WaveformWindow> waveform_windows(const record::EvenGrid& even, double ring, int most, bool free,
                                              const std::vector<double>& places) {
+  const record::Record& record = even.record;
   const double dt = record.sampling_interval();
   if (!(dt * kSamplesPerRing < ring))
     throw Refusal{Status::out_of_domain,
@@ -156,9 +165,11 @@ std::vector<WaveformWindow> waveform_windows(const record::Record& record, doubl
   if (torque.reversals.size() < kFewest)
     throw Refusal{Status::insufficient_data, "fewer than four reversals of the torque"};
   const std::vector<double> at =
-      torque.square ? known_places(torque.reversals, places) : steady(torque.reversals);
+      torque.square ? known_places(torque.reversals, places, even) : steady(torque.reversals, even);
   const int lead = waveform_lead(ring, dt), tail = static_cast<int>(std::lround(kTailRings * ring / dt));
   std::vector<WaveformWindow> all;
+  std::vector<std::size_t> of;  // the reversals that they are about
+  std::size_t broken = 0;       // windows that lack too much
   for (std::size_t k = 0; k < at.size(); ++k) {
     const int r = torque.reversals[k];
     const int end = k + 1 < at.size() ? torque.reversals[k + 1] : static_cast<int>(record.size());
@@ -172,14 +183,29 @@ std::vector<WaveformWindow> waveform_windows(const record::Record& record, doubl
     w.before = torque.level[!forward], w.after = torque.level[forward];
     w.reversal = (at[k] - w.first) * dt;
     if (!torque.square) w.drive.assign(values.begin() + w.first, values.begin() + w.first + w.samples);
-    all.push_back(w);
+    const auto first = static_cast<std::size_t>(w.first), samples = static_cast<std::size_t>(w.samples);
+    if (!even.whole(first, static_cast<std::size_t>(lead) + 1) ||
+        static_cast<double>(even.count(first, samples)) < kSeen * static_cast<double>(samples)) {
+      ++broken;
+      continue;
+    }
+    all.push_back(w), of.push_back(k);
   }
-  if (all.size() < kFewest)
+  if (all.size() + broken < kFewest)
     throw Refusal{Status::insufficient_data, "fewer than four reversals of the torque with time to settle"};
-  std::vector<WaveformWindow> chosen;  // in pairs: one reversal to either side
-  const std::size_t pairs = std::min(all.size(), static_cast<std::size_t>(most)) / 2;
-  for (std::size_t i = 0; i < pairs; ++i) {
-    const std::size_t k = i * (all.size() / 2) / pairs * 2;
+  std::vector<std::size_t> pairs;  // first windows of two reversals in a row, one to either side
+  for (std::size_t k = 0; k + 1 < all.size(); ++k)
+    if (of[k + 1] == of[k] + 1) pairs.push_back(k++);
+  const std::size_t take = std::min(pairs.size(), static_cast<std::size_t>(most) / 2);
+  if (2 * take < kFewest)
+    throw Refusal{
+        Status::insufficient_data,
+        fmt::format(
+            "of {} reversals of the torque {} have too many lost samples about them: two pairs are needed",
+            all.size() + broken, broken)};
+  std::vector<WaveformWindow> chosen;
+  for (std::size_t i = 0; i < take; ++i) {
+    const std::size_t k = pairs[i * pairs.size() / take];
     chosen.push_back(all[k]), chosen.push_back(all[k + 1]);
   }
   return chosen;

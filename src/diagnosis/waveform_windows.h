@@ -4,25 +4,25 @@
 
 #include <vector>
 
-#include "backlash_diagnosis/record/record.h"
+#include "backlash_diagnosis/record/even_grid.h"
 #include "waveform_motion.h"
 
 namespace backlash::diagnosis {
 
-/// Of a torque that is no square wave, windows have its samples (`drive`). Throws Refusal where the samples
-/// are uneven or too few.
+/// Of a torque that is no square wave, windows have its samples (`drive`). A window with a lost sample in it
+/// is left out. Throws Refusal where the samples are uneven or too few.
 ///   ring     s, cycle of the motor against the pinion: sets the scale of all times
 ///   longest  the most windows to return, spread evenly over the record
 ///   places   of the reversals of a square wave, in samples, as waveform_reversals() tells them from a longer
 ///            record; empty: told from this one
 ///   free     whether the link is, so that a smooth torque turns on the teeth at another time than at the
 ///   motor
-std::vector<WaveformWindow> waveform_windows(const record::Record& record, double ring, int most, bool free,
+std::vector<WaveformWindow> waveform_windows(const record::EvenGrid& even, double ring, int most, bool free,
                                              const std::vector<double>& places = {});
 
 /// Where a square wave reverses, in samples, more finely than one where its period is steady. Throws Refusal
 /// for a torque that never reverses.
-std::vector<double> waveform_reversals(const std::vector<double>& torque);
+std::vector<double> waveform_reversals(const record::EvenGrid& even);
 
 /// Samples before the reversal, and after it for a stage of the fit that looks `rings` cycles far.
 int waveform_lead(double ring, double interval);

@@ -85,6 +85,17 @@ TEST(GapTraverse, TellsThePlayOfOrdinaryMotionFromTheMotorsSide) {
   }
 }
 
+// One in 200, and a gap of 20: the rows are missing from the fit, and no crossing is refused for them.
+TEST(GapTraverse, LostSamplesAreMissingRows) {
+  const Servo servo;
+  const record::Record whole = servo.record();
+  std::vector<double> kept;
+  Random random(4);
+  for (std::size_t i = 0; i < whole.size(); ++i)
+    if (random.uniform(0, 1) > 0.005 && (i < 5000 || i >= 5020)) kept.push_back(whole.time[i]);
+  expect_gap(servo, estimate_gap_traverse(record::samples_at(whole, kept), declared()), 0.02);
+}
+
 TEST(GapTraverse, HoldsWithEffectsThatNobodyDeclares) {
   Servo servo;
   servo.gravity = 40, servo.cogging = 15, servo.noise = 10;

@@ -73,6 +73,23 @@ void expect_holds(const Estimate& e, double truth) {
   EXPECT_NEAR(e.backlash_angle * declared().base_radius, e.backlash, 1e-12);
 }
 
+/// A sample in 200 lost, and a gap of 10, as recorders lose them.
+TEST(Waveform, ALostSampleIsAMissingRow) {
+  for (const double backlash : {5e-5, 1.2e-4}) {
+    const record::Record whole = record_of(drawn(21, backlash));
+    std::vector<double> kept;
+    Random random(4);
+    for (std::size_t i = 0; i < whole.size(); ++i)
+      if (random.uniform(0, 1) > 0.005 && (i < 300 || i >= 310)) kept.push_back(whole.time[i]);
+    const record::Record lossy = record::samples_at(whole, kept);
+    ASSERT_LT(lossy.size(), whole.size() - 10);
+    const Estimate e = diagnosis::estimate_waveform(lossy, declared());
+    expect_holds(e, backlash);
+    const Estimate of_whole = diagnosis::estimate_waveform(whole, declared());
+    EXPECT_LT(e.upper - e.lower, 2 * (of_whole.upper - of_whole.lower));
+  }
+}
+
 TEST(Waveform, MachinesWithAllValuesOff) {
   std::uint64_t seed = 100;
   for (const double backlash : {25e-6, 100e-6}) {

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "backlash_diagnosis/record/even_grid.h"
+
+namespace backlash::record {
+namespace {
+
+Record line(const std::vector<double>& times) {
+  Record r;
+  r.time = times;
+  for (const double t : times) r.column(Channel::motor_position).push_back(3 * t);
+  return r;
+}
+
+// A straight line is its own interpolation.
+TEST(EvenGrid, GivesLostSamplesTheirRows) {
+  const EvenGrid even = even_grid(line({0, 1, 2, 5, 6, 8, 9, 10, 11, 12}));
+  ASSERT_EQ(even.record.size(), 13u);
+  for (std::size_t i = 0; i < 13; ++i) {
+    EXPECT_DOUBLE_EQ(even.record.time[i], double(i));
+    EXPECT_DOUBLE_EQ(even.record.column(Channel::motor_position)[i], 3.0 * double(i));
+    EXPECT_EQ(even.lost[i], i == 3 || i == 4 || i == 7) << i;
+  }
+  EXPECT_TRUE(even.whole(8, 5));
+  EXPECT_TRUE(even.whole(5, 2));
+  EXPECT_FALSE(even.whole(5, 3));
+  EXPECT_TRUE(even.whole(3, 0));
+}
+
+// A cubic is its own interpolation, but beside the ends, where it is a line; a torque that jumps does not
+// overshoot.
+TEST(EvenGrid, APositionGoesOnAsItWas) {
+  Record r;
+  r.time = {0, 1, 3, 4, 7, 8, 9, 10, 11};
+  for (const double t : r.time) {
+    r.column(Channel::motor_position).push_back(t * t * t - 7 * t * t);
+    r.column(Channel::motor_torque).push_back(t < 5 ? -1 : 1);
+  }
+  const EvenGrid even = even_grid(r);
+  ASSERT_EQ(even.record.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const auto t = double(i);
+    EXPECT_NEAR(even.record.column(Channel::motor_position)[i], t * t * t - 7 * t * t, 1e-12) << i;
+    EXPECT_LE(std::fabs(even.record.column(Channel::motor_torque)[i]), 1);
+  }
+}
+
+TEST(EvenGrid, LeavesWholeAndUnevenRecordsAsTheyAre) {
+  for (const std::vector<double>& times :
+       {std::vector<double>{0, 1, 2, 3, 4}, {0, 1, 2, 3.6, 4.6, 5.6}, {0, 1, 2, 3, 1e9}, {0, 1}, {}}) {
+    const EvenGrid even = even_grid(line(times));
+    EXPECT_EQ(even.record.time, times);
+    EXPECT_EQ(even.lost, std::vector<bool>(times.size(), false));
+  }
+}
+
+}  // namespace
+}  // namespace backlash::record
