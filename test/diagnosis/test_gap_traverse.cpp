@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -94,6 +95,9 @@ TEST(GapTraverse, LostSamplesAreMissingRows) {
   for (std::size_t i = 0; i < whole.size(); ++i)
     if (random.uniform(0, 1) > 0.005 && (i < 5000 || i >= 5020)) kept.push_back(whole.time[i]);
   expect_gap(servo, estimate_gap_traverse(record::samples_at(whole, kept), declared()), 0.02);
+  // A recorder that was held for half a second.
+  kept.erase(std::remove_if(kept.begin(), kept.end(), [](double t) { return t > 7 && t < 7.5; }), kept.end());
+  expect_gap(servo, estimate_gap_traverse(record::samples_at(whole, kept), declared()), 0.02);
 }
 
 TEST(GapTraverse, HoldsWithEffectsThatNobodyDeclares) {
@@ -183,7 +187,7 @@ TEST(GapTraverse, RecordsThatCannotServeAreAnswered) {
   EXPECT_EQ(answer([](auto& r) { r.column(Channel::motor_position)[7] = kNaN; }).status,
             Status::insufficient_data);
   EXPECT_EQ(answer([](auto& r) {
-              for (std::size_t i = 900; i < r.size(); ++i) r.time[i] += 0.5;
+              for (std::size_t i = 1; i < r.size(); i += 2) r.time[i] += 3e-4;  // of 1e-3
             }).status,
             Status::out_of_domain);
   EXPECT_EQ(answer([](auto& r) {
