@@ -112,7 +112,14 @@ free_port() {
   /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'
 }
 
-# The tests that only scripts/nightly.sh runs, as a filter of gtest.
+# The tests that only scripts/nightly.sh runs, as a filter of gtest; and those with nodes, as files.
 nightly_tests() {
-  grep -v '^#' "${REPO}/test/nightly.txt" | paste -sd:
+  grep -vE '^(#|ros/)' "${REPO}/test/nightly.txt" | paste -sd:
+}
+nightly_rostests() {
+  grep '^ros/' "${REPO}/test/nightly.txt" | sed 's,^,test/,'
+}
+# The targets of rostests whose files are read from standard input.
+rostest_targets() {
+  sed "s/^/run_tests_${PACKAGE}_rostest_/; s,/,_,g"
 }

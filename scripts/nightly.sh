@@ -40,6 +40,10 @@ run_nightly_tests() {
     esac
     GTEST_FILTER=${GTEST_FILTER} "${binary}" "--gtest_output=xml:${results}/$(basename "${binary}").xml" || failed=1
   done
+  use_workspace
+  mapfile -t targets < <(nightly_rostests | rostest_targets)
+  ninja -C "${WS}/build" -j1 "${targets[@]}" || failed=1
+  /usr/bin/python3 "${REPO}/scripts/summarise_tests.py" "${results}" || failed=1
   return "${failed}"
 }
 

@@ -44,19 +44,20 @@ run_tests() {
   echo "Running the $1; their output goes to ${WS}/log/run_$1.log"
   quietly "run_$1" ninja -C "${WS}/build" "-j$2" "${@:3}" || outside+=(--failed "run_$1: the run broke off")
 }
-# rostest_targets -l|-L: the rostests whose file says that they run beside others, or those that measure rates.
-rostest_targets() {
-  (cd "${REPO}" && grep "$1" 'Runs beside others' test/ros/*.test | sed "s/^/run_tests_${PACKAGE}_rostest_/; s,/,_,g")
+# rostests -l|-L: whose file says that they run beside others, or those that measure rates.
+rostests() {
+  (cd "${REPO}" && grep "$1" 'Runs beside others' test/ros/*.test | grep -vxF "$(nightly_rostests)" | rostest_targets)
 }
-mapfile -t beside < <(rostest_targets -l)
-mapfile -t alone < <(rostest_targets -L)
+mapfile -t beside < <(rostests -l)
+mapfile -t alone < <(rostests -L)
 # Those that take long are for nightly.sh; a name in its list that no test has would protect nothing.
 nightly_list_is_whole() {
   local binary known
   known=$(for binary in "${WS}/devel/lib/${PACKAGE}/${PACKAGE}"_test_*; do
     "${binary}" --gtest_list_tests | sed 's/ *#.*//' | awk '/^[^ ]/ {suite = $1} /^ / {print suite $1}'
   done)
-  ! grep -v '^#' "${REPO}/test/nightly.txt" | grep -vxF "${known}" | sed 's/$/: in test\/nightly.txt, and no such test/'
+  known+=$'\n'$(cd "${REPO}/test" && ls ros/*.test)
+  ! grep -v '^#' "${REPO}/test/nightly.txt" | grep -vxF "${known}" | sed 's/$/: in test\/nightly.txt, and no such test/' | grep .
 }
 check nightly_list nightly_list_is_whole
 GTEST_FILTER="-$(nightly_tests)" run_tests gtests "$(nproc)" "run_tests_${PACKAGE}_gtest"
