@@ -9,8 +9,9 @@
 
 namespace backlash::diagnosis {
 
-/// Of a torque that is no square wave, windows have its samples (`drive`). A window with a lost sample in it
-/// is left out. Throws Refusal where the samples are uneven or too few.
+/// Of a torque that is no square wave, windows have its samples (`drive`). A window that lacks a tenth of
+/// its samples, or one before its reversal, is left out; other lost samples do not count. Throws Refusal
+/// where the samples are uneven or too few.
 ///   ring     s, cycle of the motor against the pinion: sets the scale of all times
 ///   longest  the most windows to return, spread evenly over the record
 ///   places   of the reversals of a square wave, in samples, as waveform_reversals() tells them from a longer
