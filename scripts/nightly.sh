@@ -24,6 +24,7 @@ parts=(
   "debug_build check_debug_build"
   "coverage bash ${scripts}/coverage.sh"
   "trace_machines bash ${scripts}/trace_machines.sh"
+  "diagnose_robot_joints bash ${scripts}/diagnose_robot_joints.sh"
   "diagnose_machines bash ${scripts}/diagnose_machines.sh"
   "trixie bash ${scripts}/test_in.sh trixie"
 )

@@ -6,42 +6,52 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/parallel.h"
 #include "backlash_diagnosis/signal/distributions.h"
+#include "backlash_diagnosis/signal/order_statistics.h"
 #include "refusal.h"
-#include "traverse_fit.h"
+#include "traverse_windows.h"
 
 namespace backlash::diagnosis {
 namespace {
 
-// All choices, tried on simulated machines, but where another origin is given.
-constexpr double kModel = 0.2;                 // of the play, see gap_traverse.h: simulation
-constexpr double kAlike = 0.2;                 // of the play, between fits that tell the same: choice
-constexpr double kUnsureFriction = 0.5;        // of the declared dry friction of the motor, as the fit has it
-constexpr double kUnsureTorque = 2;            // theory: 95 % of what nothing tells
-constexpr int kFewest = 20, kFewestFirst = 8;  // crossings, for the answer and to know the motor
-constexpr int kMost = 60;                      // beyond them the errors do not shrink: the equations limit
-constexpr int kSearched = 24;                  // for the first guesses
-// Spreads of the gap: 0.3 to 3.3 times the declared one.
-constexpr double kGuesses[] = {-0.4, -0.2, 0, 0.2, 0.4};
-constexpr double kBeside[] = {0.6, 1.6};  // times the gap of a fit, from which others begin
-constexpr std::size_t kGoneOn = 2;        // of the guesses, the cheapest that differ: choice (time)
-constexpr int kRounds = 3;
-constexpr double kCheaper = 1;          // of the cost, to go on
-constexpr int kSearch = 20, kFit = 40;  // steps
-constexpr double kMisfit = 1.6;         // noises, of the median crossing
-constexpr double kFewOf = 0.54;         // of all crossings: simulation, see require_most()
-constexpr double kFar = 4;              // spreads of a declared value
-constexpr double kMostLeftOut = 0.2;    // of the crossings
-constexpr double kVague = 0.7;          // half width of the interval of the logarithm: a factor of two
-constexpr double kRivalCost = 9;        // theory: three standard errors
-constexpr double kSteepest = 1.55;      // power of the deflection: Hertz's 1.5 and what is told wrong of it
-constexpr double kHidden = 1;           // deflections under the noise, that a play must exceed
-constexpr double kLaw = 0.1;            // of the deflection: teeth that yield by no power of it, 95 %
+// Choices, tried on joints of test/campaigns/robot_joints and tests, but where another origin is given.
+constexpr int kFewest = 20,
+              kFewestFirst = 8;  // crossings by the motor alone, for the answer and to know the motor
+constexpr int kMost = 60;        // windows, beyond which the errors do not shrink
+constexpr int kMostWide = 45;    // of them, in which both flanks are seen
+constexpr int kSearched = 16;    // windows of a first guess
+constexpr int kSearch = 20;      // steps of one
+constexpr double kGuesses[] = {0.3, 0.55, 1, 1.8, 3.3};  // times the declared gap
+constexpr double kShares[] = {0.3, 0.5, 0.7, 0.85, 1};   // of the range of motor minus load position
+constexpr double kBeside[] = {0.7, 1.4};                 // times the gap of a fit, from which others begin
+constexpr std::size_t kGoneOn = 2;                       // guesses that go on, the cheapest that differ
+constexpr double kFirstNoise = 0.05;                     // of the width, of what is left at first
+constexpr double kAlike = 0.2;                           // of the play, between fits that are the same
+constexpr double kUnsureFriction = 0.5;  // of the declared dry friction of the motor, as the fit has it
+constexpr double kUnsureTorque = 2;      // theory: 95 % of what nothing explains
+constexpr int kMostOrders = 48;          // per turn of the motor: poles and slots of servo motors
+constexpr double kWaveSeen = 5;          // times what white noise shows; what is left is not white
+// The gates.
+constexpr double kFewOf = 0.35;    // of all crossings: simulation, see require_most()
+constexpr int kFewestPressed = 5;  // windows, for each flank
+constexpr double kPressed = 0.1;   // of the usual torque, in one of them
+constexpr double kLong = 0.1;      // of its samples
+constexpr double kFar = 4;         // spreads of a declared value
+constexpr double kLeft = 0.2;      // of the deflection or the torque, that is not explained
+constexpr double kVague = 4;       // upper over lower end of an interval, by which it says too little
+// The interval.
+constexpr double kRivalCost = 9;  // theory: three standard errors
+constexpr double kLaw =
+    0.2;  // of the deflection of a flank: laws of teeth that are in no prior, 95 %: simulation
+constexpr double kModelByLoad = 0.04;  // the same with the load's encoder, whose error follows the place
+constexpr double kModel =
+    0.15;  // of the play by the motor alone: what moves it beside the declared, 95 %: simulation
 
 void require(bool valid, const char* name, double value, const char* limit) {
   if (!valid || !std::isfinite(value)) throw InvalidParameter(name, value, limit);
@@ -54,12 +64,15 @@ void check(const GapTraverseSettings& s) {
   require(s.damping > 0, "damping", s.damping, "must be > 0");
   require(s.motor_damping >= 0, "motor_damping", s.motor_damping, "must be >= 0");
   require(s.motor_friction >= 0, "motor_friction", s.motor_friction, "must be >= 0");
+  require(s.load_damping >= 0, "load_damping", s.load_damping, "must be >= 0");
+  require(s.motor_turn > 0, "motor_turn", s.motor_turn, "must be > 0");
   require(s.load_friction >= 0, "load_friction", s.load_friction, "must be >= 0");
   require(s.gap >= 0, "gap", s.gap, "must be >= 0");
 }
 
-void check_channels(const record::Record& record) {
-  for (const auto channel : {record::Channel::motor_torque, record::Channel::motor_position}) {
+void check_channels(const record::Record& record, bool load) {
+  for (const auto channel : {record::Channel::motor_position,
+                             load ? record::Channel::load_position : record::Channel::motor_torque}) {
     if (!record.has(channel))
       throw Refusal{Status::insufficient_data, "needs " + record::channel_name(channel)};
     for (const double value : record.column(channel))
@@ -77,155 +90,233 @@ std::vector<TraverseWindow> some(const std::vector<TraverseWindow>& all, int mos
   return chosen;
 }
 
-struct Solution {
-  TraverseFit fit;
-  double rival_gap, rival_cost;  // rad; more than the best's
+/// A machine fitted to some windows of a record.
+struct TraverseFit {
+  std::unique_ptr<TraverseWindows> windows;
+  fit::WindowedFit fit;
+
+  TraverseFit(const TraverseData& data, const GapTraverseSettings& settings, std::vector<TraverseWindow> some,
+              const Eigen::VectorXd& shared, double of_noise)
+      : windows(std::make_unique<TraverseWindows>(data, settings, std::move(some))), fit(*windows) {
+    windows->noise = of_noise;
+    fit.shared = shared;
+  }
+
+  /// Of another fit of the same windows.
+  void begin_with_own_of(const TraverseFit& other) {
+    for (std::size_t w = 0; w < fit.own.size(); ++w)
+      for (int k = 0; k < kTraverseOwn; ++k)
+        if (const double spread = windows->own()[std::size_t(k)].spread; spread > 0)
+          fit.own[w][k] = other.fit.own[w][k] * other.windows->own()[std::size_t(k)].spread / spread;
+  }
+
+  double noise() const { return windows->noise; }
+  /// Times a sample's, as which what is left would count for what it is.
+  double noise_left() const { return noise() * std::sqrt(fit.mean_square()); }
+  double gap() const { return fit.value(kTraverseGap); }
+  /// Root mean square over the windows of what is left, in noises.
+  double misfit() const {
+    double squares = 0, expected = 0;
+    for (int w = 0; w < windows->count(); ++w) {
+      squares += fit.weight(w) * fit.residual(w).squaredNorm();
+      expected += fit.weight(w) * windows->squares_of_noise(w);
+    }
+    return std::sqrt(squares / expected);
+  }
+  /// Root mean square over the windows of a value of their own.
+  double rms_of_own(int which) const {
+    double squares = 0;
+    for (int w = 0; w < windows->count(); ++w)
+      squares += std::pow(windows->own()[std::size_t(which)].value(fit.own[std::size_t(w)][which]), 2);
+    return std::sqrt(squares / windows->count());
+  }
 };
 
-double cost_of(const TraverseFit& fit) {
-  return fit.cost() + fit.left_out() * kFar * kFar * 64;  // left out is no way to be better
-}
-
-const TraverseFit& cheapest(const std::vector<TraverseFit>& fits) {
-  return *std::min_element(fits.begin(), fits.end(),
-                           [](const auto& a, const auto& b) { return cost_of(a) < cost_of(b); });
-}
-
 bool alike(const TraverseFit& a, const TraverseFit& b) {
-  return std::fabs(std::log(a.value(kTraverseGap) / b.value(kTraverseGap))) < kAlike;
+  return std::fabs(std::log(a.gap() / b.gap())) < kAlike;
 }
 
-/// Steps of each on its crossings, side by side.
-void search(std::vector<TraverseFit>& fits) {
-  for_each_in_parallel(static_cast<int>(fits.size()),
-                       [&](int i) { fits[static_cast<std::size_t>(i)].run(kSearch); });
-}
+using Fits = std::vector<TraverseFit>;
 
-/// What fits begin with: guesses that some of the crossings have improved, cheapest first, without those that
-/// came to the same.
-std::vector<TraverseFit> guesses_of(const TraverseData& data, const TraversePriors& priors) {
-  std::vector<TraverseFit> guesses;
-  for (const double guess : kGuesses)
-    guesses.emplace_back(data, priors, some(data.windows, kSearched), guess);
-  search(guesses);
-  std::vector<const TraverseFit*> by_cost;
-  for (const TraverseFit& guess : guesses) by_cost.push_back(&guess);
-  std::sort(by_cost.begin(), by_cost.end(),
-            [](const auto* a, const auto* b) { return cost_of(*a) < cost_of(*b); });
-  std::vector<TraverseFit> kept;
-  for (const TraverseFit* guess : by_cost)
-    if (std::none_of(kept.begin(), kept.end(), [&](const auto& other) { return alike(*guess, other); }))
-      kept.push_back(*guess);
+/// Fits from these gaps [rad], side by side, cheapest first, without those that came to the same.
+Fits searched(const TraverseData& data, const GapTraverseSettings& settings,
+              const std::vector<TraverseWindow>& windows, const Eigen::VectorXd& from,
+              const std::vector<double>& gaps, double noise) {
+  Fits fits;
+  for (const double gap : gaps) {
+    fits.emplace_back(data, settings, windows, from, noise);
+    const fit::Prior& prior = fits.back().windows->shared()[kTraverseGap];
+    fits.back().fit.shared[kTraverseGap] = std::log(gap / prior.centre) / prior.spread;
+  }
+  fit::FitOptions options;
+  options.iterations = kSearch;
+  const auto run = [&] {
+    for_each_in_parallel(int(fits.size()), [&](int i) { fits[std::size_t(i)].fit.run(options); });
+  };
+  run();
+  // From afar with a noise in which all of them see where to go, then with what the best leaves.
+  if (!data.load.empty()) {
+    for (const TraverseFit& fit : fits) noise = std::min(noise, fit.noise_left());
+    for (TraverseFit& fit : fits) fit.windows->noise = std::max(1.0, noise);
+    run();
+  }
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
+  Fits kept;
+  for (TraverseFit& fit : fits)
+    if (std::isfinite(fit.fit.cost()) &&
+        std::none_of(kept.begin(), kept.end(), [&](const auto& other) { return alike(fit, other); }))
+      kept.push_back(std::move(fit));
   return kept;
 }
 
-/// Another fit's machine on all windows.
-TraverseFit gone_on(const TraverseFit& from, const TraverseData& data) {
-  TraverseFit fit(from, data, some(data.windows, kMost));
-  fit.run(kFit);
+/// Another fit's machine on these windows.
+TraverseFit gone_on(const TraverseData& data, const GapTraverseSettings& settings,
+                    const std::vector<TraverseWindow>& windows, const TraverseFit& from, double noise) {
+  TraverseFit fit(data, settings, windows, from.fit.shared, noise);
+  if (from.fit.own.size() == windows.size()) fit.begin_with_own_of(from);
+  fit.fit.run({});
   return fit;
 }
 
-/// A fit stops where it is cheapest nearby: others begin with what is declared and gaps about the cheapest
-/// one's, on some of the crossings, and go on where they are not dearer there, as long as that finds a
-/// cheaper one.
-void look_beside(std::vector<TraverseFit>& fits, const TraverseData& data, const TraversePriors& priors) {
-  const std::vector<TraverseWindow> few = some(data.windows, kSearched);
-  for (int round = 0; round < kRounds; ++round) {
-    const TraverseFit best = cheapest(fits);
-    std::vector<TraverseFit> tried = {TraverseFit(best, data, few)};
-    for (const double factor : kBeside) {
-      const TraversePrior& gap = priors[kTraverseGap];
-      tried.emplace_back(data, priors, few,
-                         std::log(factor * best.value(kTraverseGap) / gap.value) / gap.spread);
-    }
-    search(tried);
-    for (std::size_t i = 1; i < tried.size(); ++i) {
-      const double dearer = cost_of(tried[i]) - cost_of(tried[0]);
-      if (dearer < -kCheaper || (dearer < kRivalCost && !alike(tried[i], tried[0])))
-        fits.push_back(gone_on(tried[i], data));
-    }
-    if (!(cost_of(cheapest(fits)) < cost_of(best) - kCheaper)) return;
+/// Standard error of the logarithm of the gap: of the fit, and by windows as clusters.
+struct Errors {
+  double of_fit, clustered;
+  explicit Errors(const TraverseFit& f) {
+    const double spread = f.windows->shared()[kTraverseGap].spread;
+    of_fit = spread * std::sqrt(f.fit.covariance()(kTraverseGap, kTraverseGap));
+    clustered = spread * std::sqrt(f.fit.clustered_covariance()(kTraverseGap, kTraverseGap));
   }
-}
+  double larger() const { return std::max(of_fit, clustered); }
+  /// Of a difference of the cost, as many times as the windows scatter more than the noise has it.
+  double scale() const { return std::pow(std::max(1.0, clustered / of_fit), 2); }
+};
 
-/// Each leaves out other crossings: all are compared on all.
-Solution solve(const TraverseData& data, const TraversePriors& priors,
-               const std::vector<TraverseFit>& guesses) {
-  std::vector<TraverseFit> fits;
-  for (std::size_t i = 0; i < std::min(kGoneOn, guesses.size()); ++i)
-    fits.push_back(gone_on(guesses[i], data));
-  look_beside(fits, data, priors);
-  const TraverseFit& best = cheapest(fits);
-  Solution solution{best, best.value(kTraverseGap), std::numeric_limits<double>::infinity()};
-  for (const TraverseFit& other : fits)
-    if (!alike(other, best) && cost_of(other) - cost_of(best) < solution.rival_cost)
-      solution.rival_gap = other.value(kTraverseGap), solution.rival_cost = cost_of(other) - cost_of(best);
-  return solution;
+/// The cheapest first, then those that the record hardly tells from it.
+Fits solve(TraverseData& data, const GapTraverseSettings& settings,
+           const std::vector<TraverseWindow>& windows, const Fits& guesses) {
+  const std::vector<TraverseWindow> all = some(windows, kMost), few = some(windows, kSearched);
+  TraverseFit first = gone_on(data, settings, all, guesses[0], guesses[0].noise());
+  const double noise = data.load.empty() ? std::max(1.0, first.noise_left()) : first.noise_left();
+  if (!data.load.empty()) {
+    data.shown_spread = std::max(2 * data.load_noise, first.rms_of_own(kOwnShown));
+    data.load_torque_spread = std::max(data.load_torque_spread, first.rms_of_own(kOwnLoadTorque));
+  }
+  Fits fits;
+  fits.push_back(gone_on(data, settings, all, first, noise));
+  // A fit stops where it is cheapest nearby.
+  std::vector<double> beside;
+  for (const double factor : kBeside) beside.push_back(factor * fits[0].gap());
+  for (const TraverseFit& other : searched(data, settings, few, fits[0].fit.shared, beside, noise))
+    if (!alike(other, fits[0])) fits.push_back(gone_on(data, settings, all, other, noise));
+  for (std::size_t i = 1; i < guesses.size() && i < kGoneOn; ++i)
+    fits.push_back(gone_on(data, settings, all, guesses[i], noise));
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const auto& a, const auto& b) { return a.fit.cost() < b.fit.cost(); });
+  const double most = fits[0].fit.cost() + kRivalCost * Errors(fits[0]).scale();
+  while (!(fits.back().fit.cost() <= most)) fits.pop_back();
+  return fits;
 }
 
 /// [rad] Of a flank under the usual torque.
 double deflection(const TraverseFit& fit, const TraverseData& data) {
-  return data.level / fit.value(kTraverseStiffness);
+  return data.level / fit.fit.value(kTraverseStiffness);
 }
 
-void refuse(const TraverseFit& fit, const TraverseData& data) {
-  if (!(fit.misfit() < kMisfit) || fit.left_out() > kMostLeftOut * fit.windows())
-    throw Refusal{
-        Status::out_of_domain,
-        fmt::format("the machine of the rig file, whatever its values, does not explain the torque: "
-                    "{:.2g} times the noise are left, {} of {} crossings left out",
-                    fit.misfit(), fit.left_out(), fit.windows())};
-  static const char* const names[] = {"gap",
-                                      "stiffness of the mesh",
-                                      "damping of the mesh",
-                                      "inertia of the load",
-                                      "inertia of the motor",
-                                      "damping of the motor",
-                                      "dry friction of the motor",
-                                      "dry friction of the load",
-                                      "power of the torque of the teeth over the deflection"};
-  for (int k = kTraverseStiffness; k < kTraverseEarlier; ++k)
-    if (std::fabs(fit.deviation(k)) > kFar)
+/// What the record is explained by must be a machine like the declared one.
+void require_declared(const TraverseFit& fit) {
+  for (const int k : {kTraverseStiffness, kTraverseLoadInertia, kTraverseMotorInertia})
+    if (std::fabs(fit.fit.shared[k]) > kFar)
       throw Refusal{Status::out_of_domain,
                     fmt::format("the record fits only a machine far from that of the rig file: {} {:.3g}",
-                                names[k], fit.value(k))};
-  if (const double power = fit.value(kTraversePower); power > kSteepest)
-    throw Refusal{Status::out_of_domain,
-                  fmt::format("the record fits only teeth whose torque goes with the power {:.3g} of their "
-                              "deflection, steeper than any contact: they yield otherwise, or there are more "
-                              "gaps than one",
-                              power)};
-  const double hidden =
-      std::max(kHidden * data.noise / fit.value(kTraverseStiffness), 2 * kLaw * deflection(fit, data));
-  if (fit.value(kTraverseGap) < hidden)
-    throw Refusal{
-        Status::below_range,
-        fmt::format("less than {:.2g} rad, which noise and the yielding of the teeth hide", hidden)};
+                                fit.windows->shared()[std::size_t(k)].name, fit.fit.value(k))};
 }
 
-void fill(Estimate& e, const Solution& solution, const TraverseData& data, const GapTraverseSettings& s) {
-  const TraverseFit& fit = solution.fit;
-  refuse(fit, data);
-  const double gap = fit.value(kTraverseGap);
-  if (solution.rival_cost < kRivalCost)
-    throw Refusal{Status::ambiguous,
-                  fmt::format("{:.4g} and {:.4g} rad fit the record alike", gap, solution.rival_gap)};
-  const int used = fit.windows() - fit.left_out();
-  const double error = std::max(fit.standard_error() * std::max(1.0, fit.misfit()), fit.clustered_error());
-  const double half = std::hypot(signal::student_t_quantile(0.975, used - 1) * error, kModel,
-                                 kLaw * deflection(fit, data) / gap);
-  if (!(half < kVague))
-    throw Refusal{Status::insufficient_data,
-                  fmt::format("{} crossings of the gap tell it only from {:.2g} to {:.2g} rad", used,
-                              gap * std::exp(-half), gap * std::exp(half))};
+/// Share of what the machine should explain that is left: of the deflection where the load is seen, else of
+/// the torque.
+double left_of(const TraverseFit& fit, const TraverseData& data) {
+  const double times = fit.misfit();
+  return data.load.empty() ? times * data.torque_noise / data.level : times * data.load_noise / data.width;
+}
+
+/// A flank that is never pressed may be anywhere: each must be, whatever the declared torque on the load is
+/// within twice what is known of it, and without the torque that nothing explains.
+void require_both_flanks(const TraverseFit& fit, const TraverseData& data) {
+  const fit::Prior& terms = fit.windows->shared()[kTraverseLoadTerms];
+  int forward = 0, backward = 0;
+  for (int w = 0; w < fit.windows->count(); ++w) {
+    const Eigen::VectorXd& own = fit.fit.own[std::size_t(w)];
+    const Eigen::VectorXd teeth = fit.windows->teeth(w, fit.fit.shared, own);
+    const std::vector<double> torque(teeth.begin(), teeth.end());
+    const double most = signal::quantile(torque, 1 - kLong), least = signal::quantile(torque, kLong);
+    const double unexplained = fit.windows->own()[kOwnLoadTorque].value(own[kOwnLoadTorque]);
+    double highest = kNaN, lowest = kNaN;  // of the torque that presses for sure
+    for (const double z : {-2.0, 2.0}) {
+      const double other =
+          (terms.value(z) - fit.fit.value(kTraverseLoadTerms)) * fit.windows->load_torque(w) - unexplained;
+      highest = std::fmin(highest, most + other), lowest = std::fmax(lowest, least + other);
+    }
+    forward += highest > kPressed * data.level, backward += -lowest > kPressed * data.level;
+  }
+  if (std::min(forward, backward) < kFewestPressed)
+    throw Refusal{
+        Status::insufficient_data,
+        fmt::format(
+            "one flank is pressed in {} of {} windows, the other for sure in {}: moves that reverse under "
+            "load would do",
+            std::max(forward, backward), fit.windows->count(), std::min(forward, backward))};
+}
+
+/// An interval that holds the plays that fit alike.
+void fill(Estimate& e, const Fits& fits, const TraverseData& data, const GapTraverseSettings& s) {
+  const TraverseFit& best = fits[0];
+  require_declared(best);
+  require_both_flanks(best, data);
+  const int windows = best.windows->count();
+  const double gap = best.gap(), left = left_of(best, data);
+  if (!(left < kLeft))
+    throw Refusal{Status::out_of_domain,
+                  fmt::format("no machine like that of the rig file explains the {}: {:.0f} % of it are left",
+                              data.load.empty() ? "torque" : "motor's position less the load's", 100 * left)};
+  double lower = gap, upper = gap;
+  for (const TraverseFit& fit : fits) {
+    const double half = std::hypot(signal::student_t_quantile(0.975, windows - 1) * Errors(fit).larger(),
+                                   data.load.empty() ? kModel : kModelByLoad);
+    if (!(std::exp(2 * half) < kVague))
+      throw Refusal{
+          Status::insufficient_data,
+          fmt::format("{} windows of the record show the play only from {:.2g} to {:.2g} rad: moves that "
+                      "reverse, and press both flanks, would do",
+                      windows, fit.gap() * std::exp(-half), fit.gap() * std::exp(half))};
+    const double law = kLaw * deflection(fit, data);
+    lower = std::min(lower, fit.gap() - std::hypot(fit.gap() * (1 - std::exp(-half)), law));
+    upper = std::max(upper, fit.gap() + std::hypot(fit.gap() * (std::exp(half) - 1), law));
+  }
   e.status = Status::ok;
-  e.backlash_angle = gap, e.angle_lower = gap * std::exp(-half), e.angle_upper = gap * std::exp(half);
+  e.backlash_angle = gap, e.angle_lower = std::max(0.0, lower), e.angle_upper = upper;
   e.backlash = gap * s.base_radius, e.lower = e.angle_lower * s.base_radius;
   e.upper = e.angle_upper * s.base_radius;
-  e.message =
-      fmt::format("motor's side alone, {} of {} crossings of the gap; {:.2g} times the noise are left", used,
-                  data.crossings, fit.misfit());
+  e.message = fmt::format("{}, {} windows of the record; {:.2g} % of the {} are not explained",
+                          data.load.empty() ? "motor's side alone" : "both encoders", windows, 100 * left,
+                          data.load.empty() ? "torque" : "deflection");
+}
+
+/// Load driven by the recorded motor, against its own encoder.
+void by_load(Estimate& e, const record::Record& record, const GapTraverseSettings& s) {
+  TraverseData data = traverse_data_by_load(record, s);
+  std::vector<TraverseWindow> wide,
+      narrow;  // where both flanks are seen, and others, which show what the encoders err
+  for (const TraverseWindow& window : data.windows)
+    (window.width > 0.5 * data.window_width ? wide : narrow).push_back(window);
+  std::vector<TraverseWindow> chosen = some(wide, kMostWide);
+  for (const TraverseWindow& window : some(narrow, kMost - int(chosen.size()))) chosen.push_back(window);
+  std::vector<double> starts;
+  for (const double share : kShares) starts.push_back(share * data.width);
+  const Fits guesses = searched(data, s, some(wide, kSearched), Eigen::VectorXd::Zero(kTraverseValues),
+                                starts, kFirstNoise * data.width / data.load_noise);
+  if (guesses.empty())
+    throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
+  fill(e, solve(data, s, chosen, guesses), data, s);
 }
 
 void require_crossings(const TraverseData& data, int fewest) {
@@ -253,11 +344,67 @@ TraverseData first_data(const record::Record& record, const GapTraverseSettings&
       record, s, {s.motor_inertia, s.motor_damping, s.motor_friction, kUnsureFriction * s.motor_friction});
 }
 
-/// Crossings by the motor that those have told.
+/// Crossings by the motor that those have given.
 TraverseData second_data(const record::Record& record, const GapTraverseSettings& s, const TraverseFit& fit) {
-  return traverse_data(record, s,
-                       {fit.value(kTraverseMotorInertia), fit.value(kTraverseMotorDamping),
-                        fit.value(kTraverseMotorFriction), kUnsureTorque * fit.untold()});
+  return traverse_data(
+      record, s,
+      {fit.fit.value(kTraverseMotorInertia), fit.fit.value(kTraverseMotorDamping),
+       fit.fit.value(kTraverseMotorFriction), kUnsureTorque * fit.rms_of_own(kOwnMotorTorque)});
+}
+
+/// Orders of waves over the motor's turn in what a fit leaves of the torque, the largest first: as far as
+/// they are more than noise would show of so many orders.
+std::vector<double> orders_of_waves(const TraverseFit& fit, const TraverseData& data, double motor_turn) {
+  std::vector<double> left, at;
+  for (int w = 0; w < fit.windows->count(); ++w) {
+    std::vector<std::size_t> samples;
+    const Eigen::VectorXd torque =
+        fit.windows->torque_left(w, fit.fit.shared, fit.fit.own[std::size_t(w)], &samples);
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      left.push_back(torque[Eigen::Index(i)]),
+          at.push_back(data.position[samples[i]] * 2 * M_PI / motor_turn);
+  }
+  std::vector<double> orders;
+  while (orders.size() < kTorqueWaves / 2) {
+    double best = 0, order = 0, sine = 0, cosine = 0, all = 0;
+    for (const double x : left) all += x * x;
+    for (int n = 1; n <= kMostOrders; ++n) {
+      double s = 0, c = 0;
+      for (std::size_t i = 0; i < left.size(); ++i)
+        s += left[i] * std::sin(n * at[i]), c += left[i] * std::cos(n * at[i]);
+      if (s * s + c * c > best) best = s * s + c * c, order = n, sine = s, cosine = c;
+    }
+    // Of white noise 2 (s^2 + c^2) / all is exponential with mean 1 about each order.
+    if (!(2 * best / all > kWaveSeen * std::log(double(kMostOrders)))) break;
+    orders.push_back(order * 2 * M_PI / motor_turn);
+    for (std::size_t i = 0; i < left.size(); ++i)
+      left[i] -=
+          2 / double(left.size()) * (sine * std::sin(order * at[i]) + cosine * std::cos(order * at[i]));
+  }
+  return orders;
+}
+
+/// By the motor alone: torque that moves the load, in windows that begin in contact. The motor that the
+/// surest of them give finds more of them.
+void by_motor(Estimate& e, const record::Record& record, const GapTraverseSettings& s) {
+  const TraverseData first = first_data(record, s);
+  require_crossings(first, kFewestFirst);
+  std::vector<double> starts;
+  for (const double factor : kGuesses) starts.push_back(factor * std::max(s.gap, first.level / s.stiffness));
+  const Fits early =
+      searched(first, s, some(first.windows, kSearched), Eigen::VectorXd::Zero(kTraverseValues), starts, 1);
+  if (early.empty())
+    throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
+  TraverseData data = second_data(record, s, early.front());
+  require_crossings(data, kFewest);
+  require_most(data);
+  add_waves(data, orders_of_waves(early.front(), first, s.motor_turn));
+  starts.clear();
+  for (const TraverseFit& fit : early) starts.push_back(fit.gap());
+  const Fits guesses = searched(data, s, some(data.windows, kSearched), early.front().fit.shared, starts, 1);
+  if (guesses.empty())
+    throw Refusal{Status::out_of_domain, "no machine like that of the rig file follows the record"};
+  fill(e, solve(data, s, data.windows, guesses), data, s);
 }
 
 }  // namespace
@@ -265,15 +412,9 @@ TraverseData second_data(const record::Record& record, const GapTraverseSettings
 Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSettings& settings) {
   check(settings);
   return estimate_or_refusal("gap_traverse", [&](Estimate& estimate) {
-    check_channels(record);
-    const TraverseData first = first_data(record, settings);
-    require_crossings(first, kFewestFirst);
-    const TraversePriors priors = traverse_priors(first, settings);
-    const std::vector<TraverseFit> guesses = guesses_of(first, priors);
-    const TraverseData data = second_data(record, settings, guesses.front());
-    require_crossings(data, kFewest);
-    require_most(data);
-    fill(estimate, solve(data, priors, guesses), data, settings);
+    const bool load = record.has(record::Channel::load_position);
+    check_channels(record, load);
+    (load ? by_load : by_motor)(estimate, record, settings);
   });
 }
 

@@ -15,22 +15,28 @@ namespace backlash::diagnosis {
 namespace {
 
 // All choices, tried on simulated machines, but where another origin is given.
-constexpr double kCycleSamples = 8;   // fewest samples in a cycle of the motor against the load
-constexpr double kStep = 0.2;         // of the integration times the fastest frequency, rad
-constexpr double kBefore = 0.8;       // cycles of a window before a crossing, at least: tell the start
-constexpr double kLongestBefore = 3;  // the same at most
-constexpr double kAfter = 2.6;        // and from its begin on: the first touches, at least
-constexpr double kTouches = 1.6;      // the same, from the end of a crossing on
-constexpr double kMostTurns = 0.8;    // share of the crossings that fit into a window so long
-constexpr double kLongest = 12;       // cycles, after the begin of a crossing
-constexpr double kCounted = 0.5;      // share of a window in which the motor moves
-constexpr double kUneven = 0.25;      // of an interval, from one sample to the next
-constexpr double kClear = 4.4;        // noises of the averaged torque, above which it presses a flank
-constexpr double kAveraged = 0.16;    // cycles, half width of the average
-constexpr double kSlow = 0.02;        // of the rms speed: there dry friction takes any value
-constexpr double kFade = 0.01;        // of it: the load's friction turns its sign within
+constexpr double kCycleSamples = 4;        // fewest samples in a cycle of the motor against the load
+constexpr double kCycleSamplesByLoad = 2;  // theory, Nyquist: the load's encoder shows the motion
+constexpr double kStep = 0.2;              // of the integration times the fastest frequency, rad
+constexpr double kBefore = 0.8;            // cycles of a window before a crossing, at least: tell the start
+constexpr double kLongestBefore = 3;       // the same at most
+constexpr double kAfter = 2.6;             // and from its begin on: the first touches, at least
+constexpr double kTouches = 1.6;           // the same, from the end of a crossing on
+constexpr double kMostTurns = 0.8;         // share of the crossings that fit into a window so long
+constexpr double kLongest = 12;            // cycles, after the begin of a crossing
+constexpr double kCounted = 0.5;           // share of a window in which the motor moves
+constexpr double kUneven = 0.25;           // of an interval, from one sample to the next
+constexpr double kClear = 4.4;             // noises of the averaged torque, above which it presses a flank
+constexpr double kAveraged = 0.16;         // cycles, half width of the average
+constexpr double kSlow = 0.02;             // of the rms speed: there dry friction takes any value
+constexpr double kFade = 0.01;             // of it: the load's friction turns its sign within
 constexpr std::size_t kFewestSamples = 256;
-constexpr std::size_t kFirst = 3;  // samples, that differences and delays need
+constexpr double kEnd = 0.02;       // share of the samples at either end of a range, of which outliers may be
+constexpr double kShown = 5e-5;     // rad, of an encoder, beside its eccentricity: 10 seconds of arc
+constexpr double kUntracked = 0.1;  // of the usual torque, on the load
+constexpr double kTile = 6;         // cycles, of a window with the load's encoder
+constexpr std::size_t kFewestTile = 48;  // samples, of it
+constexpr std::size_t kFirst = 3;        // samples, that differences and delays need
 
 /// Value and slope per sample of a quadratic over `reach` samples to each side (Savitzky and Golay 1964).
 struct Quadratic {
@@ -69,9 +75,9 @@ double cycle_of(const GapTraverseSettings& s) {
   return 2 * M_PI / std::sqrt(s.stiffness * (1 / s.motor_inertia + 1 / s.load_inertia));
 }
 
-void check_samples(const record::Record& record, double interval, double cycle) {
+void check_samples(const record::Record& record, double interval, double cycle, double fewest) {
   if (record.size() < kFewestSamples) throw Refusal{Status::insufficient_data, "fewer than 256 samples"};
-  if (!(interval * kCycleSamples < cycle))
+  if (!(interval * fewest < cycle))
     throw Refusal{Status::out_of_domain,
                   fmt::format("a sample each {:.3g} s does not resolve the cycle of {:.3g} s of the motor "
                               "against the load",
@@ -112,7 +118,7 @@ Presses presses_of(TraverseData& d, const std::vector<double>& teeth, const Quad
   std::vector<double> pressed;
   for (std::size_t i = reach + 1; i + reach + 1 < n; ++i) {
     p.torque[i] = quadratic.of(teeth, i, quadratic.value);
-    if (std::fabs(p.torque[i]) < clear) continue;
+    if (!d.counts[i] || std::fabs(p.torque[i]) < clear) continue;  // at rest dry friction takes any value
     p.flank[i] = p.torque[i] > 0 ? 1 : -1;
     pressed.push_back(std::fabs(p.torque[i]));
   }
@@ -200,25 +206,23 @@ void find_windows(TraverseData& d, const std::vector<double>& teeth, double cycl
       continue;
     const auto from = d.counts.begin() + std::ptrdiff_t(first), to = from + std::ptrdiff_t(d.samples);
     if (double(std::count(from, to, 1)) < kCounted * double(d.samples)) continue;
-    d.windows.push_back({first, double(presses.flank[first]), presses.torque[first],
-                         quadratic.of(teeth, first, quadratic.slope) / d.interval});
+    TraverseWindow w;
+    w.first = first, w.side = presses.flank[first], w.torque = presses.torque[first];
+    w.torque_rate = quadratic.of(teeth, first, quadratic.slope) / d.interval;
+    d.windows.push_back(w);
     free_from = first + d.samples / 2;
   }
   d.within = count_within(turns, d);
 }
 
-}  // namespace
-
-TraverseData traverse_data(const record::Record& recorded, const GapTraverseSettings& settings,
-                           const TraverseMotor& motor) {
-  const record::EvenGrid even = record::even_grid(recorded);
+/// The motor's motion.
+TraverseData motor_of(const record::EvenGrid& even, const GapTraverseSettings& settings, double fewest) {
   const record::Record& record = even.record;
   TraverseData d;
   d.interval = record.sampling_interval();
   const double cycle = cycle_of(settings);
-  check_samples(record, d.interval, cycle);
+  check_samples(record, d.interval, cycle, fewest);
   d.steps = std::max(1, static_cast<int>(std::ceil(2 * M_PI * d.interval / (cycle * kStep))));
-  d.torque = record.column(record::Channel::motor_torque);
   d.position = record.column(record::Channel::motor_position);
   const std::size_t n = d.position.size();
   d.rate.assign(n, 0), d.acceleration.assign(n, 0), d.counts.assign(n, 0);
@@ -234,15 +238,99 @@ TraverseData traverse_data(const record::Record& recorded, const GapTraverseSett
   for (std::size_t i = 0; i < n; ++i)  // beside a lost sample the differences are not measured
     d.counts[i] = std::fabs(d.rate[i]) > kSlow * std::sqrt(squares) &&
                   even.whole(i - std::min<std::size_t>(i, 1), std::min<std::size_t>(3, n - i + (i > 0)));
-  const std::vector<double> teeth = torque_of_teeth(d, motor);
-  d.torque_noise = signal::noise_from_differences(d.torque, 2);
   d.position_noise = std::max(signal::noise_from_differences(d.position, 4),
                               signal::smallest_step(d.position) / std::sqrt(12.0));
+  return d;
+}
+
+/// Rate of the load by a quadratic, and how much the record says of the torque that moves it.
+void read_load(TraverseData& d, const record::EvenGrid& even, const GapTraverseSettings& settings,
+               const Quadratic& quadratic, std::vector<double>& rate) {
+  d.load = even.record.column(record::Channel::load_position);
+  const std::size_t n = d.load.size(), reach = quadratic.reach;
+  std::vector<double> apart(n);
+  for (std::size_t i = 0; i < n; ++i) apart[i] = d.position[i] - d.load[i];
+  const double low = signal::quantile(apart, kEnd), high = signal::quantile(apart, 1 - kEnd);
+  const double middle = 0.5 * (low + high);
+  d.width = high - low;
+  for (double& q : d.load) q += middle;
+  d.load_counts.assign(n, 0);
+  for (std::size_t i = 0; i < n; ++i) d.load_counts[i] = !even.lost[i];
+  d.load_noise =
+      std::max(signal::noise_from_differences(d.load, 4), signal::smallest_step(d.load) / std::sqrt(12.0));
+  double weights = 0;
+  for (const double w : quadratic.slope) weights += w * w;
+  d.load_rate_noise = d.load_noise * std::sqrt(weights) / d.interval;
+  rate.assign(n, 0);
+  for (std::size_t i = reach; i + reach < n; ++i)
+    rate[i] = quadratic.of(d.load, i, quadratic.slope) / d.interval;
+  double squares = 0, count = 0;
+  for (std::size_t i = 2 * reach; i + 2 * reach < n; ++i) {
+    if (!d.counts[i]) continue;
+    const double acceleration = (rate[i + reach] - rate[i - reach]) / (2 * double(reach) * d.interval);
+    const double declared = settings.load_torque ? settings.load_torque(d.position[i]) : 0;
+    squares += std::pow(settings.load_inertia * acceleration + declared, 2), ++count;
+  }
+  d.level = std::sqrt(squares / std::max(1.0, count));
+}
+
+}  // namespace
+
+TraverseData traverse_data_by_load(const record::Record& recorded, const GapTraverseSettings& settings) {
+  const record::EvenGrid even = record::even_grid(recorded);
+  TraverseData d = motor_of(even, settings, kCycleSamplesByLoad);
+  const double cycle = cycle_of(settings) / d.interval;
+  const Quadratic quadratic(std::max<std::size_t>(3, reach_of(d, cycle_of(settings))));
+  std::vector<double> rate;
+  read_load(d, even, settings, quadratic, rate);
+  d.samples = std::max<std::size_t>(kFewestTile, std::size_t(std::lround(kTile * cycle)));
+  std::vector<double> widths;
+  for (std::size_t first = quadratic.reach; first + d.samples + quadratic.reach < d.load.size();
+       first += d.samples) {
+    const auto from = d.counts.begin() + std::ptrdiff_t(first), to = from + std::ptrdiff_t(d.samples);
+    if (double(std::count(from, to, 1)) < kCounted * double(d.samples)) continue;
+    std::vector<double> apart;
+    for (std::size_t i = first; i < first + d.samples; ++i) apart.push_back(d.position[i] - d.load[i]);
+    const double low = signal::quantile(apart, kEnd), high = signal::quantile(apart, 1 - kEnd);
+    widths.push_back(high - low);
+    TraverseWindow w;
+    w.first = first, w.load = d.load[first], w.load_rate = rate[first], w.width = high - low;
+    if (settings.load_torque) w.load_torque = settings.load_torque(d.position[first + d.samples / 2]);
+    d.windows.push_back(w);
+  }
+  if (d.windows.empty()) throw Refusal{Status::insufficient_data, "the motor hardly moves"};
+  d.window_width = signal::quantile(widths, 0.9);
+  d.shown_spread = std::max(2 * d.load_noise, kShown);
+  d.load_torque_spread = kUntracked * d.level;
+  return d;
+}
+
+void add_waves(TraverseData& d, const std::vector<double>& orders) {
+  for (std::size_t n = 0; n < orders.size() && 2 * n + 1 < std::size_t(kTorqueWaves); ++n)
+    for (const double q : d.position) {
+      d.waves[2 * n].push_back(std::sin(orders[n] * q));
+      d.waves[2 * n + 1].push_back(std::cos(orders[n] * q));
+    }
+}
+
+TraverseData traverse_data(const record::Record& recorded, const GapTraverseSettings& settings,
+                           const TraverseMotor& motor) {
+  const record::EvenGrid even = record::even_grid(recorded);
+  TraverseData d = motor_of(even, settings, kCycleSamples);
+  d.torque = even.record.column(record::Channel::motor_torque);
+  if (settings.motor_torque)
+    for (std::size_t i = 0; i < d.torque.size(); ++i) d.torque[i] -= settings.motor_torque(d.position[i]);
+  const double cycle = cycle_of(settings);
+  const std::vector<double> teeth = torque_of_teeth(d, motor);
+  d.torque_noise = signal::noise_from_differences(d.torque, 2);
   const Quadratic quadratic(reach_of(d, cycle));
   const double differences = motor.inertia * d.position_noise / (d.interval * d.interval);
   d.noise = noise_of(quadratic.value, d.torque_noise, differences);
   d.slope_noise = noise_of(quadratic.slope, d.torque_noise, differences) / d.interval;
   find_windows(d, teeth, cycle, motor.unsure);
+  if (settings.load_torque)
+    for (TraverseWindow& w : d.windows)
+      w.load_torque = settings.load_torque(d.position[w.first + d.samples / 2]);
   return d;
 }
 

@@ -8,11 +8,18 @@
 #include "lanes_power.h"
 
 namespace backlash::diagnosis {
+double shown_too_much(const TraverseData& data, const TraverseRun& run, std::size_t sample) {
+  const double angle = data.position[sample];
+  return run.own[kOwnShown] + run.machine[kTraverseZero] + run.machine[kTraverseSine] * std::sin(angle) +
+         run.machine[kTraverseCosine] * std::cos(angle);
+}
+
 namespace {
 
-// Deflections, in those under the usual torque, and powers beyond which no fit comes: they keep lanes_exp()
-// within its range.
-constexpr double kLeastDeflection = 1e-30, kMostDeflection = 1e30, kMostPower = 10;
+// Deflections, in those under the usual torque, between which stiffness and damping follow powers: beyond, no
+// teeth go, but fits that begin far away, whose steps would not be stable there. And powers beyond which no
+// fit comes.
+constexpr double kLeastDeflection = 1e-30, kMostDeflection = 10, kMostPower = 10;
 
 template <typename Lanes>
 constexpr int kLanesOf = static_cast<int>(sizeof(Lanes) / sizeof(double));
@@ -51,13 +58,12 @@ DIAGNOSIS_LANES Lanes turned(const Lanes& a, const LaneBits<Lanes>& sign) {
   return reinterpret_cast<Lanes>(bits);
 }
 
-/// Of some runs side by side. The teeth yield as a spring does at the usual torque, and by a power of it
-/// elsewhere. Damping follows: constant for a spring and as the torque after Hertz (Hunt and Crossley 1975),
-/// between them by 3 (power - 1).
+/// Of some runs side by side. Teeth and dampers are as declared at the usual torque, and follow powers of the
+/// deflection elsewhere.
 template <typename Lanes>
 struct Machines {
-  Lanes half_gap, stiffness, damping, beyond_spring, per_deflection, per_inertia, friction, load_torque,
-      per_slow;
+  Lanes half_gap, stiffness, damping, damping_power, beyond_spring, hardening, per_hardened, per_deflection,
+      per_inertia, friction, viscous, load_torque, per_slow;
 
   DIAGNOSIS_LANES Touch<Lanes> touch(const Place<Lanes>& motor, const Place<Lanes>& load) const {
     const Lanes x = motor.position - load.position;
@@ -71,8 +77,10 @@ struct Machines {
     const Lanes deflection = (touch.depth > 0 ? touch.depth : -touch.depth) * per_deflection;
     const Lanes not_less = deflection > kLeastDeflection ? deflection : Lanes{} + kLeastDeflection;
     const Lanes within = not_less < kMostDeflection ? not_less : Lanes{} + kMostDeflection;
-    const Lanes harder = lanes_exp(Lanes(beyond_spring * lanes_log(within)));
-    const Lanes damper = beyond_spring > 0 ? damping * harder * harder * harder : damping;
+    const Lanes log = lanes_log(within);
+    const Lanes harder =
+        lanes_exp(Lanes(beyond_spring * log)) * (1 + hardening * within * within) * per_hardened;
+    const Lanes damper = damping * lanes_exp(Lanes(damping_power * log));
     return stiffness * touch.depth * harder + damper * touch.rate;
   }
 
@@ -80,7 +88,7 @@ struct Machines {
   DIAGNOSIS_LANES Lanes acceleration(const Lanes& teeth, const Lanes& rate) const {
     const Lanes slip = rate * per_slow, most = slip < 1 ? slip : Lanes{} + 1,
                 share = most > -1 ? most : Lanes{} - 1;
-    return (teeth - load_torque - friction * share) * per_inertia;
+    return (teeth - load_torque - viscous * rate - friction * share) * per_inertia;
   }
 };
 
@@ -94,17 +102,26 @@ DIAGNOSIS_LANES Machines<Lanes> machines_of(const TraverseData& data, const Trav
     to.stiffness[i] = m[kTraverseStiffness];
     to.damping[i] = m[kTraverseDamping];
     to.beyond_spring[i] = std::min(m[kTraversePower], kMostPower) - 1;
+    to.damping_power[i] = std::min(m[kTraverseDampingPower], kMostPower);
+    to.hardening[i] = m[kTraverseHardening], to.per_hardened[i] = 1 / (1 + m[kTraverseHardening]);
     to.per_deflection[i] = m[kTraverseStiffness] / data.level;
     to.per_inertia[i] = 1 / m[kTraverseLoadInertia];
-    to.friction[i] = m[kTraverseLoadFriction];
-    to.load_torque[i] = runs[i]->own[kOwnLoadTorque];
+    to.friction[i] = m[kTraverseLoadFriction], to.viscous[i] = m[kTraverseLoadDamping];
+    to.load_torque[i] = runs[i]->own[kOwnLoadTorque] + m[kTraverseLoadTerms] * runs[i]->window->load_torque;
   }
   return to;
 }
 
-/// The load as far behind the motor as the torque through the teeth at the first sample says.
+/// Where the load's encoder shows it; without one as far behind the motor as the torque through the teeth at
+/// the first sample says.
 Place<double> start_of(const TraverseData& data, const TraverseRun& run) {
   const TraverseWindow& w = *run.window;
+  if (!data.load.empty()) {
+    const double rate = w.load_rate + run.own[kOwnRate];
+    return {w.load + run.machine[kTraverseSkew] * rate - shown_too_much(data, run, w.first) +
+                run.own[kOwnPosition],
+            rate};
+  }
   const double stiffness = run.machine[kTraverseStiffness], power = run.machine[kTraversePower],
                torque = std::fabs(w.torque);
   const double in = data.level / stiffness * std::pow(torque / data.level, 1 / power);
@@ -253,6 +270,8 @@ class alignas(sizeof(Lanes)) Loads {
 
   /// About sample k.
   DIAGNOSIS_LANES double mean(int lane) const { return mean_[lane]; }
+  DIAGNOSIS_LANES double position(int lane) const { return load_.position[lane]; }
+  DIAGNOSIS_LANES double rate(int lane) const { return load_.rate[lane]; }
 
  private:
   /// Of those that are apart the depth comes to 0, of those that are pressed the torque.
@@ -333,19 +352,30 @@ DIAGNOSIS_LANES void move_step(Loads<Lanes>* parts, double from, double share, d
   for (int p = 0; p < Parts; ++p) parts[p].end_step();
 }
 
+/// Where the columns of some runs go.
+struct Columns {
+  double *teeth, *position, *rate;
+};
+
 /// Moves kTraverseRuns, of which the first `count` are wanted.
 template <typename Lanes>
 DIAGNOSIS_LANES void move_all(const TraverseData& data, const TraverseRun* const* runs, Eigen::Index count,
-                              double* to) {
+                              const Columns& to) {
   constexpr int kLanes = kLanesOf<Lanes>, kParts = kTraverseRuns / kLanes;
   Loads<Lanes> parts[kParts];
   for (int p = 0; p < kParts; ++p) parts[p].start(data, runs + p * kLanes);
   const double share = 1.0 / data.steps;
-  for (std::size_t k = 0; k + 1 < data.samples; ++k) {
+  for (std::size_t k = 0; k < data.samples; ++k) {
+    for (int i = 0; i < count; ++i) {
+      const std::size_t at = static_cast<std::size_t>(i) * data.samples + k;
+      to.position[at] = parts[i / kLanes].position(i % kLanes),
+      to.rate[at] = parts[i / kLanes].rate(i % kLanes);
+    }
+    if (k + 1 == data.samples) break;
     for (int p = 0; p < kParts; ++p) parts[p].begin(k);
     for (int s = 0; s < data.steps; ++s) move_step<kParts>(parts, s * share, share, data.interval);
     for (int i = 0; i < count; ++i)
-      to[static_cast<std::size_t>(i) * data.samples + k] = parts[i / kLanes].mean(i % kLanes);
+      to.teeth[static_cast<std::size_t>(i) * data.samples + k] = parts[i / kLanes].mean(i % kLanes);
   }
 }
 
@@ -357,17 +387,18 @@ using Lanes8 = double __attribute__((vector_size(64)));
 
 __attribute__((target("avx512f,prefer-vector-width=512"))) void move_avx512(const TraverseData& data,
                                                                             const TraverseRun* const* runs,
-                                                                            Eigen::Index count, double* to) {
+                                                                            Eigen::Index count,
+                                                                            const Columns& to) {
   move_all<Lanes8>(data, runs, count, to);
 }
 
 __attribute__((target("avx2"))) void move_avx2(const TraverseData& data, const TraverseRun* const* runs,
-                                               Eigen::Index count, double* to) {
+                                               Eigen::Index count, const Columns& to) {
   move_all<Lanes4>(data, runs, count, to);
 }
 #endif
 
-void move(const TraverseData& data, const TraverseRun* const* runs, Eigen::Index count, double* to) {
+void move(const TraverseData& data, const TraverseRun* const* runs, Eigen::Index count, const Columns& to) {
 #if defined(__x86_64__)
   static const bool has_avx512 = __builtin_cpu_supports("avx512f");
   static const bool has_avx2 = __builtin_cpu_supports("avx2");
@@ -379,46 +410,19 @@ void move(const TraverseData& data, const TraverseRun* const* runs, Eigen::Index
 
 }  // namespace
 
-bool moves_load(int value) {
-  switch (value) {
-    case kTraverseMotorInertia:
-    case kTraverseMotorDamping:
-    case kTraverseMotorFriction:
-    case kTraverseEarlier:
-    case kTraverseValues + kOwnMotorTorque:
-      return false;
-    default:
-      return true;
-  }
-}
-
-Eigen::MatrixXd traverse_teeth(const TraverseData& data, const std::vector<TraverseRun>& runs) {
+TraverseMotion traverse_motion(const TraverseData& data, const std::vector<TraverseRun>& runs) {
   const auto all = static_cast<Eigen::Index>(runs.size());
-  Eigen::MatrixXd teeth = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data.samples), all);
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data.samples), all);
+  TraverseMotion motion{none, none, none};
   for (Eigen::Index first = 0; first < all; first += kTraverseRuns) {
     const Eigen::Index count = std::min<Eigen::Index>(kTraverseRuns, all - first);
     const TraverseRun* group[kTraverseRuns];
     for (Eigen::Index i = 0; i < kTraverseRuns; ++i)
       group[i] = &runs[static_cast<std::size_t>(first + std::min(i, count - 1))];
-    move(data, group, count, teeth.col(first).data());
+    move(data, group, count,
+         {motion.teeth.col(first).data(), motion.position.col(first).data(), motion.rate.col(first).data()});
   }
-  return teeth;
-}
-
-Eigen::VectorXd traverse_residual(const TraverseData& data, const TraverseRun& run,
-                                  const Eigen::Ref<const Eigen::VectorXd>& teeth) {
-  const TraverseMachine& m = run.machine;
-  Eigen::VectorXd left = Eigen::VectorXd::Zero(teeth.size());
-  for (Eigen::Index k = 1; k + 1 < left.size(); ++k) {
-    const std::size_t i = run.window->first + static_cast<std::size_t>(k);
-    if (!data.counts[i]) continue;
-    const double drive =
-        (1 - m[kTraverseEarlier]) * data.torque[i] + m[kTraverseEarlier] * data.torque[i - 1];
-    left[k] = drive - (teeth[k] + run.own[kOwnMotorTorque] + m[kTraverseMotorInertia] * data.acceleration[i] +
-                       m[kTraverseMotorDamping] * data.rate[i] +
-                       std::copysign(m[kTraverseMotorFriction], data.rate[i]));
-  }
-  return left;
+  return motion;
 }
 
 }  // namespace backlash::diagnosis

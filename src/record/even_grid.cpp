@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace backlash::record {
 namespace {
 
-constexpr double kOffGrid = 0.25;  // of an interval, of a stamp: theory, half of what would be the next row
+constexpr double kEven =
+    1e-3;  // of an interval, off which a stamp moves no sample: choice, far below any jitter
+constexpr double kFarStep = 1e6;  // intervals, of one step: no record of such a gap is one
 
 /// A position goes on as it was; a torque may jump.
 bool smooth(Channel channel) {
@@ -15,29 +18,85 @@ bool smooth(Channel channel) {
          channel == Channel::reference_position;
 }
 
-/// `steps`: rows from the sample before. Between samples the line, or Lagrange's cubic through the two to
-/// either side.
-std::vector<double> filled(const std::vector<double>& from, const std::vector<std::size_t>& steps,
-                           bool cubic) {
-  std::vector<double> to{from[0]};
-  for (std::size_t i = 1; i < from.size(); ++i) {
-    const auto h = static_cast<double>(steps[i]);
-    const bool inside = cubic && i > 1 && i + 1 < from.size();
-    const double before = inside ? -static_cast<double>(steps[i - 1]) : 0;
-    const double after = inside ? h + static_cast<double>(steps[i + 1]) : 0;
-    for (std::size_t k = 1; k < steps[i]; ++k) {
-      const auto x = static_cast<double>(k);
-      double value = from[i - 1] + (from[i] - from[i - 1]) * x / h;
-      if (inside)
-        value = from[i - 2] * x * (x - h) * (x - after) / (before * (before - h) * (before - after)) +
-                from[i - 1] * (x - before) * (x - h) * (x - after) / (-before * h * after) +
-                from[i] * (x - before) * x * (x - after) / ((h - before) * h * (h - after)) +
-                from[i + 1] * (x - before) * x * (x - h) / ((after - before) * after * (after - h));
-      to.push_back(value);
-    }
-    to.push_back(from[i]);
+struct Grid {
+  std::vector<double> time;      // s, of the rows
+  std::vector<bool> lost;        // of each row
+  std::vector<std::size_t> row;  // of each sample: the nearest
+  double off = 0;                // intervals, largest distance of a sample from its row
+};
+
+/// Samples count on from one another: a clock that drifts against the median interval does not add up.
+std::optional<Grid> grid_of(const std::vector<double>& time, double median) {
+  Grid g;
+  g.row.push_back(0);
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    const double steps = std::round((time[i] - time[i - 1]) / median);
+    if (!(steps < kFarStep)) return {};
+    g.row.push_back(g.row.back() + static_cast<std::size_t>(std::max(1.0, steps)));
   }
-  return to;
+  const std::size_t rows = g.row.back() + 1;
+  if (rows > 2 * time.size()) return {};
+  const double interval = (time.back() - time.front()) / static_cast<double>(rows - 1);
+  for (std::size_t k = 0; k < rows; ++k) g.time.push_back(time[0] + static_cast<double>(k) * interval);
+  g.lost.assign(rows, true);
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    g.lost[g.row[i]] = false;
+    g.off = std::max(g.off, std::fabs(time[i] - g.time[g.row[i]]) / interval);
+  }
+  return g;
+}
+
+/// Between samples j and j + 1 the line, or Lagrange's cubic through the two to either side.
+double between(const std::vector<double>& time, const std::vector<double>& y, std::size_t j, double t,
+               bool cubic) {
+  if (j + 1 >= time.size() || t == time[j]) return y[j];
+  if (!cubic || j == 0 || j + 2 >= time.size())
+    return y[j] + (y[j + 1] - y[j]) * (t - time[j]) / (time[j + 1] - time[j]);
+  double sum = 0;
+  for (std::size_t i = j - 1; i <= j + 2; ++i) {
+    double weight = 1;
+    for (std::size_t k = j - 1; k <= j + 2; ++k)
+      if (k != i) weight *= (t - time[k]) / (time[i] - time[k]);
+    sum += weight * y[i];
+  }
+  return sum;
+}
+
+/// Samples taken at `time`, at the rows of the grid.
+std::vector<double> at_rows(const Grid& g, const std::vector<double>& time, const std::vector<double>& y,
+                            bool cubic) {
+  std::vector<double> rows;
+  rows.reserve(g.time.size());
+  std::size_t j = 0;
+  for (const double t : g.time) {
+    while (j + 1 < time.size() && time[j + 1] <= t) ++j;
+    rows.push_back(between(time, y, j, t, cubic));
+  }
+  return rows;
+}
+
+/// Mean square of the third differences within recorded rows: of what no motion goes through so fast.
+double roughness(const std::vector<double>& y, const std::vector<bool>& lost) {
+  double sum = 0;
+  for (std::size_t i = 3; i < y.size(); ++i)
+    if (!lost[i] && !lost[i - 1] && !lost[i - 2] && !lost[i - 3])
+      sum += std::pow(y[i] - 3 * y[i - 1] + 3 * y[i - 2] - y[i - 3], 2);
+  return sum;
+}
+
+/// The times at which the samples were taken: as stamped, or even, at their rows.
+std::vector<double> sampled_at(const Record& record, const Grid& g) {
+  std::vector<double> even;
+  for (const std::size_t row : g.row) even.push_back(g.time[row]);
+  if (g.off < kEven) return even;
+  double stamped = 0, counted = 0;
+  for (const Channel channel : {Channel::motor_position, Channel::load_position}) {
+    if (!record.has(channel)) continue;
+    const double a = roughness(at_rows(g, record.time, record.column(channel), true), g.lost),
+                 b = roughness(at_rows(g, even, record.column(channel), true), g.lost);
+    if (a + b > 0) stamped += a / (a + b), counted += b / (a + b);
+  }
+  return stamped < counted ? record.time : even;
 }
 
 }  // namespace
@@ -49,30 +108,15 @@ std::size_t EvenGrid::count(std::size_t first, std::size_t rows) const {
 
 EvenGrid even_grid(const Record& record) {
   EvenGrid even{record, std::vector<bool>(record.size(), false)};
-  if (record.size() < 3) return even;
-  const double dt = record.sampling_interval();
-  std::vector<std::size_t> steps(record.size(), 1);  // rows from the sample before
-  std::size_t rows = 1;
-  for (std::size_t i = 1; i < record.size(); ++i) {
-    const double intervals = (record.time[i] - record.time[i - 1]) / dt, whole = std::round(intervals);
-    if (whole > static_cast<double>(record.size())) return even;
-    if (whole > 1 && std::fabs(intervals - whole) < kOffGrid) steps[i] = static_cast<std::size_t>(whole);
-    rows += steps[i];
-  }
-  if (rows == record.size() || rows > 2 * record.size()) return even;
-  even.lost.assign(rows, true);
-  even.record.time.clear();
-  even.record.time.push_back(record.time[0]);
-  even.lost[0] = false;
-  for (std::size_t i = 1; i < record.size(); ++i) {
-    for (std::size_t k = 1; k <= steps[i]; ++k)
-      even.record.time.push_back(record.time[i - 1] +
-                                 (record.time[i] - record.time[i - 1]) * double(k) / double(steps[i]));
-    even.lost[even.record.time.size() - 1] = false;
-  }
+  if (record.size() < 4) return even;
+  const std::optional<Grid> grid = grid_of(record.time, record.sampling_interval());
+  if (!grid || (grid->off < kEven && grid->time.size() == record.size())) return even;
+  const std::vector<double> time = sampled_at(record, *grid);
+  even.lost = grid->lost;
+  even.record.time = grid->time;
   for (const Channel channel : kChannels)
     if (record.has(channel))
-      even.record.column(channel) = filled(record.column(channel), steps, smooth(channel));
+      even.record.column(channel) = at_rows(*grid, time, record.column(channel), smooth(channel));
   return even;
 }
 

@@ -81,10 +81,10 @@ std::optional<diagnosis::WaveformSettings> waveform_of(const model::Rig& rig) {
 }
 
 /// The same. Its values at the axis of motor_position.
-std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(const model::Rig& rig) {
+std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(
+    const model::Rig& rig, const std::shared_ptr<const model::GearTrain>& train) {
   if (rig.link_locked || !rig.input_coupling.rigid || !rig.output_coupling.rigid || rig.linear ||
-      rig.coupled || !rig.terms.empty() || rig.mesh.variation || rig.mesh.pairs ||
-      rig.mesh.contact_spec().law != "linear")
+      rig.coupled || rig.mesh.variation || rig.mesh.pairs || rig.mesh.contact_spec().law != "linear")
     return std::nullopt;
   const double ratio = rig.motor_axis_ratio(), lever = rig.mesh.lever() / ratio;
   diagnosis::GapTraverseSettings s;
@@ -93,12 +93,22 @@ std::optional<diagnosis::GapTraverseSettings> gap_traverse_of(const model::Rig& 
   s.motor_damping = rig.motor.viscous_damping + rig.pinion.viscous_damping;
   s.motor_friction = rig.motor.coulomb_friction;
   s.load_friction = rig.link.coulomb_friction / ratio;
+  s.load_damping = rig.link.viscous_damping / (ratio * ratio);
   s.stiffness = rig.mesh.contact_spec().values.at("stiffness") * lever * lever;
   s.damping = rig.mesh.contact_spec().values.at("damping") * lever * lever;
   s.gap = rig.backlash_angle(rig.mesh.backlash);
+  s.motor_turn = 2 * M_PI / (rig.motor_side ? 1 : rig.reduction_ratio);
   if (!rig.mesh.angular()) s.base_radius = 1 / rig.backlash_angle(1);
   for (const double value : {s.motor_inertia, s.load_inertia, s.stiffness, s.damping})
     if (!(value > 0)) return std::nullopt;
+  if (rig.terms.empty()) return s;
+  // Both at the load side, with the load in the middle of the gap.
+  s.load_torque = [train, ratio](double q) {
+    return -train->load_forces(model::Motion{0, q / ratio, 0, q / ratio, 0, 0}).net / ratio;
+  };
+  s.motor_torque = [train, ratio](double q) {
+    return -train->motor_forces(model::Motion{0, q / ratio, 0, q / ratio, 0, 0}).net / ratio;
+  };
   return s;
 }
 
@@ -118,7 +128,7 @@ void fill_from_rig(const model::Rig& rig, diagnosis::DiagnosisSettings& settings
       settings.lost_motion->elastic_uncertainty = default_uncertainty(rig, *train, settings);
   }
   settings.waveform = waveform_of(rig);
-  settings.gap_traverse = gap_traverse_of(rig);
+  settings.gap_traverse = gap_traverse_of(rig, train);
   const model::Coupling& coupling = rig.input_coupling;
   const double motor = rig.motor.inertia + 0.5 * coupling.inertia;
   const double pinion = rig.pinion.inertia + 0.5 * coupling.inertia;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../../src/diagnosis/traverse_motion.h"
+#include "../../src/diagnosis/traverse_windows.h"
 
 namespace backlash::diagnosis {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 TraverseData some_data() {
   TraverseData d;
   d.interval = 2e-3, d.steps = 4, d.samples = 60;
-  d.level = 300, d.slow = 2e-4;
+  d.level = 3000, d.slow = 2e-4;
   for (int i = 0; i < 400; ++i) {
     const double t = i * d.interval;
     d.position.push_back(0.4 + 0.03 * std::sin(21 * t) + 1e-3 * std::sin(170 * t));
@@ -23,7 +23,9 @@ TraverseData some_data() {
     d.torque.push_back(200 * std::sin(9 * t));
     d.counts.push_back(i % 11 != 0);
   }
-  d.windows = {{20, 1, 250, -3e3}, {170, -1, -90, 1e4}};
+  d.windows.resize(2);
+  d.windows[0].first = 20, d.windows[0].side = 1, d.windows[0].torque = 250, d.windows[0].torque_rate = -3e3;
+  d.windows[1].first = 170, d.windows[1].side = -1, d.windows[1].torque = -90, d.windows[1].torque_rate = 1e4;
   return d;
 }
 
@@ -41,8 +43,11 @@ TraverseRun some_run(const TraverseData& data, int which) {
   run.machine[kTraverseMotorFriction] = 50 / other;
   run.machine[kTraverseLoadFriction] = 15 * other;
   run.machine[kTraversePower] = 0.7 + 0.1 * which;
-  run.machine[kTraverseEarlier] = 0.4 + 0.02 * which;
-  run.own << 1e-5 * which, 2e-3 * (which - 4), 3.0 * which, -5.0 * which;
+  run.machine[kTraverseLoadDamping] = 8 * other;
+  run.machine[kTraverseHardening] = 0.01 * which;
+  run.machine[kTraverseDampingPower] = 0.05 * which;
+  run.machine[kTraverseLate] = 0.4 + 0.2 * which;
+  run.own << 1e-5 * which, 2e-3 * (which - 4), 3.0 * which, -5.0 * which, 0;
   return run;
 }
 
@@ -88,14 +93,17 @@ class Reference {
         (v0 + u * (2 * (3 * (q1 - q0) - 2 * v0 - v1) + 3 * u * (2 * (q0 - q1) + v0 + v1))) / d_.interval;
     const double side = motor > q ? 1 : -1, in = side * (motor - q) - 0.5 * m_[kTraverseGap];
     if (in <= 0) return 0;
-    const double power = m_[kTraversePower], pressed = m_[kTraverseStiffness] * in / d_.level;
-    const double damping = m_[kTraverseDamping] * (power > 1 ? std::pow(pressed, 3 * (power - 1)) : 1);
-    return side * std::max(0.0, d_.level * std::pow(pressed, power) + damping * side * (rate - w));
+    const double pressed = std::min(m_[kTraverseStiffness] * in / d_.level, 10.0), h = m_[kTraverseHardening];
+    const double spring = m_[kTraverseStiffness] * in * std::pow(pressed, m_[kTraversePower] - 1) *
+                          (1 + h * pressed * pressed) / (1 + h);
+    const double damping = m_[kTraverseDamping] * std::pow(pressed, m_[kTraverseDampingPower]);
+    return side * std::max(0.0, spring + damping * side * (rate - w));
   }
 
   double acceleration(double teeth, double w) const {
     const double friction = m_[kTraverseLoadFriction] * std::clamp(w / d_.slow, -1.0, 1.0);
-    return (teeth - own_[kOwnLoadTorque] - friction) / m_[kTraverseLoadInertia];
+    return (teeth - own_[kOwnLoadTorque] - m_[kTraverseLoadDamping] * w - friction) /
+           m_[kTraverseLoadInertia];
   }
 
   const TraverseData& d_;
@@ -111,7 +119,7 @@ double error_of(int steps, const std::vector<std::vector<double>>& expected) {
   data.steps = steps;
   std::vector<TraverseRun> runs;
   for (std::size_t i = 0; i < expected.size(); ++i) runs.push_back(some_run(data, int(i)));
-  const Eigen::MatrixXd teeth = traverse_teeth(data, runs);
+  const Eigen::MatrixXd teeth = traverse_motion(data, runs).teeth;
   double worst = 0;
   for (std::size_t i = 0; i < expected.size(); ++i)
     for (Eigen::Index k = 0; k + 1 < teeth.rows(); ++k)
@@ -130,7 +138,7 @@ TEST(TraverseMotion, IsThatOfTheEquations) {
     EXPECT_GT(std::count_if(expected[i].begin(), expected[i].end(), pressed), 10) << i;
     EXPECT_FALSE(std::all_of(expected[i].begin(), expected[i].end() - 1, pressed)) << i;
   }
-  EXPECT_LT(error_of(1, expected), 0.03);
+  EXPECT_LT(error_of(1, expected), 0.05);
   EXPECT_LT(error_of(2, expected), 0.01);
   EXPECT_LT(error_of(4, expected), 0.003);
 }
@@ -139,25 +147,46 @@ TEST(TraverseMotion, OneAloneIsTheSameAsBesideOthers) {
   const TraverseData data = some_data();
   std::vector<TraverseRun> runs;
   for (int i = 0; i < kTraverseRuns; ++i) runs.push_back(some_run(data, i));
-  const Eigen::MatrixXd together = traverse_teeth(data, runs);
+  const TraverseMotion together = traverse_motion(data, runs);
   for (int i = 0; i < kTraverseRuns; ++i) {
-    const Eigen::MatrixXd alone = traverse_teeth(data, {runs[static_cast<std::size_t>(i)]});
-    EXPECT_EQ(alone, together.col(i)) << i;
+    const TraverseMotion alone = traverse_motion(data, {runs[static_cast<std::size_t>(i)]});
+    EXPECT_EQ(alone.teeth, together.teeth.col(i)) << i;
+    EXPECT_EQ(alone.position, together.position.col(i)) << i;
   }
 }
 
-TEST(TraverseMotion, WhatDoesNotMoveTheLoadCountsInWhatIsLeftAlone) {
-  const TraverseData data = some_data();
-  for (int value = 0; value < kTraverseValues + kTraverseOwn; ++value) {
-    const TraverseRun run = some_run(data, 5);
-    TraverseRun moved = run;
-    double& changed =
-        value < kTraverseValues ? moved.machine[std::size_t(value)] : moved.own[value - kTraverseValues];
-    changed *= 1.1;
-    const Eigen::MatrixXd teeth = traverse_teeth(data, {run, moved});
-    EXPECT_EQ(teeth.col(0) != teeth.col(1), moves_load(value)) << value;
-    EXPECT_NE(traverse_residual(data, run, teeth.col(0)), traverse_residual(data, moved, teeth.col(1)))
-        << value;
+GapTraverseSettings some_settings() {
+  GapTraverseSettings s;
+  s.motor_inertia = 7, s.load_inertia = 90, s.motor_damping = 12, s.motor_friction = 50, s.load_friction = 15;
+  s.stiffness = 4e5, s.damping = 450, s.gap = 4e-4;
+  return s;
+}
+
+// Columns that share a motion are those for which it is the same: each alone gives what it gives beside
+// others, and each value that is not known changes what is left.
+TEST(TraverseWindows, ColumnsAreThoseOfEachAlone) {
+  for (const bool by_load : {false, true}) {
+    TraverseData data = some_data();
+    data.torque_noise = 2, data.position_noise = 1e-7, data.width = 1e-3, data.load_noise = 1e-6,
+    data.shown_spread = 5e-5;
+    if (by_load) {
+      data.load = data.position, data.load_counts.assign(data.load.size(), 1);
+      for (TraverseWindow& w : data.windows)
+        w.load = data.position[w.first], w.load_rate = data.rate[w.first];
+    }
+    const TraverseWindows windows(data, some_settings(), data.windows);
+    const Eigen::Index n = kTraverseValues, m = kTraverseOwn;
+    Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(n, 1 + n + m), own = Eigen::MatrixXd::Zero(m, 1 + n + m);
+    for (Eigen::Index k = 0; k < n; ++k) shared(k, 1 + k) = 0.3;
+    for (Eigen::Index k = 0; k < m; ++k) own(k, 1 + n + k) = 0.3;
+    const Eigen::MatrixXd all = windows.residuals(0, shared, own);
+    for (Eigen::Index c = 0; c < all.cols(); ++c) {
+      EXPECT_EQ(windows.residuals(0, shared.col(c), own.col(c)), all.col(c)) << c;
+      if (c == 0) continue;
+      const fit::Prior& prior =
+          c <= n ? windows.shared()[std::size_t(c - 1)] : windows.own()[std::size_t(c - 1 - n)];
+      EXPECT_EQ(all.col(c) != all.col(0), prior.spread > 0) << prior.name << " " << by_load;
+    }
   }
 }
 
@@ -170,8 +199,8 @@ TEST(TraverseMotion, WhatIsLeftIsTheTorqueLessWhatTheMachineNeeds) {
   for (Eigen::Index k = 0; k < teeth.size(); ++k) {
     const std::size_t i = run.window->first + std::size_t(k);
     const bool counts = k > 0 && k + 1 < teeth.size() && data.counts[i];
-    const double drive = data.torque[i] + m[kTraverseEarlier] * (data.torque[i - 1] - data.torque[i]) -
-                         run.own[kOwnMotorTorque];
+    // 1.0 samples late: that of the sample before.
+    const double drive = data.torque[i - 1] - run.own[kOwnMotorTorque];
     const double motor = m[kTraverseMotorInertia] * data.acceleration[i] +
                          m[kTraverseMotorDamping] * data.rate[i] +
                          m[kTraverseMotorFriction] * (data.rate[i] > 0 ? 1 : -1);

@@ -37,7 +37,7 @@ struct DiagnosisSettings {
   }
   std::optional<GapTraverseSettings> gap_traverse;
   std::string no_gap_traverse =  // the same
-      "the rig has no free load behind rigid couplings and a linear mesh, or has terms";
+      "the rig has no free load behind rigid couplings and a linear mesh";
   std::optional<CoherenceSettings> coherence;  // a detector beside the estimators
   std::optional<Limits> limits;
 };

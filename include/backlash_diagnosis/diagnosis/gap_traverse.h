@@ -1,44 +1,55 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Play from the motor's side alone, on a joint whose load is free, in ordinary motion: while the gap is
-// crossed the motor carries its own inertia only, so what it moves against the coasting load, from break-away
-// to touch, is the play (Nordin and Gutman 2002; Villwock and Pacas 2009). About each crossing the load is
-// moved by the recorded motor, and the torque that this needs is fitted to the recorded one:
+// Play of a joint whose load is free, in ordinary motion, by a machine fitted to the record
+// (fit/windowed_fit.h). In windows of the record the load is moved by the recorded motor through teeth with
+// play (Nordin and Gutman 2002):
 //
-//   Jm qm'' = tau - bm qm' - cm sign(qm') - F       F = T (k d / T)^p + c d' > 0, d = |qm - ql| - gap / 2
-//   Jl ql'' = F - cl sign(ql')                      F has the sign of qm - ql
+//   Jl ql'' = T - bl ql' - cl sign(ql') - f tau_l(ql) - own        T has the sign of qm - ql, and is 0 within
+//   the gap |T| = K d x^(p - 1) (1 + h x^2) / (1 + h) + c x^r d' > 0       d = |qm - ql| - gap / 2,  x = K d
+//   / T0
 //
-// with gap, k, p, c, Jl, Jm, bm, cm and cl of all crossings together, free within what is known of them, and
-// of each two start values and a torque on motor and load. All at the motor_position axis. The teeth are a
-// spring at the usual torque T, and may yield by a power p of the deflection, 1 within a factor of 1.5 (1.5:
-// Hertz), as far as the record tells. Beyond 1.55 nothing is told: no contact is so steep, and teeth that are
-// softer at first than a power, or two gaps in a row, look like that and like another play.
+// all at the motor_position axis. T0 is the usual torque, tau_l what declared terms take of the load, `own` a
+// torque of the window that nothing explains. The law of the teeth is free between lines and points that
+// touch (p = 1 to 1.5), with hardening h and a damping that may follow the deflection (r = 0: damper; 1.5:
+// Hunt and Crossley 1975); K and c are those at T0.
 //
-// The stretch about a crossing is as long as four of five crossings take, from a sure press on their flank to
-// the first touches, so that a play many times the declared one fits in, and more than half of the crossings
-// must lie in such a stretch: the quick ones alone tell a smaller play, with nothing but noise left. Fits
-// begin with five gaps, and with others about the cheapest one's until none is cheaper.
+// With load_position, what is left of that channel counts: its encoder shows ql later by a skew, from any
+// zero, with an eccentric disk, and some error of the window. The torque is not asked for. Windows lie side
+// by side over all of the record; in those where both flanks are seen lies what is known of the gap.
 //
-// A stretch begins while the motor moves and the teeth press one flank for sure: by more than noise and half
-// of the declared dry friction of the motor, for as long as the torque is averaged. The motor that such
-// crossings tell finds more of them.
+// Without it, what is left of the motor's torque counts (Villwock and Pacas 2009): while the gap is crossed
+// the motor carries its own inertia only,
+//
+//   Jm qm'' = tau(t - late) - bm qm' - cm sign(qm') - waves(qm) - T - own
+//
+// with waves of two orders over the motor's turn (cogging, a first stage that runs out), as far as the record
+// shows them. Windows begin in contact, about a crossing: the motor moves and the teeth press one flank for
+// sure, by more than noise and half of the declared dry friction of the motor. The motor that such crossings
+// give finds more of them. What is left is weighted by its covariance: noise of the torque, a slow torque
+// that nothing explains (5 % of T0), and noise of the position, which second differences make large and fast;
+// its fast part is all but left out, as the inertia of the motor multiplies it (attenuation).
 //
 // Teeth touch and leave within a step of the integration, at the moment that it finds: damped teeth push at
-// once, and steps across that make a cost with as many minima as there are touches.
+// once, and steps across that make a cost with as many minima as there are touches. Fits begin with several
+// gaps, and with others about the cheapest one's.
 //
-// What is left is weighted by its covariance: noise of the torque, a slow torque that nothing tells (5 % of
-// T), and noise of the position, which second differences make large and fast. The inertia of the motor
-// multiplies that noise, and a fit that counted it as it is would take a smaller inertia for a better one
-// (attenuation); its fast part is all but left out.
+// An answer passes five gates: both flanks are pressed, whatever the declared torque of the load is within
+// twice what is known of it; the motor alone: more than a third of all crossings lie in windows, since the
+// quick ones alone show a smaller play; stiffness and inertias are within four spreads of the declared ones;
+// a fifth of the channel at most is left; the interval is narrower than a factor of four.
 //
-// Needs motor_torque and motor_position, evenly sampled, at least eight samples in a cycle of the motor
-// against the load, and 20 crossings that begin in contact. No period.
+// Interval, 95 %, of all plays that fit alike: Student's t with the larger of two standard errors of the
+// logarithm (the fit's own; windows as clusters), 4 % of the play for what the machine does not hold (15 % by
+// the motor alone), and a fifth of the deflection of a flank under T0 for laws of teeth that are none of
+// these. Counted on joints of test/campaigns/robot_joints that were drawn afterwards
+// (doc/reference/robot_joints.md).
 //
-// Interval, 95 %: Student's t with the larger of two standard errors of the logarithm (crossings as clusters;
-// the fit's own), 20 % for what these equations do not hold, and 10 % of the deflection of the teeth under T:
-// checked on simulated machines with cogging, gravity, Stribeck friction, varying play, transmission errors
-// and teeth after Hertz that are not told to the fit, and on such whose play is a thirtieth of the
-// deflection.
+// Needs motor_position, and load_position or motor_torque. Samples are put on an even grid
+// (record/even_grid.h), of at least two samples in a cycle of the motor against the load, four by the motor
+// alone. No period.
 #pragma once
+
+#include <cmath>
+#include <functional>
 
 #include "backlash_diagnosis/diagnosis/estimate.h"
 #include "backlash_diagnosis/record/record.h"
@@ -49,19 +60,20 @@ namespace backlash::diagnosis {
 struct GapTraverseSettings {
   double motor_inertia = kNaN, load_inertia = kNaN;  ///< kg m^2, > 0
   double motor_damping = 0;                          ///< N m s/rad, >= 0
+  double load_damping = 0;                           ///< N m s/rad, >= 0
   double motor_friction = 0, load_friction = 0;      ///< N m, >= 0, dry
   double stiffness = kNaN, damping = kNaN;           ///< N m/rad, N m s/rad, > 0, of the flanks
   double gap = 0;                                    ///< rad, >= 0: where the fit begins, with any error
+  double motor_turn = 2 * M_PI;                      ///< rad of motor_position in a turn of the motor, > 0
   double base_radius = kNaN;                         ///< m, > 0; NaN: Estimate::backlash is NaN
+  /// N m that declared terms (gravity, cogging) take of load and motor at rest at this position [rad]; empty:
+  /// none.
+  std::function<double(double)> load_torque, motor_torque;
 };
 
 /// Throws InvalidParameter for settings outside the ranges above. Answers by status:
-///   insufficient_data  a channel is missing; too few crossings, and which motion would give them; the
-///                      crossings do not tell the play
-///   out_of_domain      uneven or too coarse samples; the equations do not fit the record, or only with
-///                      values far from the declared ones
-///   ambiguous          two plays fit alike
-///   below_range        the play is less than the noise of the torque hides, or a fifth of the deflection
+///   insufficient_data  a channel is missing; a flank is not pressed; too few crossings; the interval is too
+///   wide out_of_domain      too coarse samples; no machine like the declared one explains the record
 Estimate estimate_gap_traverse(const record::Record& record, const GapTraverseSettings& settings);
 
 }  // namespace backlash::diagnosis

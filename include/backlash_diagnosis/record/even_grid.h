@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Lost samples get their rows back, so that methods that count samples see the time that passed.
+// A record on an even time base: lost samples get their rows back, and samples that were taken early or late
+// are interpolated, so that methods that count samples see the time that passed.
 #pragma once
 
 #include <vector>
@@ -9,16 +10,18 @@
 namespace backlash::record {
 
 struct EvenGrid {
-  Record record;           ///< with a row for each lost sample: positions by a cubic, all else on the line
-  std::vector<bool> lost;  ///< of each row: it was not recorded
+  Record record;           ///< positions by a cubic between samples, all else on the line
+  std::vector<bool> lost;  ///< of each row: no sample was recorded within half an interval
 
   /// How many of `rows` rows from `first` on were recorded; and whether all were.
   std::size_t count(std::size_t first, std::size_t rows) const;
   bool whole(std::size_t first, std::size_t rows) const { return count(first, rows) == rows; }
 };
 
-/// Where an interval is a whole number of sampling intervals, to a quarter of one, the rows between are lost;
-/// other intervals stay as they are. A record of which more than half would be lost is returned as it is.
+/// A record that is even to a thousandth of an interval is returned as it is, with rows for lost samples. Of
+/// others the positions say which is even, the sampling or the stamps: where they go on more smoothly at the
+/// stamps, they were taken then, and are interpolated; else the stamps jitter, and even ones take their
+/// place. A record of which more than half would be lost is returned as it is.
 EvenGrid even_grid(const Record& record);
 
 }  // namespace backlash::record

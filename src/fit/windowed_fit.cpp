@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "backlash_diagnosis/fit/windowed_fit.h"
+
+#include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+
+#include "backlash_diagnosis/base/parallel.h"
+
+namespace backlash::fit {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Spreads, by which a value is moved for a difference: large beside rounding and what the integration leaves,
+// small beside what bends the residuals.
+constexpr double kSharedStep = 1e-3, kOwnStep = 1e-3;
+// Of one window alone, which ends where a step gains less than this share of its cost.
+constexpr int kSettleSteps = 15;
+constexpr double kSettled = 1e-3;
+
+}  // namespace
+
+double Prior::value(double z) const {
+  return factor ? centre * std::exp(spread * z) : centre + spread * z;
+}
+
+/// All windows once for each point that Ceres looks at. Slopes come along with the residuals: the machines
+/// that they need are moved side by side with that of the point.
+struct Evaluation : ceres::EvaluationCallback {
+  WindowedFit& fit;
+  VectorXd state;  // all values in one piece: Ceres orders blocks by their addresses, and sums in that order
+  explicit Evaluation(WindowedFit& of) : fit(of) {
+    Eigen::Index size = fit.shared.size();
+    for (const VectorXd& own : fit.own) size += own.size();
+    state.resize(size);
+    move([](VectorXd& values, double* at) { Eigen::Map<VectorXd>(at, values.size()) = values; });
+  }
+  template <typename Move>
+  void move(const Move& each) {
+    double* at = state.data();
+    each(fit.shared, at), at += fit.shared.size();
+    for (VectorXd& own : fit.own) each(own, at), at += own.size();
+  }
+  void take() {
+    move([](VectorXd& values, double* at) { values = Eigen::Map<VectorXd>(at, values.size()); });
+  }
+  void PrepareForEvaluation(bool, bool new_point) override {
+    if (!new_point) return;
+    take();
+    fit.evaluate();
+  }
+};
+
+/// Of one window with the shared values as they are.
+class OwnCost : public ceres::CostFunction {
+ public:
+  OwnCost(const WindowedFit& fit, int window) : fit_(fit), window_(window) {
+    set_num_residuals(int(fit.parts_[std::size_t(window)].residual.size()));
+    *mutable_parameter_block_sizes() = {int(fit.own[std::size_t(window)].size())};
+  }
+  bool Evaluate(const double* const* values, double* residuals, double** slopes) const override {
+    const Eigen::Index m = parameter_block_sizes()[0];
+    const VectorXd at = Eigen::Map<const VectorXd>(values[0], m);
+    const WindowedFit::Part part = fit_.part_of(window_, at, false);
+    if (!part.residual.allFinite() || !part.slopes.allFinite()) return false;
+    Eigen::Map<VectorXd>(residuals, num_residuals()) = part.residual;
+    if (slopes != nullptr && slopes[0] != nullptr)
+      Eigen::Map<RowMatrix>(slopes[0], num_residuals(), m) = part.slopes.rightCols(m);
+    return true;
+  }
+
+ private:
+  const WindowedFit& fit_;
+  int window_;
+};
+
+class WindowCost : public ceres::CostFunction {
+ public:
+  WindowCost(const WindowedFit& fit, int window) : part_(fit.parts_[std::size_t(window)]) {
+    set_num_residuals(int(part_.residual.size()));
+    *mutable_parameter_block_sizes() = {int(fit.shared.size()), int(fit.own[std::size_t(window)].size())};
+  }
+  bool Evaluate(const double* const*, double* residuals, double** slopes) const override {
+    if (!part_.residual.allFinite() || !part_.slopes.allFinite()) return false;
+    Eigen::Map<VectorXd>(residuals, num_residuals()) = part_.residual;
+    const Eigen::Index own = parameter_block_sizes()[1];
+    if (slopes != nullptr && slopes[0] != nullptr)
+      Eigen::Map<RowMatrix>(slopes[0], num_residuals(), parameter_block_sizes()[0]) =
+          part_.slopes.leftCols(part_.slopes.cols() - own);
+    if (slopes != nullptr && slopes[1] != nullptr)
+      Eigen::Map<RowMatrix>(slopes[1], num_residuals(), own) = part_.slopes.rightCols(own);
+    return true;
+  }
+
+ private:
+  const WindowedFit::Part& part_;
+};
+
+WindowedFit::WindowedFit(const Windows& windows)
+    : shared(VectorXd::Zero(Eigen::Index(windows.shared().size()))),
+      own(std::size_t(windows.count()), VectorXd::Zero(Eigen::Index(windows.own().size()))),
+      windows_(&windows),
+      parts_(std::size_t(windows.count())) {}
+
+WindowedFit::Part WindowedFit::part_of(int window, const VectorXd& mine, bool with_shared) const {
+  const Eigen::Index n = shared.size(), m = mine.size();
+  std::vector<Eigen::Index> moved;
+  for (Eigen::Index k = with_shared ? 0 : n; k < n + m; ++k)
+    if ((k < n ? windows_->shared()[std::size_t(k)] : windows_->own()[std::size_t(k - n)]).spread > 0)
+      moved.push_back(k);
+  const auto columns = Eigen::Index(moved.size()) + 1;
+  MatrixXd at = shared.replicate(1, columns), own_at = mine.replicate(1, columns);
+  for (Eigen::Index i = 1; i < columns; ++i) {
+    const Eigen::Index k = moved[std::size_t(i - 1)];
+    if (k < n)
+      at(k, i) += kSharedStep;
+    else
+      own_at(k - n, i) += kOwnStep;
+  }
+  const MatrixXd r = windows_->residuals(window, at, own_at);
+  Part part{r.col(0), MatrixXd::Zero(r.rows(), n + m)};
+  for (Eigen::Index i = 1; i < columns; ++i) {
+    const Eigen::Index k = moved[std::size_t(i - 1)];
+    part.slopes.col(k) = (r.col(i) - part.residual) / (k < n ? kSharedStep : kOwnStep);
+  }
+  return part;
+}
+
+void WindowedFit::evaluate() {
+  for_each_in_parallel(windows_->count(),
+                       [&](int w) { parts_[std::size_t(w)] = part_of(w, own[std::size_t(w)], true); });
+}
+
+void WindowedFit::settle() {
+  for_each_in_parallel(windows_->count(), [&](int w) {
+    VectorXd& mine = own[std::size_t(w)];
+    ceres::Problem problem;
+    problem.AddResidualBlock(new OwnCost(*this, w), nullptr, mine.data());
+    problem.AddResidualBlock(
+        new ceres::NormalPrior(MatrixXd::Identity(mine.size(), mine.size()), VectorXd::Zero(mine.size())),
+        nullptr, mine.data());
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::DENSE_QR;
+    solver.max_num_iterations = kSettleSteps;
+    solver.function_tolerance = kSettled;
+    solver.num_threads = 1;
+    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem, &summary);
+  });
+}
+
+void WindowedFit::run(const FitOptions& options) {
+  evaluate();  // for the number of residuals
+  robust_ = options.robust;
+  settle();
+  Evaluation evaluation(*this);
+  ceres::Problem::Options problem_options;
+  problem_options.evaluation_callback = &evaluation;
+  ceres::Problem problem(problem_options);
+  auto order = std::make_shared<ceres::ParameterBlockOrdering>();
+  int block = -1;  // shared values, then the windows
+  double* shared_values = nullptr;
+  evaluation.move([&](const VectorXd& z, double* at) {
+    problem.AddParameterBlock(at, int(z.size()));
+    problem.AddResidualBlock(
+        new ceres::NormalPrior(MatrixXd::Identity(z.size(), z.size()), VectorXd::Zero(z.size())), nullptr,
+        at);
+    order->AddElementToGroup(at, block < 0 ? 1 : 0);
+    if (block < 0) {
+      shared_values = at;
+    } else {
+      const double scale = std::sqrt(robust_ * double(parts_[std::size_t(block)].residual.size()));
+      problem.AddResidualBlock(new WindowCost(*this, block), new ceres::CauchyLoss(scale), shared_values, at);
+    }
+    ++block;
+  });
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  solver.linear_solver_ordering = order;
+  solver.max_num_iterations = options.iterations;
+  solver.initial_trust_region_radius = options.radius;
+  solver.function_tolerance = options.tolerance;
+  solver.num_threads = 1;
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  evaluation.take();
+  cost_ = summary.IsSolutionUsable() ? 2 * summary.final_cost : std::numeric_limits<double>::infinity();
+  evaluate();
+}
+
+double WindowedFit::weight(int window) const {
+  const VectorXd& r = parts_[std::size_t(window)].residual;
+  return 1 / (1 + r.squaredNorm() / (robust_ * double(r.size())));
+}
+
+double WindowedFit::mean_square() const {
+  double squares = 0, rows = 0;
+  for (int w = 0; w < windows_->count(); ++w) {
+    const VectorXd& r = parts_[std::size_t(w)].residual;
+    squares += weight(w) * r.squaredNorm(), rows += weight(w) * double(r.size());
+  }
+  return squares / rows;
+}
+
+/// Adds what a window says of the shared values, its own eliminated.
+void WindowedFit::reduce(int window, MatrixXd* information, VectorXd* score) const {
+  const Part& part = parts_[std::size_t(window)];
+  const Eigen::Index n = shared.size(), m = part.slopes.cols() - n;
+  const auto s = part.slopes.leftCols(n), o = part.slopes.rightCols(m);
+  const double f = weight(window);
+  const MatrixXd owns = f * (o.transpose() * o) + MatrixXd::Identity(m, m), mixed = f * (o.transpose() * s);
+  const Eigen::LDLT<MatrixXd> solver(owns);
+  *information += f * (s.transpose() * s) - mixed.transpose() * solver.solve(mixed);
+  *score = f * (s.transpose() * part.residual) -
+           mixed.transpose() *
+               solver.solve(VectorXd(f * (o.transpose() * part.residual) + own[std::size_t(window)]));
+}
+
+MatrixXd WindowedFit::covariance() const {
+  const Eigen::Index n = shared.size();
+  MatrixXd information = MatrixXd::Identity(n, n);
+  VectorXd score;
+  for (int w = 0; w < windows_->count(); ++w) reduce(w, &information, &score);
+  return information.ldlt().solve(MatrixXd::Identity(n, n));
+}
+
+MatrixXd WindowedFit::clustered_covariance() const {
+  const Eigen::Index n = shared.size();
+  MatrixXd scatter = MatrixXd::Identity(n, n), information = scatter;
+  VectorXd score;
+  for (int w = 0; w < windows_->count(); ++w) {
+    reduce(w, &information, &score);
+    scatter += score * score.transpose();
+  }
+  const MatrixXd inverse = information.ldlt().solve(MatrixXd::Identity(n, n));
+  return inverse * scatter * inverse;
+}
+
+}  // namespace backlash::fit

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A robot's joint with two encoders in a cascaded position loop, as a bag of ROS shows it. Shares nothing
+// with the package that is tested. All at the load side of the reduction, SI units:
+//   J_m w_m' = tau - friction_m - cogging - T(x_m - x_w)
+//   J_w w_w' = T - S,   J_l w_l' = S - friction_l - G sin(x_l + p),   S = k_s (x_w - x_l) + c_s (w_w - w_l)
+// a rotor, the wheel behind the teeth and the load behind a shaft: teeth and shaft together have the
+// stiffness K.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "../machines/random.h"
+
+namespace robot_joints {
+
+using machines::Random;
+
+/// What a rig file declares, and what is true.
+struct Values {
+  double load_inertia, motor_inertia, stiffness, backlash, motor_viscous, motor_coulomb, load_viscous,
+      load_coulomb, damping, gravity, gravity_phase;
+};
+
+enum class Teeth { linear, hertz, cubic, hysteresis };
+
+struct Machine {
+  Values declared, real;
+  double ratio = 100;
+  Teeth teeth = Teeth::linear;
+  double power = 1;                       // of the deflection, of Teeth::hertz and Teeth::hysteresis
+  double at = 10;                         // N m, torque at which all laws are as stiff as `stiffness`
+  double hysteresis = 0;                  // -, share of the torque that the direction of the deflection takes
+  bool bristles = false;                  // LuGre in place of Coulomb friction on the motor
+  double cogging = 0, cogging_order = 0;  // N m, per turn of the load
+  // Sensors: torque from current, encoders.
+  double gain = 1, offset = 0, ripple = 0, lag = 0, noise = 0, step = 0.05;  // -, N m, -, s, N m, N m
+  double motor_resolution = 4.8e-7, load_resolution = 1.2e-5;                // rad
+  double eccentricity = 0, eccentricity_phase = 0, interpolation = 0, interpolation_order = 512;  // rad
+  double skew = 0;                     // s, the load encoder is late
+  double jitter = 0.05, lost = 0.002;  // of an interval, of the samples
+  double rate = 1000;                  // Hz
+};
+
+Machine draw_machine(Random& random);
+
+struct Row {
+  double time, torque, motor, load;
+};
+
+struct Run {
+  std::vector<Row> rows;
+  int crossings = 0;                 // of the gap, from flank to flank
+  double forward = 0, backward = 0;  // shares of the time that each flank is pressed
+  double most_torque = 0;            // N m, through the teeth
+};
+
+/// `kind`: pick, sine, multi or via.
+Run run(const Machine& machine, const std::string& kind, double duration, Random& random);
+
+std::string rig_file(const Machine& machine, const std::string& name);
+std::string truth(const Machine& machine, const std::vector<std::pair<std::string, Run>>& runs);
+
+}  // namespace robot_joints
