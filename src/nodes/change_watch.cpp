@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The change_watch node; `--help` lists its parameters and topics.
-#include "backlash_diagnosis/ros/change_watch_node.h"
 #include "backlash_diagnosis/ros/node_main.h"
+#include "backlash_diagnosis/ros_arm/change_watch_node.h"
 
 int main(int argc, char** argv) {
   using namespace backlash;

@@ -12,7 +12,7 @@
 #include "backlash_diagnosis/changes/change_report.h"
 #include "backlash_diagnosis/changes/changes_of_rig.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
-#include "tools/common/arm_command.h"
+#include "tools/arm/arm_record.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/progress_bar.h"
@@ -115,8 +115,8 @@ int detect(const Arguments& arguments) {
   changes::Changes found;
   try {
     ProgressBar bar;
-    found = arm::is_arm_rig(inputs.rig) ? changes_of_arm(inputs, settings, bar.progress())
-                                        : changes_of_joint(inputs, settings, bar.progress());
+    found = rig_file::is_arm_rig(inputs.rig) ? changes_of_arm(inputs, settings, bar.progress())
+                                             : changes_of_joint(inputs, settings, bar.progress());
   } catch (const CannotIdentify& error) {
     found.cannot_tell = error.what();
     found.noise = kNaN;  // nothing was learned

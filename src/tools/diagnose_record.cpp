@@ -9,21 +9,19 @@
 #include "backlash_diagnosis/base/text.h"
 #include "backlash_diagnosis/diagnosis/baseline.h"
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
-#include "backlash_diagnosis/findings/arm_play_report.h"
 #include "backlash_diagnosis/report/diagnosis_page.h"
 #include "backlash_diagnosis/report/diagnosis_report.h"
+#include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
-#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/for_arm.h"
 #include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
 namespace {
-
-const std::string kStandardOutput = "-";
 
 /// What each method looks at, for the help text.
 std::string needs_of_methods() {
@@ -75,22 +73,6 @@ Command command() {
       "  2   fault found: service or stop\n"
       "  3   inconclusive: the estimates cannot tell, or not well enough for --save-baseline\n";
   return c;
-}
-
-int exit_code(diagnosis::Grade grade) {
-  switch (grade) {
-    case diagnosis::Grade::good:
-    case diagnosis::Grade::ungraded:
-      return kHealthy;
-    case diagnosis::Grade::watch:
-      return kWatch;
-    case diagnosis::Grade::service:
-    case diagnosis::Grade::stop:
-      return kFault;
-    case diagnosis::Grade::cannot_tell:
-      break;
-  }
-  return kInconclusive;
 }
 
 /// What the command was given, read.
@@ -262,43 +244,9 @@ bool save_baseline(const diagnosis::Diagnosis& diagnosis, const Inputs& in, cons
   return true;
 }
 
-/// The rig file of an arm: all its joints in one run. The exit code is that of the worst.
-int diagnose_arm(const Arguments& arguments) {
-  for (const char* option :
-       {"report", "curve", "limits", "baseline", "save-baseline", "method", "joint", "topic", "periods"})
-    if (arguments.has(option))
-      throw UsageError(std::string("--") + option +
-                       " is for a record of one joint; this is the rig file of an arm");
-  const std::string out = arguments.text("json"), rig = arguments.text("rig");
-  if (out != kStandardOutput) check_output(out, {arguments.positional(0), rig});
-  const geared_arm::GearedArm arm = geared_arm::load_geared_arm(rig);
-  const arm::ArmRecord record = read_arm_record(arguments.positional(0), arm.rig);
-  const findings::ArmPlayReport report = findings::arm_play_report(arm, record);
-  const std::string json = findings::arm_play_json(report);
-  if (out == kStandardOutput) {
-    std::cout << json;
-  } else {
-    write_text(out, json);
-    findings::print_arm_plays(report, std::cout);
-  }
-  // A fault that was found counts more than a joint that cannot be told.
-  bool unknown = false;
-  int worst = kHealthy;
-  for (std::size_t j = 0; j < report.verdicts.size(); ++j) {
-    // At most so much, without limits, is an answer.
-    const bool small =
-        report.plays[j].estimate.status == diagnosis::Status::below_range && !arm.joints[j].limits;
-    const int code = small ? kHealthy : exit_code(report.verdicts[j].grade);
-    if (code == kInconclusive)
-      unknown = true;
-    else
-      worst = std::max(worst, code);
-  }
-  return worst == kHealthy && unknown ? kInconclusive : worst;
-}
-
 int diagnose_record(const Arguments& arguments) {
-  if (arguments.has("rig") && arm::is_arm_rig(arguments.text("rig"))) return diagnose_arm(arguments);
+  if (arguments.has("rig") && rig_file::is_arm_rig(arguments.text("rig")))
+    return run_for_arm("diagnose_record", arguments);
   Inputs in = read_inputs(arguments);
   check_outputs(arguments);
   const std::string out = arguments.text("json");

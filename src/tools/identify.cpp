@@ -8,9 +8,9 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/identification_report.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
-#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
+#include "tools/common/for_arm.h"
 #include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
@@ -99,10 +99,10 @@ int identify_joint(const Arguments& arguments) {
 int identify_machine(const Arguments& arguments) {
   for (const std::string& path : arguments.positionals()) check_record_path(path);
   check_outputs(arguments);
-  const bool is_arm = arm::is_arm_rig(arguments.text("rig"));
+  const bool is_arm = rig_file::is_arm_rig(arguments.text("rig"));
   if (is_arm && arguments.has("plot")) throw UsageError("--plot: there is no plot for an arm");
   try {
-    return is_arm ? identify_arm(arguments) : identify_joint(arguments);
+    return is_arm ? run_for_arm("identify", arguments) : identify_joint(arguments);
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     identification::Identification nothing;

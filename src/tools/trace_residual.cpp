@@ -8,10 +8,10 @@
 #include "backlash_diagnosis/identification/effects/traced_rig.h"
 #include "backlash_diagnosis/record/csv.h"
 #include "backlash_diagnosis/ros/bag_record.h"
-#include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/feedback.h"
+#include "tools/common/for_arm.h"
 #include "tools/common/progress_bar.h"
 #include "tools/common/record_file.h"
 
@@ -115,9 +115,9 @@ identification::Trace run_trace(const TraceJob& job, const Progress& progress) {
 }
 
 int trace(const Arguments& arguments) {
-  if (arm::is_arm_rig(arguments.text("rig"))) {
+  if (rig_file::is_arm_rig(arguments.text("rig"))) {
     if (arguments.has("cutoff")) throw UsageError("--cutoff: the rig file of an arm says it (torque_cutoff)");
-    return trace_arm_residual(arguments);
+    return run_for_arm("trace_residual", arguments);
   }
   TraceJob job = job_of(arguments);
   identification::Trace done;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/ros/simulated_arm.h"
+#include "ros_arm/simulated_arm.h"
 
 #include <ros/console.h>
 
@@ -86,6 +86,17 @@ std::string SimulatedArm::true_backlash() const {
   std::string text;
   for (const JointControls& joint : controls_) text += (text.empty() ? "" : ", ") + joint.true_backlash();
   return text;
+}
+
+extern "C" void backlash_read_arm(Parameters& parameters, double torque_timeout, ArmToSimulate& arm) {
+  ArmSettings settings = read_arm_settings(parameters);
+  settings.torque_timeout = torque_timeout;
+  arm.rig = settings.arm.rig.name;
+  arm.sampling_rate = settings.arm.sensors.sampling_rate;
+  arm.make = [settings = std::move(settings)](const ros::NodeHandle& handle,
+                                              const ros::NodeHandle& private_handle) {
+    return std::make_unique<SimulatedArm>(settings, handle, private_handle);
+  };
 }
 
 }  // namespace backlash::ros_bridge

@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tools/common/arm_command.h"
-
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
 
-#include "backlash_diagnosis/arm/fit_records.h"
+#include "backlash_diagnosis/arm/trace.h"
+#include "backlash_diagnosis/arm_findings/arm_report.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file.h"
-#include "backlash_diagnosis/findings/arm_report.h"
 #include "backlash_diagnosis/findings/trace_folder.h"
 #include "backlash_diagnosis/report/report_page.h"
-#include "backlash_diagnosis/ros/bag_record.h"
-#include "backlash_diagnosis/ros/joint_rigs.h"
+#include "tools/arm/arm_commands.h"
+#include "tools/arm/arm_record.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/feedback.h"
 #include "tools/common/progress_bar.h"
-#include "tools/common/record_file.h"
 
 namespace backlash::tools {
 namespace {
@@ -42,16 +39,16 @@ report::Provenance provenance_of(const arm::ArmRig& rig, const findings::TraceIn
 void write_trace(const findings::TraceFolder& folder, const arm::ArmTrace& trace, const arm::ArmRig& rig,
                  const findings::TraceInputs& inputs, const std::string& name) {
   const report::TraceFiles& files = folder.files();
-  write_file(files.report, findings::arm_trace_json(trace, inputs));
-  write_file(files.series, findings::arm_series_json(trace));
+  write_file(files.report, arm_findings::arm_trace_json(trace, inputs));
+  write_file(files.series, arm_findings::arm_series_json(trace));
   write_file(files.rig, arm::arm_rig_text(trace.augmented,
                                           {"What trace_residual found is in report.json beside this file.",
                                            "SPDX-License-Identifier: BSD-3-Clause"}));
   const std::string plots =
       report::drawn_figures("arm_report.py", {"--series", files.series, "--", files.report});
   write_file(files.page,
-             findings::arm_trace_page(trace, inputs, plots,
-                                      report::provenance_sections(provenance_of(rig, inputs, name))));
+             arm_findings::arm_trace_page(trace, inputs, plots,
+                                          report::provenance_sections(provenance_of(rig, inputs, name))));
 }
 
 arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
@@ -80,38 +77,6 @@ arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
 
 }  // namespace
 
-arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) {
-  check_record_path(path);
-  std::vector<record::JointRecord> joints;
-  if (fs::path(path).extension() != ".csv") {
-    for (const arm::JointDrive& joint : rig.joints)
-      joints.push_back({joint.name, ros_bridge::read_robot_bag(
-                                        path, ros_bridge::robot_channels(joint.name, rig.channel))});
-  } else {
-    joints = record::read_joints_csv(path);
-  }
-  return arm::arm_record(joints, rig, fs::path(path).filename());
-}
-
-int identify_arm(const Arguments& arguments) {
-  const arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
-  std::vector<arm::RecordMotions> records;
-  std::vector<std::string> warnings;
-  for (const std::string& path : arguments.positionals()) {
-    const arm::ArmRecord record = read_arm_record(path, rig);
-    for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
-    records.push_back(arm::motions_of(record, rig, warnings));
-  }
-  ProgressBar bar;
-  arm::ArmFit fit = arm::fit_records(rig, records, {}, bar.progress());
-  fit.warnings.insert(fit.warnings.end(), warnings.begin(), warnings.end());
-  write_text(arguments.text("out"), findings::fitted_arm_text(fit, arguments.positionals()));
-  write_text(arguments.text("json"),
-             findings::arm_identification_json(fit, arguments.text("rig"), arguments.positionals()));
-  findings::print_arm_summary(fit, std::cout);
-  return fit.contradictions.empty() ? kHealthy : kInconclusive;
-}
-
 int trace_arm_residual(const Arguments& arguments) {
   arm::ArmTrace trace;
   try {
@@ -128,7 +93,7 @@ int trace_arm_residual(const Arguments& arguments) {
   }
   const report::TraceFiles files = report::trace_files(arguments.text("out"));
   if (!arguments.has("feedback")) {
-    findings::print_arm_trace(trace, std::cout);
+    arm_findings::print_arm_trace(trace, std::cout);
     std::cout << "\nreport: " << files.page << ", " << files.report
               << "\nrig with what was found: " << files.rig << '\n';
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/findings/motion_plan_report.h"
+#include "backlash_diagnosis/arm_findings/motion_plan_report.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include "backlash_diagnosis/base/version.h"
 #include "report/json.h"
 
-namespace backlash::findings {
+namespace backlash::arm_findings {
 namespace {
 
 report::Json gap_json(const geared_arm::JointPlan& joint) {
@@ -68,4 +68,4 @@ void print_motion_plan(const geared_arm::MotionPlan& plan, std::ostream& out) {
                        joint.gap ? "gap " + joint.message : "no gap to show");
 }
 
-}  // namespace backlash::findings
+}  // namespace backlash::arm_findings

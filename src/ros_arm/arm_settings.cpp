@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "arm_settings.h"
+#include "ros_arm/arm_settings.h"
 
-#include "given_parameters.h"
+#include "ros/given_parameters.h"
 
 namespace backlash::ros_bridge {
 namespace {

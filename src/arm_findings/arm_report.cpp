@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/findings/arm_report.h"
+#include "backlash_diagnosis/arm_findings/arm_report.h"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 #include "report/html_template.h"
 #include "report/json.h"
 
-namespace backlash::findings {
+namespace backlash::arm_findings {
 namespace {
 
 report::Json with_unit(const signal::Measured& m, const std::string& unit) {
@@ -191,7 +191,7 @@ std::string arm_verdict_sentence(const arm::ArmTrace& trace) {
   return text;
 }
 
-std::string arm_trace_json(const arm::ArmTrace& trace, const TraceInputs& inputs) {
+std::string arm_trace_json(const arm::ArmTrace& trace, const findings::TraceInputs& inputs) {
   report::Json json = {{"schema_version", 1},
                        {"version", version()},
                        {"verdict", verdict_word(trace)},
@@ -283,15 +283,15 @@ report::Json page_step(const arm::ArmStep& step) {
                                          step.push->released ? ", released" : ", not released by the end")
                            : "";
   json["gain"] = step.push ? ""
-                           : fmt::format("{} of the squared error of {} (95 %: {} to {})", percent(step.gain),
-                                         step.channel, percent(step.gain_lower), percent(step.gain_upper));
+                           : fmt::format("{} of the squared error of {} (95 %: {} to {})", findings::percent(step.gain),
+                                         step.channel, findings::percent(step.gain_lower), findings::percent(step.gain_upper));
   return json;
 }
 
 }  // namespace
 
-std::string arm_trace_page(const arm::ArmTrace& trace, const TraceInputs& inputs, const std::string& plots,
-                           const std::string& provenance) {
+std::string arm_trace_page(const arm::ArmTrace& trace, const findings::TraceInputs& inputs,
+                           const std::string& plots, const std::string& provenance) {
   report::Json data = {{"verdict", verdict_word(trace)},
                        {"message", arm_verdict_sentence(trace)},
                        {"judged", trace.judged},
@@ -307,7 +307,7 @@ std::string arm_trace_page(const arm::ArmTrace& trace, const TraceInputs& inputs
                        {"warnings", report::warnings_section(trace.warnings)},
                        {"plots", plots},
                        {"provenance", provenance}};
-  const auto number = [](double x) { return std::isfinite(x) ? percent(x) : std::string("not judged"); };
+  const auto number = [](double x) { return std::isfinite(x) ? findings::percent(x) : std::string("not judged"); };
   for (std::size_t j = 0; j < trace.joints.size(); ++j)
     data["rows"].push_back({{"joint", trace.joints[j]},
                             {"train", number(trace.train[j])},
@@ -321,4 +321,4 @@ std::string arm_trace_page(const arm::ArmTrace& trace, const TraceInputs& inputs
                              report::filled(report::kArmTraceTemplate, data));
 }
 
-}  // namespace backlash::findings
+}  // namespace backlash::arm_findings

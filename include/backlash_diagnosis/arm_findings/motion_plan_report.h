@@ -7,9 +7,9 @@
 
 #include "backlash_diagnosis/geared_arm/motion_plan.h"
 
-namespace backlash::findings {
+namespace backlash::arm_findings {
 
 std::string motion_plan_json(const geared_arm::MotionPlan& plan);
 void print_motion_plan(const geared_arm::MotionPlan& plan, std::ostream& out);
 
-}  // namespace backlash::findings
+}  // namespace backlash::arm_findings

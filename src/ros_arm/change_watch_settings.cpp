@@ -5,8 +5,8 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/base/file_folder.h"
 #include "backlash_diagnosis/base/text.h"
-#include "backlash_diagnosis/ros/change_watch_node.h"
 #include "backlash_diagnosis/ros/node_folders.h"
+#include "backlash_diagnosis/ros_arm/change_watch_node.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -81,7 +81,7 @@ namespace {
 std::vector<WatchSettings> watched(Parameters& parameters) {
   std::vector<WatchSettings> all;
   const std::string rig = parameters.text("rig", "");
-  if (rig.empty() || !arm::is_arm_rig(rig)) {
+  if (rig.empty() || !rig_file::is_arm_rig(rig)) {
     for (JointRig& joint : load_joint_rigs(parameters)) {
       all.emplace_back();
       all.back().joint = std::move(joint);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/findings/arm_play_report.h"
+#include "backlash_diagnosis/arm_findings/arm_play_report.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include "backlash_diagnosis/base/version.h"
 #include "report/diagnosis_data.h"
 
-namespace backlash::findings {
+namespace backlash::arm_findings {
 namespace {
 
 /// Of joints with one encoder. What the load tells of the flanks is said by whoever looked at it.
@@ -126,4 +126,4 @@ void print_arm_plays(const ArmPlayReport& report, std::ostream& out) {
   for (const std::string& warning : report.warnings) out << "warning: " << warning << '\n';
 }
 
-}  // namespace backlash::findings
+}  // namespace backlash::arm_findings

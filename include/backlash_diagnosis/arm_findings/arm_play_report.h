@@ -11,7 +11,7 @@
 #include "backlash_diagnosis/geared_arm/play.h"
 #include "backlash_diagnosis/geared_arm/traverse.h"
 
-namespace backlash::findings {
+namespace backlash::arm_findings {
 
 struct ArmPlayReport {
   std::string rig, record;  // names
@@ -28,4 +28,4 @@ ArmPlayReport arm_play_report(const geared_arm::GearedArm& arm, const arm::ArmRe
 std::string arm_play_json(const ArmPlayReport& report);
 void print_arm_plays(const ArmPlayReport& report, std::ostream& out);
 
-}  // namespace backlash::findings
+}  // namespace backlash::arm_findings

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tools/arm/arm_record.h"
+
+#include <filesystem>
+
+#include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/ros/bag_record.h"
+#include "backlash_diagnosis/ros/joint_rigs.h"
+#include "tools/common/record_file.h"
+
+namespace backlash::tools {
+
+namespace fs = std::filesystem;
+
+arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) {
+  check_record_path(path);
+  std::vector<record::JointRecord> joints;
+  if (fs::path(path).extension() != ".csv") {
+    for (const arm::JointDrive& joint : rig.joints)
+      joints.push_back({joint.name, ros_bridge::read_robot_bag(
+                                        path, ros_bridge::robot_channels(joint.name, rig.channel))});
+  } else {
+    joints = record::read_joints_csv(path);
+  }
+  return arm::arm_record(joints, rig, fs::path(path).filename());
+}
+
+}  // namespace backlash::tools
