@@ -282,9 +282,11 @@ report::Json page_step(const arm::ArmStep& step) {
   json["when"] = step.push ? fmt::format("{:.2f} s to {:.2f} s{}", step.push->begin, step.push->end,
                                          step.push->released ? ", released" : ", not released by the end")
                            : "";
-  json["gain"] = step.push ? ""
-                           : fmt::format("{} of the squared error of {} (95 %: {} to {})", findings::percent(step.gain),
-                                         step.channel, findings::percent(step.gain_lower), findings::percent(step.gain_upper));
+  json["gain"] =
+      step.push
+          ? ""
+          : fmt::format("{} of the squared error of {} (95 %: {} to {})", findings::percent(step.gain),
+                        step.channel, findings::percent(step.gain_lower), findings::percent(step.gain_upper));
   return json;
 }
 
@@ -307,7 +309,9 @@ std::string arm_trace_page(const arm::ArmTrace& trace, const findings::TraceInpu
                        {"warnings", report::warnings_section(trace.warnings)},
                        {"plots", plots},
                        {"provenance", provenance}};
-  const auto number = [](double x) { return std::isfinite(x) ? findings::percent(x) : std::string("not judged"); };
+  const auto number = [](double x) {
+    return std::isfinite(x) ? findings::percent(x) : std::string("not judged");
+  };
   for (std::size_t j = 0; j < trace.joints.size(); ++j)
     data["rows"].push_back({{"joint", trace.joints[j]},
                             {"train", number(trace.train[j])},
