@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/text.h"
+#include "backlash_diagnosis/ros/node_main.h"
 #include "backlash_diagnosis/ros/simulated_joint.h"
 
 namespace backlash::ros_bridge {
@@ -253,6 +254,11 @@ bool SimulatorNode::reset(std_srvs::Trigger::Request&, std_srvs::Trigger::Respon
   }
   ROS_INFO_STREAM("reset: " << response.message);
   return true;
+}
+
+int simulator_main(int argc, char** argv) {
+  return node_main(argc, argv, "simulator", simulator_help(),
+                   [] { return SimulatorNode(ros::NodeHandle(), ros::NodeHandle("~")).run(); });
 }
 
 }  // namespace backlash::ros_bridge

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/base/utc.h"
 #include "backlash_diagnosis/report/change_file.h"
 #include "backlash_diagnosis/ros/messages.h"
+#include "backlash_diagnosis/ros/node_main.h"
 
 namespace backlash::ros_bridge {
 namespace {
@@ -191,6 +192,14 @@ void ChangeWatchNode::describe(const JointWatch& joint, Status& status) const {
   status.add("Last wrong message", state.last_problem);
   status.add("Changes told", state.changes.size());
   status.add("History", state.log_problem.empty() ? settings.log : state.log_problem);
+}
+
+int change_watch_main(int argc, char** argv) {
+  return node_main(argc, argv, "change_watch", change_watch_help(), [] {
+    const ros::NodeHandle handle, private_handle("~");
+    ChangeWatchNode(handle, private_handle, load_change_watch_settings(private_handle)).run();
+    return 0;
+  });
 }
 
 }  // namespace backlash::ros_bridge
