@@ -12,12 +12,14 @@
 #include "backlash_diagnosis/findings/arm_play_report.h"
 #include "backlash_diagnosis/report/diagnosis_page.h"
 #include "backlash_diagnosis/report/diagnosis_report.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/arm_command.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -29,7 +31,7 @@ const std::string kStandardOutput = "-";
 std::string needs_of_methods() {
   std::string text = "Methods and the channels that they need:";
   for (const diagnosis::DiagnosisMethod& method : diagnosis::diagnosis_method_table())
-    text += (text.back() == ':' ? " " : "; ") + method.name + " - " + method.needs;
+    text += (text.back() == ':' ? " " : "; ") + method.name + " - " + needs_of(method);
   return text + ".";
 }
 
@@ -170,7 +172,7 @@ void read_machine_files(Inputs& in, const Arguments& arguments) {
   }
 }
 
-Inputs read_inputs(const Arguments& arguments) {
+Inputs read_inputs(const Arguments& arguments, RecordDoor& door) {
   Inputs in;
   in.method = arguments.text("method");
   const auto& methods = diagnosis::diagnosis_methods();
@@ -199,7 +201,9 @@ Inputs read_inputs(const Arguments& arguments) {
       in.warnings.push_back(warning);
   }
   read_machine_files(in, arguments);
-  in.record = read_record(arguments.positional(0), place);
+  in.record = door.admit(read_record(arguments.positional(0), place),
+                         in.rig ? rig_file::declared_motion(in.rig->rig) : record::DeclaredMotion{},
+                         arguments.positional(0));
   if (arguments.has("periods")) keep_last_periods(in, periods);
   return in;
 }
@@ -272,9 +276,10 @@ int diagnose_arm(const Arguments& arguments) {
   const std::string out = arguments.text("json"), rig = arguments.text("rig");
   if (out != kStandardOutput) check_output(out, {arguments.positional(0), rig});
   const geared_arm::GearedArm arm = geared_arm::load_geared_arm(rig);
-  const arm::ArmRecord record = read_arm_record(arguments.positional(0), arm.rig);
+  RecordDoor door("diagnose_record");
+  const arm::ArmRecord record = admitted_arm_record(arguments.positional(0), arm.rig, door);
   const findings::ArmPlayReport report = findings::arm_play_report(arm, record);
-  const std::string json = findings::arm_play_json(report);
+  const std::string json = door.with_findings(findings::arm_play_json(report));
   if (out == kStandardOutput) {
     std::cout << json;
   } else {
@@ -299,7 +304,8 @@ int diagnose_arm(const Arguments& arguments) {
 
 int diagnose_record(const Arguments& arguments) {
   if (arguments.has("rig") && arm::is_arm_rig(arguments.text("rig"))) return diagnose_arm(arguments);
-  Inputs in = read_inputs(arguments);
+  RecordDoor door("diagnose_record");
+  Inputs in = read_inputs(arguments, door);
   check_outputs(arguments);
   const std::string out = arguments.text("json");
   if (in.rig && !in.curve) build_own_curve(in);
@@ -322,7 +328,7 @@ int diagnose_record(const Arguments& arguments) {
           ? diagnosis::diagnose(*in.last_periods, in.settings, report.curve, in.baseline, in.method)
           : diagnosis::diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);
-  const std::string json = report::diagnosis_json(report);
+  const std::string json = door.with_findings(report::diagnosis_json(report));
   if (out == kStandardOutput) {
     std::cout << json;
   } else {

@@ -40,9 +40,9 @@ report::Provenance provenance_of(const arm::ArmRig& rig, const findings::TraceIn
 }
 
 void write_trace(const findings::TraceFolder& folder, const arm::ArmTrace& trace, const arm::ArmRig& rig,
-                 const findings::TraceInputs& inputs, const std::string& name) {
+                 const findings::TraceInputs& inputs, const std::string& name, const RecordDoor& door) {
   const report::TraceFiles& files = folder.files();
-  write_file(files.report, findings::arm_trace_json(trace, inputs));
+  write_file(files.report, door.with_findings(findings::arm_trace_json(trace, inputs)));
   write_file(files.series, findings::arm_series_json(trace));
   write_file(files.rig, arm::arm_rig_text(trace.augmented,
                                           {"What trace_residual found is in report.json beside this file.",
@@ -59,13 +59,14 @@ arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
                                         arguments.text("test")};
   const arm::ArmRig rig = arm::load_arm_rig(inputs.rig);
   std::vector<arm::ArmRecord> train;
+  RecordDoor door("trace_residual");
   std::error_code error;
   bool same = false;
   for (const std::string& path : inputs.train) {
-    train.push_back(read_arm_record(path, rig));
+    train.push_back(admitted_arm_record(path, rig, door));
     same = same || fs::equivalent(path, inputs.test, error);
   }
-  const arm::ArmRecord test = read_arm_record(inputs.test, rig);
+  const arm::ArmRecord test = admitted_arm_record(inputs.test, rig, door);
   std::vector<std::string> files = inputs.train;
   files.insert(files.end(), {inputs.test, inputs.rig, rig.urdf});
   const findings::TraceFolder folder(arguments.text("out"), files);
@@ -74,13 +75,13 @@ arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
   for (const arm::ArmRecord& record : train)
     for (const std::string& warning : record.warnings) trace.warnings.push_back(record.name + ": " + warning);
   for (const std::string& warning : test.warnings) trace.warnings.push_back(test.name + ": " + warning);
-  write_trace(folder, trace, rig, inputs, arguments.text("out"));
+  write_trace(folder, trace, rig, inputs, arguments.text("out"), door);
   return trace;
 }
 
 }  // namespace
 
-arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) {
+std::vector<record::JointRecord> read_joints(const std::string& path, const arm::ArmRig& rig) {
   check_record_path(path);
   std::vector<record::JointRecord> joints;
   if (fs::path(path).extension() != ".csv") {
@@ -90,15 +91,19 @@ arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) 
   } else {
     joints = record::read_joints_csv(path);
   }
-  return arm::arm_record(joints, rig, fs::path(path).filename());
+  return joints;
 }
 
-int identify_arm(const Arguments& arguments) {
+arm::ArmRecord admitted_arm_record(const std::string& path, const arm::ArmRig& rig, RecordDoor& door) {
+  return arm::arm_record(door.admit(read_joints(path, rig), path), rig, fs::path(path).filename());
+}
+
+int identify_arm(const Arguments& arguments, RecordDoor& door) {
   const arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
   std::vector<arm::RecordMotions> records;
   std::vector<std::string> warnings;
   for (const std::string& path : arguments.positionals()) {
-    const arm::ArmRecord record = read_arm_record(path, rig);
+    const arm::ArmRecord record = admitted_arm_record(path, rig, door);
     for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
     records.push_back(arm::motions_of(record, rig, warnings));
   }
@@ -106,8 +111,8 @@ int identify_arm(const Arguments& arguments) {
   arm::ArmFit fit = arm::fit_records(rig, records, {}, bar.progress());
   fit.warnings.insert(fit.warnings.end(), warnings.begin(), warnings.end());
   write_text(arguments.text("out"), findings::fitted_arm_text(fit, arguments.positionals()));
-  write_text(arguments.text("json"),
-             findings::arm_identification_json(fit, arguments.text("rig"), arguments.positionals()));
+  write_text(arguments.text("json"), door.with_findings(findings::arm_identification_json(
+                                         fit, arguments.text("rig"), arguments.positionals())));
   findings::print_arm_summary(fit, std::cout);
   return fit.contradictions.empty() ? kHealthy : kInconclusive;
 }
