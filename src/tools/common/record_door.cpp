@@ -54,11 +54,11 @@ record::Stretch longest_of_all(const report::CheckedFile& file) {
   return record::longest_stretch(all);
 }
 
-/// A jump is looked for by whoever asks for it; what else cuts makes a change of its own.
-void refuse_other_cuts(const report::CheckedFile& file) {
+/// Jumps are what is looked for, and a step of the clock is a rest; a channel that stands still would be a
+/// change of anything.
+void refuse_frozen(const report::CheckedFile& file) {
   for (const record::Finding& finding : file.findings())
-    if (finding.consequence == record::Consequence::cut && finding.kind != record::FindingKind::jump)
-      throw CannotIdentify(file.path + ": " + finding.message);
+    if (finding.kind == record::FindingKind::frozen) throw CannotIdentify(file.path + ": " + finding.message);
 }
 
 }  // namespace
@@ -116,7 +116,7 @@ std::vector<record::Record> RecordDoor::admit_stretches(record::Record record,
 record::Record RecordDoor::admit_with_jumps(record::Record record, const record::DeclaredMotion& declared,
                                             const std::string& path, std::vector<JointJump>& jumps) {
   record::CheckedRecord checked = look(std::move(record), declared, path);
-  refuse_other_cuts(files_.back());
+  refuse_frozen(files_.back());
   for (const record::Jump& jump : checked.check.jumps) jumps.push_back({"", jump});
   return record::without_jumps(std::move(checked.record), checked.check.jumps);
 }
@@ -145,7 +145,7 @@ std::vector<record::JointRecord> RecordDoor::admit_with_jumps(std::vector<record
                                                               const std::string& path,
                                                               std::vector<JointJump>& jumps) {
   joints = look(std::move(joints), path);
-  refuse_other_cuts(files_.back());
+  refuse_frozen(files_.back());
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const std::vector<record::Jump>& found = files_.back().joints[j].check.jumps;
     joints[j].record = record::without_jumps(std::move(joints[j].record), found);

@@ -30,7 +30,7 @@ class RecordDoor {
     record::Jump jump;
   };
   /// A record with its jumps taken out, for whoever looks for them; throws as admit, and CannotIdentify where
-  /// a stretch would have to be cut out.
+  /// a channel stands still.
   record::Record admit_with_jumps(record::Record record, const record::DeclaredMotion& declared,
                                   const std::string& path, std::vector<JointJump>& jumps);
 

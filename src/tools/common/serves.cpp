@@ -159,8 +159,8 @@ std::vector<Serves> serves_of(const report::CheckedFile& file, const std::vector
     if (r.has(Channel::motor_position) && reversals_of(r.column(Channel::motor_position)) < 2)
       still += (still.empty() ? "" : ", ") + joint.joint;
   }
-  const std::string hardly =
-      still.empty() ? "all joints move both ways" : "hardly identifiable, as they do not move both ways: " + still;
+  const std::string hardly = still.empty() ? "all joints move both ways"
+                                           : "hardly identifiable, as they do not move both ways: " + still;
   std::vector<Serves> all = {
       {"diagnose_record", lacks.empty(),
        !lacks.empty()       ? lacks
