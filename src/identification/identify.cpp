@@ -14,7 +14,6 @@
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
 #include "fit/joint_fit.h"
-#include "fit/record_sense.h"
 #include "procedures/procedures.h"
 
 namespace backlash::identification {
@@ -28,18 +27,12 @@ void require_finite(const record::Record& record) {
                                        " has no value at t = " + record::time_text(record.time[k]) + " s");
 }
 
-RecordedMotion motion_of(const record::Record& r) {
-  return {r.name, r.sampling_interval(), r.column(record::Channel::motor_torque),
-          r.column(record::Channel::motor_position), r.column(record::Channel::load_position)};
-}
-
 /// A body stands where it moves less than a twentieth of what the other does.
 CaseRecord case_record(const record::Record& record, const model::Rig& declared) {
   CaseRecord r;
   require_finite(record);
   r.record = record::evenly_sampled(load_side(record, declared));
   r.has_load = r.record.has(record::Channel::load_position);
-  require_sense(motion_of(r.record), model::load_side(declared));
   if (!r.record.has(record::Channel::motor_position) || !r.has_load) return r;
   const double motor = signal::peak_to_peak(r.record.column(record::Channel::motor_position));
   const double load = signal::peak_to_peak(r.record.column(record::Channel::load_position));
@@ -54,9 +47,6 @@ void read_records(const std::vector<record::Record>& records, const model::Rig& 
   for (const record::Record& record : records) {
     try {
       c.records.push_back(case_record(record, declared));
-      for (const std::string& warning :
-           unit_warnings(motion_of(c.records.back().record), model::load_side(declared)))
-        c.result.warnings.push_back(warning);
     } catch (const BadData& error) {
       if (records.size() == 1) throw;
       c.result.warnings.push_back(std::string("not used: ") + error.what());

@@ -101,6 +101,7 @@ class JointRun {
   record::Record with_warnings() {
     const std::string repeated = stamps_.describe("topic " + topic_);
     if (!repeated.empty()) record_.warnings.push_back(repeated);
+    stamps_.count_into(record_);
     for (std::string& warning : record::describe_time_base(record_.time))
       record_.warnings.push_back(std::move(warning));
     return std::move(record_);

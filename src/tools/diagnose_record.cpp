@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/diagnosis/sample_stream.h"
 #include "backlash_diagnosis/report/diagnosis_page.h"
 #include "backlash_diagnosis/report/diagnosis_report.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "backlash_diagnosis/rig_file/rig_file.h"
 #include "backlash_diagnosis/studies/curve_builder.h"
 #include "tools/common/command_line.h"
@@ -18,6 +19,7 @@
 #include "tools/common/for_arm.h"
 #include "tools/common/of_file.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -27,7 +29,7 @@ namespace {
 std::string needs_of_methods() {
   std::string text = "Methods and the channels that they need:";
   for (const diagnosis::DiagnosisMethod& method : diagnosis::diagnosis_method_table())
-    text += (text.back() == ':' ? " " : "; ") + method.name + " - " + method.needs;
+    text += (text.back() == ':' ? " " : "; ") + method.name + " - " + needs_of(method);
   return text + ".";
 }
 
@@ -152,7 +154,7 @@ void read_machine_files(Inputs& in, const Arguments& arguments) {
   }
 }
 
-Inputs read_inputs(const Arguments& arguments) {
+Inputs read_inputs(const Arguments& arguments, RecordDoor& door) {
   Inputs in;
   in.method = arguments.text("method");
   const auto& methods = diagnosis::diagnosis_methods();
@@ -181,7 +183,9 @@ Inputs read_inputs(const Arguments& arguments) {
       in.warnings.push_back(warning);
   }
   read_machine_files(in, arguments);
-  in.record = read_record(arguments.positional(0), place);
+  in.record = door.admit(read_record(arguments.positional(0), place),
+                         in.rig ? rig_file::declared_motion(in.rig->rig) : record::DeclaredMotion{},
+                         arguments.positional(0));
   if (arguments.has("periods")) keep_last_periods(in, periods);
   return in;
 }
@@ -245,9 +249,10 @@ bool save_baseline(const diagnosis::Diagnosis& diagnosis, const Inputs& in, cons
 }
 
 int diagnose_record(const Arguments& arguments) {
+  RecordDoor door("diagnose_record");
   if (arguments.has("rig") && rig_file::is_arm_rig(arguments.text("rig")))
-    return run_for_arm("diagnose_record", arguments);
-  Inputs in = read_inputs(arguments);
+    return run_for_arm(arguments, door);
+  Inputs in = read_inputs(arguments, door);
   check_outputs(arguments);
   const std::string out = arguments.text("json");
   if (in.rig && !in.curve) build_own_curve(in);
@@ -270,7 +275,7 @@ int diagnose_record(const Arguments& arguments) {
           ? diagnosis::diagnose(*in.last_periods, in.settings, report.curve, in.baseline, in.method)
           : diagnosis::diagnose(in.record, in.settings, report.curve, in.baseline, in.method);
   explain(report.diagnosis, in);
-  const std::string json = report::diagnosis_json(report);
+  const std::string json = door.with_findings(report::diagnosis_json(report));
   if (out == kStandardOutput) {
     std::cout << json;
   } else {

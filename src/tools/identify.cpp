@@ -8,12 +8,14 @@
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/findings/identification_report.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/for_arm.h"
 #include "tools/common/of_file.h"
 #include "tools/common/plot.h"
 #include "tools/common/progress_bar.h"
+#include "tools/common/record_door.h"
 #include "tools/common/record_file.h"
 
 namespace backlash::tools {
@@ -73,12 +75,16 @@ void check_outputs(const Arguments& arguments) {
   check_output(plot, inputs);
 }
 
-int identify_joint(const Arguments& arguments) {
+int identify_joint(const Arguments& arguments, RecordDoor& door) {
   const rig_file::RigFile file = rig_file::load_rig_file(arguments.text("rig"));
+  record::DeclaredMotion declared = rig_file::declared_motion(file.rig);
+  declared.may_hold_load = arguments.positionals().size() > 1;
   std::vector<record::Record> records;
   for (const std::string& path : arguments.positionals()) {
-    records.push_back(read_record(path, place_of(file)));
-    records.back().name = std::filesystem::path(path).filename();
+    record::Record record = read_record(path, place_of(file));
+    record.name = std::filesystem::path(path).filename();
+    for (record::Record& stretch : door.admit_stretches(std::move(record), declared, path))
+      records.push_back(std::move(stretch));
   }
   identification::Identification found = of_file(file.source, [&] {
     ProgressBar bar;  // gone before anything is printed
@@ -88,8 +94,8 @@ int identify_joint(const Arguments& arguments) {
   for (const record::Record& record : records)
     for (const std::string& warning : record.warnings) found.warnings.push_back(record.name + ": " + warning);
   write_text(arguments.text("out"), identification::fitted_rig_text(file, found));
-  write_text(arguments.text("json"),
-             findings::identification_json(found, arguments.text("rig"), arguments.positionals()));
+  write_text(arguments.text("json"), door.with_findings(findings::identification_json(
+                                         found, arguments.text("rig"), arguments.positionals())));
   findings::print_summary(found, std::cout);
   std::cout.flush();
   if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
@@ -101,14 +107,15 @@ int identify_machine(const Arguments& arguments) {
   check_outputs(arguments);
   const bool is_arm = rig_file::is_arm_rig(arguments.text("rig"));
   if (is_arm && arguments.has("plot")) throw UsageError("--plot: there is no plot for an arm");
+  RecordDoor door("identify");
   try {
-    return is_arm ? run_for_arm("identify", arguments) : identify_joint(arguments);
+    return is_arm ? run_for_arm(arguments, door) : identify_joint(arguments, door);
   } catch (const CannotIdentify& error) {
     std::cerr << "identify: " << error.what() << '\n';
     identification::Identification nothing;
     nothing.warnings.emplace_back(error.what());
-    write_text(arguments.text("json"),
-               findings::identification_json(nothing, arguments.text("rig"), arguments.positionals()));
+    write_text(arguments.text("json"), door.with_findings(findings::identification_json(
+                                           nothing, arguments.text("rig"), arguments.positionals())));
     return kInconclusive;
   }
 }

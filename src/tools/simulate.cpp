@@ -81,7 +81,8 @@ int list_runs(const Arguments& arguments) {
 }
 
 int simulate(const Arguments& arguments) {
-  if (rig_file::is_arm_rig(arguments.positional(0))) return run_for_arm("simulate", arguments);
+  RecordDoor door("simulate");
+  if (rig_file::is_arm_rig(arguments.positional(0))) return run_for_arm(arguments, door);
   if (arguments.has("motion")) throw UsageError("--motion is for the rig file of an arm");
   if (arguments.has("list-runs")) return list_runs(arguments);
   for (const char* option : {"out", "duration"})

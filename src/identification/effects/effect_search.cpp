@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../fit/record_sense.h"
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "backlash_diagnosis/record/shared_samples.h"
 #include "backlash_diagnosis/simulation/driven_load.h"
 #include "contradicting_records.h"
@@ -73,7 +72,7 @@ Records records_of(const model::Rig& rig, const std::vector<record::Record>& tra
   }
   records.names.push_back(test.name);
   double torque = 0;  // what the model says of the test record knows nothing of that record's torque
-  for (const ServoData& data : records.train) torque = std::max(torque, usual_torque(data.torque));
+  for (const ServoData& data : records.train) torque = std::max(torque, model::usual_torque(data.torque));
   records.test = traced_data(test, rig, torque);
   require_same_rate(records.train, records.test);
   return records;
@@ -278,12 +277,6 @@ Trace trace_residual(const model::Rig& raw, const std::vector<record::Record>& t
   if (trace.unexplained)
     trace.several = several_of(declared, records, settings, most_left(trace, found), progress);
   trace.warnings = range_warnings(records.train, records.test, declared.linear);
-  for (std::size_t i = 0; i < records.train.size(); ++i) {
-    const ServoData& d = records.train[i];
-    for (const std::string& warning :
-         unit_warnings({records.names[i], d.interval, d.torque, d.motor, d.load}, declared))
-      trace.warnings.push_back(warning);
-  }
   return trace;
 }
 

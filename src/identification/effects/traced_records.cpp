@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../fit/record_sense.h"
 #include "backlash_diagnosis/base/error.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/signal/order_statistics.h"
@@ -27,7 +26,6 @@ constexpr double kFaster = 1.5;            // choice: times speed or torque
 
 ServoData traced_data(const record::Record& record, const model::Rig& rig, double torque) {
   ServoData data = servo_data(record, rig, torque);
-  require_sense({record.name, data.interval, data.torque, data.motor, data.load}, model::load_side(rig));
   if (simulation::load_moves_freely(rig)) {
     if (data.load.empty())
       throw CannotIdentify(record.name + " has no load_position, which a rig with two inertias needs");

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "backlash_diagnosis/base/error.h"
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
 #include "backlash_diagnosis/model/gear_train.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 #include "backlash_diagnosis/signal/linear_algebra.h"
 #include "backlash_diagnosis/signal/zero_phase.h"
 #include "backlash_diagnosis/simulation/plant.h"
@@ -63,7 +63,7 @@ simulation::SolverSettings solver(const model::Rig& rig, const ServoData& data) 
   settings.relative_tolerance = kTolerance;
   settings.position_tolerance = kTolerance * largest;
   settings.velocity_tolerance =
-      settings.position_tolerance * 2 * M_PI * mesh_resonance(rig, usual_torque(data.torque));
+      settings.position_tolerance * 2 * M_PI * mesh_resonance(rig, model::usual_torque(data.torque));
   return settings;
 }
 

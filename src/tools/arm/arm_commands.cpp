@@ -7,14 +7,15 @@
 
 namespace backlash::tools {
 
-extern "C" int backlash_run_for_arm(const std::string& name, const Arguments& arguments) {
-  static const std::map<std::string, int (*)(const Arguments&)> commands = {
-      {"simulate", simulate_arm},
+extern "C" int backlash_run_for_arm(const Arguments& arguments, RecordDoor& door) {
+  static const std::map<std::string, int (*)(const Arguments&, RecordDoor&)> commands = {
+      {"simulate", [](const Arguments& a, RecordDoor&) { return simulate_arm(a); }},
+      {"check_record", [](const Arguments& a, RecordDoor&) { return check_arm(a); }},
       {"diagnose_record", diagnose_arm},
       {"identify", identify_arm},
       {"trace_residual", trace_arm_residual},
   };
-  return commands.at(name)(arguments);
+  return commands.at(door.command())(arguments, door);
 }
 
 }  // namespace backlash::tools

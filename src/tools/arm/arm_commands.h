@@ -3,15 +3,18 @@
 #pragma once
 
 #include "tools/common/command_line.h"
+#include "tools/common/record_door.h"
 
 namespace backlash::tools {
 
 int simulate_arm(const Arguments& arguments);
-/// All its joints in one run. The exit code is that of the worst.
-int diagnose_arm(const Arguments& arguments);
-/// Outputs are checked already. Throws CannotIdentify.
-int identify_arm(const Arguments& arguments);
 /// Outputs are checked already.
-int trace_arm_residual(const Arguments& arguments);
+int check_arm(const Arguments& arguments);
+/// All its joints in one run. The exit code is that of the worst.
+int diagnose_arm(const Arguments& arguments, RecordDoor& door);
+/// Outputs are checked already. Throws CannotIdentify.
+int identify_arm(const Arguments& arguments, RecordDoor& door);
+/// Outputs are checked already.
+int trace_arm_residual(const Arguments& arguments, RecordDoor& door);
 
 }  // namespace backlash::tools

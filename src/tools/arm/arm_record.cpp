@@ -12,7 +12,7 @@ namespace backlash::tools {
 
 namespace fs = std::filesystem;
 
-arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) {
+std::vector<record::JointRecord> read_joints(const std::string& path, const arm::ArmRig& rig) {
   check_record_path(path);
   std::vector<record::JointRecord> joints;
   if (fs::path(path).extension() != ".csv") {
@@ -22,7 +22,11 @@ arm::ArmRecord read_arm_record(const std::string& path, const arm::ArmRig& rig) 
   } else {
     joints = record::read_joints_csv(path);
   }
-  return arm::arm_record(joints, rig, fs::path(path).filename());
+  return joints;
+}
+
+arm::ArmRecord admitted_arm_record(const std::string& path, const arm::ArmRig& rig, RecordDoor& door) {
+  return arm::arm_record(door.admit(read_joints(path, rig), path), rig, fs::path(path).filename());
 }
 
 }  // namespace backlash::tools

@@ -10,7 +10,7 @@
 
 namespace backlash::tools {
 
-int diagnose_arm(const Arguments& arguments) {
+int diagnose_arm(const Arguments& arguments, RecordDoor& door) {
   for (const char* option :
        {"report", "curve", "limits", "baseline", "save-baseline", "method", "joint", "topic", "periods"})
     if (arguments.has(option))
@@ -19,9 +19,9 @@ int diagnose_arm(const Arguments& arguments) {
   const std::string out = arguments.text("json"), rig = arguments.text("rig");
   if (out != kStandardOutput) check_output(out, {arguments.positional(0), rig});
   const geared_arm::GearedArm arm = geared_arm::load_geared_arm(rig);
-  const arm::ArmRecord record = read_arm_record(arguments.positional(0), arm.rig);
+  const arm::ArmRecord record = admitted_arm_record(arguments.positional(0), arm.rig, door);
   const arm_findings::ArmPlayReport report = arm_findings::arm_play_report(arm, record);
-  const std::string json = arm_findings::arm_play_json(report);
+  const std::string json = door.with_findings(arm_findings::arm_play_json(report));
   if (out == kStandardOutput) {
     std::cout << json;
   } else {

@@ -11,12 +11,12 @@
 
 namespace backlash::tools {
 
-int identify_arm(const Arguments& arguments) {
+int identify_arm(const Arguments& arguments, RecordDoor& door) {
   const arm::ArmRig rig = arm::load_arm_rig(arguments.text("rig"));
   std::vector<arm::RecordMotions> records;
   std::vector<std::string> warnings;
   for (const std::string& path : arguments.positionals()) {
-    const arm::ArmRecord record = read_arm_record(path, rig);
+    const arm::ArmRecord record = admitted_arm_record(path, rig, door);
     for (const std::string& warning : record.warnings) warnings.push_back(record.name + ": " + warning);
     records.push_back(arm::motions_of(record, rig, warnings));
   }
@@ -24,8 +24,8 @@ int identify_arm(const Arguments& arguments) {
   arm::ArmFit fit = arm::fit_records(rig, records, {}, bar.progress());
   fit.warnings.insert(fit.warnings.end(), warnings.begin(), warnings.end());
   write_text(arguments.text("out"), arm_findings::fitted_arm_text(fit, arguments.positionals()));
-  write_text(arguments.text("json"),
-             arm_findings::arm_identification_json(fit, arguments.text("rig"), arguments.positionals()));
+  write_text(arguments.text("json"), door.with_findings(arm_findings::arm_identification_json(
+                                         fit, arguments.text("rig"), arguments.positionals())));
   arm_findings::print_arm_summary(fit, std::cout);
   return fit.contradictions.empty() ? kHealthy : kInconclusive;
 }

@@ -37,9 +37,9 @@ report::Provenance provenance_of(const arm::ArmRig& rig, const findings::TraceIn
 }
 
 void write_trace(const findings::TraceFolder& folder, const arm::ArmTrace& trace, const arm::ArmRig& rig,
-                 const findings::TraceInputs& inputs, const std::string& name) {
+                 const findings::TraceInputs& inputs, const std::string& name, const RecordDoor& door) {
   const report::TraceFiles& files = folder.files();
-  write_file(files.report, arm_findings::arm_trace_json(trace, inputs));
+  write_file(files.report, door.with_findings(arm_findings::arm_trace_json(trace, inputs)));
   write_file(files.series, arm_findings::arm_series_json(trace));
   write_file(files.rig, arm::arm_rig_text(trace.augmented,
                                           {"What trace_residual found is in report.json beside this file.",
@@ -51,7 +51,7 @@ void write_trace(const findings::TraceFolder& folder, const arm::ArmTrace& trace
                                           report::provenance_sections(provenance_of(rig, inputs, name))));
 }
 
-arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
+arm::ArmTrace run_trace(const Arguments& arguments, RecordDoor& door, const Progress& progress) {
   const findings::TraceInputs inputs = {arguments.text("rig"), arguments.texts("train"),
                                         arguments.text("test")};
   const arm::ArmRig rig = arm::load_arm_rig(inputs.rig);
@@ -59,10 +59,10 @@ arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
   std::error_code error;
   bool same = false;
   for (const std::string& path : inputs.train) {
-    train.push_back(read_arm_record(path, rig));
+    train.push_back(admitted_arm_record(path, rig, door));
     same = same || fs::equivalent(path, inputs.test, error);
   }
-  const arm::ArmRecord test = read_arm_record(inputs.test, rig);
+  const arm::ArmRecord test = admitted_arm_record(inputs.test, rig, door);
   std::vector<std::string> files = inputs.train;
   files.insert(files.end(), {inputs.test, inputs.rig, rig.urdf});
   const findings::TraceFolder folder(arguments.text("out"), files);
@@ -71,21 +71,21 @@ arm::ArmTrace run_trace(const Arguments& arguments, const Progress& progress) {
   for (const arm::ArmRecord& record : train)
     for (const std::string& warning : record.warnings) trace.warnings.push_back(record.name + ": " + warning);
   for (const std::string& warning : test.warnings) trace.warnings.push_back(test.name + ": " + warning);
-  write_trace(folder, trace, rig, inputs, arguments.text("out"));
+  write_trace(folder, trace, rig, inputs, arguments.text("out"), door);
   return trace;
 }
 
 }  // namespace
 
-int trace_arm_residual(const Arguments& arguments) {
+int trace_arm_residual(const Arguments& arguments, RecordDoor& door) {
   arm::ArmTrace trace;
   try {
     if (arguments.has("feedback")) {
       FeedbackLines lines;
-      trace = run_trace(arguments, lines.progress());
+      trace = run_trace(arguments, door, lines.progress());
     } else {
       ProgressBar bar;
-      trace = run_trace(arguments, bar.progress());
+      trace = run_trace(arguments, door, bar.progress());
     }
   } catch (const CannotIdentify& error) {
     std::cerr << "trace_residual: " << error.what() << '\n';

@@ -5,9 +5,9 @@
 
 namespace backlash::tools {
 
-int run_for_arm(const std::string& name, const Arguments& arguments) {
+int run_for_arm(const Arguments& arguments, RecordDoor& door) {
   return loaded_function<decltype(backlash_run_for_arm)>("backlash_diagnosis_arm_tools",
-                                                         "backlash_run_for_arm")(name, arguments);
+                                                         "backlash_run_for_arm")(arguments, door);
 }
 
 }  // namespace backlash::tools

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "backlash_diagnosis/identification/fit/mesh_resonance.h"
+#include "backlash_diagnosis/model/mesh_resonance.h"
 
 #include <cmath>
 
 #include "backlash_diagnosis/model/gear_train.h"
 
-namespace backlash::identification {
+namespace backlash::model {
 namespace {
 
 constexpr double kSecant = 0.01;  // theory: relative change of the force over which the stiffness is taken
 
 }  // namespace
 
-double mesh_resonance(const model::Rig& rig, double torque) {
+double mesh_resonance(const Rig& rig, double torque) {
   if (rig.mesh.rigid || !(torque > 0)) return 0;
-  const model::GearTrain train(rig);
+  const GearTrain train(rig);
   const double lever = rig.mesh.lever(), force = torque / lever;
   const double deeper = rig.mesh.contact->static_penetration((1 + kSecant) * force) -
                         rig.mesh.contact->static_penetration(force);
@@ -30,4 +30,4 @@ double usual_torque(const std::vector<double>& torque) {
   return std::sqrt(square);
 }
 
-}  // namespace backlash::identification
+}  // namespace backlash::model

@@ -6,12 +6,12 @@
 
 #include "backlash_diagnosis/model/rig.h"
 
-namespace backlash::identification {
+namespace backlash::model {
 
 /// Hz: sqrt(k (1 / J_M + 1 / J_L)) / 2 pi, of a locked link sqrt(k / J_M) / 2 pi, with the stiffness k of
 /// closed teeth at rest under `torque` [N m] > 0 (of a linear law the same under any). 0 for a rigid mesh.
 /// `rig` is of the load side.
-double mesh_resonance(const model::Rig& rig, double torque);
+double mesh_resonance(const Rig& rig, double torque);
 
 /// Hz: that of config/two_inertia_servo.yaml, on whose records the bands of fits were tried (simulation).
 /// Bands of other machines are as far from their own resonance.
@@ -20,4 +20,4 @@ constexpr double kTriedResonance = 44.2425;
 /// N m: root mean square, the usual torque that a mesh is under.
 double usual_torque(const std::vector<double>& torque);
 
-}  // namespace backlash::identification
+}  // namespace backlash::model

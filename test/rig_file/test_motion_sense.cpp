@@ -7,12 +7,12 @@
 #include <functional>
 #include <string>
 
-#include "../../support/servo.h"
-#include "backlash_diagnosis/base/error.h"
+#include "../support/servo.h"
 #include "backlash_diagnosis/model/rig.h"
-#include "identification/fit/record_sense.h"
+#include "backlash_diagnosis/record/motion_sense.h"
+#include "backlash_diagnosis/rig_file/declared_motion.h"
 
-namespace backlash::identification {
+namespace backlash::rig_file {
 namespace {
 
 constexpr double kInterval = 1e-3, kDuration = 10;  // s
@@ -37,13 +37,15 @@ Columns moved(double inertia, double viscous, double coulomb, double weight = 0)
   return c;
 }
 
+std::vector<record::Finding> findings(const Columns& c, const model::Rig& rig, double interval = kInterval) {
+  return record::sense_of({interval, c.torque, c.motor, c.load}, declared_motion(rig));
+}
+
+/// What is refused; empty: nothing.
 std::string refusal(const Columns& c, const model::Rig& rig, double interval = kInterval) {
-  try {
-    require_sense({"run.csv", interval, c.torque, c.motor, c.load}, rig);
-    return "";
-  } catch (const BadData& error) {
-    return error.what();
-  }
+  for (const record::Finding& finding : findings(c, rig, interval))
+    if (finding.consequence == record::Consequence::refused) return finding.message;
+  return "";
 }
 
 Columns scaled(Columns c, double torque, double motor, double load) {
@@ -75,9 +77,9 @@ TEST(RecordSense, LeavesAMachineAlone) {
 
 TEST(RecordSense, NamesTheSignThatIsWrong) {
   const std::string torque = refusal(scaled(good(), -1, 1, 1), servo());
-  EXPECT_NE(torque.find("run.csv: motor_torque works against the motion"), std::string::npos) << torque;
+  EXPECT_NE(torque.find("motor_torque works against the motion"), std::string::npos) << torque;
   const std::string load = refusal(scaled(good(), 1, 1, -1), servo());
-  EXPECT_NE(load.find("run.csv: load_position turns against motor_position"), std::string::npos) << load;
+  EXPECT_NE(load.find("load_position turns against motor_position"), std::string::npos) << load;
 }
 
 TEST(RecordSense, NamesPositionsInOtherUnits) {
@@ -104,23 +106,44 @@ TEST(RecordSense, ALockedLinkIsNotAsked) {
   EXPECT_EQ(refusal(scaled(good(), -1, 1, -1), locked), "");
 }
 
-TEST(RecordSense, WarnsOfAnInertiaOfAnotherSize) {
-  const auto warnings = [](const Columns& c) {
-    return unit_warnings({"run.csv", kInterval, c.torque, c.motor, c.load}, servo());
-  };
-  EXPECT_TRUE(warnings(good()).empty());
-  EXPECT_TRUE(warnings(moved(3 * all(), 20, 60)).empty());
-  EXPECT_TRUE(warnings(moved(0.02 * all(), 200, 600)).empty());  // friction takes nearly all
+TEST(RecordSense, NamesTheUnitBehindAnInertiaOfAnotherSize) {
+  EXPECT_TRUE(findings(good(), servo()).empty());
+  EXPECT_TRUE(findings(moved(3 * all(), 20, 60), servo()).empty());
+  EXPECT_TRUE(findings(moved(0.02 * all(), 200, 600), servo()).empty());  // friction takes nearly all
   Columns driver = moved(servo().motor.inertia, 0.2, 0.6);  // by itself, with and without the other encoder
   driver.load.assign(driver.motor.size(), 0.3);
-  EXPECT_TRUE(warnings(driver).empty());
+  EXPECT_TRUE(findings(driver, servo()).empty());
   driver.load.clear();
-  EXPECT_TRUE(warnings(driver).empty());
+  EXPECT_TRUE(findings(driver, servo()).empty());
   const double degrees = 180 / M_PI;
-  ASSERT_EQ(warnings(scaled(good(), 1, degrees, degrees)).size(), 1u);
-  EXPECT_NE(warnings(scaled(good(), 1, degrees, degrees))[0].find("0.0175 times"), std::string::npos);
-  ASSERT_EQ(warnings(scaled(good(), 1000, 1, 1)).size(), 1u);
+  const std::string in_degrees = refusal(scaled(good(), 1, degrees, degrees), servo());
+  EXPECT_NE(in_degrees.find("0.0175 times"), std::string::npos) << in_degrees;
+  EXPECT_NE(in_degrees.find("degrees"), std::string::npos) << in_degrees;
+  EXPECT_NE(refusal(scaled(good(), 1000, 1, 1), servo()).find("N mm"), std::string::npos);
+  const auto odd = findings(scaled(good(), 13, 1, 1), servo());  // no unit is 13 times another
+  ASSERT_EQ(odd.size(), 1u);
+  EXPECT_EQ(odd[0].kind, record::FindingKind::scale);
+  EXPECT_EQ(odd[0].consequence, record::Consequence::noted);
+}
+
+// The load is driven by the motor: with the columns exchanged it would run ahead of what drives it.
+TEST(RecordSense, NamesColumnsInEachOthersPlace) {
+  Columns c = good();
+  std::swap(c.motor, c.load);
+  EXPECT_NE(refusal(c, servo()).find("in each other's place"), std::string::npos) << refusal(c, servo());
+  c = good();
+  std::swap(c.motor, c.torque);
+  c.load.clear();
+  EXPECT_NE(refusal(c, servo()).find("in each other's place"), std::string::npos) << refusal(c, servo());
+}
+
+// A model's gravity in place of what was measured: no friction, no inertia.
+TEST(RecordSense, NamesATorqueOfThePositionAlone) {
+  const Columns c = moved(0, 0, 0, 300);
+  EXPECT_NE(refusal(c, servo()).find("function of motor_position alone"), std::string::npos)
+      << refusal(c, servo());
+  EXPECT_EQ(refusal(moved(0, 0, 30, 300), servo()), "");
 }
 
 }  // namespace
-}  // namespace backlash::identification
+}  // namespace backlash::rig_file
