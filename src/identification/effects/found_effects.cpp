@@ -83,7 +83,7 @@ FittedValues fitted_values(const BandFit& fitted, std::size_t declared) {
   const Unknowns unknowns(fitted.start);
   FittedValues out;
   for (std::size_t i = 0; i < fitted.start.parameters.size(); ++i) {
-    const signal::Measured m = unknowns.parameter(fit.fit, i);
+    const signal::Measured m = unknowns.parameter(fit, i);
     if (i < declared)
       out.machine[fitted.start.parameters[i].name] = m;
     else

@@ -11,6 +11,7 @@
 #include "backlash_diagnosis/identification/fit/noise_floor.h"
 #include "backlash_diagnosis/model/axis_unit.h"
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
+#include "declared_terms.h"
 #include "procedures.h"
 
 namespace backlash::identification {
@@ -53,6 +54,17 @@ void require_possible(const OneInertia& found, const std::string& record) {
                                   std::hypot(found.coulomb.standard_error, found.offset.standard_error)};
   if (found.viscous.value < -by_noise * found.viscous.standard_error) refuse("viscous", found.viscous);
   if (least.value < -by_noise * least.standard_error) refuse("coulomb friction of the one direction", least);
+}
+
+/// What the rig file declares beside inertia and friction is no part of either.
+void take_off_terms(IdentificationCase& c) {
+  for (CaseRecord& r : c.records) {
+    if (!r.record.has(record::Channel::motor_torque) || !r.record.has(record::Channel::motor_position))
+      continue;
+    const std::vector<double> taken = torque_of_terms(r.record, c.declared);
+    std::vector<double>& torque = r.record.column(record::Channel::motor_torque);
+    for (std::size_t k = 0; k < taken.size(); ++k) torque[k] -= taken[k];
+  }
 }
 
 /// A record, and the machine that it tells by itself.
@@ -125,6 +137,7 @@ void take_machine(const OneInertia& found, IdentificationCase& c) {
 
 ProcedureReport run_one_inertia(IdentificationCase& c) {
   ProcedureReport report{"one_inertia", {}, ""};
+  take_off_terms(c);
   const std::vector<Told> told = told_by_each(c);
   std::vector<OneInertia> alone, together;
   for (const Told& t : told) alone.push_back(t.machine);
