@@ -40,7 +40,9 @@ RecordedMotion motion_of(const record::Record& r) {
 CaseRecord case_record(const record::Record& record, const model::Rig& declared) {
   CaseRecord r;
   require_finite(record);
-  r.record = record::evenly_sampled(load_side(record, declared));
+  record::EvenGrid even = record::evenly_sampled_grid(load_side(record, declared));
+  r.record = std::move(even.record);
+  r.lost = std::move(even.lost);
   r.has_load = r.record.has(record::Channel::load_position);
   require_sense(motion_of(r.record), model::load_side(declared));
   if (!r.record.has(record::Channel::motor_position) || !r.has_load) return r;

@@ -67,15 +67,15 @@ Records records_of(const model::Rig& rig, const std::vector<record::Record>& tra
   if (train.empty()) throw CannotIdentify("no training record");
   require_unseen(train, test);
   Records records;
+  const double interval = common_interval(train, test);
   for (const record::Record& record : train) {
     records.names.push_back(record.name);
-    records.train.push_back(traced_data(record, rig));
+    records.train.push_back(traced_data(record, rig, 0, interval));
   }
   records.names.push_back(test.name);
   double torque = 0;  // what the model says of the test record knows nothing of that record's torque
   for (const ServoData& data : records.train) torque = std::max(torque, usual_torque(data.torque));
-  records.test = traced_data(test, rig, torque);
-  require_same_rate(records.train, records.test);
+  records.test = traced_data(test, rig, torque, interval);
   return records;
 }
 

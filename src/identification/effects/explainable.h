@@ -41,9 +41,10 @@ struct Remainder {
 /// repeats; else 0.
 double repeated_noise(const Predicted& record, bool deflection);
 
-/// Of all samples that count. Too few (least_samples) say how much is left, and not what it follows. States: position (and the strongest orders of it), velocity, acceleration,
-/// transmitted torque and path since the last reversal, all of them as the model has them, and time. The
-/// measured torque is none of them: it holds its own noise.
+/// Of all samples that count. Too few (least_samples) say how much is left, and not what it follows. States:
+/// position (and the strongest orders of it), velocity, acceleration, transmitted torque and path since the
+/// last reversal, all of them as the model has them, and time. The measured torque is none of them: it holds
+/// its own noise.
 Remainder remainder(const std::vector<Predicted>& records, bool deflection, double cutoff,
                     const ExplainableSettings& settings);
 
