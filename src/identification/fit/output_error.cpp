@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "backlash_diagnosis/identification/fit/output_error.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -10,6 +9,7 @@
 
 #include "backlash_diagnosis/rig_file/rig_parameters.h"
 #include "multi_start.h"
+#include "valley.h"
 
 namespace backlash::identification {
 namespace {
@@ -35,11 +35,7 @@ Machine start_machine(const model::Rig& rig, std::size_t records, const OutputEr
   return machine;
 }
 
-constexpr double kFlat = 0.01;       // simulation: below, fits from beside an end no longer come back to it
-constexpr double kBeside = 0.1;      // choice: of the logarithms, to either side
-constexpr int kOtherEnds = 3;        // choice (time)
-constexpr double kHardlyMore = 1.1;  // choice: of the sum of squares
-constexpr double kVanishes = 2;      // choice: standard errors, below which a play may be none
+constexpr double kVanishes = 2;  // choice: standard errors, below which a play may be none
 
 bool is_play(const FitParameter& p) {
   return p.name == rig_file::servo_parameter(rig_file::RigPart::mesh, rig_file::ParameterKind::backlash).name;
@@ -64,47 +60,6 @@ std::optional<BandFit> without_play(const BandFit& fitted, const std::vector<Ser
   if (!(left(other.fit) <= left(fitted.fit))) return std::nullopt;
   judge_errors(other.fit, other.start, other.records);
   return other;
-}
-
-/// 1 where the rows tell all values apart, 0 where two are one.
-double flatness(const Eigen::MatrixXd& jacobian) {
-  const Eigen::MatrixXd scaled = jacobian * jacobian.colwise().norm().cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd normal = scaled.transpose() * scaled;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(normal, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
-}
-
-/// Where values nearly mix, the sum of squares has a valley, rough by standstills and touches of the load: a
-/// fit ends anywhere in it. Fits that begin beside its end say where else. The best is taken; of the others
-/// that leave hardly more, the root mean square of the distance to it is an error.
-std::map<std::string, double> search_valley(BandFit& fitted, const FitSettings& settings) {
-  if (flatness(fitted.fit.fit.jacobian) > kFlat) return {};
-  const auto left = [records = fitted.records](const MachineFit& fit) {
-    return records.rows(fit.machine.rig, fit.machine.calibrations).squaredNorm();
-  };
-  std::vector<std::pair<double, Machine>> ends = {{left(fitted.fit), fitted.fit.machine}};
-  double least = ends.front().first;
-  for (int i = 1; i <= kOtherEnds; ++i) try {
-      Machine beside = other_start(ends.front().second, kBeside, settings.seed + std::uint64_t(i));
-      MachineFit end = fit_machine(beside, fitted.records, fit_options(settings, settings.tolerance, false));
-      ends.emplace_back(left(end), end.machine);
-      if (ends.back().first >= least) continue;
-      least = ends.back().first;
-      fitted.misfit = fitted.records.misfit(end.machine);
-      fitted.start = std::move(beside), fitted.fit = std::move(end);
-    } catch (const CannotIdentify&) {
-    }
-  std::map<std::string, double> errors;
-  for (const FitParameter& p : fitted.start.parameters) {
-    double squares = 0, count = 0;
-    for (const auto& [squares_left, machine] : ends) {
-      if (squares_left > kHardlyMore * least) continue;
-      squares += std::pow(p.get(machine.rig) - p.get(fitted.fit.machine.rig), 2);
-      ++count;
-    }
-    errors[p.name] = std::sqrt(squares / count);
-  }
-  return errors;
 }
 
 }  // namespace
