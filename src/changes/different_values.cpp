@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "backlash_diagnosis/model/axis_unit.h"
+#include "backlash_diagnosis/signal/measured.h"
 #include "healthy_columns.h"
 
 namespace backlash::changes {
@@ -25,18 +26,22 @@ struct Named {
 };
 
 /// Relative to the healthy value; 0 where it is not clear.
-double difference(const HealthyModel& model, const Background& b, int column) {
-  const double by = b.estimate[column], healthy = std::fabs(model.values[column]);
-  const bool clear = std::fabs(by) > kClear * model.spread[column] &&
-                     std::fabs(by) > kClear * std::sqrt(b.inverse(column, column));
-  return clear && healthy > 0 && std::fabs(by) > kLeast * healthy ? by / model.values[column] : 0;
+signal::Measured difference(const HealthyModel& model, const Background& b, int column) {
+  const double by = b.estimate[column], error = std::sqrt(b.inverse(column, column)),
+               healthy = model.values[column];
+  const bool clear = std::fabs(by) > kClear * std::max(model.spread[column], error) &&
+                     std::fabs(by) > kLeast * std::fabs(healthy);
+  return clear && healthy != 0 ? signal::Measured{by / healthy, error / std::fabs(healthy)}
+                               : signal::Measured{0, 0};
 }
 
 }  // namespace
 
 std::vector<DifferentValue> different_values(const HealthyModel& model, Background background, bool linear) {
   // Values of another machine are not drawn to those of the healthy one.
-  background.spread.head(model.values.size()).setConstant(std::numeric_limits<double>::infinity());
+  background.spread.head(kCommonColumns).setConstant(std::numeric_limits<double>::infinity());
+  if (model.sampling.channel == ChangeChannel::deflection)
+    background.spread[kHalfGap] = std::numeric_limits<double>::infinity();
   background.solve();
   const std::vector<Named> torque = {{kInertia, "inertia", "kg m^2", 1},
                                      {kCoulomb, "motor_coulomb", "N m", 1},
@@ -44,19 +49,22 @@ std::vector<DifferentValue> different_values(const HealthyModel& model, Backgrou
                            deflection = {{kHalfGap, "backlash", "rad", 2}};
   const bool of_torque = model.sampling.channel == ChangeChannel::torque;
   std::vector<DifferentValue> all;
-  std::vector<double> factors;
+  std::vector<signal::Measured> factors;
   for (const Named& n : of_torque ? torque : deflection) {
-    const double by = difference(model, background, n.column);
-    if (by == 0) continue;
+    const signal::Measured by = difference(model, background, n.column);
+    if (by.value == 0) continue;
     factors.push_back(by);
     all.push_back({n.name, fmt::format("{} by {:.3g} {} (healthy: {:.3g})", n.name,
                                        n.times * background.estimate[n.column],
                                        model::axis_unit(n.unit, linear), n.times * model.values[n.column])});
   }
   if (factors.size() < 2) return all;
-  const auto [least, most] = std::minmax_element(factors.begin(), factors.end());
-  if (*most - *least > kAlike) return all;
-  return {{"motor_torque_gain", fmt::format("motor_torque_gain by {:.2g}", 0.5 * (*least + *most))}};
+  const signal::Measured best =
+      *std::min_element(factors.begin(), factors.end(),
+                        [](const auto& x, const auto& y) { return x.standard_error < y.standard_error; });
+  for (const signal::Measured& f : factors)
+    if (std::fabs(f.value - best.value) > kAlike + 2 * f.standard_error) return all;
+  return {{"motor_torque_gain", fmt::format("motor_torque_gain by {:.2g}", best.value)}};
 }
 
 }  // namespace backlash::changes
