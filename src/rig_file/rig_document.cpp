@@ -224,8 +224,9 @@ void RigDocument::list_by_lines(const std::string& key) {
     std::string text;
     for (std::size_t k = begin.line; k <= end.line; ++k) {
       const std::size_t from = k == begin.line ? begin.column : 0;
-      text += (k == begin.line ? "" : "\n    ") +
-              std::string(trimmed(lines_[k].substr(from, k == end.line ? end.column - from : std::string::npos)));
+      text +=
+          (k == begin.line ? "" : "\n    ") +
+          std::string(trimmed(lines_[k].substr(from, k == end.line ? end.column - from : std::string::npos)));
     }
     for (const std::string& line : split("  - " + text, '\n')) items.push_back(line);
   }
