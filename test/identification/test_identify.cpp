@@ -131,10 +131,10 @@ TEST(Identify, LostSamplesAreNoMissingEffect) {
 // machine's.
 TEST(Identify, AMachineOfAnotherKindHasNoValues) {
   const rig_file::RigFile file = test::servo_file();
-  model::Rig heavy = file.rig;
-  heavy.terms.push_back(model::make_term("gravity", {{"amplitude", 900}, {"phase", 0.4}}));
-  record::Record record = simulation::simulate_record(heavy, test::servo_run(1), 10);
-  record.name = "heavy.csv";
+  record::Record record = simulation::simulate_record(file.rig, test::servo_run(1), 10);
+  record.name = "pushed.csv";
+  std::vector<double>& torque = record.column(record::Channel::motor_torque);
+  for (std::size_t k = 0; k < record.size(); ++k) torque[k] += 2000 * std::sin(0.6 * M_PI * record.time[k]);
   const Identification found = identify(file.rig, {record});
   ASSERT_TRUE(found.unexplained) << found.channels.at("torque").error;
   EXPECT_GT(found.channels.at("torque").error, 0.5);
