@@ -36,6 +36,7 @@ constexpr double kShowing = 0.05;     // choice: of the speed: noise that hides 
                                       // standstill
 constexpr double kSignBandwidth = 4;  // choice: but not below four times the cutoff
 constexpr double kReach = 0.3;        // theory: periods of its cutoff that the speed is sharp to
+constexpr std::size_t kSeen = 2;      // theory: samples to either side
 constexpr std::size_t kBlocks = 30;   // choice: left out one at a time, for the errors
 constexpr double kUnsureOfNoise = 0.3;  // choice: of what noise of the acceleration makes of the inertia
 constexpr double kMuchLeft = 0.1;       // choice: relative error that is worth a warning
@@ -107,7 +108,15 @@ double speed_bandwidth(double position_noise, const std::vector<double>& speed, 
   return std::pow(share * size / speed_noise(position_noise, 1, interval), 2.0 / 3);
 }
 
-Signals prepare(const record::Record& record, double cutoff) {
+/// A record on an even grid, with what is known of lost samples beside what its stamps show.
+record::EvenGrid even(const record::Record& recorded, const std::vector<bool>& lost) {
+  record::EvenGrid grid = record::evenly_sampled_grid(recorded);
+  if (lost.size() == grid.lost.size()) grid.lost = lost;
+  return grid;
+}
+
+Signals prepare(const record::EvenGrid& grid, double cutoff) {
+  const record::Record& record = grid.record;
   Signals s;
   const std::vector<double>& position = record.column(record::Channel::motor_position);
   const std::size_t n = record.size();
@@ -135,6 +144,9 @@ Signals prepare(const record::Record& record, double cutoff) {
   for (std::size_t k = 0; k < n; ++k) sign[k] = (sharp[k] > 0) - (sharp[k] < 0);
   const double threshold = kStanding * speed_noise(s.position_noise, sharp_cutoff, t);
   s.slides = sliding(sharp, threshold, 1 + std::lround(kReach / (sharp_cutoff * t)));
+  for (std::size_t k = 0; k < n; ++k)  // as far as a second difference of a difference sees
+    for (std::size_t j = k < kSeen ? 0 : k - kSeen; j <= std::min(n - 1, k + kSeen); ++j)
+      if (grid.lost[j]) s.slides[k] = 0;
   s.columns.resize(n, 4);
   const std::vector<double> filtered[] = {
       low_pass_sliding(s, second_derivative(position, t)), low_pass_sliding(s, over_second_difference(speed)),
@@ -265,8 +277,9 @@ double spread(const Eigen::VectorXd& values) {
 
 OneInertia identify_one_inertia(const record::Record& recorded, const OneInertiaOptions& options) {
   require_channels(recorded);
-  const record::Record record = record::evenly_sampled(recorded);
-  const Signals s = prepare(record, options.cutoff);
+  const record::EvenGrid grid = even(recorded, options.lost);
+  const record::Record& record = grid.record;
+  const Signals s = prepare(grid, options.cutoff);
   require_both_directions(record.name, s);
   if (options.delay && !(std::fabs(*options.delay) <= kLargestDelay * s.interval))
     throw InvalidParameter("delay", *options.delay, "must be within two sampling intervals");
@@ -309,10 +322,11 @@ OneInertia identify_one_inertia(const record::Record& recorded, const OneInertia
   return out;
 }
 
-OneInertia applied(const OneInertia& machine, const record::Record& recorded) {
+OneInertia applied(const OneInertia& machine, const record::Record& recorded, const std::vector<bool>& lost) {
   require_channels(recorded);
-  const record::Record record = record::evenly_sampled(recorded);
-  const Signals s = prepare(record, machine.cutoff);
+  const record::EvenGrid grid = even(recorded, lost);
+  const record::Record& record = grid.record;
+  const Signals s = prepare(grid, machine.cutoff);
   if (s.used.size() < 2) throw CannotIdentify(record.name + ": stands still");
   const Eigen::VectorXd torque =
       picked(low_pass_sliding(s, signal::delayed(s.torque, machine.delay.value / s.interval)), s.used);

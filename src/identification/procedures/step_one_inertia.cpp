@@ -71,6 +71,7 @@ void take_off_terms(IdentificationCase& c) {
 struct Told {
   const record::Record* record;
   OneInertia machine;
+  const std::vector<bool>* lost;
 };
 
 /// All records that tell one; what is left out is a warning. Throws CannotIdentify where none does.
@@ -79,7 +80,9 @@ std::vector<Told> told_by_each(IdentificationCase& c) {
   std::vector<std::string> reasons;
   for (const CaseRecord& r : c.records) {
     try {
-      all.push_back({&r.record, identify_one_inertia(r.record)});
+      OneInertiaOptions options;
+      options.lost = r.lost;
+      all.push_back({&r.record, identify_one_inertia(r.record, options), &r.lost});
       require_possible(all.back().machine, r.record.name);
     } catch (const CannotIdentify& error) {
       if (!all.empty() && all.back().record == &r.record) all.pop_back();
@@ -146,7 +149,7 @@ ProcedureReport run_one_inertia(IdentificationCase& c) {
     OneInertia machine = found;
     machine.cutoff = t.machine.cutoff;
     machine.delay = t.machine.delay;
-    together.push_back(applied(machine, *t.record));
+    together.push_back(applied(machine, *t.record, *t.lost));
     report.records.push_back(t.record->name);
     c.result.torque.push_back(trace_of(together.back(), *t.record));
   }
