@@ -31,6 +31,19 @@ TEST_F(Cases, AHundredAndFortyPercentOfTheTorqueAreNotNothing) {
   EXPECT_EQ(json("out/report.json")["verdict"], "unexplained");
 }
 
+// Gravity holds one flank in both records, and nothing of it is declared: 139 % of the torque are left.
+TEST_F(Cases, OneFlankOfAMachineOfAnotherKindHasNoPlay) {
+  SKIP_WITHOUT("A30_identify_wrong_and_sure");
+  const std::string folder = file("A30_identify_wrong_and_sure");
+  for (const std::string name : {"record", "record2"})
+    ASSERT_EQ(shell("gunzip -c " + folder + "/" + name + ".csv.gz | cat >" + name + ".csv; true").code, 0);
+  const Outcome outcome =
+      run("identify record.csv record2.csv --rig " + folder + "/rig.yaml --out f.yaml --json x.json");
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_TRUE(json("x.json")["parameters"]["backlash_angle"]["standard_error"].is_null());
+  EXPECT_EQ(read("f.yaml"), content(folder + "/rig.yaml"));
+}
+
 TEST_F(Cases, DeclaredGravityCounts) {
   SKIP_WITHOUT("identify_ignores_declared_gravity");
   const std::string folder = file("identify_ignores_declared_gravity");
