@@ -9,12 +9,6 @@ namespace {
 
 constexpr double kOffGrid = 0.25;  // of an interval, of a stamp: theory, half of what would be the next row
 
-/// A position goes on as it was; a torque may jump.
-bool smooth(Channel channel) {
-  return channel == Channel::motor_position || channel == Channel::load_position ||
-         channel == Channel::reference_position;
-}
-
 /// `steps`: rows from the sample before. Between samples the line, or Lagrange's cubic through the two to
 /// either side.
 std::vector<double> filled(const std::vector<double>& from, const std::vector<std::size_t>& steps,
@@ -41,6 +35,11 @@ std::vector<double> filled(const std::vector<double>& from, const std::vector<st
 }
 
 }  // namespace
+
+bool is_smooth(Channel channel) {
+  return channel == Channel::motor_position || channel == Channel::load_position ||
+         channel == Channel::reference_position;
+}
 
 std::size_t EvenGrid::count(std::size_t first, std::size_t rows) const {
   const auto begin = lost.begin() + static_cast<std::ptrdiff_t>(first);
@@ -72,7 +71,7 @@ EvenGrid even_grid(const Record& record) {
   }
   for (const Channel channel : kChannels)
     if (record.has(channel))
-      even.record.column(channel) = filled(record.column(channel), steps, smooth(channel));
+      even.record.column(channel) = filled(record.column(channel), steps, is_smooth(channel));
   return even;
 }
 

@@ -9,6 +9,7 @@
 #include "backlash_diagnosis/findings/identification_report.h"
 #include "backlash_diagnosis/identification/fitted_rig.h"
 #include "backlash_diagnosis/rig_file/declared_motion.h"
+#include "backlash_diagnosis/rig_file/rig_document.h"
 #include "tools/common/command_line.h"
 #include "tools/common/exit_codes.h"
 #include "tools/common/for_arm.h"
@@ -57,9 +58,10 @@ Command command() {
                 "--plot fit.png"};
   c.exit_codes =
       "  0   done\n"
-      "  3   the records allow no procedure, or contradict each other (then the values hold none of them "
-      "well, "
-      "and their errors hold all); OUT.json has the reason\n";
+      "  3   the records allow no procedure, contradict each other (then the values hold none of them well, "
+      "and their errors hold all), or are of a machine of another kind: half of what a channel does, and "
+      "more, is left (then errors are null and FITTED.yaml keeps what was declared); OUT.json has the "
+      "reason\n";
   return c;
 }
 
@@ -77,6 +79,7 @@ void check_outputs(const Arguments& arguments) {
 
 int identify_joint(const Arguments& arguments, RecordDoor& door) {
   const rig_file::RigFile file = rig_file::load_rig_file(arguments.text("rig"));
+  if (!file.diagnosis.waveform) rig_file::RigDocument(file).check_changes(file.rig);  // before the work
   record::DeclaredMotion declared = rig_file::declared_motion(file.rig);
   declared.may_hold_load = arguments.positionals().size() > 1;
   std::vector<record::Record> records;
@@ -99,7 +102,7 @@ int identify_joint(const Arguments& arguments, RecordDoor& door) {
   findings::print_summary(found, std::cout);
   std::cout.flush();
   if (arguments.has("plot")) plot_identification(arguments.text("json"), arguments.text("plot"));
-  return found.several ? kInconclusive : kHealthy;
+  return found.several || found.unexplained ? kInconclusive : kHealthy;
 }
 
 int identify_machine(const Arguments& arguments) {

@@ -42,9 +42,10 @@ Command command() {
   c.notes =
       "Two inertias with a mesh between them need motor_torque, motor_position and load_position; one "
       "inertia "
-      "(mesh: rigid) and a locked link need motor_torque and motor_position. All records must be sampled at "
-      "the "
-      "same rate. DIR/rig.yaml can be simulated at once. All parameters are those of the load side of the "
+      "(mesh: rigid) and a locked link need motor_torque and motor_position. Records of "
+      "a "
+      "higher rate are brought to that of the slowest. DIR/rig.yaml can be simulated at once. All parameters "
+      "are those of the load side of the "
       "reduction. Of an arm (a rig file with urdf, records with columns JOINT/channel) payload, direction of "
       "gravity, friction of a joint and pushes are traced; the test record may be of a machine that has "
       "changed: then effects are fitted to its first half and judged on its second.";

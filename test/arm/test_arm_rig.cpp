@@ -134,6 +134,21 @@ TEST_F(ArmRigFile, WrongRobotsAreRefused) {
       std::string::npos);
 }
 
+// A tool in a macro would be left out, and gravity with it.
+TEST_F(ArmRigFile, AXacroFileIsNoUrdf) {
+  const std::string macro =
+      with(urdf_, "<link name=\"base_link\"", "<xacro:tool parent=\"x\"/>\n  <link name=\"base_link\"");
+  write_file(path("ur5_arm.urdf"), macro);
+  const std::string said = refusal(rig_);
+  EXPECT_NE(said.find("ur5_arm.urdf"), std::string::npos) << said;
+  EXPECT_NE(said.find("element xacro:tool"), std::string::npos) << said;
+  EXPECT_NE(said.find("rosrun xacro xacro"), std::string::npos) << said;
+  // What xacro has written names it in a comment.
+  write_file(path("ur5_arm.urdf"),
+             with(urdf_, "<link name=\"base_link\"", "<!-- by <xacro:tool/> --><link name=\"base_link\""));
+  EXPECT_EQ(refusal(rig_), "accepted");
+}
+
 TEST_F(ArmRigFile, AUrdfByItselfIsAllItsJointsThatMove) {
   const std::string urdf = path("ur5_arm.urdf");
   const ArmRig declared = load_arm_rig(path("ur5_arm.yaml"));

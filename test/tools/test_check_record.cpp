@@ -108,7 +108,7 @@ TEST_F(CheckRecord, LooksAtEachJointOfAnArm) {
 }
 
 // The cases of ../shared/data/cases; README or truth.json of each says what is right.
-class Cases : public CheckRecord {
+class CheckRecordCases : public CheckRecord {
  protected:
   /// Path of a file of a case, in quotes; empty where there is none.
   static std::string of(const std::string& file) {
@@ -124,7 +124,7 @@ class Cases : public CheckRecord {
   }
 };
 
-TEST_F(Cases, AClutchThatSlipsIsCutAndEachSlipIsAChange) {
+TEST_F(CheckRecordCases, AClutchThatSlipsIsCutAndEachSlipIsAChange) {
   const std::string folder = "clutch_slips/";
   if (of(folder + "one_way.csv").empty()) GTEST_SKIP() << "no cases/clutch_slips";
   const std::string rig = " --rig " + of(folder + "rig.yaml") + " --json x.json";
@@ -143,7 +143,7 @@ TEST_F(Cases, AClutchThatSlipsIsCutAndEachSlipIsAChange) {
   }
 }
 
-TEST_F(Cases, AZeroThatMovesIsTheOnlyChange) {
+TEST_F(CheckRecordCases, AZeroThatMovesIsTheOnlyChange) {
   const std::string folder = "joint_zero_steps_30_deg/";
   const auto a = test::find_data("measured/ur5_arm_a.csv"), b = test::find_data("measured/ur5_arm_b.csv");
   if (of(folder + "record_lift.csv").empty() || !a || !b) GTEST_SKIP() << "no cases/joint_zero_steps_30_deg";
@@ -160,7 +160,7 @@ TEST_F(Cases, AZeroThatMovesIsTheOnlyChange) {
               2e-3);  // of 1 rad/s over 10 ms, known to a tenth
 }
 
-TEST_F(Cases, AnEncoderThatFreezesOrWraps) {
+TEST_F(CheckRecordCases, AnEncoderThatFreezesOrWraps) {
   const std::string folder = "load_encoder_freezes_or_wraps/";
   if (of(folder + "frozen.csv").empty()) GTEST_SKIP() << "no cases/load_encoder_freezes_or_wraps";
   const std::string rig = " --rig " + of(folder + "rig.yaml") + " --json x.json",
@@ -179,7 +179,7 @@ TEST_F(Cases, AnEncoderThatFreezesOrWraps) {
   EXPECT_EQ(wrapped.code, 0) << wrapped.out;  // nothing but its turns is wrong with it
 }
 
-TEST_F(Cases, AnEffortThatIsAlwaysZero) {
+TEST_F(CheckRecordCases, AnEffortThatIsAlwaysZero) {
   const std::string folder = "effort_always_zero/";
   if (of(folder + "record.csv").empty()) GTEST_SKIP() << "no cases/effort_always_zero";
   for (const auto& [file, rig] :
@@ -191,7 +191,7 @@ TEST_F(Cases, AnEffortThatIsAlwaysZero) {
   }
 }
 
-TEST_F(Cases, ALostSampleCostsASample) {
+TEST_F(CheckRecordCases, ALostSampleCostsASample) {
   const std::string folder = "one_lost_sample/";
   if (of(folder + "rig_all.csv").empty()) GTEST_SKIP() << "no cases/one_lost_sample";
   for (const auto& [name, method] :
@@ -210,7 +210,7 @@ TEST_F(Cases, ALostSampleCostsASample) {
   }
 }
 
-TEST_F(Cases, OneLostRowOf24000) {
+TEST_F(CheckRecordCases, OneLostRowOf24000) {
   if (of("B_one_lost_row/record.csv.gz").empty()) GTEST_SKIP() << "no cases/B_one_lost_row";
   ASSERT_EQ(
       shell("gunzip -c " + of("B_one_lost_row/record.csv.gz") + " > ../work/a.csv.part; mv a.csv.part a.csv")

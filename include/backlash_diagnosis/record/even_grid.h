@@ -8,6 +8,9 @@
 
 namespace backlash::record {
 
+/// A position goes on as it was; a torque may jump.
+bool is_smooth(Channel channel);
+
 struct EvenGrid {
   Record record;           ///< with a row for each lost sample: positions by a cubic, all else on the line
   std::vector<bool> lost;  ///< of each row: it was not recorded

@@ -74,13 +74,25 @@ Spring mesh_spring(const model::Rig& rig, const std::vector<double>& torque) {
 
 }  // namespace
 
+namespace {
+
+/// Without what lies between the grid of an encoder.
+std::vector<double> recorded(const std::vector<double>& x, const std::vector<bool>& lost) {
+  std::vector<double> kept;
+  for (std::size_t k = 0; k < x.size(); ++k)
+    if (lost.empty() || !lost[k]) kept.push_back(x[k]);
+  return kept;
+}
+
+}  // namespace
+
 RecordNoise record_noise(const ServoData& data) {
   RecordNoise noise;
   noise.motor = noise_deviation(data.motor);
   noise.torque = by_median(data.torque, signal::white_noise(data.torque));
   if (data.load.empty()) return noise;
   noise.load = noise_deviation(data.load);
-  noise.load_step = signal::resolution(data.load);
+  noise.load_step = signal::resolution(recorded(data.load, data.lost));
   return noise;
 }
 

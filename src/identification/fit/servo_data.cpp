@@ -151,11 +151,16 @@ record::Record load_side(const record::Record& record, const model::Rig& rig) {
 }
 
 ServoData servo_data(const record::Record& raw, const model::Rig& rig, double torque) {
+  return servo_data(record::evenly_sampled_grid(raw), rig, torque);
+}
+
+ServoData servo_data(const record::EvenGrid& grid, const model::Rig& rig, double torque) {
+  const record::Record& record = grid.record;
   for (const record::Channel channel : {record::Channel::motor_torque, record::Channel::motor_position})
-    if (!raw.has(channel)) throw CannotIdentify(raw.name + " has no " + record::channel_name(channel));
-  const record::Record record = record::evenly_sampled(raw);
+    if (!record.has(channel)) throw CannotIdentify(record.name + " has no " + record::channel_name(channel));
   const double ratio = rig.motor_axis_ratio();
   ServoData data;
+  data.lost = grid.lost;
   data.interval = record.sampling_interval();
   data.torque = scaled(record, record::Channel::motor_torque, ratio);
   data.motor = scaled(record, record::Channel::motor_position, 1 / ratio);

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "backlash_diagnosis/record/csv.h"
+#include "backlash_diagnosis/record/sample_joiner.h"
 #include "backlash_diagnosis/ros/bag_record.h"
 #include "backlash_diagnosis/ros/joint_rigs.h"
 #include "tools/common/record_file.h"
@@ -22,6 +23,8 @@ std::vector<record::JointRecord> read_joints(const std::string& path, const arm:
   } else {
     joints = record::read_joints_csv(path);
   }
+  // What is seen of one joint at a time is cut out of all: each has its own clock in a bag.
+  for (record::JointRecord& joint : joints) record::set_origin(joint.record, joints.front().record.origin);
   return joints;
 }
 

@@ -10,7 +10,8 @@
 namespace backlash::tools {
 
 /// The joints of the rig out of a .csv with columns JOINT/channel, or of a .bag with stock joint_states
-/// (position, velocity, effort as the rig's channel). Throws as read_record().
+/// (position, velocity, effort as the rig's channel). Their times count from the first one's time 0. Throws
+/// as read_record().
 std::vector<record::JointRecord> read_joints(const std::string& path, const arm::ArmRig& rig);
 
 /// The same, as far as it can be used (record_door.h).
